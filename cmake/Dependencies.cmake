@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Everything comes from Debian's packages; scripts/install-deps lists them.
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d flann ximgproc line_descriptor video)
+find_package(Ceres 2.1 REQUIRED)
+find_package(TBB REQUIRED)
+find_package(yaml-cpp 0.7 REQUIRED)
+find_package(CLI11 2.1 REQUIRED)
+find_package(spdlog 1.10 REQUIRED)
+find_package(fmt REQUIRED)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(embree 3 REQUIRED)
+
+# PCL's own package file drags VTK into every target that links pcl_io; link the libraries by name instead,
+# so that only viz/ sees VTK.
+find_package(PkgConfig REQUIRED)
+find_path(PCL_INCLUDE pcl/point_types.h PATH_SUFFIXES pcl-1.13 REQUIRED)
+find_package(Boost REQUIRED)
+add_library(plumbline_pcl INTERFACE)
+target_include_directories(plumbline_pcl SYSTEM INTERFACE ${PCL_INCLUDE})
+foreach(component common octree kdtree search sample_consensus filters features io segmentation surface registration)
+  find_library(PCL_${component}_LIBRARY pcl_${component} REQUIRED)
+  target_link_libraries(plumbline_pcl INTERFACE ${PCL_${component}_LIBRARY})
+endforeach()
+target_link_libraries(plumbline_pcl INTERFACE Eigen3::Eigen Boost::headers)

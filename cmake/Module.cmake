@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# plumbline_module(NAME [DEPENDS module...] [LINK library...] [PCH header...])
+# One folder = one static library = one layer. Sources are all *.cpp of the folder.
+function(plumbline_module name)
+  cmake_parse_arguments(ARG "" "" "DEPENDS;LINK;PRIVATE_LINK;PCH" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  list(TRANSFORM ARG_DEPENDS PREPEND plumbline::)
+  if(sources)
+    add_library(plumbline_${name} STATIC ${sources})
+    target_include_directories(plumbline_${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+                               $<INSTALL_INTERFACE:include> PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+    target_link_libraries(plumbline_${name} PUBLIC ${ARG_DEPENDS} ${ARG_LINK}
+                          PRIVATE ${ARG_PRIVATE_LINK} $<BUILD_INTERFACE:plumbline_warnings>)
+    if(ARG_PCH)
+      target_precompile_headers(plumbline_${name} PRIVATE ${ARG_PCH})
+    endif()
+  else()
+    add_library(plumbline_${name} INTERFACE)
+    target_include_directories(plumbline_${name} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
+                               $<INSTALL_INTERFACE:include>)
+    target_link_libraries(plumbline_${name} INTERFACE ${ARG_DEPENDS} ${ARG_LINK})
+  endif()
+  add_library(plumbline::${name} ALIAS plumbline_${name})
+endfunction()
+
+# plumbline_test(NAME SOURCES... LINK library...): a GoogleTest program, each of its tests seen by ctest.
+function(plumbline_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main plumbline_warnings)
+  target_compile_definitions(${name} PRIVATE PLUMBLINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
+endfunction()

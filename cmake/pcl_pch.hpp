@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Precompiled header of the modules that see PCL.
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+#include <string>
+#include <vector>

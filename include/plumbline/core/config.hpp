@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A parsed configuration file as a plain tree that remembers where everything stood.
+// yaml-cpp stays inside core; everyone else sees these structs.
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::core {
+
+/// Place in a text file; lines and columns count from 1, 0 means unknown (a value from the command line).
+struct ConfigMark {
+  std::string file;
+  int line = 0;
+  int column = 0;
+};
+
+struct ConfigNode {
+  enum class Kind { kNull, kScalar, kSequence, kMap };
+  Kind kind = Kind::kNull;
+  ConfigMark mark;
+  std::string scalar;
+  bool quoted = false;  ///< the scalar was written in quotes: never a number or boolean
+  std::vector<ConfigNode> items;                            ///< of a sequence
+  std::vector<std::pair<std::string, ConfigNode>> entries;  ///< of a map, in file order
+  std::vector<ConfigMark> key_marks;                        ///< where each entry's key stands
+
+  [[nodiscard]] const ConfigNode* find(const std::string& key) const;
+};
+
+/// All problems of a file are collected and told together.
+struct ConfigProblem {
+  ConfigMark mark;
+  std::string path;  ///< dotted path of the key, e.g. "stages.track.points"
+  std::string what;  ///< what is wrong, what is allowed, did you mean ...
+};
+using ConfigProblems = std::vector<ConfigProblem>;
+
+/// "file:line:column: path: what", one line per problem, in file order.
+std::string to_string(const ConfigProblems& problems);
+
+/// kUsage error holding all problems.
+Error to_error(const ConfigProblems& problems);
+
+/// Reads YAML. Refuses: unreadable files, files over 1 MB, duplicate keys, several documents, non-scalar keys,
+/// trees over 20 levels or 100 000 nodes after alias expansion. Messages name file, line and column.
+Result<ConfigNode> read_yaml(const std::filesystem::path& file);
+Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name);
+
+/// The word of `candidates` nearest to `word` if it is near enough to be a typing error, else "".
+std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates);
+
+}  // namespace plumbline::core

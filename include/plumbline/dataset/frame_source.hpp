@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A recording, whatever its layout: an indexed list of RGB-D pairs.
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/frame.hpp"
+
+namespace plumbline::dataset {
+
+struct PairInfo {
+  double stamp = 0.0;        ///< of colour, seconds
+  double depth_stamp = 0.0;  ///< seconds
+  std::string color_file;    ///< for messages; empty when there is no file
+  std::string depth_file;
+};
+
+/// Read access to one recording. All const methods are thread-safe: frames may be decoded side by side.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  [[nodiscard]] virtual const std::string& name() const = 0;    ///< short, e.g. the folder's name
+  [[nodiscard]] virtual const std::string& format() const = 0;  ///< "tum", "7scenes", "redwood", "synth"
+  [[nodiscard]] virtual const sensor::Camera& camera() const = 0;
+  [[nodiscard]] virtual std::size_t size() const = 0;
+  [[nodiscard]] virtual PairInfo info(std::size_t index) const = 0;
+  /// Decoded, rectified, depth in metres, gray filled in. An error is about this frame only: skip it.
+  [[nodiscard]] virtual core::Result<sensor::RgbdFrame> read(std::size_t index) const = 0;
+  /// Truth that comes with the recording, if any.
+  [[nodiscard]] virtual std::optional<geometry::Trajectory> truth() const = 0;
+};
+
+struct OpenOptions {
+  std::string format = "auto";  ///< auto, tum, 7scenes, redwood
+  std::string camera;           ///< shipped name or file; "" = camera.yaml in the folder
+  std::filesystem::path cameras_folder;
+  double max_pair_gap_s = 0.02;  ///< colour and depth further apart are no pair
+  double from_s = 0.0;           ///< seconds after the first pair
+  double to_s = 1e300;           ///< seconds after the first pair
+  int every = 1;                 ///< every n-th pair
+};
+
+/// Opens a folder. Checks camera, lists and the depth scale (median depth of some frames outside
+/// 0.35-20 m: error; outside 0.7-7 m: warning; both name the depth_scale that would fit).
+core::Result<std::unique_ptr<FrameSource>> open_recording(const std::filesystem::path& folder,
+                                                          const OpenOptions& options, core::Log& log);
+
+}  // namespace plumbline::dataset

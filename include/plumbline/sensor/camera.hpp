@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Calibration of an RGB-D camera.
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::sensor {
+
+/// Pinhole intrinsics, pixels. Pixel (0, 0) is the centre of the top-left pixel. x right, y down, z forward.
+struct Pinhole {
+  int width = 0;
+  int height = 0;
+  double fx = 0.0;
+  double fy = 0.0;
+  double cx = 0.0;
+  double cy = 0.0;
+
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& p) const {
+    return {fx * p.x() / p.z() + cx, fy * p.y() / p.z() + cy};
+  }
+  /// Point on the pixel's ray at depth z metres.
+  [[nodiscard]] Eigen::Vector3d unproject(double u, double v, double z) const {
+    return {(u - cx) / fx * z, (v - cy) / fy * z, z};
+  }
+  [[nodiscard]] bool contains(const Eigen::Vector2d& pixel, double border = 0.0) const {
+    return pixel.x() >= border && pixel.y() >= border && pixel.x() <= width - 1 - border &&
+           pixel.y() <= height - 1 - border;
+  }
+};
+
+/// OpenCV's radial-tangential model: k1 k2 p1 p2 k3.
+using Distortion = std::array<double, 5>;
+
+struct Camera {
+  std::string name;
+  Pinhole color;
+  Distortion distortion{};  ///< of the colour image; all 0 = none
+  double depth_scale = 5000.0;  ///< raw units per metre
+  double fps = 30.0;
+  /// When present, depth is not registered to colour: the reader does that.
+  std::optional<geometry::Rigid3> color_from_depth;
+  std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
+
+  [[nodiscard]] bool distorted() const {
+    for (double k : distortion) {
+      if (k != 0.0) return true;
+    }
+    return false;
+  }
+};
+
+/// Reads a camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps
+/// [color_from_depth, depth_intrinsics]). All problems are told together with file:line:column.
+core::Result<Camera> read_camera(const std::filesystem::path& file);
+
+/// `name_or_file`: a shipped calibration (a file of `cameras_folder` without .yaml) or a path.
+core::Result<Camera> find_camera(const std::string& name_or_file, const std::filesystem::path& cameras_folder);
+
+/// The same calibration as camera.yaml text; read_camera(write) gives the same camera.
+std::string to_yaml(const Camera& camera);
+
+}  // namespace plumbline::sensor

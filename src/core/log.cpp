@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/core/log.hpp"
+
+#include <spdlog/logger.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+
+namespace plumbline::core {
+namespace {
+
+class StderrLog : public Log {
+ public:
+  explicit StderrLog(LogLevel threshold)
+      : logger_("plumbline", std::make_shared<spdlog::sinks::stderr_color_sink_mt>()) {
+    logger_.set_level(level(threshold));
+    logger_.set_pattern("plumbline: %^%l%$: %v");
+  }
+  void write(LogLevel l, const std::string& message) override { logger_.log(level(l), message); }
+
+ private:
+  static spdlog::level::level_enum level(LogLevel l) {
+    switch (l) {
+      case LogLevel::kDebug: return spdlog::level::debug;
+      case LogLevel::kInfo: return spdlog::level::info;
+      case LogLevel::kWarning: return spdlog::level::warn;
+      case LogLevel::kError: return spdlog::level::err;
+    }
+    return spdlog::level::info;
+  }
+  spdlog::logger logger_;
+};
+
+class NullLog : public Log {
+ public:
+  void write(LogLevel /*level*/, const std::string& /*message*/) override {}
+};
+
+}  // namespace
+
+std::shared_ptr<Log> stderr_log(LogLevel threshold) { return std::make_shared<StderrLog>(threshold); }
+std::shared_ptr<Log> null_log() { return std::make_shared<NullLog>(); }
+
+}  // namespace plumbline::core
