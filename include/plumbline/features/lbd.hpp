@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Line band descriptor (Zhang & Koch 2013; METHOD section 1), 256 bits, matched by Hamming distance.
+#include <array>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "plumbline/features/line_segment.hpp"
+
+namespace plumbline::features {
+
+using LineDescriptor = std::array<std::uint64_t, 4>;
+
+/// Number of differing bits, 0-256.
+inline int hamming(const LineDescriptor& a, const LineDescriptor& b) {
+  int sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += __builtin_popcountll(a[i] ^ b[i]);
+  return sum;
+}
+
+/// 72 numbers of a line, normalised: for each of m = 9 bands (left of the line to right) mean and standard
+/// deviation of four gradient sums (along +, along -, across +, across -).
+using BandStatistics = std::array<float, 72>;
+
+/// Band statistics of every segment over `gray` (CV_8UC1, the image the segments are of).
+std::vector<BandStatistics> band_statistics(const cv::Mat& gray, const std::vector<LineSegment>& segments);
+
+/// 32 fixed pairs of bands, 8 comparisons each.
+LineDescriptor binarise(const BandStatistics& statistics);
+
+/// Descriptors of every segment, in their order.
+std::vector<LineDescriptor> describe_lines(const cv::Mat& gray, const std::vector<LineSegment>& segments);
+
+}  // namespace plumbline::features

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A 3D line from the depth under an image segment (METHOD section 1: wrong lines go before they are used).
+#include <Eigen/Core>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/line_segment.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::features {
+
+/// 3D segment in the camera frame, metres. Its image is the measured segment.
+struct Line3 {
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d start_covariance = Eigen::Matrix3d::Zero();  ///< m^2, from depth noise and pixel noise
+  Eigen::Matrix3d end_covariance = Eigen::Matrix3d::Zero();
+  double inlier_share = 0.0;  ///< of the depth samples along the segment
+  double coverage = 0.0;      ///< share of the segment's length that has supporting depth
+};
+
+struct LineDepthOptions {
+  int samples = 40;  ///< places along the segment, at most
+  int side_px = 3;   ///< depth is looked for this far beside the segment
+  double max_depth_m = 8.0;
+  double inlier_sigmas = 3.0;  ///< gate in units of the depth noise
+  double min_inlier_share = 0.6;
+  double min_coverage = 0.5;
+  int min_inliers = 8;
+  int ransac_rounds = 24;
+  double pixel_sigma = 0.7;  ///< px, across the segment, for the endpoints' covariance
+
+  void declare(core::OptionTable& table);
+};
+
+/// 3D line of `segment` from `depth_m` (CV_32FC1, metres along z, 0 or NaN = none, same pinhole as the
+/// segment). At a depth jump the foreground side is taken, since an occluding edge belongs to what is in
+/// front. None when depth does not support one 3D line. Deterministic: the same input gives the same bytes.
+std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& depth_m,
+                                    const sensor::Pinhole& camera, const LineDepthOptions& options = {});
+
+}  // namespace plumbline::features

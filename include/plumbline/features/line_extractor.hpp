@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Everything a frame's lines need: detection, descriptor, 3D.
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/lbd.hpp"
+#include "plumbline/features/line_depth.hpp"
+#include "plumbline/features/line_detector.hpp"
+#include "plumbline/features/line_match.hpp"
+
+namespace plumbline::features {
+
+struct LineFeature {
+  LineSegment segment;
+  LineDescriptor descriptor{};
+  std::optional<Line3> line3;  ///< none where depth does not support one 3D line: the line stays 2D
+};
+
+struct LineOptions {
+  LineDetectorOptions detector;
+  LineDepthOptions depth;
+
+  /// Keys of the detector as they are, those of the depth fit with the prefix "depth_".
+  void declare(core::OptionTable& table);
+};
+
+/// Thread-safe.
+class LineExtractor {
+ public:
+  explicit LineExtractor(const LineOptions& options = {}) : options_(options), detector_(options.detector) {}
+
+  /// Lines of `gray` (CV_8UC1), longest first. `depth_m` (CV_32FC1, metres, 0 = none) may be empty: then all
+  /// lines stay 2D. Both must be images of `camera`.
+  [[nodiscard]] std::vector<LineFeature> extract(const cv::Mat& gray, const cv::Mat& depth_m,
+                                                 const sensor::Pinhole& camera) const;
+
+  [[nodiscard]] const LineOptions& options() const { return options_; }
+
+ private:
+  LineOptions options_;
+  LineDetector detector_;
+};
+
+/// Segment and descriptor of each feature, for match_lines.
+std::vector<DescribedLine> described(const std::vector<LineFeature>& features);
+
+}  // namespace plumbline::features
