@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What can be chosen when a world is filmed.
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/options.hpp"
+
+namespace plumbline::synth {
+
+enum class Texture { kFull, kWeak, kNone };
+enum class Sensor { kIdeal, kKinect, kRealsense };
+enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene file says
+
+struct SynthOptions {
+  int frames = 0;                    ///< of each robot; 0 = the path once; more than the path: it goes on round it
+  int robots = 1;                    ///< how many recordings
+  Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
+  Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur
+  Motion motion = Motion::kScene;
+  int seed = 1;  ///< of textures, sway and all noise
+  int width = 640;
+  int height = 480;
+  double fps = 30.0;
+  double speed = 1.0;             ///< times the scene's own speed
+  double reference_spacing = 0.0;  ///< m between samples of reference.ply; 0 = 5 mm, more for large scenes
+  /// Hard moments, "kind@start+duration[*value]" in seconds from the first frame, separated by commas; added to
+  /// those of the scene. Kinds: whiteout, lampoff, blur (value px, default 8), drop, cover, spin (value turns,
+  /// default 1: pure rotation on the spot), nodepth. Example: "whiteout@3+1,blur@6+0.5*12".
+  std::string events;
+
+  void declare(core::OptionTable& table);
+};
+
+enum class EventKind { kWhiteout, kLampOff, kBlur, kDrop, kCover, kSpin, kNoDepth };
+
+/// One hard moment: [start, start + duration) seconds from the first frame.
+struct Event {
+  EventKind kind = EventKind::kWhiteout;
+  double start_s = 0.0;
+  double duration_s = 0.0;
+  double value = 0.0;  ///< kBlur: pixels; kSpin: turns; others unused
+
+  [[nodiscard]] bool active(double t) const { return t >= start_s && t < start_s + duration_s; }
+};
+
+/// Errors (kUsage) name the piece that could not be read, with a suggestion.
+core::Result<std::vector<Event>> parse_events(const std::string& text);
+
+/// Ranges are the option table's; this checks what a table cannot: events, pictures of no sensible shape.
+core::Result<void> check(const SynthOptions& options);
+
+const char* to_string(Texture texture);
+const char* to_string(Sensor sensor);
+const char* to_string(Motion motion);
+
+}  // namespace plumbline::synth

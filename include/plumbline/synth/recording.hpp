@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Writes what the robots film: TUM-layout folders, the true surfaces and a description.
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/core/stop.hpp"
+#include "plumbline/synth/options.hpp"
+#include "plumbline/synth/scene.hpp"
+
+namespace plumbline::synth {
+
+struct WriteSummary {
+  int robots = 0;
+  std::size_t frames = 0;             ///< pairs written, all robots
+  double path_m = 0.0;                ///< all robots
+  std::size_t reference_samples = 0;  ///< points of reference.ply
+  std::size_t reference_visible = 0;  ///< of these seen by a camera within the sensor's range
+  double reference_spacing_m = 0.0;
+  bool stopped = false;  ///< ended early; what is there is complete up to the last frame listed
+  double wall_s = 0.0;   ///< of rendering and writing the frames
+};
+
+/// Frames written so far, frames in all.
+using Progress = std::function<void(std::size_t, std::size_t)>;
+
+/// Makes
+///   OUT/robot0/ ...       TUM layout: rgb/ (8-bit PNG), depth/ (16-bit PNG, 5000 per metre), rgb.txt, depth.txt,
+///                         associations.txt, groundtruth.txt (exact world_from_camera at colour and depth stamps),
+///                         camera.yaml
+///   OUT/reference.ply     binary PLY, samples of the true surfaces in the frame of groundtruth.txt:
+///                         float x y z, float nx ny nz, uchar red green blue, uchar visible.
+///                         visible = 1 when some camera saw that spot within the sensor's range and at no grazing
+///                         angle, else 0. Insides of solids and the world's outer skin are left out.
+///   OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path lengths, counts
+/// Errors: kUsage (options, scene), kOutput (cannot write; names the file). `progress` may be empty; it is called
+/// from one thread at a time.
+core::Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options,
+                                            const std::filesystem::path& output, const core::Executor& executor,
+                                            const core::StopToken& stop, core::Log& log, const Progress& progress);
+
+}  // namespace plumbline::synth

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A world as its YAML file describes it: flat faces, lamps and the ways robots take through it.
+// World frame: metres, z up, the floor at z = 0 by custom.
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/config.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/synth/options.hpp"
+
+namespace plumbline::synth {
+
+/// A convex flat polygon with its own texture frame. Point (u, v) in metres is origin + u u_axis + v v_axis.
+struct Face {
+  Eigen::Vector3d origin;
+  Eigen::Vector3d u_axis;                ///< unit
+  Eigen::Vector3d v_axis;                ///< unit, perpendicular to u_axis
+  Eigen::Vector3d normal;                ///< unit, outwards: u_axis x v_axis
+  std::vector<Eigen::Vector2d> polygon;  ///< counter-clockwise seen from outside, (u, v) metres
+  std::string material;                  ///< a name that material_names() lists
+  int seed = 0;                          ///< tells apart prints of the same material
+  double stretch_u = 0.0;                ///< one copy of the texture covers this many metres; 0 = tiles
+  double stretch_v = 0.0;
+  int object = -1;  ///< index into Scene::objects
+
+  [[nodiscard]] Eigen::Vector3d at(double u, double v) const { return origin + u * u_axis + v * v_axis; }
+};
+
+/// What a face belongs to, for messages.
+struct Object {
+  std::string type;  ///< "wall", "desk", ...
+  std::string name;  ///< from the file, or type and number
+  core::ConfigMark mark;
+};
+
+/// A rectangle that gives light (a ceiling lamp, a window).
+struct Lamp {
+  Eigen::Vector3d center;
+  Eigen::Vector3d half_u;
+  Eigen::Vector3d half_v;
+  Eigen::Vector3d normal;  ///< unit, where the light goes
+  double power = 1.0;
+};
+
+struct Waypoint {
+  Eigen::Vector3d position;
+  std::optional<Eigen::Vector3d> look;  ///< point looked at; none = along the way
+  double pitch_rad = 0.0;               ///< added to the viewing direction, positive looks up
+  double yaw_rad = 0.0;                 ///< added to the viewing direction, positive to the left
+  core::ConfigMark mark;
+};
+
+struct RobotPath {
+  std::string name;
+  std::vector<Waypoint> waypoints;  ///< at least 2
+  bool closed = false;              ///< the way goes on from the last waypoint to the first
+  double speed = 0.5;               ///< m/s
+  double turn_rate = 0.6;           ///< rad/s, slower where the camera has to turn faster
+};
+
+struct Scene {
+  std::string name;
+  std::string description;
+  std::filesystem::path file;
+  std::vector<Object> objects;
+  std::vector<Face> faces;
+  std::vector<Lamp> lamps;
+  double ambient = 0.35;                ///< share of light without direction
+  Motion motion = Motion::kHandheld;    ///< when the options do not choose
+  std::vector<RobotPath> robots;        ///< at least one
+  std::vector<Event> events;
+};
+
+/// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the file are
+/// told together as file:line:column: key: what is wrong; an unknown name comes with a suggestion.
+core::Result<Scene> load_scene(const std::string& name_or_file, const std::filesystem::path& scenes_folder);
+
+/// The same from YAML text; `file_name` is for messages.
+core::Result<Scene> parse_scene(const std::string& yaml, const std::string& file_name);
+
+/// Names of the scenes in a folder, sorted.
+std::vector<std::string> scene_names(const std::filesystem::path& scenes_folder);
+
+/// Materials a scene file may name, sorted.
+const std::vector<std::string>& material_names();
+
+}  // namespace plumbline::synth

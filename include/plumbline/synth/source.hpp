@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A scene filmed on demand: the same frames for a seed, whatever the order or the number of threads.
+#include <memory>
+#include <string>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/synth/options.hpp"
+#include "plumbline/synth/scene.hpp"
+
+namespace plumbline::synth {
+
+class World;  // scene made ready to render: textures, light maps, BVH
+
+/// Builds textures, light maps and BVH (the part that takes a second or two); shared by all robots.
+core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
+                                                       const core::Executor& executor);
+
+/// What one frame was made from; for tests and instruments.
+struct ExactFrame {
+  geometry::Rigid3 world_from_color;  ///< pose at the colour stamp
+  geometry::Rigid3 world_from_depth;  ///< pose at the depth stamp
+  cv::Mat depth;                      ///< CV_32FC1 metres, of the true surfaces at the depth stamp, 0 = nothing hit
+  cv::Mat face;                       ///< CV_32SC1, index into Scene::faces, -1 = nothing hit
+};
+
+class SynthSource final : public dataset::FrameSource {
+ public:
+  /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the thing).
+  static core::Result<std::unique_ptr<SynthSource>> create(std::shared_ptr<const World> world, int robot);
+  ~SynthSource() override;
+
+  [[nodiscard]] const std::string& name() const override;
+  [[nodiscard]] const std::string& format() const override;
+  [[nodiscard]] const sensor::Camera& camera() const override;
+  [[nodiscard]] std::size_t size() const override;
+  [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
+  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  /// Exact poses at the colour stamps, in the frame of the scene file.
+  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override;
+
+  /// Exact pose at any time between first and last stamp (clamped to them).
+  [[nodiscard]] geometry::Rigid3 world_from_camera(double stamp) const;
+  [[nodiscard]] ExactFrame exact(std::size_t index) const;
+  /// Metres of path from the first to the last frame.
+  [[nodiscard]] double path_length() const;
+
+ private:
+  struct Impl;
+  explicit SynthSource(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Opens "synth:SCENE?key=value&..."; keys are those of SynthOptions and `robot` (0 .. robots-1).
+/// Unknown scenes and keys are errors with a suggestion.
+core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string& url,
+                                                               const std::filesystem::path& scenes_folder,
+                                                               const core::Executor& executor, core::Log& log);
+
+/// Whether an input is such a URL ("synth:...").
+bool is_synth_url(const std::string& input);
+
+/// One URL per robot: "synth:room?robots=2" -> "synth:room?robots=2&robot=0", "...&robot=1"; unchanged when it
+/// already names its robot.
+core::Result<std::vector<std::string>> split_robots(const std::string& url);
+
+/// The camera of a sensor at a picture size. kinect: TUM fr3's intrinsics; depth_scale 5000; no distortion.
+sensor::Camera make_camera(Sensor sensor, int width, int height, double fps);
+
+}  // namespace plumbline::synth
