@@ -49,20 +49,25 @@ class OptionTable {
  public:
   OptionTable& boolean(std::string key, bool& value, std::string help);
   OptionTable& integer(std::string key, int& value, Range<int> range, std::string unit, std::string help);
-  OptionTable& number(std::string key, double& value, Range<double> range, std::string unit, std::string help);
+  OptionTable& number(std::string key, double& value, Range<double> range, std::string unit,
+                      std::string help);
   OptionTable& text(std::string key, std::string& value, std::string help);
-  OptionTable& choice(std::string key, std::string& value, std::vector<std::string> allowed, std::string help);
+  OptionTable& choice(std::string key, std::string& value, std::vector<std::string> allowed,
+                      std::string help);
   OptionTable& numbers(std::string key, std::vector<double>& value, std::size_t length, Range<double> range,
                        std::string unit, std::string help);
   template <typename Enum>
   OptionTable& choice(std::string key, Enum& value, std::vector<std::pair<std::string, Enum>> allowed,
                       std::string help);
 
-  /// Reads one value. Numbers may carry a unit ("5 mm", "10 deg", "0.5 s"), converted to the option's unit;
-  /// booleans are true/false/on/off/yes/no. The problem (if any) says what is wrong and what is allowed.
-  void set(const std::string& key, const ConfigNode& value, const std::string& path, ConfigProblems& problems);
+  /// Reads one value; `path` is the dotted path of the map that holds the key. Numbers may carry a unit ("5
+  /// mm", "10 deg", "0.5 s"), converted to the option's unit; booleans are true/false/on/off/yes/no. The
+  /// problem (if any) says what is wrong and what is allowed.
+  void set(const std::string& key, const ConfigNode& value, const std::string& path,
+           ConfigProblems& problems);
 
-  /// Reads every entry of a map; unknown keys are problems with a suggestion. `reserved` keys are passed over.
+  /// Reads every entry of a map; unknown keys are problems with a suggestion. `reserved` keys are passed
+  /// over.
   void set_all(const ConfigNode& map, const std::string& path, ConfigProblems& problems,
                const std::vector<std::string>& reserved = {});
 
@@ -84,8 +89,8 @@ class OptionTable {
 };
 
 template <typename Enum>
-OptionTable& OptionTable::choice(std::string key, Enum& value, std::vector<std::pair<std::string, Enum>> allowed,
-                                 std::string help) {
+OptionTable& OptionTable::choice(std::string key, Enum& value,
+                                 std::vector<std::pair<std::string, Enum>> allowed, std::string help) {
   OptionSpec spec;
   spec.key = std::move(key);
   spec.type = OptionType::kChoice;
