@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Trajectory error against truth: ATE and RPE (Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM
+// Systems, IROS 2012). Definitions and formulas: docs/evaluate.md.
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/evaluate/statistics.hpp"
+#include "plumbline/geometry/trajectory.hpp"
+
+namespace plumbline::evaluate {
+
+enum class TrajectoryAlignment {
+  kNone,   ///< compared as they are
+  kSe3,    ///< least squares over all matched positions (Horn 1987)
+  kStart,  ///< the first matched pose of the estimate is laid on the truth
+};
+
+struct TrajectoryOptions {
+  TrajectoryAlignment align = TrajectoryAlignment::kSe3;
+  double max_dt_s = 0.02;    ///< truth is interpolated; gaps over 2*max_dt_s are not bridged
+  int rpe_frames = 1;        ///< frames between the two poses of an RPE pair
+  double rpe_seconds = 1.0;  ///< seconds between the two poses of an RPE pair
+  void declare(core::OptionTable& table);
+};
+
+/// One matched pose, in the frame of the truth.
+struct PoseError {
+  double stamp = 0.0;                                 ///< seconds
+  geometry::Rigid3 estimate;                          ///< after alignment
+  geometry::Rigid3 truth;                             ///< interpolated at `stamp`
+  Eigen::Vector3d error_m = Eigen::Vector3d::Zero();  ///< estimate - truth, axes of the truth's frame
+  double distance_m = 0.0;                            ///< |error_m|
+  double rotation_deg = 0.0;                          ///< angle between the orientations, [0, 180]
+};
+
+/// Relative pose error over a fixed step: E = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), Q truth, P estimate.
+struct RelativeError {
+  std::size_t pairs = 0;
+  Statistics translation_m;  ///< |trans E|
+  Statistics rotation_deg;   ///< angle of rot E
+};
+
+struct TrajectoryReport {
+  TrajectoryAlignment align = TrajectoryAlignment::kSe3;
+  geometry::Rigid3 truth_from_estimate;
+  std::size_t estimated = 0;  ///< poses in the estimate
+  std::size_t matched = 0;    ///< of them with truth at their stamp
+  Statistics ate_m;
+  Statistics rotation_deg;              ///< orientation error after the alignment
+  std::array<Statistics, 3> axis_m;     ///< |error| along x, y, z
+  std::array<double, 3> axis_bias_m{};  ///< mean signed error along x, y, z
+  RelativeError rpe_frame;              ///< over TrajectoryOptions::rpe_frames
+  RelativeError rpe_second;             ///< over TrajectoryOptions::rpe_seconds
+  int rpe_frames = 1;
+  double rpe_seconds = 1.0;
+  double path_m = 0.0;                    ///< length of the truth over the matched poses
+  double duration_s = 0.0;                ///< first to last matched pose
+  std::optional<std::size_t> frames;      ///< distinct stamps of the frames list, when one was given
+  std::optional<double> tracked_percent;  ///< share of them with a pose of their own stamp (to 0.1 ms)
+  /// From the first listed frame (without a list: from the first truth pose) to the first pose, >= 0. None
+  /// when a list was given and none of its frames has a pose.
+  std::optional<double> first_pose_s;
+  std::vector<PoseError> poses;       ///< matched poses, by time
+  geometry::Trajectory aligned;       ///< the whole estimate in the truth's frame, for drawing
+  geometry::Trajectory truth;         ///< the whole truth, for drawing
+  std::vector<std::string> warnings;  ///< one sentence each
+};
+
+/// `frame_stamps`: stamps of the recording's colour frames (seconds), empty when unknown.
+/// Errors (kInput): an empty side, a value that is not finite, no overlap in time (both ranges are told),
+/// fewer than 3 matched poses (1 unless align is kSe3). kUsage: an option out of range.
+core::Result<TrajectoryReport> evaluate_trajectory(const geometry::Trajectory& estimate,
+                                                   const geometry::Trajectory& truth,
+                                                   const TrajectoryOptions& options = {},
+                                                   const std::vector<double>& frame_stamps = {});
+
+/// Stamps of a list such as TUM's rgb.txt: the first column of every line that is not a comment; sorted.
+core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list);
+
+/// Roll, pitch, yaw in degrees of R = Rz(yaw) Ry(pitch) Rx(roll); pitch in [-90, 90]. For drawing.
+Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation);
+
+/// One JSON object: ate_m {rmse, mean, median, min, max, sse, std}, rpe {per_frame, per_second}, matched, ...
+std::string to_json(const TrajectoryReport& report);
+/// A table for people, several lines.
+std::string to_text(const TrajectoryReport& report);
+
+}  // namespace plumbline::evaluate

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// How thick flat walls are in a cloud, from the cloud alone.
+#include <cstddef>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/evaluate/surface.hpp"
+
+namespace plumbline::evaluate {
+
+struct WallThicknessOptions {
+  double patch_m = 0.25;        ///< edge of a planar patch
+  double cell_m = 0.05;         ///< edge of the cells it is measured in (more where the cloud is sparser)
+  double max_spacing_m = 0.10;  ///< layers further apart are two walls
+  double flatness_m = 0.02;     ///< a patch's main layer stays within this of a plane
+  void declare(core::OptionTable& table);
+};
+
+/// Definition. The cloud is cut into voxels of `patch_m`; in each the main plane is found by RANSAC. Points
+/// within max_spacing_m of that plane, and facing its way if the cloud has normals, are divided along the
+/// plane into cells of `cell_m`. In a cell with one layer the thickness t is the RMS spread along the normal;
+/// in a cell with two layers (1-D two-means; separation d at least four times their own spread s, each with a
+/// tenth of the points) t = sqrt(s^2 + d^2), so that a doubled wall counts with its whole spacing, however
+/// many points each layer has. A patch's thickness is the median over its cells, which passes over corners
+/// and things that stand before the wall.
+struct WallThickness {
+  std::size_t patches = 0;
+  double rms_mm = 0.0;  ///< over patches: sqrt(mean t^2)
+  double mean_mm = 0.0;
+  double median_mm = 0.0;
+  double p90_mm = 0.0;
+  double layered_percent = 0.0;  ///< share of patches where most cells have two layers
+};
+
+/// `spacing_m`: typical distance to the nearest neighbour. Points must be finite.
+WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
+                             const WallThicknessOptions& options, const core::Executor& executor);
+
+}  // namespace plumbline::evaluate
