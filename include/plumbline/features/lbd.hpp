@@ -3,22 +3,18 @@
 
 // Line band descriptor (Zhang & Koch 2013; METHOD section 1), 256 bits, matched by Hamming distance.
 #include <array>
-#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "plumbline/features/descriptor.hpp"
 #include "plumbline/features/line_segment.hpp"
 
 namespace plumbline::features {
 
-using LineDescriptor = std::array<std::uint64_t, 4>;
+using LineDescriptor = Descriptor256;
 
 /// Number of differing bits, 0-256.
-inline int hamming(const LineDescriptor& a, const LineDescriptor& b) {
-  int sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += __builtin_popcountll(a[i] ^ b[i]);
-  return sum;
-}
+inline int hamming(const LineDescriptor& a, const LineDescriptor& b) { return hamming_distance(a, b); }
 
 /// 72 numbers of a line, normalised: for each of m = 9 bands (left of the line to right) mean and standard
 /// deviation of four gradient sums (along +, along -, across +, across -).

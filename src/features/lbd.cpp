@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Line band descriptor (Zhang & Koch, JVCIR 24, 2013; METHOD section 1).
+#include "plumbline/features/lbd.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/core/hal/intrin.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace plumbline::features {
+namespace {
+
+constexpr int kBands = 9;      // m
+constexpr int kBandWidth = 7;  // w, rows
+constexpr int kRows = kBands * kBandWidth;
+constexpr int kMaxColumns = 32;  // samples along a line; longer lines are sampled more sparsely
+constexpr float kClip = 0.4F;    // no single entry may dominate
+constexpr double kDirectionUnit = 4096.0;
+
+// Row sums of the four gradients: along +, along -, across +, across -.
+using RowSums = std::array<std::array<float, 4>, kRows>;
+
+// f_g(row) f_l(row, band): weight of each row in each band it touches (its own and both neighbours).
+struct Weights {
+  // [row][0..2]: weight in the band before, the own band, the band after.
+  std::array<std::array<float, 3>, kRows> value{};
+  Weights() {
+    const double sigma_g = 0.5 * (kRows - 1);
+    const double sigma_l = kBandWidth;
+    for (int row = 0; row < kRows; ++row) {
+      const double d = row - 0.5 * (kRows - 1);
+      const double global = std::exp(-0.5 * d * d / (sigma_g * sigma_g));
+      for (int k = 0; k < 3; ++k) {
+        const int band = row / kBandWidth + k - 1;
+        const double centre = band * kBandWidth + 0.5 * (kBandWidth - 1);
+        const double local = std::exp(-0.5 * (row - centre) * (row - centre) / (sigma_l * sigma_l));
+        value[static_cast<std::size_t>(row)][static_cast<std::size_t>(k)] =
+            static_cast<float>(global * local);
+      }
+    }
+  }
+};
+
+// Central differences, (gx, gy) interleaved so that one 32-bit load fetches both.
+cv::Mat gradients(const cv::Mat& gray) {
+  cv::Mat gx;
+  cv::Mat gy;
+  cv::Sobel(gray, gx, CV_16S, 1, 0, 3);
+  cv::Sobel(gray, gy, CV_16S, 0, 1, 3);
+  cv::Mat both;
+  cv::merge(std::vector<cv::Mat>{gx, gy}, both);
+  return both;
+}
+
+// Support region of one line: where its samples lie in the gradient image.
+struct Support {
+  Eigen::Vector2f direction;
+  Eigen::Vector2f normal;  // to the right
+  Eigen::Vector2f middle;
+  float step = 1.0F;  // px between columns
+  int columns = 4;    // multiple of 4
+};
+
+Support support_of(const LineSegment& segment) {
+  Support s;
+  s.direction = segment.direction();
+  s.normal = {-s.direction.y(), s.direction.x()};
+  s.middle = segment.middle();
+  s.columns = std::clamp(static_cast<int>(segment.length() / 4.0F) * 4, 4, kMaxColumns);
+  s.step = std::max(segment.length() / static_cast<float>(s.columns), 0.25F);
+  return s;
+}
+
+Eigen::Vector2f row_start(const Support& s, int row) {
+  const float across = static_cast<float>(row) - 0.5F * static_cast<float>(kRows - 1);
+  const float along = -0.5F * static_cast<float>(s.columns - 1) * s.step;
+  return s.middle + across * s.normal + along * s.direction;
+}
+
+using Row = std::array<std::int32_t, kMaxColumns>;  // packed (gx, gy)
+
+const std::int32_t* packed(const cv::Mat& gradient) {
+  return reinterpret_cast<const std::int32_t*>(gradient.data);
+}
+
+bool inside(const Support& s, const cv::Mat& gradient) {
+  const float along = 0.5F * static_cast<float>(s.columns) * s.step;
+  const float across = 0.5F * static_cast<float>(kRows);
+  const float reach_x = along * std::abs(s.direction.x()) + across * std::abs(s.direction.y()) + 2.0F;
+  const float reach_y = along * std::abs(s.direction.y()) + across * std::abs(s.direction.x()) + 2.0F;
+  return s.middle.x() > reach_x && s.middle.y() > reach_y &&
+         s.middle.x() < static_cast<float>(gradient.cols) - reach_x &&
+         s.middle.y() < static_cast<float>(gradient.rows) - reach_y;
+}
+
+// Nearest samples of one row; `offsets` are the columns' places relative to the first, in elements.
+void fetch_inside(const cv::Mat& gradient, const Support& s, int row, const Row& offsets, Row& out) {
+  const Eigen::Vector2f p = row_start(s, row);
+  const std::int32_t* base =
+      packed(gradient) + static_cast<std::ptrdiff_t>(std::lround(p.y())) * gradient.cols + std::lround(p.x());
+  for (std::size_t k = 0; k < static_cast<std::size_t>(s.columns); ++k) out[k] = base[offsets[k]];
+}
+
+// The same where the support region leaves the image: no gradient outside.
+void fetch_clipped(const cv::Mat& gradient, const Support& s, int row, Row& out) {
+  const Eigen::Vector2f start = row_start(s, row);
+  for (int k = 0; k < s.columns; ++k) {
+    const Eigen::Vector2f p = start + static_cast<float>(k) * s.step * s.direction;
+    const long x = std::lround(p.x());
+    const long y = std::lround(p.y());
+    const bool in = x >= 0 && y >= 0 && x < gradient.cols && y < gradient.rows;
+    out[static_cast<std::size_t>(k)] = in ? packed(gradient)[y * gradient.cols + x] : 0;
+  }
+}
+
+Row column_offsets(const cv::Mat& gradient, const Support& s) {
+  Row offsets{};
+  for (int k = 0; k < s.columns; ++k) {
+    const Eigen::Vector2f p = static_cast<float>(k) * s.step * s.direction;
+    offsets[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::lround(p.y())) * gradient.cols +
+                                           static_cast<std::int32_t>(std::lround(p.x()));
+  }
+  return offsets;
+}
+
+// Gradients turned into the line's frame and summed by sign, in whole numbers: no rounding, any order.
+class RowSummer {
+ public:
+  explicit RowSummer(const Support& s) {
+    const auto pair = [](const Eigen::Vector2f& v) {
+      const auto x = static_cast<short>(std::lround(kDirectionUnit * static_cast<double>(v.x())));
+      const auto y = static_cast<short>(std::lround(kDirectionUnit * static_cast<double>(v.y())));
+      return cv::v_int16x8(x, y, x, y, x, y, x, y);
+    };
+    along_ = pair(s.direction);
+    across_ = pair(s.normal);
+  }
+
+  [[nodiscard]] std::array<float, 4> operator()(const Row& row, int columns) const {
+    cv::v_int32x4 along = cv::v_setzero_s32();
+    cv::v_int32x4 along_abs = cv::v_setzero_s32();
+    cv::v_int32x4 across = cv::v_setzero_s32();
+    cv::v_int32x4 across_abs = cv::v_setzero_s32();
+    for (int k = 0; k < columns; k += 4) {
+      const cv::v_int16x8 g = cv::v_reinterpret_as_s16(cv::v_load(row.data() + k));
+      const cv::v_int32x4 a = cv::v_dotprod(g, along_);
+      const cv::v_int32x4 c = cv::v_dotprod(g, across_);
+      along = along + a;
+      along_abs = along_abs + cv::v_reinterpret_as_s32(cv::v_abs(a));
+      across = across + c;
+      across_abs = across_abs + cv::v_reinterpret_as_s32(cv::v_abs(c));
+    }
+    const auto a = static_cast<float>(cv::v_reduce_sum(along));
+    const auto a_abs = static_cast<float>(cv::v_reduce_sum(along_abs));
+    const auto c = static_cast<float>(cv::v_reduce_sum(across));
+    const auto c_abs = static_cast<float>(cv::v_reduce_sum(across_abs));
+    return {0.5F * (a_abs + a), 0.5F * (a_abs - a), 0.5F * (c_abs + c), 0.5F * (c_abs - c)};
+  }
+
+ private:
+  cv::v_int16x8 along_;
+  cv::v_int16x8 across_;
+};
+
+RowSums row_sums(const cv::Mat& gradient, const LineSegment& segment) {
+  const Support support = support_of(segment);
+  const RowSummer summer(support);
+  const bool whole = inside(support, gradient);
+  const Row offsets = whole ? column_offsets(gradient, support) : Row{};
+  RowSums sums;
+  Row row{};
+  for (int i = 0; i < kRows; ++i) {
+    if (whole) {
+      fetch_inside(gradient, support, i, offsets, row);
+    } else {
+      fetch_clipped(gradient, support, i, row);
+    }
+    sums[static_cast<std::size_t>(i)] = summer(row, support.columns);
+  }
+  return sums;
+}
+
+void normalise(float* values, std::size_t count) {
+  float sum = 0.0F;
+  for (std::size_t i = 0; i < count; ++i) sum += values[i] * values[i];
+  if (!(sum > 0.0F)) return;
+  const float factor = 1.0F / std::sqrt(sum);
+  for (std::size_t i = 0; i < count; ++i) values[i] *= factor;
+}
+
+// Statistics of band j over its own rows and those of its neighbours; layout: mean[4], deviation[4] per band.
+BandStatistics band_statistics(const RowSums& sums, const Weights& weights) {
+  std::array<std::array<float, 4>, kBands + 2> mean{};  // one band more at each side takes what falls outside
+  std::array<std::array<float, 4>, kBands + 2> square{};
+  for (std::size_t row = 0; row < kRows; ++row) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float weight = weights.value[row][k];
+      const std::size_t band = row / kBandWidth + k;
+      for (std::size_t c = 0; c < 4; ++c) {
+        const float v = weight * sums[row][c];
+        mean[band][c] += v;
+        square[band][c] += v * v;
+      }
+    }
+  }
+  std::array<float, 4 * kBands> means{};
+  std::array<float, 4 * kBands> deviations{};
+  for (std::size_t j = 0; j < kBands; ++j) {
+    const float share = 1.0F / static_cast<float>(kBandWidth * (j == 0 || j + 1 == kBands ? 2 : 3));
+    for (std::size_t c = 0; c < 4; ++c) {
+      const float m = mean[j + 1][c] * share;
+      means[4 * j + c] = m;
+      deviations[4 * j + c] = std::sqrt(std::max(0.0F, square[j + 1][c] * share - m * m));
+    }
+  }
+  normalise(means.data(), means.size());
+  normalise(deviations.data(), deviations.size());
+  BandStatistics result;
+  for (std::size_t j = 0; j < kBands; ++j) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      result[8 * j + c] = std::min(means[4 * j + c], kClip);
+      result[8 * j + 4 + c] = std::min(deviations[4 * j + c], kClip);
+    }
+  }
+  normalise(result.data(), result.size());
+  return result;
+}
+
+// All 36 pairs of bands but the four of bands farthest apart across the line, the least stable ones.
+constexpr std::array<std::array<unsigned char, 2>, 32> kPairs = {
+    {{0, 1}, {0, 2}, {0, 3}, {0, 4}, {0, 5}, {0, 6}, {1, 2}, {1, 3}, {1, 4}, {1, 5}, {1, 6},
+     {2, 3}, {2, 4}, {2, 5}, {2, 6}, {2, 7}, {2, 8}, {3, 4}, {3, 5}, {3, 6}, {3, 7}, {3, 8},
+     {4, 5}, {4, 6}, {4, 7}, {4, 8}, {5, 6}, {5, 7}, {5, 8}, {6, 7}, {6, 8}, {7, 8}}};
+
+}  // namespace
+
+std::vector<BandStatistics> band_statistics(const cv::Mat& gray, const std::vector<LineSegment>& segments) {
+  std::vector<BandStatistics> result;
+  if (segments.empty() || gray.empty()) return result;
+  CV_Assert(gray.type() == CV_8UC1);
+  static const Weights weights;
+  const cv::Mat gradient = gradients(gray);
+  result.reserve(segments.size());
+  for (const LineSegment& s : segments) result.push_back(band_statistics(row_sums(gradient, s), weights));
+  return result;
+}
+
+LineDescriptor binarise(const BandStatistics& statistics) {
+  LineDescriptor bits{};
+  for (std::size_t p = 0; p < kPairs.size(); ++p) {
+    const float* a = statistics.data() + 8 * static_cast<std::size_t>(kPairs[p][0]);
+    const float* b = statistics.data() + 8 * static_cast<std::size_t>(kPairs[p][1]);
+    std::uint64_t byte = 0;
+    for (unsigned c = 0; c < 8; ++c) byte |= static_cast<std::uint64_t>(a[c] > b[c]) << c;
+    bits[p / 8] |= byte << (8 * (p % 8));
+  }
+  return bits;
+}
+
+std::vector<LineDescriptor> describe_lines(const cv::Mat& gray, const std::vector<LineSegment>& segments) {
+  std::vector<LineDescriptor> result;
+  result.reserve(segments.size());
+  for (const BandStatistics& s : band_statistics(gray, segments)) result.push_back(binarise(s));
+  return result;
+}
+
+}  // namespace plumbline::features

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Along the image of a 3D line the inverse depth is affine in the pixel position, so the fit lives in two
+// numbers: 1/z(s) = (1 - s) / z_start + s / z_end, s in [0, 1]. RANSAC, weighting and covariance all work on
+// these; the endpoints then lie on their pixels' rays by construction.
+#include "plumbline/features/line_depth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "plumbline/features/line_segment.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::features {
+namespace {
+
+constexpr double kMinDepth = 0.1;      // m
+constexpr int kCoverageBins = 10;      // stretches of a segment that should each hold support
+constexpr double kSameSurface = 0.02;  // of depth: spread across a few pixels of one (slanted) surface
+constexpr std::uint32_t kSeed = 0x9E3779B9U;
+constexpr int kRefinements = 3;
+
+struct Sample {
+  double s;        // place along the segment, [0, 1]
+  double inverse;  // 1 / z
+};
+
+struct InverseDepth {
+  double start = 0.0;
+  double end = 0.0;
+  [[nodiscard]] double at(double s) const { return (1.0 - s) * start + s * end; }
+};
+
+double inverse_sigma(double inverse) { return sensor::depth_sigma(1.0 / inverse) * inverse * inverse; }
+
+float depth_at(const cv::Mat& depth, double x, double y) {
+  const int u = static_cast<int>(std::lround(x));
+  const int v = static_cast<int>(std::lround(y));
+  if (u < 0 || v < 0 || u >= depth.cols || v >= depth.rows) return 0.0F;
+  return depth.at<float>(v, u);
+}
+
+// Depth of the foreground surface at one place of the line: where depth jumps between the two sides, samples
+// of the nearer surface only; of those the one nearest to the line. 0 if there is none.
+double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Eigen::Vector2d& normal,
+                        const LineDepthOptions& options) {
+  double nearest = 0.0;
+  const auto usable = [&](double z) { return z >= kMinDepth && z <= options.max_depth_m; };  // false for NaN
+  const auto sample = [&](int offset) {
+    return static_cast<double>(depth_at(depth, p.x() + offset * normal.x(), p.y() + offset * normal.y()));
+  };
+  for (int o = -options.side_px; o <= options.side_px; ++o) {
+    const double z = sample(o);
+    if (usable(z) && (nearest == 0.0 || z < nearest)) nearest = z;
+  }
+  if (nearest == 0.0) return 0.0;
+  const double limit = nearest + kSameSurface * nearest + 4.0 * sensor::depth_sigma(nearest);
+  for (int o = 0; o <= options.side_px; ++o) {
+    const double a = sample(o);
+    const double b = o == 0 ? a : sample(-o);
+    const bool a_ok = usable(a) && a <= limit;
+    const bool b_ok = usable(b) && b <= limit;
+    // Both sides: their mean is the depth on the line of a slanted surface.
+    if (a_ok && b_ok) return 0.5 * (a + b);
+    if (a_ok || b_ok) return a_ok ? a : b;
+  }
+  return 0.0;
+}
+
+std::vector<Sample> collect(const LineSegment& segment, const cv::Mat& depth, int places,
+                            const LineDepthOptions& options) {
+  const Eigen::Vector2d start = segment.start.cast<double>();
+  const Eigen::Vector2d along = (segment.end - segment.start).cast<double>();
+  const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
+  std::vector<Sample> samples;
+  samples.reserve(static_cast<std::size_t>(places));
+  for (int i = 0; i < places; ++i) {
+    const double s = (i + 0.5) / places;
+    const double z = foreground_depth(depth, start + s * along, normal, options);
+    if (z > 0.0) samples.push_back({s, 1.0 / z});
+  }
+  return samples;
+}
+
+bool plausible(const InverseDepth& line, const LineDepthOptions& options) {
+  const double most = 1.0 / kMinDepth;
+  const double least = 0.5 / options.max_depth_m;
+  return line.start > least && line.end > least && line.start < most && line.end < most;
+}
+
+bool supports(const InverseDepth& line, const Sample& sample, double gate) {
+  const double predicted = line.at(sample.s);
+  return predicted > 0.0 && std::abs(sample.inverse - predicted) <= gate * inverse_sigma(predicted);
+}
+
+std::optional<InverseDepth> ransac(const std::vector<Sample>& samples, const LineDepthOptions& options) {
+  std::mt19937 random(kSeed);  // the same rounds for every line: the result depends on its own samples only
+  const auto count = static_cast<std::uint32_t>(samples.size());
+  std::optional<InverseDepth> best;
+  int most = 0;
+  for (int round = 0; round < options.ransac_rounds; ++round) {
+    // A short base extrapolates badly: the two come from different thirds or farther apart.
+    const Sample& a = samples[random() % count];
+    const Sample& b = samples[random() % count];
+    if (std::abs(a.s - b.s) < 0.25) continue;
+    const double slope = (b.inverse - a.inverse) / (b.s - a.s);
+    const InverseDepth line{a.inverse - slope * a.s, a.inverse + slope * (1.0 - a.s)};
+    if (!plausible(line, options)) continue;
+    const int support = static_cast<int>(std::count_if(samples.begin(), samples.end(), [&](const Sample& q) {
+      return supports(line, q, options.inlier_sigmas);
+    }));
+    if (support > most) {
+      most = support;
+      best = line;
+    }
+  }
+  return best;
+}
+
+struct Fit {
+  InverseDepth line;
+  Eigen::Matrix2d covariance;  // of (start, end)
+  int inliers = 0;
+  int bins = 0;  // of kCoverageBins with support
+};
+
+std::optional<Fit> least_squares(InverseDepth line, const std::vector<Sample>& samples, double gate) {
+  Fit fit;
+  for (int pass = 0; pass < kRefinements; ++pass) {
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d vector = Eigen::Vector2d::Zero();
+    double chi2 = 0.0;
+    unsigned bins = 0;
+    fit.inliers = 0;
+    for (const Sample& q : samples) {
+      if (!supports(line, q, gate)) continue;
+      const double sigma = inverse_sigma(line.at(q.s));
+      const Eigen::Vector2d basis = Eigen::Vector2d(1.0 - q.s, q.s) / sigma;
+      information += basis * basis.transpose();
+      vector += basis * (q.inverse / sigma);
+      const double r = (q.inverse - line.at(q.s)) / sigma;
+      chi2 += r * r;
+      bins |= 1U << std::min(static_cast<int>(q.s * kCoverageBins), kCoverageBins - 1);
+      ++fit.inliers;
+    }
+    if (fit.inliers < 3 || !(information.determinant() > 1e-9 * information.trace() * information.trace())) {
+      return std::nullopt;
+    }
+    const Eigen::Vector2d solution = information.ldlt().solve(vector);
+    line = {solution.x(), solution.y()};
+    if (!(line.start > 0.0 && line.end > 0.0)) return std::nullopt;
+    fit.covariance = information.inverse() * std::max(1.0, chi2 / (fit.inliers - 2));
+    fit.bins = __builtin_popcount(bins);
+  }
+  fit.line = line;
+  return fit;
+}
+
+Eigen::Vector3d ray_of(const Eigen::Vector2f& pixel, const sensor::Pinhole& camera) {
+  return camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), 1.0);
+}
+
+// Depth noise along the ray, pixel noise in both directions across it.
+Eigen::Matrix3d point_covariance(const Eigen::Vector3d& ray, double inverse, double variance,
+                                 const sensor::Pinhole& camera, double pixel_sigma) {
+  const double z = 1.0 / inverse;
+  const double depth_variance = variance * z * z * z * z;
+  Eigen::Matrix3d covariance = depth_variance * ray * ray.transpose();
+  covariance(0, 0) += std::pow(z * pixel_sigma / camera.fx, 2);
+  covariance(1, 1) += std::pow(z * pixel_sigma / camera.fy, 2);
+  return covariance;
+}
+
+}  // namespace
+
+void LineDepthOptions::declare(core::OptionTable& table) {
+  table.integer("depth_samples", samples, {8, 400}, "", "Depth samples along a line, at most");
+  table.integer("depth_side", side_px, {0, 10}, "px", "Depth is looked for this far beside a line");
+  table.number("depth_max", max_depth_m, {0.5, 100.0}, "m", "Depth beyond this does not make 3D lines");
+  table.number("depth_inlier_sigmas", inlier_sigmas, {1.0, 10.0}, "",
+               "Inlier gate in standard deviations of depth");
+  table.number("depth_min_inlier_share", min_inlier_share, {0.1, 1.0}, "",
+               "Smallest share of agreeing samples");
+  table.number("depth_min_coverage", min_coverage, {0.1, 1.0}, "",
+               "Smallest share of the length with support");
+  table.integer("depth_min_inliers", min_inliers, {3, 400}, "", "Fewest agreeing samples");
+  table.integer("depth_ransac_rounds", ransac_rounds, {1, 1000}, "", "RANSAC rounds of the 3D line fit");
+  table.number("depth_pixel_sigma", pixel_sigma, {0.05, 10.0}, "px",
+               "Standard deviation of an endpoint's position");
+}
+
+std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& depth_m,
+                                    const sensor::Pinhole& camera, const LineDepthOptions& options) {
+  const double length = static_cast<double>(segment.length());
+  if (depth_m.empty() || !(length >= 2.0) || !std::isfinite(length)) return std::nullopt;
+  CV_Assert(depth_m.type() == CV_32FC1);
+  const int places = std::clamp(static_cast<int>(length), 2, options.samples);
+  const std::vector<Sample> samples = collect(segment, depth_m, places, options);
+  if (static_cast<int>(samples.size()) < options.min_inliers) return std::nullopt;
+
+  const std::optional<InverseDepth> start = ransac(samples, options);
+  if (!start) return std::nullopt;
+  const std::optional<Fit> fit = least_squares(*start, samples, options.inlier_sigmas);
+  if (!fit || !plausible(fit->line, options)) return std::nullopt;
+
+  Line3 line;
+  line.inlier_share = static_cast<double>(fit->inliers) / static_cast<double>(samples.size());
+  line.coverage = static_cast<double>(fit->bins) / std::min(kCoverageBins, places);
+  if (fit->inliers < options.min_inliers || line.inlier_share < options.min_inlier_share ||
+      line.coverage < options.min_coverage) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d start_ray = ray_of(segment.start, camera);
+  const Eigen::Vector3d end_ray = ray_of(segment.end, camera);
+  line.start = start_ray / fit->line.start;
+  line.end = end_ray / fit->line.end;
+  line.start_covariance =
+      point_covariance(start_ray, fit->line.start, fit->covariance(0, 0), camera, options.pixel_sigma);
+  line.end_covariance =
+      point_covariance(end_ray, fit->line.end, fit->covariance(1, 1), camera, options.pixel_sigma);
+  return line;
+}
+
+}  // namespace plumbline::features

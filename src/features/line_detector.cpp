@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/features/line_detector.hpp"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/ximgproc/edge_drawing.hpp>
+#include <opencv2/ximgproc/fast_line_detector.hpp>
+
+#include "line_geometry.hpp"
+#include "plumbline/features/line_border.hpp"
+
+namespace plumbline::features {
+namespace {
+
+constexpr int kSmallestImage = 32;    // px; nothing of min_length to be found below
+constexpr double kPieceShare = 0.4;   // pieces this long, relative to min_length, may still be joined
+constexpr float kMinResponse = 1.0F;  // grey levels per px
+
+// Detectors keep scratch state, so each call has its own.
+std::vector<cv::Vec4f> run(LineMethod method, const cv::Mat& image, float min_length) {
+  std::vector<cv::Vec4f> lines;
+  switch (method) {
+    case LineMethod::kLsd:
+      cv::createLineSegmentDetector(cv::LSD_REFINE_STD, 1.0)->detect(image, lines);
+      break;
+    case LineMethod::kEdlines: {
+      auto drawing = cv::ximgproc::createEdgeDrawing();
+      drawing->params.EdgeDetectionOperator = cv::ximgproc::EdgeDrawing::SOBEL;
+      drawing->params.GradientThresholdValue = 20;
+      drawing->params.AnchorThresholdValue = 4;
+      drawing->params.MinLineLength = static_cast<int>(min_length);
+      drawing->detectEdges(image);
+      drawing->detectLines(lines);
+      break;
+    }
+    case LineMethod::kFld:
+      cv::ximgproc::createFastLineDetector(static_cast<int>(min_length), 1.414F, 30.0, 60.0, 3, false)
+          ->detect(image, lines);
+      break;
+  }
+  return lines;
+}
+
+bool along_border(const LineSegment& s, const cv::Rect& region, float margin) {
+  const auto both_below = [&](float a, float b, float limit) { return a < limit && b < limit; };
+  const float left = static_cast<float>(region.x);
+  const float top = static_cast<float>(region.y);
+  const float right = static_cast<float>(region.x + region.width - 1);
+  const float bottom = static_cast<float>(region.y + region.height - 1);
+  return both_below(s.start.x() - left, s.end.x() - left, margin) ||
+         both_below(s.start.y() - top, s.end.y() - top, margin) ||
+         both_below(right - s.start.x(), right - s.end.x(), margin) ||
+         both_below(bottom - s.start.y(), bottom - s.end.y(), margin);
+}
+
+}  // namespace
+
+void LineDetectorOptions::declare(core::OptionTable& table) {
+  table.choice("method", method,
+               {{"lsd", LineMethod::kLsd}, {"edlines", LineMethod::kEdlines}, {"fld", LineMethod::kFld}},
+               "Line detector");
+  table.choice(
+      "scale", scale, {{"half", LineScale::kHalf}, {"full", LineScale::kFull}},
+      "Resolution at which edges are looked for; positions are refined at full resolution either way");
+  table.number("min_length", min_length_px, {5.0, 1000.0}, "px", "Shorter lines are dropped");
+  table.number("border", border_px, {0.0, 100.0}, "px",
+               "Lines that run within this margin of a side are dropped");
+  table.integer("max_count", max_count, {0, 10000}, "", "Keep the longest so many lines; 0 keeps all");
+  table.boolean("join", join, "Join collinear pieces and drop near-duplicates");
+  table.number("join_gap", join_gap_px, {0.0, 200.0}, "px",
+               "Largest gap between collinear pieces that are joined");
+  table.number("join_angle", join_angle_rad, {0.0, 0.5}, "rad",
+               "Largest angle between pieces that are joined");
+  table.number("join_offset", join_offset_px, {0.0, 20.0}, "px",
+               "Largest sideways offset of pieces that are joined");
+}
+
+std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
+  if (gray.empty() || std::min(gray.cols, gray.rows) < kSmallestImage) return {};
+  CV_Assert(gray.type() == CV_8UC1);
+  cv::Rect region = valid_region(gray);
+  const bool half = options_.scale == LineScale::kHalf;
+  cv::Mat image = gray(region);
+  if (half) {
+    // An odd last row or column has no partner to be averaged with.
+    const cv::Size even(region.width / 2, region.height / 2);
+    cv::resize(image(cv::Rect(0, 0, even.width * 2, even.height * 2)), image, even, 0.0, 0.0, cv::INTER_AREA);
+  }
+  // A pixel of the half image is centred between four pixels: full = 2 half + 0.5.
+  const float factor = half ? 2.0F : 1.0F;
+  const float shift = half ? 0.5F : 0.0F;
+  const Eigen::Vector2f origin(static_cast<float>(region.x) + shift, static_cast<float>(region.y) + shift);
+  const auto min_length = static_cast<float>(options_.min_length_px);
+  const float piece = options_.join ? static_cast<float>(kPieceShare) * min_length : min_length;
+
+  std::vector<LineSegment> segments;
+  for (const cv::Vec4f& line : run(options_.method, image, std::max(4.0F, piece / factor))) {
+    LineSegment s;
+    s.start = factor * Eigen::Vector2f(line[0], line[1]) + origin;
+    s.end = factor * Eigen::Vector2f(line[2], line[3]) + origin;
+    if (!(s.length() >= piece) || along_border(s, region, static_cast<float>(options_.border_px))) continue;
+    orient(s, gray);
+    if (s.response >= kMinResponse) segments.push_back(s);
+  }
+  if (options_.join) segments = join_collinear(std::move(segments), options_);
+
+  std::vector<LineSegment> kept;
+  for (LineSegment& s : segments) {
+    if (s.length() < min_length) continue;
+    refine(s, gray);
+    orient(s, gray);
+    if (s.response >= kMinResponse && s.length() >= min_length) kept.push_back(s);
+  }
+  sort_segments(kept);
+  if (options_.max_count > 0 && kept.size() > static_cast<std::size_t>(options_.max_count)) {
+    kept.resize(static_cast<std::size_t>(options_.max_count));
+  }
+  return kept;
+}
+
+}  // namespace plumbline::features
