@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Clouds on disk.
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "plumbline/cloud/types.hpp"
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::cloud {
+
+/// What may be known of every point beside the Point itself; each empty or one value per point.
+struct CloudColumns {
+  std::vector<float> confidence;            ///< 0-1, see VoxelMap
+  std::vector<std::uint32_t> observations;  ///< views that saw the point
+  std::vector<std::uint8_t> robot;          ///< who saw it
+};
+
+/// Binary PLY: float x y z nx ny nz, uchar red green blue [, float confidence, int observations, uchar
+/// robot]; opens with colours and normals in PCL, Open3D, MeshLab and CloudCompare. Points with a NaN
+/// coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. Errors (kOutput) name
+/// the file; it appears whole or not at all.
+core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
+                             const CloudColumns& columns = {});
+
+/// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot]. An
+/// organised cloud stays organised and keeps its NaN points; an unorganised one loses them.
+core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
+                             const CloudColumns& columns = {});
+
+/// write_ply or write_pcd by the name's ending; another ending is a kUsage error.
+core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
+                               const CloudColumns& columns = {});
+
+struct CloudFile {
+  CloudPtr cloud;  ///< without colour: 255 255 255; without normals: NaN normals
+  CloudColumns columns;
+  bool has_color = false;
+  bool has_normals = false;
+  std::size_t nan_points = 0;   ///< with a coordinate that is not finite; kept in `cloud`
+  std::size_t nan_normals = 0;  ///< points whose normal is unknown (NaN or zero) though the file has normals
+};
+
+/// Reads PLY (ascii, binary), PCD (ascii, binary, binary_compressed) and text (.xyz .txt .csv .asc .pts: x y
+/// z, then 0-255 red green blue and/or nx ny nz; separated by blanks, commas or semicolons; a CSV header line
+/// names columns). Errors (kInput): missing, empty, not this format, without x y z, truncated, header
+/// promising more points than the file holds (found before memory is taken).
+core::Result<CloudFile> read_cloud(const std::filesystem::path& file);
+
+}  // namespace plumbline::cloud

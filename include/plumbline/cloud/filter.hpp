@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a cloud filter is, and the list of those that exist. A filter is a class with declared options, one
+// registration (a FilterInfo) and its words for the reference page docs/filters.md, which is made from these.
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/types.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/options.hpp"
+
+namespace plumbline::cloud {
+
+/// What a filter may know beside the cloud.
+struct FilterContext {
+  /// Where the sensor stood, in the cloud's frame; without it the cloud's own sensor_origin_.
+  std::optional<Eigen::Vector3f> viewpoint;
+  std::uint32_t seed = 0;  ///< of random choices
+};
+
+class Filter {
+ public:
+  virtual ~Filter() = default;
+  /// Binds the options of this very filter.
+  virtual void declare(core::OptionTable& table) = 0;
+  /// What is wrong with the options taken together, "" if nothing.
+  [[nodiscard]] virtual std::string check() const { return ""; }
+  /// The input is never changed; returning it as it came is not allowed. Filters that only choose points keep
+  /// an organised cloud organised (rejected points become NaN). Const and free of hidden state: one filter
+  /// may run on several threads. Errors: kUsage when the options do not fit this cloud (message without the
+  /// filter's name).
+  [[nodiscard]] virtual core::Result<CloudPtr> apply(const CloudConstPtr& input,
+                                                     const FilterContext& context) const = 0;
+};
+
+struct FilterInfo {
+  std::string type;     ///< as in `type: voxel_grid`
+  std::string summary;  ///< one line
+  std::string details;  ///< a paragraph for the reference page
+  std::string example;  ///< YAML of one list entry
+  std::function<std::unique_ptr<Filter>()> make;
+};
+
+class FilterRegistry {
+ public:
+  /// Throws std::invalid_argument on a type that is there already.
+  void add(FilterInfo info);
+  [[nodiscard]] const FilterInfo* find(const std::string& type) const;
+  [[nodiscard]] const std::vector<FilterInfo>& filters() const { return filters_; }  ///< sorted by type
+  [[nodiscard]] std::vector<std::string> types() const;
+
+ private:
+  std::vector<FilterInfo> filters_;
+};
+
+/// All filters of this library.
+FilterRegistry builtin_filters();
+
+/// The reference page of a registry's filters as Markdown (docs/filters.md).
+std::string filters_reference(const FilterRegistry& registry);
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A file that appears whole or not at all.
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::cloud {
+
+/// Buffered writer to a hidden file in the target's folder that commit() renames to the target. A target that
+/// is a device or pipe (/dev/stdout) is written in place. Without commit() the target stays as it was.
+class OutputFile {
+ public:
+  explicit OutputFile(std::filesystem::path target);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  void write(const void* bytes, std::size_t count);
+  void write(std::string_view text) { write(text.data(), text.size()); }
+  /// Little endian, as all machines this runs on.
+  template <typename T>
+  void put(const T& value) {
+    write(&value, sizeof(value));
+  }
+
+  /// Flushes, closes, renames. The first thing that went wrong since opening, as a kOutput error naming the
+  /// target.
+  core::Result<void> commit();
+
+ private:
+  void flush();
+  void fail(const std::string& what);
+  void discard();
+
+  std::filesystem::path target_;
+  std::filesystem::path written_;  ///< the hidden file, or target_ itself
+  int descriptor_ = -1;
+  std::vector<char> buffer_;
+  std::string problem_;
+};
+
+}  // namespace plumbline::cloud
