@@ -1,17 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/core/executor.hpp"
 
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 #include <oneapi/tbb/task_group.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace plumbline::core {
 
 struct Executor::Impl {
-  explicit Impl(int threads) : arena(threads) { arena.initialize(); }
+  explicit Impl(int threads)
+      : allowed(tbb::global_control::max_allowed_parallelism,
+                static_cast<std::size_t>(std::max(threads, tbb::info::default_concurrency()))),
+        arena(threads) {
+    arena.initialize();
+  }
+  tbb::global_control allowed;  ///< more threads than cores are given when they are asked for
   mutable tbb::task_arena arena;
 };
 
@@ -32,7 +40,10 @@ void Executor::parallel_for(std::size_t count, const std::function<void(std::siz
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;
   }
-  impl_->arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body); });
+  // Isolated: a thread that waits here takes up nothing else, so that a short loop in a serial stage is not
+  // held up by another frame's long work, and a lock held by the caller cannot meet itself.
+  impl_->arena.execute(
+      [&] { tbb::this_task_arena::isolate([&] { tbb::parallel_for(std::size_t{0}, count, body); }); });
 }
 
 Executor::Job Executor::submit(std::function<void()> work) const {

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Runs a checked graph on oneTBB.
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/pipeline/graph.hpp"
+
+namespace plumbline::pipeline {
+
+/// Times of one stage, milliseconds.
+struct StageTiming {
+  std::string name;
+  std::vector<float> frame_ms;  ///< one per frame; NaN = the stage had nothing to do
+  double finish_ms = 0.0;
+
+  [[nodiscard]] double quantile_ms(double q) const;  ///< over the frames it worked on; 0 when there are none
+};
+
+struct RunReport {
+  std::size_t frames = 0;  ///< that went through the graph
+  std::size_t frames_available = 0;
+  bool stopped = false;  ///< ended early because it was asked to
+  double map_s =
+      0.0;  ///< first frame read to last change of the map: frames and the end of non-export stages
+  double export_s = 0.0;            ///< end of the stages that export
+  std::vector<StageTiming> stages;  ///< in graph order
+};
+
+/// Called in frame order, from one thread at a time.
+using Progress = std::function<void(std::size_t done, std::size_t total)>;
+
+/// Frames travel the stages in graph order; several are under way at a time, never more than twice the
+/// threads plus two, so that memory stays bounded. Stateless stages work side by side, serial stages see the
+/// frames in order: results do not depend on the number of threads. The run ends early, in order, when the
+/// context's stop token says so (stages still finish) or when a stage fails: then the error of the earliest
+/// such frame is returned and no stage finishes.
+core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress);
+
+}  // namespace plumbline::pipeline

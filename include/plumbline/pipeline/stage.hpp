@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Stage: one node of a pipeline graph. A stage type declares typed ports and options; the graph connects
+// them.
+//
+//   read ──frame──▶ features ──features──▶ track ──track──▶ cloud ──keyframe_cloud──▶ fuse ──cloud──▶ output
+//
+// Adding a stage: derive from Stage in src/pipeline/stage_<name>.cpp, describe it in a StageType, add one
+// line to register_stages() (src/pipeline/registry.cpp).
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <typeindex>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/config.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/core/stop.hpp"
+
+namespace plumbline::dataset {
+class FrameSource;
+}
+
+namespace plumbline::pipeline {
+
+struct RunSummary;
+
+/// How often a port carries a value.
+enum class Rate {
+  kFrame,  ///< once a frame, or nothing for a frame (unreadable, no keyframe ...)
+  kEnd,    ///< once, after the last frame
+};
+
+/// What flows through a port: a name for users and the C++ type behind it.
+struct PortType {
+  std::string name;
+  std::type_index type;
+  Rate rate = Rate::kFrame;
+
+  friend bool operator==(const PortType& a, const PortType& b) {
+    return a.name == b.name && a.type == b.type && a.rate == b.rate;
+  }
+};
+
+template <typename T>
+PortType port_type(std::string name, Rate rate = Rate::kFrame) {
+  return {std::move(name), std::type_index(typeid(T)), rate};
+}
+
+struct Port {
+  std::string name;
+  PortType type;
+  bool required = true;  ///< of inputs: must be connected, and hold a value for the stage to be called
+};
+
+using Value = std::shared_ptr<const void>;
+
+/// The values one call of a stage reads and writes. Values are shared and never change once written.
+class StageIo {
+ public:
+  StageIo(std::size_t frame, const std::vector<Port>& inputs, const std::vector<Port>& outputs)
+      : frame_(frame), inputs_(inputs), outputs_(outputs), in_(inputs.size()), out_(outputs.size()) {}
+
+  [[nodiscard]] std::size_t frame() const { return frame_; }  ///< number of the frame within this run
+
+  /// Null when the input is optional and there is nothing.
+  template <typename T>
+  [[nodiscard]] std::shared_ptr<const T> input(const std::string& name) const {
+    return std::static_pointer_cast<const T>(in_[find<T>(inputs_, name)]);
+  }
+  /// Leave an output out to say "nothing for this frame".
+  template <typename T>
+  void output(const std::string& name, std::shared_ptr<const T> value) {
+    out_[find<T>(outputs_, name)] = std::move(value);
+  }
+
+  std::vector<Value>& input_values() { return in_; }    ///< for the engine
+  std::vector<Value>& output_values() { return out_; }  ///< for the engine
+
+ private:
+  template <typename T>
+  static std::size_t find(const std::vector<Port>& ports, const std::string& name) {
+    for (std::size_t i = 0; i < ports.size(); ++i) {
+      if (ports[i].name == name && ports[i].type.type == std::type_index(typeid(T))) return i;
+    }
+    throw std::logic_error("stage has no port " + name + " of this type");
+  }
+
+  std::size_t frame_;
+  const std::vector<Port>& inputs_;
+  const std::vector<Port>& outputs_;
+  std::vector<Value> in_;
+  std::vector<Value> out_;
+};
+
+/// What a run lends to its stages; outlives them.
+struct RunContext {
+  const dataset::FrameSource* source = nullptr;
+  const core::Executor* executor = nullptr;
+  core::Log* log = nullptr;
+  core::StopToken stop;
+  std::filesystem::path output_folder;  ///< where sinks write
+};
+
+/// What a stage may look at while the graph is checked.
+struct CheckContext {
+  std::filesystem::path pipeline_folder;   ///< of the pipeline file
+  std::filesystem::path pipelines_folder;  ///< shipped pipelines, filters and cameras
+
+  /// A file named in a pipeline: absolute, beside the pipeline file, or shipped. Empty when there is none.
+  [[nodiscard]] std::filesystem::path find(const std::string& file) const;
+};
+
+/// Life of a stage: constructed, declare, check, start, process once a frame, finish, summarise.
+class Stage {
+ public:
+  virtual ~Stage() = default;
+
+  /// Binds the options; called once.
+  virtual void declare(core::OptionTable& /*table*/) {}
+  /// Checks what needs more than one option, e.g. files named by options. `mark` and `path` are the stage's.
+  virtual void check(const CheckContext& /*context*/, const core::ConfigMark& /*mark*/,
+                     const std::string& /*path*/, core::ConfigProblems& /*problems*/) {}
+  virtual core::Result<void> start(const RunContext& /*context*/) { return {}; }
+  /// Of sources: how many frames there are; asked after start.
+  [[nodiscard]] virtual std::size_t frames() const { return 0; }
+  /// One frame, when all required per-frame inputs hold a value. Stateless stages are called from several
+  /// threads at a time and in any order, serial ones in frame order. An error ends the run; what concerns
+  /// this frame only is not an error here: log it and leave the outputs out.
+  virtual core::Result<void> process(StageIo& io) = 0;
+  /// After the last frame, in graph order; reads and writes the ports of Rate::kEnd.
+  virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
+  /// Adds what this stage knows about the run.
+  virtual void summarise(RunSummary& /*summary*/) const {}
+};
+
+enum class Mode {
+  kStateless,  ///< frames side by side
+  kSerial,     ///< one frame after another, in order
+};
+
+struct StageType {
+  std::string name;
+  std::string help;  ///< one line
+  Mode mode = Mode::kStateless;
+  std::vector<Port> inputs;
+  std::vector<Port> outputs;
+  std::function<std::unique_ptr<Stage>()> make;
+  bool exports = false;  ///< writes results after the map is complete; its time counts as export
+
+  /// Gives frames without taking any.
+  [[nodiscard]] bool is_source() const;
+};
+
+/// The stage types a pipeline file may name.
+class StageRegistry {
+ public:
+  void add(StageType type);  ///< throws std::logic_error for a name that is taken
+  [[nodiscard]] const StageType* find(const std::string& name) const;
+  [[nodiscard]] std::vector<std::string> names() const;  ///< sorted
+
+ private:
+  std::vector<std::unique_ptr<const StageType>> types_;
+};
+
+/// All stages of this library.
+void register_stages(StageRegistry& registry);
+
+}  // namespace plumbline::pipeline

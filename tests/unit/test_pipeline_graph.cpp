@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "plumbline/pipeline/graph.hpp"
+#include "test_pipeline_toys.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+const char* const kGood = R"(description: adds
+stages:
+  collect: {type: collect, inputs: {total: sum}}
+  sum: {type: sum, inputs: {number: twice}}
+  twice:
+    type: scale
+    inputs: {number: count.number}
+    by: 3
+  count: {type: count, n: 7}
+)";
+
+class GraphFile : public testing::Test {
+ protected:
+  GraphFile() { toys::register_toys(registry_, bench_); }
+
+  core::Result<Graph> parse(const std::string& text, const std::vector<std::string>& overrides = {}) {
+    return parse_graph(text, "g.yaml", registry_, "/nowhere", overrides);
+  }
+  std::string refusal(const std::string& text, const std::vector<std::string>& overrides = {}) {
+    const auto graph = parse(text, overrides);
+    if (graph) return "accepted";
+    EXPECT_EQ(graph.error().kind, core::ErrorKind::kUsage);
+    return graph.error().message;
+  }
+  void expect_told(const std::string& text, const std::string& told) {
+    const std::string message = refusal(text);
+    EXPECT_NE(message.find(told), std::string::npos) << message;
+  }
+
+  toys::Bench bench_;
+  StageRegistry registry_;
+};
+
+TEST_F(GraphFile, IsSortedWhateverTheOrderInTheFile) {
+  const auto graph = parse(kGood);
+  ASSERT_TRUE(graph) << graph.error().message;
+  std::string names;
+  for (const Node& node : graph->nodes) names += node.name + " ";
+  EXPECT_EQ(names, "count twice sum collect ");
+  EXPECT_EQ(graph->source().name, "count");
+  EXPECT_EQ(graph->nodes[1].options.value("by"), "3");
+}
+
+TEST_F(GraphFile, EffectiveConfigurationReadsBackTheSame) {
+  const auto graph = parse(kGood, {"twice.by=-4", "count.n=9"});
+  ASSERT_TRUE(graph) << graph.error().message;
+  const std::string text = to_yaml(*graph);
+  EXPECT_NE(text.find("by: -4"), std::string::npos) << text;
+  const auto again = parse(text);
+  ASSERT_TRUE(again) << again.error().message << text;
+  EXPECT_EQ(to_yaml(*again), text);
+}
+
+TEST_F(GraphFile, AllProblemsAreToldAtOnceWithTheirPlaces) {
+  const std::string message = refusal(R"(stages:
+  count: {type: cuont}
+  twice:
+    type: scale
+    inputs: {nmber: count}
+    by: 50
+    colour: red
+  sum: {type: sum, inputs: {number: twise}}
+flags: 1
+)",
+                                      {"twice.by=x", "tice.by=1", "sum", "twice.type=sum"});
+  for (const char* told :
+       {"g.yaml:2:17: stages.count.type: unknown stage type 'cuont' (allowed: collect, count, scale, sum; "
+        "did you "
+        "mean count?)",
+        "g.yaml:5:14: stages.twice.inputs.nmber: unknown input (allowed: number; did you mean number?)",
+        "g.yaml:5:13: stages.twice.inputs: the input number is missing",
+        "g.yaml:6:9: stages.twice.by: 50 is out of range", "g.yaml:7:5: stages.twice.colour: unknown key",
+        "g.yaml:8:37: stages.sum.inputs.number: there is no stage 'twise'", "did you mean twice?",
+        "g.yaml:9:1: flags: unknown key", "--set twice.by: 'x' is not a number",
+        "--set tice.by: there is no stage 'tice'", "--set sum: write it as stage.key=value",
+        "--set twice.type: only options can be set"}) {
+    EXPECT_NE(message.find(told), std::string::npos) << told << "\nnot in\n" << message;
+  }
+}
+
+TEST_F(GraphFile, PortTypesMustFit) {
+  expect_told(
+      "stages:\n  a: {type: count}\n  b: {type: collect, inputs: {total: a}}\n",
+      "g.yaml:3:38: stages.b.inputs.total: 'a' does not give the total that is needed here; it gives number "
+      "(number) (no stage of this file gives a total)");
+  expect_told(
+      "stages:\n  a: {type: count}\n  s: {type: sum, inputs: {number: a.total}}\n",
+      "'a.total' does not give the number that is needed here; it gives number (number) (allowed: a)");
+}
+
+TEST_F(GraphFile, CyclesAreNamed) {
+  expect_told(R"(stages:
+  count: {type: count}
+  a: {type: scale, inputs: {number: c}}
+  b: {type: scale, inputs: {number: a}}
+  c: {type: scale, inputs: {number: b}}
+  sum: {type: sum, inputs: {number: c, other: count}}
+  out: {type: collect, inputs: {total: sum}}
+)",
+              "g.yaml:3:3: stages.a: the stages read from each other in a circle (a <- c <- b <- a)");
+  expect_told("stages:\n  a: {type: scale, inputs: {number: a}}\n", "in a circle (a <- a)");
+}
+
+TEST_F(GraphFile, UnusedAndMissingStagesAreTold) {
+  expect_told(std::string(kGood) + "  idle: {type: scale, inputs: {number: count}}\n",
+              "g.yaml:10:3: stages.idle: nothing reads from this stage");
+  expect_told(std::string(kGood) + "  again: {type: count}\n", "a pipeline has one stage that gives frames");
+  expect_told("description: x\n", "stages: must be a map of stages");
+  expect_told("stages: {}\n", "stages: must be a map of stages");
+  expect_told("", "a pipeline is a map");
+  expect_told("stages:\n  Bad Name: {type: count}\n", "a stage's name is made of");
+  expect_told("stages:\n  a:\n", "must be a map with a type");
+  expect_told("stages:\n  a: {n: 3}\n", "needs a type (allowed: collect, count, scale, sum)");
+}
+
+TEST_F(GraphFile, FilesAreFoundBesideThePipelineAndAmongTheShipped) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / "plumbline_graph";
+  std::filesystem::create_directories(folder / "shipped");
+  std::ofstream(folder / "own.txt") << "x";
+  std::ofstream(folder / "shipped" / "theirs.txt") << "x";
+  for (const char* file : {"own.txt", "theirs.txt", "none.txt"}) {
+    std::ofstream(folder / "p.yaml") << kGood << "    #\n";
+    const auto graph =
+        load_graph(folder / "p.yaml", registry_, folder / "shipped", {std::string("twice.file=") + file});
+    EXPECT_EQ(graph.has_value(), std::string(file) != "none.txt");
+  }
+  std::ofstream(folder / "shipped" / "rgbd.yaml") << kGood;
+  EXPECT_TRUE(find_pipeline("rgbd", folder / "shipped"));
+  EXPECT_TRUE(find_pipeline((folder / "p.yaml").string(), folder / "shipped"));
+  const auto missing = find_pipeline("rgdb", folder / "shipped");
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().message.find("did you mean rgbd?"), std::string::npos);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Registry, ANameIsTakenOnce) {
+  toys::Bench bench;
+  StageRegistry registry;
+  toys::register_toys(registry, bench);
+  EXPECT_THROW(toys::register_toys(registry, bench), std::logic_error);
+}
+
+}  // namespace
+}  // namespace plumbline::pipeline
