@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Everything the tracker and the map need to know of one picture; the picture itself is not kept.
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/line_extractor.hpp"
+#include "plumbline/features/orb.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/frame.hpp"
+
+namespace plumbline::features {
+
+/// Indices of points by image cell, for look-ups around a pixel.
+class PointGrid {
+ public:
+  PointGrid() = default;
+  PointGrid(const std::vector<PointFeature>& points, int width, int height);
+  /// Appends the indices of points within `radius` pixels of (x, y), in a fixed order.
+  void within(const std::vector<PointFeature>& points, float x, float y, float radius,
+              std::vector<int>& indices) const;
+
+ private:
+  static constexpr int kCell = 20;  ///< pixels
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<int> begin_;  ///< first entry of each cell in order_
+  std::vector<int> order_;
+};
+
+struct FrameFeatures {
+  std::vector<PointFeature> points;
+  std::vector<Descriptor256> descriptors;  ///< of points
+  PointGrid grid;
+  std::vector<LineFeature> lines;
+  cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
+  cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
+};
+constexpr int kThumbnailWidth = 80;
+
+struct FeatureOptions {
+  bool points = true;
+  bool lines = true;
+  OrbOptions orb;
+  LineOptions line;
+  void declare(core::OptionTable& table);
+};
+
+/// Stateless; extract is thread-safe.
+class FeatureExtractor {
+ public:
+  FeatureExtractor(const FeatureOptions& options, const sensor::Pinhole& camera);
+  [[nodiscard]] FrameFeatures extract(const sensor::RgbdFrame& frame) const;
+
+ private:
+  FeatureOptions options_;
+  sensor::Pinhole camera_;
+  OrbExtractor orb_;
+  LineExtractor lines_;
+};
+
+/// Depth of a corner, metres: the mean of the valid pixels around it that belong to one surface; 0 when there
+/// are too few or they spread over a depth border.
+float corner_depth(const cv::Mat& depth, float x, float y);
+
+}  // namespace plumbline::features

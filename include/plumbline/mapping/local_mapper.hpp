@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Turns frames into keyframes and keeps the landmarks worth having (METHOD section 3).
+#include <memory>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/frame.hpp"
+#include "plumbline/tracking/surface_sampler.hpp"
+#include "plumbline/tracking/tracker.hpp"
+
+namespace plumbline::mapping {
+
+struct LocalMapperOptions {
+  double max_landmark_depth_m = 8.0;
+  double min_found_share = 0.3;
+  int min_visible = 10;
+  tracking::SurfaceSamplerOptions surface;
+  void declare(core::OptionTable& table);
+};
+
+class LocalMapper {
+ public:
+  LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera) : options_(options), camera_(camera) {}
+
+  /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth.
+  core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
+                          const std::shared_ptr<const features::FrameFeatures>& features,
+                          const tracking::TrackResult& track);
+
+  /// Counts which landmarks a tracked frame should have seen and did.
+  void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
+
+  /// Removes landmarks that were made lately and are seldom found where they should be.
+  void cull(maps::Map& map);
+
+ private:
+  void add_points(maps::Map& map, core::KeyframeId keyframe);
+  void add_lines(maps::Map& map, core::KeyframeId keyframe);
+
+  LocalMapperOptions options_;
+  sensor::Pinhole camera_;
+  std::vector<core::PointId> recent_points_;
+  std::vector<core::LineId> recent_lines_;
+};
+
+}  // namespace plumbline::mapping

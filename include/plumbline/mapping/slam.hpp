@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// One robot's SLAM: frames in, poses and a map out. Serial and deterministic.
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/mapping/keyframe_rule.hpp"
+#include "plumbline/mapping/local_mapper.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/tracking/tracker.hpp"
+
+namespace plumbline::mapping {
+
+struct SlamOptions {
+  tracking::TrackerOptions tracker;
+  KeyframeRuleOptions keyframe;
+  LocalMapperOptions mapper;
+  void declare(core::OptionTable& table);
+};
+
+/// What happened to one frame; one line of frames.csv.
+struct FrameReport {
+  std::int64_t frame_index = -1;
+  double stamp = 0.0;
+  tracking::TrackState state = tracking::TrackState::kLost;
+  core::KeyframeId reference;  ///< keyframe the pose is relative to
+  core::KeyframeId keyframe;   ///< made of this frame; invalid: none
+  optimize::FamilySummary points;
+  optimize::FamilySummary lines;
+  optimize::FamilySummary surface;
+  double min_eigenvalue = 0.0;
+  int weak_directions = 0;
+  bool relocalised = false;
+  KeyframeDecision decision;
+};
+
+class Slam {
+ public:
+  Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot, const core::Executor& executor,
+       core::Log& log);
+  ~Slam();
+
+  /// Frames in order of time. The features are kept when the frame becomes a keyframe.
+  FrameReport process(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features);
+  /// Ends what still runs beside the tracker; call once, after the last frame.
+  void finish();
+
+  [[nodiscard]] const maps::Map& map() const { return map_; }
+  /// Poses after optimisation: tracked frames only, in order of time.
+  [[nodiscard]] geometry::Trajectory trajectory() const;
+  [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
+  /// Line landmarks that enough keyframes have seen, as 3D segments in the world frame, metres.
+  [[nodiscard]] std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> line_segments() const;
+
+ private:
+  struct FramePose {
+    double stamp = 0.0;
+    core::KeyframeId reference;
+    geometry::Rigid3 camera_from_reference;
+    bool tracked = false;
+  };
+  void start_map(const sensor::RgbdFrame& frame, const std::shared_ptr<const features::FrameFeatures>& features,
+                 FrameReport& report);
+  void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
+
+  SlamOptions options_;
+  sensor::Pinhole camera_;
+  std::int32_t robot_;
+  core::Log* log_;
+  maps::Map map_;
+  tracking::Tracker tracker_;
+  KeyframeRule rule_;
+  LocalMapper mapper_;
+  std::vector<FramePose> frames_;
+};
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The map itself: keyframes, point and line landmarks, who sees what, and who sees the same. Data and its
+// rules; estimation lives elsewhere. One writer at a time; a const Map may be read by many threads.
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/ids.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/maps/id_map.hpp"
+
+namespace plumbline::maps {
+
+using core::KeyframeId;
+using core::LineId;
+using core::PointId;
+
+/// A piece of surface that a keyframe's depth image measured, in the keyframe's camera frame.
+struct SurfaceSample {
+  Eigen::Vector3f point = Eigen::Vector3f::Zero();    ///< metres
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< unit, towards the camera
+  float sigma = 0.01F;                                ///< metres, along the normal
+};
+
+/// What was measured at a keyframe; never changes after creation.
+struct Keyframe {
+  KeyframeId id;
+  std::int64_t frame_index = -1;
+  double stamp = 0.0;  ///< seconds
+  std::shared_ptr<const features::FrameFeatures> features;
+  std::vector<SurfaceSample> surface;  ///< well spread over directions and over the picture
+};
+
+/// Feature `feature` of keyframe `keyframe`.
+struct Observation {
+  KeyframeId keyframe;
+  int feature = -1;
+};
+
+struct MapPoint {
+  PointId id;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, metres
+  features::Descriptor256 descriptor{};                ///< the most typical of its observations
+  Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
+  double reference_distance = 1.0;  ///< metres from the camera of its first observation
+  int reference_octave = 0;         ///< in which octave it was seen there
+  std::vector<Observation> observations;
+  int visible = 0;  ///< frames whose view contained it
+  int found = 0;    ///< frames that matched it
+};
+
+struct MapLine {
+  LineId id;
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();  ///< world, metres
+  Eigen::Vector3d end = Eigen::Vector3d::Zero();
+  features::LineDescriptor descriptor{};
+  std::vector<Observation> observations;
+  int visible = 0;
+  int found = 0;
+};
+
+class Map {
+ public:
+  // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
+  KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe, const geometry::Rigid3& camera_from_world);
+  [[nodiscard]] KeyframeId next_keyframe_id(std::int32_t robot) const;
+  [[nodiscard]] bool has_keyframe(KeyframeId id) const { return keyframes_.contains(id); }
+  [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return *keyframes_.at(id).data; }
+  [[nodiscard]] const geometry::Rigid3& camera_from_world(KeyframeId id) const { return keyframes_.at(id).pose; }
+  void set_pose(KeyframeId id, const geometry::Rigid3& camera_from_world);
+  [[nodiscard]] std::vector<KeyframeId> keyframe_ids() const { return keyframes_.ids(); }
+  [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }
+
+  // Landmarks.
+  PointId add_point(std::int32_t robot, MapPoint point);
+  LineId add_line(std::int32_t robot, MapLine line);
+  void remove_point(PointId id);
+  void remove_line(LineId id);
+  [[nodiscard]] const MapPoint* find_point(PointId id) const { return points_.find(id); }
+  [[nodiscard]] const MapLine* find_line(LineId id) const { return lines_.find(id); }
+  [[nodiscard]] MapPoint& point(PointId id) { return points_.at(id); }
+  [[nodiscard]] MapLine& line(LineId id) { return lines_.at(id); }
+  [[nodiscard]] const MapPoint& point(PointId id) const { return points_.at(id); }
+  [[nodiscard]] const MapLine& line(LineId id) const { return lines_.at(id); }
+  [[nodiscard]] std::vector<PointId> point_ids() const { return points_.ids(); }
+  [[nodiscard]] std::vector<LineId> line_ids() const { return lines_.ids(); }
+  [[nodiscard]] std::size_t point_count() const { return points_.size(); }
+  [[nodiscard]] std::size_t line_count() const { return lines_.size(); }
+
+  // Observations. A feature sees at most one landmark; a keyframe sees a landmark with at most one feature:
+  // observe returns false and changes nothing otherwise.
+  bool observe(PointId point, KeyframeId keyframe, int feature);
+  bool observe(LineId line, KeyframeId keyframe, int feature);
+  void unobserve(PointId point, KeyframeId keyframe);
+  void unobserve(LineId line, KeyframeId keyframe);
+  /// Landmark that a keyframe's feature sees; an invalid id: none.
+  [[nodiscard]] PointId point_of(KeyframeId keyframe, int feature) const;
+  [[nodiscard]] LineId line_of(KeyframeId keyframe, int feature) const;
+  [[nodiscard]] const std::vector<PointId>& points_of(KeyframeId keyframe) const;
+  [[nodiscard]] const std::vector<LineId>& lines_of(KeyframeId keyframe) const;
+
+  /// Keyframes that share at least `min_shared` landmarks with `keyframe`, most first, ties by id. If there
+  /// are none, the ones that share most.
+  [[nodiscard]] std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId keyframe, int min_shared) const;
+
+  /// Recomputes view direction and the most typical descriptor from the observations.
+  void refresh_point(PointId id);
+
+ private:
+  struct KeyframeEntry {
+    std::shared_ptr<const Keyframe> data;
+    geometry::Rigid3 pose;
+    std::vector<PointId> points;  ///< by feature
+    std::vector<LineId> lines;    ///< by feature
+    std::map<KeyframeId, int> shared;
+  };
+  void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
+
+  IdMap<KeyframeId, KeyframeEntry> keyframes_;
+  IdMap<PointId, MapPoint> points_;
+  IdMap<LineId, MapLine> lines_;
+};
+
+}  // namespace plumbline::maps

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which features of a frame are which landmarks of the local map, given a guess of the pose.
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/optimize/pose_solver.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "plumbline/tracking/local_map.hpp"
+
+namespace plumbline::tracking {
+
+struct PointMatch {
+  core::PointId point;
+  int feature = -1;
+  int distance = 256;
+};
+struct LineMatch {
+  core::LineId line;
+  int feature = -1;
+  int distance = 256;
+};
+
+struct AssociationOptions {
+  int max_hamming = 64;
+  double ratio = 0.9;
+  double scale_factor = 1.2;  ///< of the ORB pyramid
+  int max_line_hamming = 90;
+  double max_line_angle_rad = 0.2;
+  void declare(core::OptionTable& table);
+};
+
+/// Point landmarks by projection: within `radius` pixels (grown with the octave), of a fitting octave, seen from
+/// a fitting side, best and clearly better than the second best, each feature used once. `visible` receives the
+/// landmarks inside the view.
+std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,
+                                     const features::FrameFeatures& frame, const sensor::Pinhole& camera,
+                                     const geometry::Rigid3& camera_from_world, double radius,
+                                     const AssociationOptions& options, std::vector<core::PointId>* visible);
+
+/// Line landmarks by projection: near in distance and angle, overlapping, and alike in descriptor.
+std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core::LineId>& lines,
+                                   const features::FrameFeatures& frame, const sensor::Pinhole& camera,
+                                   const geometry::Rigid3& camera_from_world, double radius,
+                                   const AssociationOptions& options, std::vector<core::LineId>* visible);
+
+struct SurfaceAssociationOptions {
+  double max_distance_m = 0.10;  ///< measured point from the tangent plane
+  int max_samples = 2000;
+  double max_depth_m = 6.0;
+};
+
+/// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, the depth
+/// measured there is the point that should lie on its tangent plane. `depth_from_camera` carries the camera of the
+/// colour picture to that of the depth picture (they are stamped apart); the measured points come back in the
+/// colour camera's frame.
+std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface, const cv::Mat& depth,
+                                                   const sensor::Pinhole& camera,
+                                                   const geometry::Rigid3& camera_from_world,
+                                                   const geometry::Rigid3& depth_from_camera,
+                                                   const SurfaceAssociationOptions& options);
+
+}  // namespace plumbline::tracking

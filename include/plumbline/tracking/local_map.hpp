@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The part of the map that the camera can be expected to see.
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::tracking {
+
+/// A surface sample in world coordinates.
+struct WorldSurface {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double sigma = 0.01;
+};
+
+struct LocalMapOptions {
+  int keyframes = 12;          ///< whose landmarks are tracked
+  int surface_keyframes = 4;   ///< whose surfaces are aligned to
+  double overlap_angle_rad = 0.6;
+  void declare(core::OptionTable& table);
+};
+
+struct LocalMap {
+  core::KeyframeId reference;
+  std::vector<core::KeyframeId> keyframes;  ///< the reference first
+  std::vector<core::PointId> points;        ///< sorted, unique
+  std::vector<core::LineId> lines;
+  std::vector<WorldSurface> surface;        ///< interleaved, so that any prefix is spread over all keyframes
+};
+
+/// Keyframes that share landmarks with `reference`, filled up with those that were made last and look the same
+/// way (where there is no texture, nothing else tells that they overlap); their landmarks and surfaces.
+LocalMap build_local_map(const maps::Map& map, core::KeyframeId reference, const LocalMapOptions& options);
+
+}  // namespace plumbline::tracking

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Pose of every frame against the map: predict, guess, associate, estimate points, lines and depth together
+// (METHOD sections 1 and 2). Sees a const map; what changes the map is in mapping.
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/optimize/pose_solver.hpp"
+#include "plumbline/sensor/frame.hpp"
+#include "plumbline/tracking/association.hpp"
+#include "plumbline/tracking/local_map.hpp"
+#include "plumbline/tracking/relocalise.hpp"
+
+namespace plumbline::tracking {
+
+enum class TrackState { kInitialising, kTracked, kLost };
+const char* to_string(TrackState state);
+
+struct TrackerOptions {
+  bool points = true;
+  bool lines = true;
+  bool depth = true;
+  bool align_stamps = true;
+  int min_inliers = 15;
+  int min_surface = 300;
+  AssociationOptions association;
+  LocalMapOptions local_map;
+  optimize::PoseSolverOptions solver;
+  void declare(core::OptionTable& table);
+};
+
+/// What the tracker found out about one frame.
+struct TrackResult {
+  TrackState state = TrackState::kLost;
+  geometry::Rigid3 camera_from_world;
+  std::vector<PointMatch> points;  ///< inliers
+  std::vector<LineMatch> lines;
+  std::vector<core::PointId> visible_points;  ///< landmarks that should have been seen
+  std::vector<core::LineId> visible_lines;
+  optimize::PoseSummary estimate;
+  double surface_share = 0.0;   ///< share of the local surface in view that the depth image confirms
+  double min_eigenvalue = 0.0;  ///< of the information matrix, 1/m^2 after scaling rotations by the scene's depth
+  int weak_directions = 0;      ///< of six, that nothing but the motion model holds
+  bool relocalised = false;
+};
+
+class Tracker {
+ public:
+  Tracker(const TrackerOptions& options, const sensor::Pinhole& camera);
+
+  /// The frame is localised against `map`; `reference` is the keyframe whose surroundings are expected in view.
+  /// An empty map gives kInitialising.
+  TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame,
+                    const features::FrameFeatures& features);
+
+  /// The map has changed (keyframe added, poses corrected). `corrected_from_old`: where the last pose went.
+  void map_changed(const maps::Map& map, core::KeyframeId reference, const geometry::Rigid3& last_camera_from_world);
+
+  [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
+  [[nodiscard]] const LocalMap& local_map() const { return local_map_; }
+
+ private:
+  struct Last {
+    double stamp = 0.0;
+    geometry::Rigid3 camera_from_world;
+    cv::Mat thumbnail;
+    cv::Mat thumbnail_depth;
+    bool valid = false;
+  };
+  struct Attempt;
+
+  [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
+  [[nodiscard]] std::vector<geometry::Rigid3> guesses(const features::FrameFeatures& features, double stamp) const;
+  [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                     const features::FrameFeatures& features, const geometry::Rigid3& guess,
+                                     double radius) const;
+  [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
+  [[nodiscard]] bool trustworthy(const TrackResult& result, const features::FrameFeatures& features) const;
+  void judge(const features::FrameFeatures& features, TrackResult& result) const;
+  void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features, const TrackResult& result);
+
+  TrackerOptions options_;
+  sensor::Pinhole camera_;
+  LocalMap local_map_;
+  Last last_;
+  geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
+  int lost_frames_ = 0;
+};
+
+}  // namespace plumbline::tracking

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/map.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace plumbline::maps {
+namespace {
+
+bool seen_by(const std::vector<Observation>& observations, KeyframeId keyframe) {
+  return std::any_of(observations.begin(), observations.end(),
+                     [&](const Observation& o) { return o.keyframe == keyframe; });
+}
+
+int take(std::vector<Observation>& observations, KeyframeId keyframe) {
+  const auto found = std::find_if(observations.begin(), observations.end(),
+                                  [&](const Observation& o) { return o.keyframe == keyframe; });
+  if (found == observations.end()) return -1;
+  const int feature = found->feature;
+  observations.erase(found);
+  return feature;
+}
+
+}  // namespace
+
+KeyframeId Map::next_keyframe_id(std::int32_t robot) const { return keyframes_.next_id(robot); }
+
+KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe, const geometry::Rigid3& camera_from_world) {
+  if (keyframe == nullptr || !keyframe->id.valid()) throw std::invalid_argument("add_keyframe: no id");
+  const KeyframeId id = keyframe->id;
+  KeyframeEntry entry;
+  if (keyframe->features != nullptr) {
+    entry.points.resize(keyframe->features->points.size());
+    entry.lines.resize(keyframe->features->lines.size());
+  }
+  entry.data = std::move(keyframe);
+  entry.pose = camera_from_world;
+  keyframes_.insert(id, std::move(entry));
+  return id;
+}
+
+void Map::set_pose(KeyframeId id, const geometry::Rigid3& camera_from_world) {
+  keyframes_.at(id).pose = camera_from_world;
+}
+
+PointId Map::add_point(std::int32_t robot, MapPoint point) {
+  point.id = points_.next_id(robot);
+  point.observations.clear();
+  const PointId id = point.id;
+  points_.insert(id, std::move(point));
+  return id;
+}
+
+LineId Map::add_line(std::int32_t robot, MapLine line) {
+  line.id = lines_.next_id(robot);
+  line.observations.clear();
+  const LineId id = line.id;
+  lines_.insert(id, std::move(line));
+  return id;
+}
+
+void Map::remove_point(PointId id) {
+  if (!points_.contains(id)) return;
+  const std::vector<Observation> observations = points_.at(id).observations;
+  for (const Observation& o : observations) unobserve(id, o.keyframe);
+  points_.erase(id);
+}
+
+void Map::remove_line(LineId id) {
+  if (!lines_.contains(id)) return;
+  const std::vector<Observation> observations = lines_.at(id).observations;
+  for (const Observation& o : observations) unobserve(id, o.keyframe);
+  lines_.erase(id);
+}
+
+void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int change) {
+  KeyframeEntry& entry = keyframes_.at(keyframe);
+  for (const Observation& o : others) {
+    if (o.keyframe == keyframe) continue;
+    KeyframeEntry& other = keyframes_.at(o.keyframe);
+    const int shared = (entry.shared[o.keyframe] += change);
+    other.shared[keyframe] = shared;
+    if (shared == 0) {
+      entry.shared.erase(o.keyframe);
+      other.shared.erase(keyframe);
+    }
+  }
+}
+
+bool Map::observe(PointId id, KeyframeId keyframe, int feature) {
+  MapPoint& p = points_.at(id);
+  PointId& slot = keyframes_.at(keyframe).points.at(static_cast<std::size_t>(feature));
+  if (slot.valid() || seen_by(p.observations, keyframe)) return false;
+  share(p.observations, keyframe, +1);
+  p.observations.push_back({keyframe, feature});
+  slot = id;
+  return true;
+}
+
+bool Map::observe(LineId id, KeyframeId keyframe, int feature) {
+  MapLine& l = lines_.at(id);
+  LineId& slot = keyframes_.at(keyframe).lines.at(static_cast<std::size_t>(feature));
+  if (slot.valid() || seen_by(l.observations, keyframe)) return false;
+  share(l.observations, keyframe, +1);
+  l.observations.push_back({keyframe, feature});
+  slot = id;
+  return true;
+}
+
+void Map::unobserve(PointId id, KeyframeId keyframe) {
+  MapPoint& p = points_.at(id);
+  const int feature = take(p.observations, keyframe);
+  if (feature < 0) return;
+  keyframes_.at(keyframe).points[static_cast<std::size_t>(feature)] = PointId{};
+  share(p.observations, keyframe, -1);
+}
+
+void Map::unobserve(LineId id, KeyframeId keyframe) {
+  MapLine& l = lines_.at(id);
+  const int feature = take(l.observations, keyframe);
+  if (feature < 0) return;
+  keyframes_.at(keyframe).lines[static_cast<std::size_t>(feature)] = LineId{};
+  share(l.observations, keyframe, -1);
+}
+
+PointId Map::point_of(KeyframeId keyframe, int feature) const {
+  return keyframes_.at(keyframe).points.at(static_cast<std::size_t>(feature));
+}
+LineId Map::line_of(KeyframeId keyframe, int feature) const {
+  return keyframes_.at(keyframe).lines.at(static_cast<std::size_t>(feature));
+}
+const std::vector<PointId>& Map::points_of(KeyframeId keyframe) const { return keyframes_.at(keyframe).points; }
+const std::vector<LineId>& Map::lines_of(KeyframeId keyframe) const { return keyframes_.at(keyframe).lines; }
+
+std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int min_shared) const {
+  const auto& shared = keyframes_.at(keyframe).shared;
+  std::vector<std::pair<KeyframeId, int>> result(shared.begin(), shared.end());
+  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  if (result.empty()) return result;
+  const int threshold = std::min(min_shared, result.front().second);
+  while (result.back().second < threshold) result.pop_back();
+  return result;
+}
+
+void Map::refresh_point(PointId id) {
+  MapPoint& p = points_.at(id);
+  if (p.observations.empty()) return;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  std::vector<const features::Descriptor256*> descriptors;
+  for (const Observation& o : p.observations) {
+    const KeyframeEntry& entry = keyframes_.at(o.keyframe);
+    direction += (p.position - entry.pose.inverse().translation).normalized();
+    descriptors.push_back(&entry.data->features->descriptors[static_cast<std::size_t>(o.feature)]);
+  }
+  if (direction.norm() > 1e-9) p.view_direction = direction.normalized();
+  // The descriptor with the least sum of distances to the others.
+  int best_sum = -1;
+  for (const auto* candidate : descriptors) {
+    int sum = 0;
+    for (const auto* other : descriptors) sum += features::hamming_distance(*candidate, *other);
+    if (best_sum < 0 || sum < best_sum) {
+      best_sum = sum;
+      p.descriptor = *candidate;
+    }
+  }
+}
+
+}  // namespace plumbline::maps

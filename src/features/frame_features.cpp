@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/features/frame_features.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "plumbline/features/line_border.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::features {
+namespace {
+
+/// Blurred small grey picture: blur and noise of the original hardly show in it.
+cv::Mat make_thumbnail(const cv::Mat& gray) {
+  const cv::Size size(kThumbnailWidth, std::max(1, gray.rows * kThumbnailWidth / std::max(1, gray.cols)));
+  cv::Mat small;
+  cv::resize(gray, small, size, 0, 0, cv::INTER_AREA);
+  cv::Mat result;
+  small.convertTo(result, CV_32F);
+  cv::GaussianBlur(result, result, {3, 3}, 0.8);
+  return result;
+}
+
+/// Depth at the middle of each thumbnail pixel: the median of a few samples, never a mix over a border.
+cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
+  cv::Mat result(size, CV_32FC1, cv::Scalar(0));
+  if (depth.empty()) return result;
+  const float step_x = static_cast<float>(depth.cols) / static_cast<float>(size.width);
+  const float step_y = static_cast<float>(depth.rows) / static_cast<float>(size.height);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      std::array<float, 5> found{};
+      std::size_t count = 0;
+      for (const auto& [dx, dy] : {std::pair{0.5F, 0.5F}, {0.25F, 0.5F}, {0.75F, 0.5F}, {0.5F, 0.25F}, {0.5F, 0.75F}}) {
+        const int px = std::min(depth.cols - 1, static_cast<int>((static_cast<float>(x) + dx) * step_x));
+        const int py = std::min(depth.rows - 1, static_cast<int>((static_cast<float>(y) + dy) * step_y));
+        const float z = depth.at<float>(py, px);
+        if (z > 0.0F) found[count++] = z;
+      }
+      if (count < 3) continue;
+      std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
+      result.at<float>(y, x) = found[count / 2];
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+PointGrid::PointGrid(const std::vector<PointFeature>& points, int width, int height)
+    : columns_(std::max(1, (width + kCell - 1) / kCell)), rows_(std::max(1, (height + kCell - 1) / kCell)) {
+  const auto cell_of = [&](const PointFeature& p) {
+    const int c = std::clamp(static_cast<int>(p.pixel.x()) / kCell, 0, columns_ - 1);
+    const int r = std::clamp(static_cast<int>(p.pixel.y()) / kCell, 0, rows_ - 1);
+    return static_cast<std::size_t>(r * columns_ + c);
+  };
+  begin_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
+  for (const PointFeature& p : points) ++begin_[cell_of(p) + 1];
+  for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
+  order_.resize(points.size());
+  std::vector<int> next(begin_.begin(), begin_.end() - 1);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    order_[static_cast<std::size_t>(next[cell_of(points[i])]++)] = static_cast<int>(i);
+  }
+}
+
+void PointGrid::within(const std::vector<PointFeature>& points, float x, float y, float radius,
+                       std::vector<int>& indices) const {
+  if (columns_ == 0) return;
+  const auto cell = [](float v, int count) {
+    return std::clamp(static_cast<int>(std::floor(v / static_cast<float>(kCell))), 0, count - 1);
+  };
+  const float radius_sq = radius * radius;
+  for (int r = cell(y - radius, rows_); r <= cell(y + radius, rows_); ++r) {
+    for (int c = cell(x - radius, columns_); c <= cell(x + radius, columns_); ++c) {
+      const auto k = static_cast<std::size_t>(r * columns_ + c);
+      for (int i = begin_[k]; i < begin_[k + 1]; ++i) {
+        const int index = order_[static_cast<std::size_t>(i)];
+        const Eigen::Vector2f& p = points[static_cast<std::size_t>(index)].pixel;
+        const float dx = p.x() - x;
+        const float dy = p.y() - y;
+        if (dx * dx + dy * dy <= radius_sq) indices.push_back(index);
+      }
+    }
+  }
+}
+
+float corner_depth(const cv::Mat& depth, float x, float y) {
+  if (depth.empty()) return 0.0F;
+  const int cx = cvRound(x);
+  const int cy = cvRound(y);
+  constexpr int kRadius = 2;
+  float nearest = 1e30F;
+  float farthest = 0.0F;
+  float sum = 0.0F;
+  int count = 0;
+  for (int v = std::max(0, cy - kRadius); v <= std::min(depth.rows - 1, cy + kRadius); ++v) {
+    const float* row = depth.ptr<float>(v);
+    for (int u = std::max(0, cx - kRadius); u <= std::min(depth.cols - 1, cx + kRadius); ++u) {
+      const float z = row[u];
+      if (!(z > 0.0F)) continue;
+      nearest = std::min(nearest, z);
+      farthest = std::max(farthest, z);
+      sum += z;
+      ++count;
+    }
+  }
+  if (count < 8) return 0.0F;
+  const double tolerance = 0.01 * nearest + 6.0 * sensor::depth_sigma(nearest);
+  if (farthest - nearest > tolerance) return 0.0F;
+  return sum / static_cast<float>(count);
+}
+
+void FeatureOptions::declare(core::OptionTable& table) {
+  table.boolean("points", points, "Extract ORB points");
+  table.boolean("lines", lines, "Extract lines");
+  orb.declare(table);
+  line.declare(table);
+}
+
+FeatureExtractor::FeatureExtractor(const FeatureOptions& options, const sensor::Pinhole& camera)
+    : options_(options), camera_(camera), orb_(options.orb), lines_(options.line) {}
+
+FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
+  FrameFeatures result;
+  if (frame.gray.empty()) return result;
+  if (options_.points) {
+    OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
+    for (PointFeature& p : orb.points) p.depth = corner_depth(frame.depth, p.pixel.x(), p.pixel.y());
+    result.points = std::move(orb.points);
+    result.descriptors = std::move(orb.descriptors);
+  }
+  result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
+  if (options_.lines) result.lines = lines_.extract(frame.gray, frame.depth, camera_);
+  result.thumbnail = make_thumbnail(frame.gray);
+  result.thumbnail_depth = make_thumbnail_depth(frame.depth, result.thumbnail.size());
+  return result;
+}
+
+}  // namespace plumbline::features

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/local_mapper.hpp"
+
+#include <algorithm>
+
+namespace plumbline::mapping {
+
+void LocalMapperOptions::declare(core::OptionTable& table) {
+  table.number("landmark.max_depth", max_landmark_depth_m, {0.5, 100.0}, "m",
+               "Landmarks are made of depth up to here");
+  table.number("landmark.min_found", min_found_share, {0.0, 1.0}, "",
+               "Landmarks found in a smaller share of the frames that should see them are removed");
+  table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
+                "Frames that should have seen a landmark before it is judged");
+  surface.declare(table);
+}
+
+core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
+                                     const std::shared_ptr<const features::FrameFeatures>& features,
+                                     const tracking::TrackResult& track) {
+  auto keyframe = std::make_shared<maps::Keyframe>();
+  keyframe->id = map.next_keyframe_id(robot);
+  keyframe->frame_index = frame.index;
+  keyframe->stamp = frame.stamp;
+  keyframe->features = features;
+  keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
+  const core::KeyframeId id = map.add_keyframe(keyframe, track.camera_from_world);
+  for (const tracking::PointMatch& m : track.points) {
+    if (map.observe(m.point, id, m.feature)) map.refresh_point(m.point);
+  }
+  for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
+  add_points(map, id);
+  add_lines(map, id);
+  return id;
+}
+
+void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
+  const features::FrameFeatures& features = *map.keyframe(id).features;
+  const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
+  for (std::size_t i = 0; i < features.points.size(); ++i) {
+    const features::PointFeature& f = features.points[i];
+    if (!(f.depth > 0.0F) || static_cast<double>(f.depth) > options_.max_landmark_depth_m) continue;
+    if (map.point_of(id, static_cast<int>(i)).valid()) continue;
+    maps::MapPoint point;
+    const Eigen::Vector3d in_camera = camera_.unproject(static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), static_cast<double>(f.depth));
+    point.position = world_from_camera * in_camera;
+    point.descriptor = features.descriptors[i];
+    point.view_direction = (point.position - world_from_camera.translation).normalized();
+    point.reference_distance = in_camera.norm();
+    point.reference_octave = f.octave;
+    point.visible = 1;
+    point.found = 1;
+    const core::PointId point_id = map.add_point(id.robot, point);
+    map.observe(point_id, id, static_cast<int>(i));
+    recent_points_.push_back(point_id);
+  }
+}
+
+void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
+  const features::FrameFeatures& features = *map.keyframe(id).features;
+  const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
+  for (std::size_t i = 0; i < features.lines.size(); ++i) {
+    const features::LineFeature& f = features.lines[i];
+    if (!f.line3 || map.line_of(id, static_cast<int>(i)).valid()) continue;
+    if (std::max(f.line3->start.z(), f.line3->end.z()) > options_.max_landmark_depth_m) continue;
+    maps::MapLine line;
+    line.start = world_from_camera * f.line3->start;
+    line.end = world_from_camera * f.line3->end;
+    line.descriptor = f.descriptor;
+    line.visible = 1;
+    line.found = 1;
+    const core::LineId line_id = map.add_line(id.robot, line);
+    map.observe(line_id, id, static_cast<int>(i));
+    recent_lines_.push_back(line_id);
+  }
+}
+
+void LocalMapper::count_sightings(maps::Map& map, const tracking::TrackResult& track) const {
+  for (core::PointId id : track.visible_points) ++map.point(id).visible;
+  for (core::LineId id : track.visible_lines) ++map.line(id).visible;
+  for (const tracking::PointMatch& m : track.points) ++map.point(m.point).found;
+  for (const tracking::LineMatch& m : track.lines) ++map.line(m.line).found;
+}
+
+void LocalMapper::cull(maps::Map& map) {
+  const auto seldom = [&](int found, int visible) {
+    return visible >= options_.min_visible && found < options_.min_found_share * visible;
+  };
+  // A landmark is judged once it should have been seen often enough; then it stays.
+  std::vector<core::PointId> points;
+  for (core::PointId id : recent_points_) {
+    const maps::MapPoint* p = map.find_point(id);
+    if (p == nullptr) continue;
+    if (seldom(p->found, p->visible)) {
+      map.remove_point(id);
+    } else if (p->visible < 3 * options_.min_visible) {
+      points.push_back(id);
+    }
+  }
+  recent_points_ = std::move(points);
+  std::vector<core::LineId> lines;
+  for (core::LineId id : recent_lines_) {
+    const maps::MapLine* l = map.find_line(id);
+    if (l == nullptr) continue;
+    if (seldom(l->found, l->visible)) {
+      map.remove_line(id);
+    } else if (l->visible < 3 * options_.min_visible) {
+      lines.push_back(id);
+    }
+  }
+  recent_lines_ = std::move(lines);
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/slam.hpp"
+
+#include <utility>
+
+namespace plumbline::mapping {
+
+using geometry::Rigid3;
+
+void SlamOptions::declare(core::OptionTable& table) {
+  tracker.declare(table);
+  keyframe.declare(table);
+  mapper.declare(table);
+}
+
+Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
+           const core::Executor& /*executor*/, core::Log& log)
+    : options_(options),
+      camera_(camera),
+      robot_(robot),
+      log_(&log),
+      tracker_(options.tracker, camera),
+      rule_(options.keyframe),
+      mapper_(options.mapper, camera) {}
+
+Slam::~Slam() = default;
+
+void Slam::start_map(const sensor::RgbdFrame& frame, const std::shared_ptr<const features::FrameFeatures>& features,
+                     FrameReport& report) {
+  tracking::TrackResult origin;
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin);
+  report.reference = report.keyframe;
+  report.state = tracking::TrackState::kTracked;
+  rule_.keyframe_made();
+  tracker_.map_changed(map_, report.keyframe, origin.camera_from_world);
+}
+
+FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features) {
+  FrameReport report;
+  report.frame_index = frame.index;
+  report.stamp = frame.stamp;
+  const tracking::TrackResult track = tracker_.track(map_, frame, *features);
+  report.state = track.state;
+  if (track.state == tracking::TrackState::kInitialising) {
+    start_map(frame, features, report);
+    remember_pose(frame.stamp, Rigid3{}, true);
+    return report;
+  }
+  report.reference = tracker_.reference();
+  report.points = track.estimate.points;
+  report.lines = track.estimate.lines;
+  report.surface = track.estimate.planes;
+  report.min_eigenvalue = track.min_eigenvalue;
+  report.weak_directions = track.weak_directions;
+  report.relocalised = track.relocalised;
+  const bool tracked = track.state == tracking::TrackState::kTracked;
+  if (tracked) {
+    mapper_.count_sightings(map_, track);
+    report.decision = rule_.decide(map_, tracker_.reference(), track, camera_);
+    if (report.decision.wanted) {
+      report.keyframe = mapper_.insert(map_, robot_, frame, features, track);
+      report.reference = report.keyframe;
+      mapper_.cull(map_);
+      rule_.keyframe_made();
+      tracker_.map_changed(map_, report.keyframe, track.camera_from_world);
+    }
+  }
+  remember_pose(frame.stamp, track.camera_from_world, tracked);
+  return report;
+}
+
+void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
+  const core::KeyframeId reference = tracker_.reference();
+  frames_.push_back({stamp, reference, camera_from_world * map_.camera_from_world(reference).inverse(), tracked});
+}
+
+void Slam::finish() {}
+
+geometry::Trajectory Slam::trajectory() const {
+  geometry::Trajectory result;
+  for (const FramePose& frame : frames_) {
+    if (!frame.tracked) continue;
+    const Rigid3 camera_from_world = frame.camera_from_reference * map_.camera_from_world(frame.reference);
+    result.push_back({frame.stamp, camera_from_world.inverse()});
+  }
+  return result;
+}
+
+geometry::Trajectory Slam::keyframe_trajectory() const {
+  geometry::Trajectory result;
+  for (core::KeyframeId id : map_.keyframe_ids()) {
+    result.push_back({map_.keyframe(id).stamp, map_.camera_from_world(id).inverse()});
+  }
+  return result;
+}
+
+std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> Slam::line_segments() const {
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> result;
+  for (core::LineId id : map_.line_ids()) {
+    const maps::MapLine& line = map_.line(id);
+    if (line.observations.size() >= 2) result.emplace_back(line.start, line.end);
+  }
+  return result;
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/optimize/pose_solver.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace plumbline::optimize {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::Rigid3;
+using geometry::Vector6d;
+
+struct NormalEquations {
+  Matrix6d h = Matrix6d::Zero();  ///< lower triangle
+  Vector6d g = Vector6d::Zero();
+  double cost = 0.0;
+};
+
+/// Huber: cost and weight of a squared error in standard deviations.
+struct Robust {
+  double cost;
+  double weight;
+};
+Robust huber(double squared, double threshold) {
+  const double error = std::sqrt(squared);
+  if (error <= threshold) return {0.5 * squared, 1.0};
+  return {threshold * (error - 0.5 * threshold), threshold / error};
+}
+
+void add_row(const Row6& j, double r, double w, NormalEquations& n) {
+  for (int a = 0; a < 6; ++a) {
+    const double wa = w * j(a);
+    for (int b = 0; b <= a; ++b) n.h(a, b) += wa * j(b);
+    n.g(a) += wa * r;
+  }
+}
+
+template <bool kDerivatives>
+NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options) {
+  NormalEquations n;
+  Eigen::Matrix<double, 3, 6> j3;
+  Eigen::Matrix<double, 2, 6> j2;
+  Row6 j1;
+  for (const PointTerm& term : problem.points) {
+    Eigen::Vector3d r;
+    const int rows = point_residual(term, pose, problem.camera, r, kDerivatives ? &j3 : nullptr);
+    if (rows == 0) continue;
+    const Robust pixel = huber(r.head<2>().squaredNorm(), options.point_loss);
+    n.cost += options.point_weight * pixel.cost;
+    double depth_weight = 0.0;
+    if (rows == 3) {
+      const Robust depth = huber(r(2) * r(2), options.plane_loss);
+      // A corner whose picture does not fit has no say about depth either.
+      depth_weight = options.point_weight * depth.weight * pixel.weight;
+      n.cost += options.point_weight * depth.cost;
+    }
+    if constexpr (kDerivatives) {
+      add_row(j3.row(0), r(0), options.point_weight * pixel.weight, n);
+      add_row(j3.row(1), r(1), options.point_weight * pixel.weight, n);
+      if (rows == 3) add_row(j3.row(2), r(2), depth_weight, n);
+    }
+  }
+  const Eigen::Matrix3d projection =
+      geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx, problem.camera.cy);
+  for (const LineTerm& term : problem.lines) {
+    Eigen::Vector2d r;
+    if (!line_residual(term, pose, projection, r, kDerivatives ? &j2 : nullptr)) continue;
+    const Robust robust = huber(r.squaredNorm(), options.line_loss);
+    n.cost += options.line_weight * robust.cost;
+    if constexpr (kDerivatives) {
+      add_row(j2.row(0), r(0), options.line_weight * robust.weight, n);
+      add_row(j2.row(1), r(1), options.line_weight * robust.weight, n);
+    }
+  }
+  for (const PlaneTerm& term : problem.planes) {
+    const double r = plane_residual(term, pose, kDerivatives ? &j1 : nullptr);
+    const Robust robust = huber(r * r, options.plane_loss);
+    n.cost += options.plane_weight * robust.cost;
+    if constexpr (kDerivatives) add_row(j1, r, options.plane_weight * robust.weight, n);
+  }
+  return n;
+}
+
+/// The prior's cost; the derivative of log(Exp(xi) T M^-1) by xi is taken as identity (small differences).
+void add_prior(const PoseProblem& problem, const Rigid3& pose, NormalEquations& n) {
+  if (!problem.prior) return;
+  const Vector6d e = geometry::log_se3(pose * problem.prior->camera_from_world.inverse());
+  const Vector6d g = problem.prior->information * e;
+  n.cost += 0.5 * e.dot(g);
+  n.g += g;
+  n.h += problem.prior->information;
+}
+
+FamilySummary summarise(const std::vector<double>& squared, double gate_sq) {
+  FamilySummary s;
+  s.terms = static_cast<int>(squared.size());
+  double sum = 0.0;
+  for (double e : squared) {
+    if (!(e <= gate_sq)) continue;
+    ++s.inliers;
+    sum += e;
+  }
+  if (s.inliers > 0) s.rms = std::sqrt(sum / s.inliers);
+  return s;
+}
+
+}  // namespace
+
+void PoseSolverOptions::declare(core::OptionTable& table) {
+  table.integer("solver.max_iterations", max_iterations, {1, 100}, "", "Levenberg-Marquardt iterations at most");
+  table.number("solver.point_loss", point_loss, {0.1, 100.0}, "", "Huber threshold of points, standard deviations");
+  table.number("solver.line_loss", line_loss, {0.1, 100.0}, "", "Huber threshold of lines, standard deviations");
+  table.number("solver.plane_loss", plane_loss, {0.1, 100.0}, "", "Huber threshold of depth, standard deviations");
+  table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
+  table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
+  table.number("solver.plane_weight", plane_weight, {0.0, 100.0}, "", "Weight of all depth samples together");
+}
+
+PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_world, const PoseSolverOptions& options) {
+  PoseSummary summary;
+  Rigid3 pose = camera_from_world;
+  NormalEquations n = evaluate<true>(problem, pose, options);
+  const Matrix6d information_at_start = n.h;
+  summary.information = information_at_start;
+  add_prior(problem, pose, n);
+  summary.initial_cost = n.cost;
+  double lambda = 1e-5;
+  for (; summary.iterations < options.max_iterations; ++summary.iterations) {
+    Matrix6d damped = n.h.selfadjointView<Eigen::Lower>();
+    damped.diagonal() += lambda * n.h.diagonal() + Vector6d::Constant(1e-9);
+    const Vector6d step = -damped.ldlt().solve(n.g);
+    if (!step.allFinite()) break;
+    const Rigid3 trial = geometry::exp_se3(step) * pose;
+    NormalEquations at_trial = evaluate<true>(problem, trial, options);
+    const Matrix6d information = at_trial.h;
+    add_prior(problem, trial, at_trial);
+    if (at_trial.cost <= n.cost) {
+      pose = trial;
+      n = at_trial;
+      summary.information = information;
+      lambda = std::max(1e-9, lambda * 0.1);
+      if (step.cwiseAbs().maxCoeff() < options.min_step) {
+        summary.converged = true;
+        break;
+      }
+    } else {
+      lambda *= 10.0;
+      if (lambda > 1e6 || step.cwiseAbs().maxCoeff() < options.min_step) {
+        summary.converged = true;
+        break;
+      }
+    }
+  }
+  summary.information = summary.information.selfadjointView<Eigen::Lower>();
+  summary.camera_from_world = pose;
+  summary.final_cost = n.cost;
+  constexpr double kGateSq = 9.0;
+  summary.points = summarise(point_errors(problem, pose), kGateSq);
+  summary.lines = summarise(line_errors(problem, pose), kGateSq);
+  std::vector<double> planes;
+  planes.reserve(problem.planes.size());
+  for (const PlaneTerm& term : problem.planes) {
+    const double r = plane_residual(term, pose, nullptr);
+    planes.push_back(r * r);
+  }
+  summary.planes = summarise(planes, kGateSq);
+  return summary;
+}
+
+std::vector<double> point_errors(const PoseProblem& problem, const Rigid3& camera_from_world) {
+  std::vector<double> errors;
+  errors.reserve(problem.points.size());
+  for (const PointTerm& term : problem.points) {
+    Eigen::Vector3d r;
+    const int rows = point_residual(term, camera_from_world, problem.camera, r, nullptr);
+    errors.push_back(rows == 0 ? std::numeric_limits<double>::infinity() : r.head<2>().squaredNorm());
+  }
+  return errors;
+}
+
+std::vector<double> line_errors(const PoseProblem& problem, const Rigid3& camera_from_world) {
+  const Eigen::Matrix3d projection =
+      geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx, problem.camera.cy);
+  std::vector<double> errors;
+  errors.reserve(problem.lines.size());
+  for (const LineTerm& term : problem.lines) {
+    Eigen::Vector2d r;
+    const bool valid = line_residual(term, camera_from_world, projection, r, nullptr);
+    errors.push_back(valid ? r.squaredNorm() : std::numeric_limits<double>::infinity());
+  }
+  return errors;
+}
+
+}  // namespace plumbline::optimize

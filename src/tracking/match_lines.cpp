@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/features/line_match.hpp"
+#include "plumbline/tracking/association.hpp"
+
+namespace plumbline::tracking {
+namespace {
+
+/// Image of a 3D segment, cut off at the near plane; false when it is not in the picture.
+bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_from_world,
+                     const sensor::Pinhole& camera, features::LineSegment& segment) {
+  constexpr double kNear = 0.1;  // metres
+  Eigen::Vector3d a = camera_from_world * line.start;
+  Eigen::Vector3d b = camera_from_world * line.end;
+  if (a.z() < kNear && b.z() < kNear) return false;
+  if (a.z() < kNear) a += (b - a) * ((kNear - a.z()) / (b.z() - a.z()));
+  if (b.z() < kNear) b += (a - b) * ((kNear - b.z()) / (a.z() - b.z()));
+  segment.start = camera.project(a).cast<float>();
+  segment.end = camera.project(b).cast<float>();
+  const Eigen::Vector2f low = segment.start.cwiseMin(segment.end);
+  const Eigen::Vector2f high = segment.start.cwiseMax(segment.end);
+  return high.x() > 0.0F && high.y() > 0.0F && low.x() < static_cast<float>(camera.width) &&
+         low.y() < static_cast<float>(camera.height) && segment.length() > 10.0F;
+}
+
+float line_distance(const features::LineSegment& line, const Eigen::Vector2f& p) {
+  const Eigen::Vector2f d = line.direction();
+  const Eigen::Vector2f r = p - line.start;
+  return std::abs(d.x() * r.y() - d.y() * r.x());
+}
+
+}  // namespace
+
+std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core::LineId>& lines,
+                                   const features::FrameFeatures& frame, const sensor::Pinhole& camera,
+                                   const geometry::Rigid3& camera_from_world, double radius,
+                                   const AssociationOptions& options, std::vector<core::LineId>* visible) {
+  const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
+  std::vector<LineMatch> by_feature(frame.lines.size());
+  for (core::LineId id : lines) {
+    const maps::MapLine* line = map.find_line(id);
+    features::LineSegment predicted;
+    if (line == nullptr || !project_segment(*line, camera_from_world, camera, predicted)) continue;
+    if (visible != nullptr) visible->push_back(id);
+    LineMatch best{id, -1, options.max_line_hamming + 1};
+    for (std::size_t i = 0; i < frame.lines.size(); ++i) {
+      const features::LineFeature& candidate = frame.lines[i];
+      if (predicted.direction().dot(candidate.segment.direction()) < min_cosine) continue;
+      if (line_distance(predicted, candidate.segment.middle()) > static_cast<float>(radius)) continue;
+      if (features::overlap(predicted, candidate.segment) < 0.4) continue;
+      const int distance = features::hamming(line->descriptor, candidate.descriptor);
+      if (distance < best.distance) best = {id, static_cast<int>(i), distance};
+    }
+    if (best.feature < 0) continue;
+    LineMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];
+    if (slot.feature < 0 || best.distance < slot.distance) slot = best;
+  }
+  std::vector<LineMatch> matches;
+  for (const LineMatch& m : by_feature) {
+    if (m.feature >= 0) matches.push_back(m);
+  }
+  return matches;
+}
+
+}  // namespace plumbline::tracking

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/tracking/tracker.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/sensor/depth_noise.hpp"
+#include "plumbline/tracking/thumbnail_alignment.hpp"
+
+namespace plumbline::tracking {
+
+using geometry::Rigid3;
+using geometry::Vector6d;
+
+namespace {
+
+constexpr double kSecondRadius = 6.0;  // px, once the pose is roughly known
+constexpr double kPointGate = 7.8;     // chi-square, 2 degrees of freedom, 98 %
+constexpr double kLineGate = 9.2;      // 99 %: line ends are less exact than corners
+
+std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
+                                             const features::FrameFeatures& features, double scale_factor) {
+  std::vector<optimize::PointTerm> terms;
+  terms.reserve(matches.size());
+  for (const PointMatch& match : matches) {
+    const features::PointFeature& f = features.points[static_cast<std::size_t>(match.feature)];
+    optimize::PointTerm term;
+    term.world = map.point(match.point).position;
+    term.pixel = f.pixel.cast<double>();
+    term.pixel_sigma = std::pow(scale_factor, f.octave);
+    if (f.depth > 0.0F) {
+      term.depth = static_cast<double>(f.depth);
+      // The landmark's own depth is no better than the measurement.
+      term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
+    }
+    terms.push_back(term);
+  }
+  return terms;
+}
+
+std::vector<optimize::LineTerm> line_terms(const maps::Map& map, const std::vector<LineMatch>& matches,
+                                           const features::FrameFeatures& features) {
+  std::vector<optimize::LineTerm> terms;
+  terms.reserve(matches.size());
+  for (const LineMatch& match : matches) {
+    const maps::MapLine& line = map.line(match.line);
+    const features::LineSegment& s = features.lines[static_cast<std::size_t>(match.feature)].segment;
+    optimize::LineTerm term;
+    term.world = geometry::line_through(line.start, line.end);
+    term.start = s.start.cast<double>();
+    term.end = s.end.cast<double>();
+    term.pixel_sigma = 1.2;
+    terms.push_back(term);
+  }
+  return terms;
+}
+
+/// Keeps what fits at the estimated pose.
+template <typename Match, typename Term>
+void drop_outliers(const std::vector<double>& errors, double gate, std::vector<Match>& matches,
+                   std::vector<Term>& terms) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!(errors[i] <= gate)) continue;
+    matches[kept] = matches[i];
+    terms[kept] = terms[i];
+    ++kept;
+  }
+  matches.resize(kept);
+  terms.resize(kept);
+}
+
+}  // namespace
+
+const char* to_string(TrackState state) {
+  switch (state) {
+    case TrackState::kInitialising: return "initialising";
+    case TrackState::kTracked: return "tracked";
+    case TrackState::kLost: return "lost";
+  }
+  return "";
+}
+
+void TrackerOptions::declare(core::OptionTable& table) {
+  table.boolean("points", points, "Track ORB points");
+  table.boolean("lines", lines, "Track lines");
+  table.boolean("depth", depth, "Align depth with the surfaces of the local map");
+  table.boolean("align_stamps", align_stamps, "Bring colour and depth stamped apart together with the motion model");
+  table.integer("min_inliers", min_inliers, {3, 1000}, "", "Features that a pose must explain to be trusted");
+  table.integer("min_surface", min_surface, {10, 100000}, "",
+                "Depth samples that a pose without enough features must explain");
+  association.declare(table);
+  local_map.declare(table);
+  solver.declare(table);
+}
+
+Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera) : options_(options), camera_(camera) {}
+
+Rigid3 Tracker::predict(double stamp) const {
+  const double dt = std::clamp(stamp - last_.stamp, 0.0, 0.2);
+  return geometry::exp_se3(velocity_ * dt) * last_.camera_from_world;
+}
+
+Rigid3 Tracker::depth_from_camera(const sensor::RgbdFrame& frame) const {
+  const double dt = frame.depth_stamp - frame.stamp;
+  if (!options_.align_stamps || std::abs(dt) > 0.05) return {};
+  return geometry::exp_se3(velocity_ * dt);
+}
+
+std::vector<Rigid3> Tracker::guesses(const features::FrameFeatures& features, double stamp) const {
+  std::vector<Rigid3> result;
+  const Rigid3 predicted = predict(stamp);
+  const ThumbnailAlignment alignment =
+      align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
+                       predicted * last_.camera_from_world.inverse());
+  if (alignment.better) result.push_back(alignment.current_from_previous * last_.camera_from_world);
+  result.push_back(predicted);
+  result.push_back(last_.camera_from_world);
+  return result;
+}
+
+TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
+                              const features::FrameFeatures& features, const Rigid3& guess, double radius) const {
+  TrackResult result;
+  Rigid3 pose = guess;
+  const Rigid3 depth_from_colour = depth_from_camera(frame);
+  optimize::PoseProblem problem;
+  problem.camera = camera_;
+  SurfaceAssociationOptions surface;
+  optimize::PoseSolverOptions solver = options_.solver;
+
+  // Coarse: features within the radius, few surface samples, wide gates; then fine.
+  struct Round {
+    double radius;
+    double surface_distance;
+    int surface_samples;
+    bool rematch;
+    bool gate;
+  };
+  const Round rounds[] = {{radius, 0.15, 500, true, false},
+                          {radius, 0.08, 700, false, false},
+                          {kSecondRadius, 0.05, 1200, true, true},
+                          {kSecondRadius, 0.03, 2400, false, true},
+                          {kSecondRadius, 0.03, 2400, false, false}};
+  for (const Round& round : rounds) {
+    if (round.rematch) {
+      result.visible_points.clear();
+      result.visible_lines.clear();
+      if (options_.points) {
+        result.points = match_points(map, local_map_.points, features, camera_, pose, round.radius,
+                                     options_.association, &result.visible_points);
+        problem.points = point_terms(map, result.points, features, options_.association.scale_factor);
+      }
+      if (options_.lines) {
+        result.lines = match_lines(map, local_map_.lines, features, camera_, pose, round.radius,
+                                   options_.association, &result.visible_lines);
+        problem.lines = line_terms(map, result.lines, features);
+      }
+    }
+    if (options_.depth) {
+      surface.max_distance_m = round.surface_distance;
+      surface.max_samples = round.surface_samples;
+      problem.planes =
+          associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour, surface);
+    }
+    solver.max_iterations = 4;
+    result.estimate = optimize::solve_pose(problem, pose, solver);
+    pose = result.estimate.camera_from_world;
+    if (round.gate) {
+      drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
+      drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);
+    }
+  }
+  result.camera_from_world = pose;
+  return result;
+}
+
+void Tracker::judge(const features::FrameFeatures& features, TrackResult& result) const {
+  // Rotations in units that move the scene as much as a metre of translation does, at 2 m.
+  Vector6d scale;
+  scale << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5;
+  const geometry::Matrix6d h = scale.asDiagonal() * result.estimate.information * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(h, Eigen::EigenvaluesOnly);
+  result.min_eigenvalue = eigen.eigenvalues()(0);
+  constexpr double kWeak = 2500.0;  // a standard deviation of 2 cm
+  result.weak_directions = static_cast<int>((eigen.eigenvalues().array() < kWeak).count());
+  const int surface_used = result.estimate.planes.terms;
+  result.surface_share = surface_used > 0 ? static_cast<double>(result.estimate.planes.inliers) / surface_used : 0.0;
+  result.state = trustworthy(result, features) ? TrackState::kTracked : TrackState::kLost;
+}
+
+bool Tracker::trustworthy(const TrackResult& result, const features::FrameFeatures& /*features*/) const {
+  if (!result.camera_from_world.translation.allFinite()) return false;
+  const int features_used = result.estimate.points.inliers + 2 * result.estimate.lines.inliers;
+  const bool by_features = features_used >= options_.min_inliers;
+  const bool by_surface =
+      result.estimate.planes.inliers >= options_.min_surface && result.surface_share > 0.5;
+  if (result.weak_directions > 0) return by_features && by_surface;
+  return by_features || by_surface;
+}
+
+TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
+                           const features::FrameFeatures& features) {
+  TrackResult result;
+  if (map.keyframe_count() == 0) {
+    result.state = TrackState::kInitialising;
+    remember(frame, features, result);
+    return result;
+  }
+  bool found = false;
+  if (lost_frames_ < 30) {
+    for (const Rigid3& guess : guesses(features, frame.stamp)) {
+      TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
+      judge(features, attempt);
+      if (attempt.state != TrackState::kTracked) continue;
+      result = std::move(attempt);
+      found = true;
+      break;
+    }
+  }
+  if (!found) {
+    std::vector<core::KeyframeId> candidates = local_map_.keyframes;
+    const std::vector<core::KeyframeId> all = map.keyframe_ids();
+    for (auto id = all.rbegin(); id != all.rend() && candidates.size() < 40; ++id) {
+      if (std::find(candidates.begin(), candidates.end(), *id) == candidates.end()) candidates.push_back(*id);
+    }
+    if (const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers)) {
+      local_map_ = build_local_map(map, seen->keyframe, options_.local_map);
+      TrackResult attempt = estimate(map, frame, features, seen->camera_from_world, 10.0);
+      judge(features, attempt);
+      attempt.relocalised = true;
+      if (attempt.state == TrackState::kTracked) {
+        result = std::move(attempt);
+        velocity_.setZero();
+        last_.valid = false;
+        found = true;
+      }
+    }
+  }
+  if (!found) {
+    result.state = TrackState::kLost;
+    result.camera_from_world = predict(frame.stamp);
+    ++lost_frames_;
+    velocity_ *= 0.8;
+    return result;
+  }
+  remember(frame, features, result);
+  return result;
+}
+
+void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                       const TrackResult& result) {
+  const double dt = frame.stamp - last_.stamp;
+  if (last_.valid && lost_frames_ == 0 && dt > 1e-4 && dt < 0.5) {
+    velocity_ = geometry::log_se3(result.camera_from_world * last_.camera_from_world.inverse()) / dt;
+  } else {
+    velocity_.setZero();
+  }
+  lost_frames_ = 0;
+  last_.stamp = frame.stamp;
+  last_.camera_from_world = result.camera_from_world;
+  last_.thumbnail = features.thumbnail;
+  last_.thumbnail_depth = features.thumbnail_depth;
+  last_.valid = true;
+}
+
+void Tracker::map_changed(const maps::Map& map, core::KeyframeId reference, const Rigid3& last_camera_from_world) {
+  local_map_ = build_local_map(map, reference, options_.local_map);
+  last_.camera_from_world = last_camera_from_world;
+}
+
+}  // namespace plumbline::tracking
