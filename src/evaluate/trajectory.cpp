@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/evaluate/trajectory.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "plumbline/geometry/alignment.hpp"
+
+namespace plumbline::evaluate {
+namespace {
+
+using geometry::Rigid3;
+using geometry::StampedPose;
+using geometry::Trajectory;
+
+constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+
+/// Stamps that agree to 0.1 ms have the same key. The product is exact in 64 bits of mantissa, so that the
+/// key is that of the stamp rounded to four decimals.
+long long stamp_key(double stamp) { return std::llrint(static_cast<long double>(stamp) * 10000.0L); }
+
+core::Result<void> check_options(const TrajectoryOptions& options) {
+  if (!(options.max_dt_s > 0.0) || !std::isfinite(options.max_dt_s)) {
+    return core::usage_error(fmt::format("max_dt is {} s; it must be above 0", options.max_dt_s));
+  }
+  if (options.rpe_frames < 1) {
+    return core::usage_error(fmt::format("rpe_frames is {}; it must be at least 1", options.rpe_frames));
+  }
+  if (!(options.rpe_seconds > 0.0) || !std::isfinite(options.rpe_seconds)) {
+    return core::usage_error(fmt::format("rpe_seconds is {}; it must be above 0", options.rpe_seconds));
+  }
+  return {};
+}
+
+core::Result<Trajectory> checked(const char* which, const Trajectory& given) {
+  if (given.empty()) return core::input_error(fmt::format("the {} trajectory has no poses", which));
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    const Rigid3& pose = given[i].world_from_camera;
+    if (!std::isfinite(given[i].stamp) || !pose.translation.allFinite() || !pose.rotation.allFinite()) {
+      return core::input_error(
+          fmt::format("the {} trajectory: pose {} of {} is not finite", which, i + 1, given.size()));
+    }
+  }
+  Trajectory sorted = given;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.stamp < b.stamp; });
+  return sorted;
+}
+
+struct Match {
+  double stamp;
+  Rigid3 estimate;  ///< in its own world
+  Rigid3 truth;
+};
+
+std::vector<Match> match(const Trajectory& estimate, const Trajectory& truth, double max_dt_s) {
+  std::vector<Match> matches;
+  for (const StampedPose& pose : estimate) {
+    if (const auto at = geometry::pose_at(truth, pose.stamp, max_dt_s)) {
+      matches.push_back({pose.stamp, pose.world_from_camera, *at});
+    }
+  }
+  return matches;
+}
+
+std::string too_few_message(std::size_t matched, std::size_t needed, const Trajectory& estimate,
+                            const Trajectory& truth, double max_dt_s) {
+  const bool apart =
+      estimate.back().stamp < truth.front().stamp || estimate.front().stamp > truth.back().stamp;
+  const std::string ranges =
+      fmt::format("estimate {:.4f} to {:.4f} s, truth {:.4f} to {:.4f} s", estimate.front().stamp,
+                  estimate.back().stamp, truth.front().stamp, truth.back().stamp);
+  if (apart) {
+    return fmt::format("estimate and truth do not overlap in time ({}): are they of the same recording?",
+                       ranges);
+  }
+  return fmt::format(
+      "only {} of {} poses have truth within {} s of their stamp, {} are needed ({}): is the truth complete, "
+      "or "
+      "max_dt too small?",
+      matched, estimate.size(), max_dt_s, needed, ranges);
+}
+
+Rigid3 alignment(const std::vector<Match>& matches, TrajectoryAlignment align) {
+  if (align == TrajectoryAlignment::kNone) return {};
+  if (align == TrajectoryAlignment::kStart) return matches.front().truth * matches.front().estimate.inverse();
+  std::vector<Eigen::Vector3d> source;
+  std::vector<Eigen::Vector3d> target;
+  for (const Match& m : matches) {
+    source.push_back(m.estimate.translation);
+    target.push_back(m.truth.translation);
+  }
+  return geometry::align_points(source, target);
+}
+
+/// The rotation about a path along one line, or at one place, is not determined by its positions.
+bool positions_fix_rotation(const std::vector<Match>& matches) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Match& m : matches) mean += m.truth.translation;
+  mean /= static_cast<double>(matches.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Match& m : matches) {
+    const Eigen::Vector3d d = m.truth.translation - mean;
+    scatter += d * d.transpose();
+  }
+  scatter /= static_cast<double>(matches.size());
+  const Eigen::Vector3d variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+  return variance(1) > 1e-6;  // 1 mm across the main direction
+}
+
+PoseError pose_error(const Match& m, const Rigid3& truth_from_estimate) {
+  PoseError e;
+  e.stamp = m.stamp;
+  e.estimate = truth_from_estimate * m.estimate;
+  e.truth = m.truth;
+  e.error_m = e.estimate.translation - e.truth.translation;
+  e.distance_m = e.error_m.norm();
+  e.rotation_deg = kDegrees * geometry::rotation_angle(e.truth.rotation.transpose() * e.estimate.rotation);
+  return e;
+}
+
+void add_absolute_errors(TrajectoryReport& report) {
+  std::vector<double> distance;
+  std::vector<double> rotation;
+  std::array<std::vector<double>, 3> axis;
+  for (const PoseError& e : report.poses) {
+    distance.push_back(e.distance_m);
+    rotation.push_back(e.rotation_deg);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double signed_error = e.error_m(static_cast<Eigen::Index>(k));
+      axis[k].push_back(std::abs(signed_error));
+      report.axis_bias_m[k] += signed_error / static_cast<double>(report.poses.size());
+    }
+  }
+  report.ate_m = summarize(distance);
+  report.rotation_deg = summarize(rotation);
+  for (std::size_t k = 0; k < 3; ++k) report.axis_m[k] = summarize(axis[k]);
+}
+
+using IndexPairs = std::vector<std::pair<std::size_t, std::size_t>>;
+
+RelativeError relative_error(const std::vector<PoseError>& poses, const IndexPairs& pairs) {
+  std::vector<double> translation;
+  std::vector<double> rotation;
+  for (const auto& [i, j] : pairs) {
+    const Rigid3 true_step = poses[i].truth.inverse() * poses[j].truth;
+    const Rigid3 step = poses[i].estimate.inverse() * poses[j].estimate;
+    const Rigid3 error = true_step.inverse() * step;
+    translation.push_back(error.translation.norm());
+    rotation.push_back(kDegrees * geometry::rotation_angle(error.rotation));
+  }
+  return {pairs.size(), summarize(translation), summarize(rotation)};
+}
+
+/// With a frames list: listed frames k and k + step that both have a pose; else matched poses i and i + step.
+IndexPairs frame_pairs(const std::vector<PoseError>& poses, const std::vector<long long>& frame_keys,
+                       std::size_t step) {
+  IndexPairs pairs;
+  if (frame_keys.empty()) {
+    for (std::size_t i = 0; i + step < poses.size(); ++i) pairs.emplace_back(i, i + step);
+    return pairs;
+  }
+  std::map<long long, std::size_t> pose_of;
+  for (std::size_t i = 0; i < poses.size(); ++i) pose_of.emplace(stamp_key(poses[i].stamp), i);
+  for (std::size_t k = 0; k + step < frame_keys.size(); ++k) {
+    const auto a = pose_of.find(frame_keys[k]);
+    const auto b = pose_of.find(frame_keys[k + step]);
+    if (a != pose_of.end() && b != pose_of.end()) pairs.emplace_back(a->second, b->second);
+  }
+  return pairs;
+}
+
+/// For each pose the one whose stamp is nearest to `seconds` later, if it is no more than max_dt or half the
+/// usual time between poses off.
+IndexPairs time_pairs(const std::vector<PoseError>& poses, double seconds, double max_dt_s) {
+  IndexPairs pairs;
+  if (poses.size() < 2) return pairs;
+  std::vector<double> steps;
+  for (std::size_t i = 0; i + 1 < poses.size(); ++i) steps.push_back(poses[i + 1].stamp - poses[i].stamp);
+  const double tolerance = std::min(std::max(max_dt_s, 0.5 * summarize(steps).median), 0.5 * seconds);
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double wanted = poses[i].stamp + seconds;
+    while (j + 1 < poses.size() && std::abs(poses[j + 1].stamp - wanted) <= std::abs(poses[j].stamp - wanted))
+      ++j;
+    if (j > i && std::abs(poses[j].stamp - wanted) <= tolerance) pairs.emplace_back(i, j);
+  }
+  return pairs;
+}
+
+std::vector<long long> sorted_keys(const std::vector<double>& stamps) {
+  std::vector<long long> keys;
+  keys.reserve(stamps.size());
+  for (const double s : stamps) keys.push_back(stamp_key(s));
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+void add_tracked_share(const Trajectory& estimate, const std::vector<long long>& frame_keys,
+                       TrajectoryReport& report) {
+  if (frame_keys.empty()) {
+    report.first_pose_s = std::max(0.0, estimate.front().stamp - report.truth.front().stamp);
+    return;
+  }
+  std::vector<double> stamps;
+  for (const StampedPose& pose : estimate) stamps.push_back(pose.stamp);
+  const std::vector<long long> pose_keys = sorted_keys(stamps);
+  std::vector<long long> tracked;
+  std::set_intersection(frame_keys.begin(), frame_keys.end(), pose_keys.begin(), pose_keys.end(),
+                        std::back_inserter(tracked));
+  report.frames = frame_keys.size();
+  report.tracked_percent =
+      100.0 * static_cast<double>(tracked.size()) / static_cast<double>(frame_keys.size());
+  if (!tracked.empty())
+    report.first_pose_s = 1e-4 * static_cast<double>(tracked.front() - frame_keys.front());
+}
+
+void add_warnings(const std::vector<Match>& matches, TrajectoryReport& report) {
+  if (report.align == TrajectoryAlignment::kSe3 && !positions_fix_rotation(matches)) {
+    report.warnings.push_back(
+        "the matched positions lie on one line or at one place: the alignment's rotation is not determined, "
+        "and "
+        "ATE says little");
+  }
+  if (2 * report.matched < report.estimated) {
+    report.warnings.push_back(
+        fmt::format("only {} of {} poses have truth at their stamp", report.matched, report.estimated));
+  }
+  if (report.tracked_percent && *report.tracked_percent < 90.0) {
+    report.warnings.push_back(
+        fmt::format("only {:.1f} % of the frames have a pose: the errors are those of the "
+                    "frames that were tracked",
+                    *report.tracked_percent));
+  }
+  if (report.rpe_second.pairs == 0) {
+    report.warnings.push_back(
+        fmt::format("no two matched poses are {} s apart: RPE over time is left out", report.rpe_seconds));
+  }
+}
+
+}  // namespace
+
+void TrajectoryOptions::declare(core::OptionTable& table) {
+  table.choice(
+      "align", align,
+      {{"none", TrajectoryAlignment::kNone},
+       {"se3", TrajectoryAlignment::kSe3},
+       {"start", TrajectoryAlignment::kStart}},
+      "How the estimate is laid on the truth: not at all, least squares over all positions, first pose");
+  table.number("max_dt", max_dt_s, {1e-4, 10.0}, "s",
+               "Truth is interpolated; gaps over twice this are not bridged");
+  table.integer("rpe_frames", rpe_frames, {1, 100000}, "",
+                "Frames between the two poses of a relative error");
+  table.number("rpe_seconds", rpe_seconds, {1e-3, 1e5}, "s",
+               "Seconds between the two poses of a relative error");
+}
+
+core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, const Trajectory& truth,
+                                                   const TrajectoryOptions& options,
+                                                   const std::vector<double>& frame_stamps) {
+  if (const auto ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  auto sorted_estimate = checked("estimated", estimate);
+  if (!sorted_estimate) return tl::unexpected(sorted_estimate.error());
+  auto sorted_truth = checked("true", truth);
+  if (!sorted_truth) return tl::unexpected(sorted_truth.error());
+  for (const double s : frame_stamps) {
+    if (!std::isfinite(s)) return core::input_error("the list of frames has a stamp that is not finite");
+  }
+
+  const std::vector<Match> matches = match(*sorted_estimate, *sorted_truth, options.max_dt_s);
+  const std::size_t needed = options.align == TrajectoryAlignment::kSe3 ? 3 : 1;
+  if (matches.size() < needed) {
+    return core::input_error(
+        too_few_message(matches.size(), needed, *sorted_estimate, *sorted_truth, options.max_dt_s));
+  }
+
+  TrajectoryReport report;
+  report.align = options.align;
+  report.rpe_frames = options.rpe_frames;
+  report.rpe_seconds = options.rpe_seconds;
+  report.estimated = sorted_estimate->size();
+  report.matched = matches.size();
+  report.truth = std::move(*sorted_truth);
+  report.truth_from_estimate = alignment(matches, options.align);
+  for (const Match& m : matches) report.poses.push_back(pose_error(m, report.truth_from_estimate));
+  for (const StampedPose& pose : *sorted_estimate) {
+    report.aligned.push_back({pose.stamp, report.truth_from_estimate * pose.world_from_camera});
+  }
+  for (std::size_t i = 0; i + 1 < matches.size(); ++i) {
+    report.path_m += (matches[i + 1].truth.translation - matches[i].truth.translation).norm();
+  }
+  report.duration_s = matches.back().stamp - matches.front().stamp;
+  add_absolute_errors(report);
+  const std::vector<long long> frame_keys = sorted_keys(frame_stamps);
+  add_tracked_share(*sorted_estimate, frame_keys, report);
+  report.rpe_frame = relative_error(
+      report.poses, frame_pairs(report.poses, frame_keys, static_cast<std::size_t>(options.rpe_frames)));
+  report.rpe_second =
+      relative_error(report.poses, time_pairs(report.poses, options.rpe_seconds, options.max_dt_s));
+  add_warnings(matches, report);
+  return report;
+}
+
+}  // namespace plumbline::evaluate

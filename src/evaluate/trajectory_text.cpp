@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "plumbline/evaluate/trajectory.hpp"
+
+namespace plumbline::evaluate {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* name_of(TrajectoryAlignment align) {
+  switch (align) {
+    case TrajectoryAlignment::kNone:
+      return "none";
+    case TrajectoryAlignment::kSe3:
+      return "se3";
+    case TrajectoryAlignment::kStart:
+      return "start";
+  }
+  return "";
+}
+
+Json json_of(const Statistics& s) {
+  return {{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"min", s.min},
+          {"max", s.max},   {"sse", s.sse},   {"std", s.std}};
+}
+
+Json json_of(const RelativeError& e) {
+  const auto brief = [](const Statistics& s) {
+    return Json{{"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median}, {"max", s.max}};
+  };
+  return {
+      {"pairs", e.pairs}, {"translation_m", brief(e.translation_m)}, {"rotation_deg", brief(e.rotation_deg)}};
+}
+
+Json json_of(const geometry::Rigid3& t) {
+  const Eigen::Quaterniond q = t.quaternion();
+  return {{"translation_m", {t.translation.x(), t.translation.y(), t.translation.z()}},
+          {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+}
+
+std::string row(const std::string& name, const Statistics& s, const char* unit) {
+  return fmt::format("{:<22} {:>10.6f} {:>10.6f} {:>10.6f} {:>10.6f} {:>10.6f} {:>10.6f}  {}\n", name, s.rmse,
+                     s.mean, s.median, s.min, s.max, s.std, unit);
+}
+
+}  // namespace
+
+core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list) {
+  std::ifstream in(list);
+  if (!in) return core::input_error(fmt::format("{}: cannot be read", list.string()));
+  std::vector<double> stamps;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    std::istringstream fields(line);
+    std::string first;
+    if (!(fields >> first) || first[0] == '#') continue;
+    std::istringstream value(first);
+    value.imbue(std::locale::classic());
+    double stamp = 0.0;
+    if (!(value >> stamp) || !value.eof() || !std::isfinite(stamp)) {
+      return core::input_error(
+          fmt::format("{}:{}: '{}' is not a time stamp in seconds", list.string(), number, first));
+    }
+    stamps.push_back(stamp);
+  }
+  if (stamps.empty()) return core::input_error(fmt::format("{}: lists no frames", list.string()));
+  std::sort(stamps.begin(), stamps.end());
+  return stamps;
+}
+
+Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& r) {
+  constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+  const double pitch = std::asin(std::clamp(-r(2, 0), -1.0, 1.0));
+  if (std::abs(r(2, 0)) >
+      1.0 - 1e-12) {  // gimbal lock: roll and yaw turn about one axis, all of it is called yaw
+    return Eigen::Vector3d(0.0, pitch, std::atan2(-r(0, 1), r(1, 1))) * kDegrees;
+  }
+  return Eigen::Vector3d(std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))) * kDegrees;
+}
+
+std::string to_json(const TrajectoryReport& r) {
+  Json per_axis = Json::object();
+  const std::array<const char*, 3> names = {"x", "y", "z"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    per_axis[names[k]] = json_of(r.axis_m[k]);
+    per_axis[names[k]]["bias"] = r.axis_bias_m[k];
+  }
+  Json per_frame = json_of(r.rpe_frame);
+  per_frame["frames"] = r.rpe_frames;
+  Json per_second = json_of(r.rpe_second);
+  per_second["seconds"] = r.rpe_seconds;
+  Json out;
+  out["ate_m"] = json_of(r.ate_m);
+  out["rotation_deg"] = json_of(r.rotation_deg);
+  out["per_axis_m"] = per_axis;
+  out["rpe"] = {{"per_frame", per_frame}, {"per_second", per_second}};
+  out["poses"] = r.estimated;
+  out["matched"] = r.matched;
+  if (r.frames) out["frames"] = *r.frames;
+  out["tracked_percent"] = r.tracked_percent ? Json(*r.tracked_percent) : Json(nullptr);
+  out["first_pose_s"] = r.first_pose_s ? Json(*r.first_pose_s) : Json(nullptr);
+  out["path_m"] = r.path_m;
+  out["duration_s"] = r.duration_s;
+  out["alignment"] = json_of(r.truth_from_estimate);
+  out["alignment"]["type"] = name_of(r.align);
+  out["warnings"] = r.warnings;
+  return out.dump(2) + "\n";
+}
+
+std::string to_text(const TrajectoryReport& r) {
+  std::string out = fmt::format("matched {} of {} poses, alignment {}, path {:.3f} m in {:.2f} s\n",
+                                r.matched, r.estimated, name_of(r.align), r.path_m, r.duration_s);
+  if (r.tracked_percent) out += fmt::format("tracked {:.2f} % of {} frames\n", *r.tracked_percent, *r.frames);
+  if (r.first_pose_s) out += fmt::format("first pose after {:.3f} s\n", *r.first_pose_s);
+  out += fmt::format("{:<22} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median",
+                     "min", "max", "std");
+  out += row("ATE", r.ate_m, "m");
+  out += row("  along x", r.axis_m[0], "m");
+  out += row("  along y", r.axis_m[1], "m");
+  out += row("  along z", r.axis_m[2], "m");
+  out += row("orientation", r.rotation_deg, "deg");
+  const std::string frames = r.rpe_frames == 1 ? "frame" : fmt::format("{} frames", r.rpe_frames);
+  const std::string seconds = r.rpe_seconds == 1.0 ? "second" : fmt::format("{} s", r.rpe_seconds);
+  if (r.rpe_frame.pairs > 0) {
+    out += row("RPE per " + frames, r.rpe_frame.translation_m, "m");
+    out += row("", r.rpe_frame.rotation_deg, "deg");
+  }
+  if (r.rpe_second.pairs > 0) {
+    out += row("RPE per " + seconds, r.rpe_second.translation_m, "m");
+    out += row("", r.rpe_second.rotation_deg, "deg");
+  }
+  out += fmt::format("SSE {:.6f} m^2\n", r.ate_m.sse);
+  for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
+  return out;
+}
+
+}  // namespace plumbline::evaluate
