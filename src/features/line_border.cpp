@@ -2,15 +2,15 @@
 #include "plumbline/features/line_border.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <opencv2/core.hpp>
 
 namespace plumbline::features {
 namespace {
 
 constexpr int kMaxSpread = 3;        // grey levels within one constant row (JPEG leaves a little noise)
-constexpr int kVisibleStep = 12;     // grey levels from the frame to the picture
-constexpr double kStepShare = 0.25;  // of the side's pixels must show the step
+constexpr int kVisibleStep = 12;     // grey levels from the frame up to the picture
+constexpr double kStepShare = 0.25;  // of a side's pixels must show the step
+constexpr int kRaggedWidth = 3;      // px: a frame that is blended or covers a part of the side only
 
 bool constant(const cv::Mat& strip) {
   double low = 0.0;
@@ -19,26 +19,32 @@ bool constant(const cv::Mat& strip) {
   return high - low <= kMaxSpread;
 }
 
-double step_share(const cv::Mat& frame, const cv::Mat& picture) {
-  cv::Mat difference;
-  cv::absdiff(frame, picture, difference);
-  return static_cast<double>(cv::countNonZero(difference > kVisibleStep)) /
-         static_cast<double>(difference.total());
+bool visible_step(const cv::Mat& outside, const cv::Mat& inside, bool either_sign) {
+  cv::Mat step;
+  if (either_sign) {
+    cv::absdiff(inside, outside, step);
+  } else {
+    cv::subtract(inside, outside, step);  // saturates at 0: brighter inside
+  }
+  const int count = cv::countNonZero(step > kVisibleStep);
+  return count >= kStepShare * static_cast<double>(step.total());
 }
 
-// Width of the frame at one side; strip(i) is the i-th row or column counted from that side. One row between
-// frame and picture may be a blend of both (interpolated colours), so the step is looked for two strips on.
+// Width of the frame at one side; strip(i) is the i-th row or column counted from that side.
 template <typename Strip>
 int frame_width(const Strip& strip, int max_width, int available) {
   const int limit = std::min(max_width, available / 4);
   int width = 0;
-  while (width < limit && constant(strip(width)) &&
-         (width == 0 || std::abs(cv::mean(strip(width))[0] - cv::mean(strip(0))[0]) <= kMaxSpread)) {
-    ++width;
+  while (width < limit && constant(strip(width))) ++width;
+  // Constant up to the limit is a dark or white scene, and without a step there is nothing to take for an
+  // edge.
+  if (width == limit || (width > 0 && !visible_step(strip(width - 1), strip(width + 1), true))) width = 0;
+  // Lens rectification leaves frames that are black in the middle of a side and fade out towards its ends.
+  int ragged = width;
+  for (int i = width; i < width + kRaggedWidth; ++i) {
+    if (visible_step(strip(i), strip(i + 1), false)) ragged = i + 1;
   }
-  if (width == 0 || width == limit) return 0;
-  if (step_share(strip(0), strip(width)) >= kStepShare) return width;
-  return step_share(strip(0), strip(width + 1)) >= kStepShare ? width + 1 : 0;
+  return ragged;
 }
 
 }  // namespace

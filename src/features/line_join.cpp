@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
-#include <optional>
 
 #include "line_geometry.hpp"
 #include "plumbline/features/line_detector.hpp"
@@ -10,41 +9,37 @@ namespace {
 
 constexpr float kDuplicateOffset = 1.0F;  // px: overlapping parallels nearer than this are one edge
 
-// How `other` lies along and beside `base`, in base's frame.
-struct Placement {
-  float low, high;  // projections of other's ends on base, px from base.start
-  float offset;     // largest distance of other's ends from base's line
-  float gap;        // px between them along base; negative = overlap
+// A segment with what the pairwise tests need again and again.
+struct Piece {
+  LineSegment segment;
+  Eigen::Vector2f direction;
+  Eigen::Vector2f normal;
+  Eigen::Vector2f middle;
+  float length;
+  explicit Piece(const LineSegment& s)
+      : segment(s),
+        direction(s.direction()),
+        normal(right_of(direction)),
+        middle(s.middle()),
+        length(s.length()) {}
 };
 
-Placement place(const LineSegment& base, const LineSegment& other) {
-  const Eigen::Vector2f d = base.direction();
-  const Eigen::Vector2f n = right_of(d);
-  const Eigen::Vector2f s = other.start - base.start;
-  const Eigen::Vector2f e = other.end - base.start;
-  const float a = d.dot(s);
-  const float b = d.dot(e);
-  Placement p{};
-  p.low = std::min(a, b);
-  p.high = std::max(a, b);
-  p.offset = std::max(std::abs(n.dot(s)), std::abs(n.dot(e)));
-  p.gap = std::max(p.low - base.length(), -p.high);
-  return p;
-}
-
-bool belong_together(const LineSegment& longer, const LineSegment& shorter,
-                     const LineDetectorOptions& options) {
-  const Eigen::Vector2f d = longer.direction();
-  const Eigen::Vector2f e = shorter.direction();
-  if (d.dot(e) <= 0.0F) return false;  // opposite steps: the two edges of a thin line
-  const Placement p = place(longer, shorter);
-  if (p.gap > static_cast<float>(options.join_gap_px)) return false;
-  if (p.offset > static_cast<float>(options.join_offset_px)) return false;
+bool belong_together(const Piece& a, const Piece& b, const LineDetectorOptions& options) {
+  if (a.direction.dot(b.direction) <= 0.8F) return false;  // opposite steps: the two edges of a thin line
+  const Piece& longer = a.length >= b.length ? a : b;
+  const Piece& shorter = a.length >= b.length ? b : a;
+  const Eigen::Vector2f between = shorter.middle - longer.middle;
+  const auto offset_limit = static_cast<float>(options.join_offset_px);
+  const float offset_at_middle = std::abs(longer.normal.dot(between));
+  if (offset_at_middle > offset_limit) return false;
+  const float gap = std::abs(longer.direction.dot(between)) - 0.5F * (longer.length + shorter.length);
+  if (gap > static_cast<float>(options.join_gap_px)) return false;
   // A short piece's angle is uncertain by about a pixel over its length.
-  const float angle = std::abs(d.x() * e.y() - d.y() * e.x());
-  if (angle > std::max(static_cast<float>(options.join_angle_rad), 1.5F / shorter.length())) return false;
-  const bool overlapping = p.gap < -0.25F * shorter.length();
-  return !overlapping || p.offset <= kDuplicateOffset;
+  const float angle = std::abs(longer.normal.dot(shorter.direction));
+  if (angle > std::max(static_cast<float>(options.join_angle_rad), 1.5F / shorter.length)) return false;
+  const float offset = offset_at_middle + 0.5F * shorter.length * angle;  // of the farther end
+  const bool overlapping = gap < -0.25F * shorter.length;
+  return offset <= (overlapping ? std::min(kDuplicateOffset, offset_limit) : offset_limit);
 }
 
 // Least-squares line through both (weight = length), spanning both.
@@ -82,20 +77,22 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
                                 [](const LineSegment& s) { return !(s.length() > 0.0F); }),
                  segments.end());
   sort_segments(segments);
-  // Each line grows by its first fitting partner until none fits; longest lines grow first.
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    bool grown = true;
-    while (grown) {
-      grown = false;
-      for (std::size_t j = 0; j < segments.size(); ++j) {
-        if (j == i || !belong_together(segments[i], segments[j], options)) continue;
-        segments[i] = merged(segments[i], segments[j]);
-        segments.erase(segments.begin() + static_cast<std::ptrdiff_t>(j));
-        if (j < i) --i;
-        grown = true;
-        break;
-      }
+  std::vector<Piece> pieces;
+  pieces.reserve(segments.size());
+  for (const LineSegment& s : segments) pieces.emplace_back(s);
+  // Longest lines grow first, each by its first fitting partner, until nothing fits any more.
+  std::vector<char> gone(pieces.size(), 0);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    for (std::size_t j = 0; gone[i] == 0 && j < pieces.size(); ++j) {
+      if (j == i || gone[j] != 0 || !belong_together(pieces[i], pieces[j], options)) continue;
+      pieces[i] = Piece(merged(pieces[i].segment, pieces[j].segment));
+      gone[j] = 1;
+      j = static_cast<std::size_t>(-1);  // what did not fit the shorter line may fit now: from the start
     }
+  }
+  segments.clear();
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (gone[i] == 0) segments.push_back(pieces[i].segment);
   }
   sort_segments(segments);
   return segments;
