@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/output_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr std::size_t kBuffer = std::size_t{1} << 20;
+
+std::string reason() { return std::strerror(errno); }
+
+}  // namespace
+
+OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)) {
+  std::error_code error;
+  std::filesystem::path real = target_;
+  if (std::filesystem::is_symlink(target_, error)) {  // the link stays, what it points to is replaced
+    auto resolved = std::filesystem::weakly_canonical(target_, error);
+    if (!error) real = std::move(resolved);
+  }
+  if (std::filesystem::is_directory(real, error)) {
+    fail("is a folder");
+    return;
+  }
+  const bool device = std::filesystem::exists(real, error) && !std::filesystem::is_regular_file(real, error);
+  if (device) {
+    written_ = real;
+    descriptor_ = ::open(written_.c_str(), O_WRONLY | O_CLOEXEC);
+  } else {
+    written_ =
+        real.parent_path() / ("." + real.filename().string() + "." + std::to_string(::getpid()) + ".part");
+    descriptor_ = ::open(written_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  }
+  if (descriptor_ < 0) {
+    fail("cannot be opened for writing (" + reason() + ")");
+    return;
+  }
+  target_ = real;
+  buffer_.reserve(kBuffer);
+}
+
+OutputFile::~OutputFile() { discard(); }
+
+void OutputFile::write(const void* bytes, std::size_t count) {
+  if (!problem_.empty()) return;
+  const char* from = static_cast<const char*>(bytes);
+  while (count > 0) {
+    const std::size_t part = std::min(count, kBuffer - buffer_.size());
+    buffer_.insert(buffer_.end(), from, from + part);
+    from += part;
+    count -= part;
+    if (buffer_.size() == kBuffer) flush();
+  }
+}
+
+void OutputFile::flush() {
+  std::size_t done = 0;
+  while (done < buffer_.size() && problem_.empty()) {
+    const ssize_t n = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
+    if (n >= 0) {
+      done += static_cast<std::size_t>(n);
+    } else if (errno != EINTR) {
+      fail("cannot be written (" + reason() + ")");
+    }
+  }
+  buffer_.clear();
+}
+
+void OutputFile::fail(const std::string& what) {
+  if (problem_.empty()) problem_ = target_.string() + ": " + what;
+}
+
+void OutputFile::discard() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  descriptor_ = -1;
+  if (written_ != target_) ::unlink(written_.c_str());
+}
+
+core::Result<void> OutputFile::commit() {
+  if (problem_.empty()) flush();
+  if (problem_.empty()) {
+    const int descriptor = descriptor_;
+    descriptor_ = -1;
+    // A full disk may show only here (delayed allocation on network folders).
+    if (::close(descriptor) != 0) {
+      fail("cannot be written (" + reason() + ")");
+      if (written_ != target_) ::unlink(written_.c_str());
+    } else if (written_ != target_ && ::rename(written_.c_str(), target_.c_str()) != 0) {
+      fail("cannot be replaced (" + reason() + ")");
+      ::unlink(written_.c_str());
+    }
+  }
+  discard();
+  if (problem_.empty()) return {};
+  return core::output_error(problem_ + "; free space or choose another folder");
+}
+
+}  // namespace plumbline::cloud
