@@ -15,7 +15,8 @@ class Rectifier {
   explicit Rectifier(const Camera& camera);
   ~Rectifier();
   /// 8-bit image, 1 or 3 channels, of the camera's size -> undistorted (bilinear); the same image when
-  /// there is no distortion.
+  /// there is no distortion. What no source pixel covers repeats the rim (depth is 0 there). Throws
+  /// std::invalid_argument on an image of another kind or size; so does depth().
   [[nodiscard]] cv::Mat color(const cv::Mat& raw) const;
   /// Raw 16-bit depth -> CV_32FC1 metres in the undistorted colour camera. 0 and 65535 become 0. Registers
   /// with color_from_depth (z-buffered splat, no holes torn by the change of resolution) when present;

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/sensor/camera.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+
+namespace plumbline::sensor {
+namespace {
+
+using core::ConfigNode;
+using core::ConfigProblems;
+
+constexpr double kRigidTolerance = 1e-3;  // of R^T R against identity: calibration files are often rounded
+
+std::string join(const std::string& path, const std::string& key) {
+  return path.empty() ? key : path + "." + key;
+}
+
+void declare_pinhole(core::OptionTable& table, Pinhole& pinhole) {
+  constexpr core::Range<double> focal{1e-3, 1e6};
+  table.integer("width", pinhole.width, {1, 32768}, "px", "Width of the images");
+  table.integer("height", pinhole.height, {1, 32768}, "px", "Height of the images");
+  table.number("fx", pinhole.fx, focal, "px", "Focal length along x");
+  table.number("fy", pinhole.fy, focal, "px", "Focal length along y");
+  table.number("cx", pinhole.cx, {}, "px", "Principal point; 0 is the centre of the leftmost pixel");
+  table.number("cy", pinhole.cy, {}, "px", "Principal point; 0 is the centre of the topmost pixel");
+}
+
+/// Every key of a pinhole must be there and the principal point inside the image.
+void check_pinhole(const ConfigNode& map, const Pinhole& pinhole, const std::string& path,
+                   ConfigProblems& problems) {
+  for (const char* key : {"width", "height", "fx", "fy", "cx", "cy"}) {
+    if (map.find(key) == nullptr) {
+      problems.push_back({map.mark, join(path, key), "is missing (needed: width height fx fy cx cy)"});
+    }
+  }
+  const auto inside = [&](const char* key, double value, int size) {
+    const ConfigNode* node = map.find(key);
+    if (node == nullptr || size < 1 || (value >= 0.0 && value <= size - 1)) return;
+    problems.push_back({node->mark, join(path, key),
+                        fmt::format("{} lies outside the image (allowed: 0 to {})", value, size - 1)});
+  };
+  inside("cx", pinhole.cx, pinhole.width);
+  inside("cy", pinhole.cy, pinhole.height);
+}
+
+std::optional<double> number_of(const ConfigNode& node) {
+  double value = 0.0;
+  core::OptionTable table;
+  table.number("n", value, {}, "", "");
+  ConfigProblems problems;
+  table.set("n", node, "", problems);
+  if (!problems.empty() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+/// 4 lists of 4 numbers or 16 numbers, row by row.
+std::optional<Eigen::Matrix4d> read_matrix(const ConfigNode& node) {
+  std::vector<const ConfigNode*> cells;
+  for (const ConfigNode& item : node.items) {
+    if (item.kind == ConfigNode::Kind::kSequence && item.items.size() == 4 && node.items.size() == 4) {
+      for (const ConfigNode& cell : item.items) cells.push_back(&cell);
+    } else {
+      cells.push_back(&item);
+    }
+  }
+  if (cells.size() != 16) return std::nullopt;
+  Eigen::Matrix4d matrix;
+  for (std::size_t i = 0; i < 16; ++i) {
+    const std::optional<double> value = number_of(*cells[i]);
+    if (!value) return std::nullopt;
+    matrix(static_cast<int>(i) / 4, static_cast<int>(i) % 4) = *value;
+  }
+  return matrix;
+}
+
+void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblems& problems) {
+  const std::string path = "color_from_depth";
+  const std::optional<Eigen::Matrix4d> matrix = read_matrix(node);
+  if (!matrix) {
+    problems.push_back(
+        {node.mark, path, "is no 4x4 matrix (allowed: four lists of four numbers, or 16 numbers)"});
+    return;
+  }
+  const Eigen::Matrix3d r = matrix->topLeftCorner<3, 3>();
+  const double error = (r.transpose() * r - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  const bool last_row = (matrix->row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() < 1e-9;
+  if (error > kRigidTolerance || r.determinant() < 0.0 || !last_row) {
+    problems.push_back({node.mark, path,
+                        "is not rigid (allowed: a rotation and a translation in metres, last row 0 0 0 1)"});
+    return;
+  }
+  camera.color_from_depth = geometry::Rigid3(Eigen::Quaterniond(r), matrix->topRightCorner<3, 1>());
+}
+
+void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& problems) {
+  const ConfigNode* transform = root.find("color_from_depth");
+  const ConfigNode* depth = root.find("depth");
+  if (transform != nullptr) read_color_from_depth(*transform, camera, problems);
+  if (transform != nullptr && depth == nullptr) {
+    problems.push_back(
+        {transform->mark, "depth",
+         "is missing: color_from_depth needs the depth camera's own width height fx fy cx cy"});
+  }
+  if (depth == nullptr) return;
+  if (transform == nullptr) {
+    problems.push_back({depth->mark, "color_from_depth",
+                        "is missing: with a depth camera of its own, say where it sits (4x4, metres)"});
+  }
+  if (depth->kind != ConfigNode::Kind::kMap) {
+    problems.push_back({depth->mark, "depth", "must hold the keys width height fx fy cx cy"});
+    return;
+  }
+  Pinhole pinhole;
+  core::OptionTable table;
+  declare_pinhole(table, pinhole);
+  table.set_all(*depth, "depth", problems);
+  check_pinhole(*depth, pinhole, "depth", problems);
+  camera.depth = pinhole;
+}
+
+std::vector<std::string> shipped_names(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+/// Quoted where YAML needs it.
+std::string text_yaml(std::string text) {
+  core::OptionTable table;
+  table.text("text", text, "");
+  return table.value("text");
+}
+
+std::string pinhole_yaml(const Pinhole& p, const std::string& indent) {
+  // "{}" prints the shortest text that reads back as the same double
+  return fmt::format("{0}width: {1}\n{0}height: {2}\n{0}fx: {3}\n{0}fy: {4}\n{0}cx: {5}\n{0}cy: {6}\n",
+                     indent, p.width, p.height, p.fx, p.fy, p.cx, p.cy);
+}
+
+}  // namespace
+
+core::Result<Camera> read_camera(const std::filesystem::path& file) {
+  auto root = core::read_yaml(file);
+  if (!root) return tl::unexpected<core::Error>(root.error());
+
+  ConfigProblems problems;
+  if (root->kind != ConfigNode::Kind::kMap && root->kind != ConfigNode::Kind::kNull) {
+    problems.push_back({root->mark, "", "is no camera file: expected lines such as 'fx: 525.0'"});
+    return tl::unexpected<core::Error>(core::to_error(problems));
+  }
+  if (root->mark.file.empty()) root->mark = {file.string(), 1, 1};
+
+  Camera camera;
+  std::string model = "pinhole";
+  std::vector<double> distortion(camera.distortion.size(), 0.0);
+  core::OptionTable table;
+  declare_pinhole(table, camera.color);
+  table.text("name", camera.name, "Name of the camera");
+  table.choice("model", model, {"pinhole"}, "Camera model");
+  table.numbers("distortion", distortion, 0, {}, "", "k1 k2 p1 p2 k3 of the colour image");
+  table.number("depth_scale", camera.depth_scale, {1e-3, 1e7}, "", "Raw depth units per metre");
+  table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
+  if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
+
+  check_pinhole(*root, camera.color, "", problems);
+  if (distortion.empty() || distortion.size() > camera.distortion.size()) {
+    problems.push_back({root->find("distortion")->mark, "distortion",
+                        fmt::format("has {} numbers (allowed: [k1, k2, p1, p2, k3])", distortion.size())});
+  } else {
+    std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+  }
+  read_depth_camera(*root, camera, problems);
+
+  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  if (camera.name.empty()) camera.name = file.stem().string();
+  return camera;
+}
+
+core::Result<Camera> read_open3d_camera(const std::filesystem::path& file) {
+  auto root = core::read_yaml(file);  // JSON is YAML
+  if (!root) return tl::unexpected<core::Error>(root.error());
+  constexpr double millimetres = 1000.0;  // Open3D's convention for 16-bit depth
+  Camera camera;
+  camera.name = file.stem().string();
+  camera.depth_scale = millimetres;
+  std::vector<double> k;  // column by column
+  core::OptionTable table;
+  table.integer("width", camera.color.width, {1, 32768}, "px", "");
+  table.integer("height", camera.color.height, {1, 32768}, "px", "");
+  table.numbers("intrinsic_matrix", k, 9, {}, "", "");
+  ConfigProblems problems;
+  for (const char* key : {"width", "height", "intrinsic_matrix"}) {
+    const ConfigNode* node = root->find(key);
+    if (node == nullptr) {
+      problems.push_back({root->mark, key, "is missing (needed: width height intrinsic_matrix)"});
+    } else {
+      table.set(key, *node, key, problems);
+    }
+  }
+  if (k.size() == 9) {
+    camera.color.fx = k[0];
+    camera.color.fy = k[4];
+    camera.color.cx = k[6];
+    camera.color.cy = k[7];
+    const bool focal = k[0] > 0.0 && k[4] > 0.0;
+    const bool inside = k[6] >= 0.0 && k[7] >= 0.0 && k[6] < camera.color.width && k[7] < camera.color.height;
+    if (!focal || !inside) {
+      problems.push_back({root->find("intrinsic_matrix")->mark, "intrinsic_matrix",
+                          "is no camera of that size (expected: [fx, 0, 0, 0, fy, 0, cx, cy, 1])"});
+    }
+  }
+  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  return camera;
+}
+
+core::Result<Camera> find_camera(const std::string& name_or_file,
+                                 const std::filesystem::path& cameras_folder) {
+  const std::filesystem::path shipped = cameras_folder / (name_or_file + ".yaml");
+  std::error_code ignored;
+  if (name_or_file.find('/') == std::string::npos && std::filesystem::is_regular_file(shipped, ignored)) {
+    return read_camera(shipped);
+  }
+  if (std::filesystem::is_regular_file(name_or_file, ignored)) return read_camera(name_or_file);
+
+  const std::vector<std::string> names = shipped_names(cameras_folder);
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  const std::string near = core::did_you_mean(name_or_file, names);
+  return core::usage_error(
+      fmt::format("camera '{}': neither a file nor a shipped calibration (shipped: {}{})", name_or_file,
+                  all.empty() ? "none found in " + cameras_folder.string() : all,
+                  near.empty() ? "" : "; did you mean " + near + "?"));
+}
+
+std::string to_yaml(const Camera& camera) {
+  std::string text = camera.name.empty() ? "" : fmt::format("name: {}\n", text_yaml(camera.name));
+  text += "model: pinhole\n" + pinhole_yaml(camera.color, "");
+  const Distortion& k = camera.distortion;
+  text += fmt::format("distortion: [{}, {}, {}, {}, {}]  # k1 k2 p1 p2 k3\n", k[0], k[1], k[2], k[3], k[4]);
+  text += fmt::format("depth_scale: {}  # raw units per metre\nfps: {}\n", camera.depth_scale, camera.fps);
+  if (camera.color_from_depth && camera.depth) {
+    const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();
+    text += "color_from_depth:\n";
+    for (int r = 0; r < 4; ++r) {
+      text += fmt::format("  - [{}, {}, {}, {}]\n", m(r, 0), m(r, 1), m(r, 2), m(r, 3));
+    }
+    text += "depth:\n" + pinhole_yaml(*camera.depth, "  ");
+  }
+  return text;
+}
+
+}  // namespace plumbline::sensor
