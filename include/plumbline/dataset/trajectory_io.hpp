@@ -13,6 +13,7 @@ namespace plumbline::dataset {
 core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& file);
 
 /// Stamps with 6 decimals, positions and quaternions with 9; written to a temporary file and renamed.
-core::Result<void> write_trajectory(const std::filesystem::path& file, const geometry::Trajectory& trajectory);
+core::Result<void> write_trajectory(const std::filesystem::path& file,
+                                    const geometry::Trajectory& trajectory);
 
 }  // namespace plumbline::dataset

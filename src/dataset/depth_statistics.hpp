@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Depth of a few sample frames, and whether it looks like metres.
+#include <cstddef>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+namespace plumbline::dataset {
+
+class DepthStatistics {
+ public:
+  void add(const cv::Mat& depth_m);  ///< CV_32FC1, 0 = no measurement
+  [[nodiscard]] std::optional<double> median() const;
+  [[nodiscard]] double missing_share() const;  ///< of all pixels, 1 when there are none
+
+ private:
+  std::vector<float> measured_;
+  std::size_t pixels_ = 0;
+};
+
+/// Among the scales in use, the one that brings the raw median depth nearest to that of a room. 5000 (TUM)
+/// and 1000 (millimetres) come first: the others only when neither gives a usual depth.
+double fitting_depth_scale(double median_raw);
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Decoders behind read_image. They return what is wrong as text without the file's name.
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace plumbline::dataset {
+
+using Bytes = std::vector<std::uint8_t>;
+using Decoded = tl::expected<cv::Mat, std::string>;
+
+constexpr std::int64_t kMaxPixels =
+    1 << 27;  // 134 megapixels: beyond any depth camera, small enough to allocate
+
+bool is_png(const Bytes& file);
+bool is_jpeg(const Bytes& file);
+/// Checks every chunk's checksum and the end mark, then inflates and unfilters. Kinds of PNG that no depth
+/// camera writes (palette, interlaced, 1-4 bit) go to OpenCV after the check.
+Decoded decode_png(const Bytes& file);
+/// libjpeg with its warnings taken as errors: it would otherwise fill what is missing with grey.
+Decoded decode_jpeg(const Bytes& file);
+Decoded decode_other(const Bytes& file);
+
+}  // namespace plumbline::dataset

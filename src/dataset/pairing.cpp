@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "layout.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+constexpr double kStampResolution = 1e-6;  // of seconds since 1970 in a double, rounded up
+
+bool earlier(const StampedFile& file, double stamp) { return file.stamp < stamp; }
+
+}  // namespace
+
+std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
+                                    const std::vector<StampedFile>& depth, double max_gap_s) {
+  const double reach = max_gap_s + kStampResolution;
+  std::vector<std::tuple<double, std::size_t, std::size_t>> candidates;  // gap, colour, depth
+  for (std::size_t i = 0; i < color.size(); ++i) {
+    const double stamp = color[i].stamp;
+    for (auto d = std::lower_bound(depth.begin(), depth.end(), stamp - reach, earlier);
+         d != depth.end() && d->stamp <= stamp + reach; ++d) {
+      candidates.emplace_back(std::abs(d->stamp - stamp), i, static_cast<std::size_t>(d - depth.begin()));
+    }
+  }
+  std::sort(candidates.begin(), candidates.end());
+
+  constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> depth_of(color.size(), none);
+  std::vector<bool> used(depth.size(), false);
+  for (const auto& [gap, i, j] : candidates) {
+    if (depth_of[i] != none || used[j]) continue;
+    depth_of[i] = j;
+    used[j] = true;
+  }
+  std::vector<PairInfo> pairs;
+  for (std::size_t i = 0; i < color.size(); ++i) {
+    if (depth_of[i] == none) continue;
+    const StampedFile& d = depth[depth_of[i]];
+    pairs.push_back({color[i].stamp, d.stamp, color[i].file, d.file});
+  }
+  return pairs;
+}
+
+std::string no_common_time(const std::string& color_name, const std::vector<StampedFile>& color,
+                           const std::string& depth_name, const std::vector<StampedFile>& depth,
+                           double max_gap_s) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const StampedFile& c : color) {
+    const auto after = std::lower_bound(depth.begin(), depth.end(), c.stamp, earlier);
+    if (after != depth.end()) nearest = std::min(nearest, after->stamp - c.stamp);
+    if (after != depth.begin()) nearest = std::min(nearest, c.stamp - (after - 1)->stamp);
+  }
+  return fmt::format(
+      "{} and {} have no frame in common in time: the nearest stamps are {:.3f} s apart (allowed: {:.3f} s); "
+      "colour covers {:.3f} to {:.3f}, depth {:.3f} to {:.3f}; check that both lists are of one recording "
+      "and "
+      "one clock",
+      color_name, depth_name, nearest, max_gap_s, color.front().stamp, color.back().stamp,
+      depth.front().stamp, depth.back().stamp);
+}
+
+core::Result<void> check_files(const std::string& list, const std::vector<StampedFile>& files,
+                               core::Log& log) {
+  std::size_t missing = 0;
+  const StampedFile* first = nullptr;
+  for (const StampedFile& file : files) {
+    std::error_code ignored;
+    if (std::filesystem::exists(file.file, ignored)) continue;
+    if (missing++ == 0) first = &file;
+  }
+  if (missing == 0) return {};
+  if (missing == files.size()) {
+    return core::input_error(fmt::format(
+        "{}:{}: names {}, which does not exist, and none of its {} files does; copy the image folder "
+        "beside the list or correct the list",
+        list, first->line, first->file, files.size()));
+  }
+  log.warning(fmt::format("{}:{}: {} of {} files do not exist, these frames are skipped (first: {})", list,
+                          first->line, missing, files.size(), first->file));
+  return {};
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Redwood and Open3D layout: color/, image/ or rgb/ beside depth/, files matched by their number;
+// trajectory.log (Choi, Zhou, Koltun: Robust Reconstruction of Indoor Scenes, CVPR 2015) as truth.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+
+#include "layout.hpp"
+#include "text_lines.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMicroseconds = 1e-6;
+
+struct NumberedFile {
+  long long number = 0;
+  std::optional<double> stamp;  ///< from names such as 0000012-000000400431.jpg: number, microseconds
+  std::string file;
+};
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+std::optional<fs::path> color_folder(const fs::path& folder) {
+  for (const char* name : {"color", "image", "rgb"}) {
+    if (is_folder(folder / name)) return folder / name;
+  }
+  return std::nullopt;
+}
+
+bool is_image(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+/// The groups of digits of a name, left to right.
+std::vector<long long> numbers_of(const std::string& name) {
+  std::vector<long long> numbers;
+  for (std::size_t i = 0; i < name.size();) {
+    std::size_t end = i;
+    while (end < name.size() && name[end] >= '0' && name[end] <= '9') ++end;
+    if (end > i && end - i <= 18) numbers.push_back(std::stoll(name.substr(i, end - i)));
+    i = end + 1;
+  }
+  return numbers;
+}
+
+/// Images with a number in their name, by number; a number seen twice keeps the first name.
+std::map<long long, NumberedFile> list_images(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    if (is_image(entry.path())) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::map<long long, NumberedFile> images;
+  for (const fs::path& file : files) {
+    const std::vector<long long> numbers = numbers_of(file.stem().string());
+    if (numbers.empty()) continue;
+    NumberedFile image{numbers[0], std::nullopt, file.string()};
+    if (numbers.size() == 2) image.stamp = static_cast<double>(numbers[1]) * kMicroseconds;
+    images.emplace(image.number, std::move(image));
+  }
+  return images;
+}
+
+bool all_stamped(const std::map<long long, NumberedFile>& images) {
+  return std::all_of(images.begin(), images.end(), [](const auto& i) { return i.second.stamp.has_value(); });
+}
+
+std::vector<StampedFile> by_stamp(const std::map<long long, NumberedFile>& images) {
+  std::vector<StampedFile> files;
+  for (const auto& [number, image] : images) files.push_back({*image.stamp, image.file, 0});
+  std::sort(files.begin(), files.end(),
+            [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; });
+  return files;
+}
+
+/// Blocks of "a b c" and four rows of a 4x4 world_from_camera; a is the position of the pair.
+geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>& pairs, core::Log& log) {
+  geometry::Trajectory truth;
+  const auto lines = read_lines(file);
+  if (!lines) return truth;
+  for (std::size_t i = 0; i + 4 < lines->size(); i += 5) {
+    const std::optional<double> index = to_number((*lines)[i].words[0]);
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
+    bool good = index && *index >= 0.0 && *index < static_cast<double>(pairs.size());
+    for (std::size_t r = 0; r < 4; ++r) {
+      const std::vector<std::string>& words = (*lines)[i + 1 + r].words;
+      for (std::size_t c = 0; c < 4 && c < words.size(); ++c) {
+        matrix(static_cast<int>(r), static_cast<int>(c)) = to_number(words[c]).value_or(NAN);
+      }
+    }
+    const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+    const double error =
+        (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    good = good && matrix.allFinite() && error < 0.01;
+    if (!good) {
+      log.warning(
+          fmt::format("{}:{}: is no pose of a pair; the truth ends here", file.string(), (*lines)[i].number));
+      break;
+    }
+    truth.push_back({pairs[static_cast<std::size_t>(*index)].stamp,
+                     geometry::Rigid3(Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>())});
+  }
+  std::stable_sort(
+      truth.begin(), truth.end(),
+      [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
+  return truth;
+}
+
+std::vector<PairInfo> pair_by_number(const std::map<long long, NumberedFile>& color,
+                                     const std::map<long long, NumberedFile>& depth, double fps) {
+  std::vector<PairInfo> pairs;
+  for (const auto& [number, image] : color) {
+    const auto partner = depth.find(number);
+    if (partner == depth.end()) continue;
+    const double stamp = static_cast<double>(number) / fps;
+    pairs.push_back({stamp, stamp, image.file, partner->second.file});
+  }
+  return pairs;
+}
+
+}  // namespace
+
+bool looks_like_redwood(const fs::path& folder) {
+  return color_folder(folder) && is_folder(folder / "depth");
+}
+
+core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
+  const std::optional<fs::path> colors = color_folder(folder);
+  if (!colors || !is_folder(folder / "depth")) {
+    return core::input_error(
+        fmt::format("{}: no {} folder (a Redwood or Open3D recording needs color/, image/ or "
+                    "rgb/, and depth/)",
+                    folder.string(), colors ? "depth/" : "colour"));
+  }
+  const auto color = list_images(*colors);
+  const auto depth = list_images(folder / "depth");
+  for (const auto& [images, path] : {std::pair(&color, *colors), std::pair(&depth, folder / "depth")}) {
+    if (images->empty()) {
+      return core::input_error(fmt::format("{}: no numbered image (looked for .png, .jpg)", path.string()));
+    }
+  }
+  Layout layout{"redwood", {}, std::nullopt};
+  if (all_stamped(color) && all_stamped(depth)) {
+    const auto c = by_stamp(color);
+    const auto d = by_stamp(depth);
+    layout.pairs = pair_by_stamp(c, d, options.max_pair_gap_s);
+    if (layout.pairs.empty()) {
+      return core::input_error(
+          no_common_time(colors->string(), c, (folder / "depth").string(), d, options.max_pair_gap_s));
+    }
+  } else {
+    layout.pairs = pair_by_number(color, depth, options.fps);
+  }
+  if (layout.pairs.empty()) {
+    return core::input_error(
+        fmt::format("{}: no number is in both {}/ ({} to {}) and depth/ ({} to {}); colour and depth are "
+                    "matched by number",
+                    folder.string(), colors->filename().string(), color.begin()->first, color.rbegin()->first,
+                    depth.begin()->first, depth.rbegin()->first));
+  }
+  const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
+  if (unmatched > 0) {
+    log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));
+  }
+  std::error_code ignored;
+  if (fs::is_regular_file(folder / "trajectory.log", ignored)) {
+    geometry::Trajectory truth = read_log(folder / "trajectory.log", layout.pairs, log);
+    if (!truth.empty()) layout.truth = std::move(truth);
+  }
+  return layout;
+}
+
+}  // namespace plumbline::dataset

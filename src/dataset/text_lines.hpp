@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Lines of a text file as words, the way every list in this module is read.
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::dataset {
+
+struct TextLine {
+  int number = 0;  ///< counts from 1
+  std::vector<std::string> words;
+};
+
+/// Words are separated by blanks, tabs or commas. Comments ('#'), blank lines, a byte order mark and
+/// carriage returns are passed over.
+core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file);
+
+/// The whole word as a number, whatever the locale; "nan" and "inf" are numbers here.
+std::optional<double> to_number(std::string_view word);
+
+}  // namespace plumbline::dataset

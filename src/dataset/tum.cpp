@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// TUM RGB-D benchmark layout: associations.txt, or rgb.txt and depth.txt; groundtruth.txt.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "layout.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "text_lines.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+core::Result<double> read_stamp(const std::string& list, const TextLine& line, std::size_t word) {
+  const std::optional<double> stamp = to_number(line.words[word]);
+  if (stamp && std::isfinite(*stamp)) return *stamp;
+  return core::input_error(
+      fmt::format("{}:{}: '{}' is no time in seconds", list, line.number, line.words[word]));
+}
+
+/// Sorts by stamp and drops files whose stamp came before; says so.
+void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, core::Log& log) {
+  const auto by_stamp = [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; };
+  if (!std::is_sorted(files.begin(), files.end(), by_stamp)) {
+    log.warning(fmt::format("{}: the stamps are not in order; sorted", list));
+    std::stable_sort(files.begin(), files.end(), by_stamp);
+  }
+  const auto same = [](const StampedFile& a, const StampedFile& b) { return a.stamp == b.stamp; };
+  const auto end = std::unique(files.begin(), files.end(), same);
+  if (end != files.end()) {
+    log.warning(
+        fmt::format("{}: {} lines repeat a stamp; the first of each is used", list, files.end() - end));
+    files.erase(end, files.end());
+  }
+}
+
+/// "stamp file" per line.
+core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log& log) {
+  auto lines = read_lines(list);
+  if (!lines) return tl::unexpected<core::Error>(lines.error());
+  std::vector<StampedFile> files;
+  for (const TextLine& line : *lines) {
+    if (line.words.size() < 2) {
+      return core::input_error(
+          fmt::format("{}:{}: expected 'stamp file', found one word", list.string(), line.number));
+    }
+    const auto stamp = read_stamp(list.string(), line, 0);
+    if (!stamp) return tl::unexpected<core::Error>(stamp.error());
+    std::string name = line.words[1];
+    for (std::size_t i = 2; i < line.words.size(); ++i) name += " " + line.words[i];  // a name with blanks
+    files.push_back({*stamp, (list.parent_path() / name).string(), line.number});
+  }
+  if (files.empty()) return core::input_error(fmt::format("{}: names no image", list.string()));
+  sort_and_unique(list.string(), files, log);
+  if (auto there = check_files(list.string(), files, log); !there) {
+    return tl::unexpected<core::Error>(there.error());
+  }
+  return files;
+}
+
+core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const LayoutOptions& options,
+                                                   core::Log& log) {
+  for (const char* name : {"rgb.txt", "depth.txt"}) {
+    if (is_file(folder / name)) continue;
+    return core::input_error(
+        fmt::format("{}: {} is missing (a TUM recording needs rgb.txt and depth.txt, or "
+                    "associations.txt)",
+                    folder.string(), name));
+  }
+  auto color = read_list(folder / "rgb.txt", log);
+  if (!color) return tl::unexpected<core::Error>(color.error());
+  auto depth = read_list(folder / "depth.txt", log);
+  if (!depth) return tl::unexpected<core::Error>(depth.error());
+  std::vector<PairInfo> pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s);
+  if (pairs.empty()) {
+    return core::input_error(no_common_time((folder / "rgb.txt").string(), *color,
+                                            (folder / "depth.txt").string(), *depth, options.max_pair_gap_s));
+  }
+  return pairs;
+}
+
+/// Whether the first file of a line of four words is the depth image. TUM's own tool writes colour first;
+/// ICL-NUIM's lists begin with depth.
+bool depth_first(const std::string& first, const std::string& second) {
+  const auto says_depth = [](const std::string& name) { return name.find("depth") != std::string::npos; };
+  const auto says_color = [](const std::string& name) {
+    const std::string extension = fs::path(name).extension().string();
+    return name.find("rgb") != std::string::npos || name.find("color") != std::string::npos ||
+           extension == ".jpg" || extension == ".jpeg";
+  };
+  if (says_depth(first) != says_depth(second)) return says_depth(first);
+  return says_color(second) && !says_color(first);
+}
+
+/// "stamp file stamp file" per line. Every image is used once; the pairs are trusted, however far apart.
+core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core::Log& log) {
+  auto lines = read_lines(list);
+  if (!lines) return tl::unexpected<core::Error>(lines.error());
+  std::vector<StampedFile> color;
+  std::vector<StampedFile> depth;
+  std::set<std::string> used;
+  for (const TextLine& line : *lines) {
+    if (line.words.size() != 4) {
+      return core::input_error(fmt::format("{}:{}: expected 'stamp file stamp file', found {} words",
+                                           list.string(), line.number, line.words.size()));
+    }
+    const auto first = read_stamp(list.string(), line, 0);
+    if (!first) return tl::unexpected<core::Error>(first.error());
+    const auto second = read_stamp(list.string(), line, 2);
+    if (!second) return tl::unexpected<core::Error>(second.error());
+    StampedFile a{*first, (list.parent_path() / line.words[1]).string(), line.number};
+    StampedFile b{*second, (list.parent_path() / line.words[3]).string(), line.number};
+    if (used.count(a.file) + used.count(b.file) > 0) continue;
+    used.insert({a.file, b.file});
+    if (depth_first(line.words[1], line.words[3])) std::swap(a, b);
+    color.push_back(std::move(a));
+    depth.push_back(std::move(b));
+  }
+  if (color.empty()) return core::input_error(fmt::format("{}: names no pair of images", list.string()));
+  if (color.size() < lines->size()) {
+    log.warning(fmt::format("{}: {} of {} lines name an image a second time; not used", list.string(),
+                            lines->size() - color.size(), lines->size()));
+  }
+  for (const auto* files : {&color, &depth}) {
+    if (auto there = check_files(list.string(), *files, log); !there) {
+      return tl::unexpected<core::Error>(there.error());
+    }
+  }
+  std::vector<PairInfo> pairs;
+  for (std::size_t i = 0; i < color.size(); ++i) {
+    pairs.push_back({color[i].stamp, depth[i].stamp, color[i].file, depth[i].file});
+  }
+  const auto by_stamp = [](const PairInfo& a, const PairInfo& b) { return a.stamp < b.stamp; };
+  if (!std::is_sorted(pairs.begin(), pairs.end(), by_stamp)) {
+    log.warning(fmt::format("{}: the stamps are not in order; sorted", list.string()));
+    std::stable_sort(pairs.begin(), pairs.end(), by_stamp);
+  }
+  return pairs;
+}
+
+}  // namespace
+
+bool looks_like_tum(const fs::path& folder) {
+  return is_file(folder / "associations.txt") || is_file(folder / "rgb.txt") || is_file(folder / "depth.txt");
+}
+
+core::Result<Layout> read_tum(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
+  const fs::path associations = folder / "associations.txt";
+  auto pairs =
+      is_file(associations) ? read_associations(associations, log) : read_two_lists(folder, options, log);
+  if (!pairs) return tl::unexpected<core::Error>(pairs.error());
+  Layout layout{"tum", std::move(*pairs), std::nullopt};
+  if (is_file(folder / "groundtruth.txt")) {
+    auto truth = read_trajectory(folder / "groundtruth.txt");
+    if (truth) {
+      layout.truth = std::move(*truth);
+    } else {
+      log.warning(truth.error().message + "; the recording is used without truth");
+    }
+  }
+  return layout;
+}
+
+}  // namespace plumbline::dataset

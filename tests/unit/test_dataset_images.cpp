@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+#include "plumbline/dataset/image_io.hpp"
+#include "test_dataset_world.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class Images : public RecordingTest {
+ protected:
+  void expect_same_as_opencv(const std::string& name) {
+    const auto image = read_image(folder_ / name);
+    ASSERT_TRUE(image) << image.error().message;
+    const cv::Mat reference = cv::imread((folder_ / name).string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(image->type(), reference.type()) << name;
+    ASSERT_EQ(image->size(), reference.size()) << name;
+    EXPECT_EQ(cv::norm(*image, reference, cv::NORM_INF), 0.0) << name;
+  }
+  std::string error_of(const std::string& name) {
+    const auto image = read_image(folder_ / name);
+    EXPECT_FALSE(image) << name;
+    return image ? "" : image.error().message;
+  }
+  std::string bytes(const std::string& name) {
+    std::ifstream stream(folder_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+};
+
+/// Smooth shading with some noise: encoders choose every kind of row filter for it.
+cv::Mat picture(int type, cv::Size size) {
+  cv::Mat image(size, type);
+  cv::RNG rng(7);
+  const double top = image.depth() == CV_8U ? 200.0 : 50000.0;
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      for (int c = 0; c < image.channels(); ++c) {
+        const double value =
+            top * (u + v * (c + 1)) / (size.width + 3.0 * size.height) + (v % 3 == 0 ? rng() % 9 : 0);
+        if (image.depth() == CV_8U) {
+          image.ptr<std::uint8_t>(v)[u * image.channels() + c] = static_cast<std::uint8_t>(value);
+        } else {
+          image.ptr<std::uint16_t>(v)[u * image.channels() + c] = static_cast<std::uint16_t>(value);
+        }
+      }
+    }
+  }
+  return image;
+}
+
+TEST_F(Images, PngAgreesWithOpenCv) {
+  int made = 0;
+  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3}) {
+    for (const cv::Size size : {cv::Size(64, 48), cv::Size(1, 1), cv::Size(7, 3), cv::Size(1, 9)}) {
+      for (const int strategy : {cv::IMWRITE_PNG_STRATEGY_DEFAULT, cv::IMWRITE_PNG_STRATEGY_FILTERED}) {
+        const std::string name = std::to_string(made++) + ".png";
+        // with a compression level given, OpenCV leaves the row filters to libpng, which then uses all of them
+        ASSERT_TRUE(cv::imwrite((folder_ / name).string(), picture(type, size),
+                                {cv::IMWRITE_PNG_COMPRESSION, 6, cv::IMWRITE_PNG_STRATEGY, strategy}));
+        expect_same_as_opencv(name);
+      }
+    }
+  }
+}
+
+TEST_F(Images, JpegAgreesWithOpenCv) {
+  write_image("color.jpg", picture(CV_8UC3, {64, 48}));
+  expect_same_as_opencv("color.jpg");
+  write_image("grey.jpg", picture(CV_8UC1, {63, 47}));
+  const auto grey = read_image(folder_ / "grey.jpg");
+  ASSERT_TRUE(grey);
+  EXPECT_EQ(grey->type(), CV_8UC3);
+  EXPECT_EQ(grey->size(), cv::Size(63, 47));
+}
+
+TEST_F(Images, OtherFormatsGoToOpenCv) {
+  write_image("color.bmp", picture(CV_8UC3, {64, 48}));
+  expect_same_as_opencv("color.bmp");
+}
+
+TEST_F(Images, TruncationAnywhereIsAnError) {
+  write_image("depth.png", picture(CV_16UC1, {64, 48}));
+  write_image("color.jpg", picture(CV_8UC3, {64, 48}));
+  for (const char* name : {"depth.png", "color.jpg"}) {
+    const std::string whole = bytes(name);
+    for (std::size_t size = 0; size + 2 < whole.size(); size += 13) {
+      write_text(name, whole.substr(0, size));
+      EXPECT_THAT(error_of(name), AllOf(HasSubstr(name), HasSubstr("truncated or damaged"))) << size;
+    }
+  }
+}
+
+TEST_F(Images, OneWrongByteInAPngIsAnError) {
+  write_image("depth.png", picture(CV_16UC1, {64, 48}));
+  const std::string whole = bytes("depth.png");
+  for (std::size_t at = 0; at + 12 < whole.size(); at += 7) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x40);
+    write_text("depth.png", damaged);
+    EXPECT_FALSE(read_image(folder_ / "depth.png")) << "byte " << at;
+  }
+}
+
+TEST_F(Images, NoiseInAJpegNeverCrashes) {
+  write_image("color.jpg", picture(CV_8UC3, {64, 48}));
+  const std::string whole = bytes("color.jpg");
+  cv::RNG rng(3);
+  int refused = 0;
+  for (int i = 0; i < 200; ++i) {
+    std::string damaged = whole;
+    for (int k = 0; k < 8; ++k) damaged[rng() % damaged.size()] = static_cast<char>(rng());
+    write_text("color.jpg", damaged);
+    refused += read_image(folder_ / "color.jpg") ? 0 : 1;
+  }
+  EXPECT_GT(refused, 50);  // a JPEG has no checksums: some damage only changes pixels
+}
+
+TEST_F(Images, LyingHeadersAreRefused) {
+  write_image("depth.png", picture(CV_16UC1, {64, 48}));
+  EXPECT_THAT(error_of("nothing.png"), HasSubstr("nothing.png"));
+  write_text("empty.png", "");
+  EXPECT_THAT(error_of("empty.png"), HasSubstr("empty file"));
+  write_text("text.png", "this is no picture");
+  EXPECT_THAT(error_of("text.png"), HasSubstr("no known image format"));
+  std::filesystem::create_directories(folder_ / "folder.png");
+  EXPECT_THAT(error_of("folder.png"), HasSubstr("folder.png"));
+}
+
+using Frames = RecordingTest;
+
+TEST_F(Frames, TruncatedImageInTheMiddleIsOneBadFrame) {
+  write_tum(5);
+  truncate("depth/2.png", 0.6);
+  truncate("rgb/3.png", 0.9);
+  testing::internal::CaptureStderr();
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_TRUE((*source)->read(1));
+  const auto depth = (*source)->read(2);
+  ASSERT_FALSE(depth);
+  EXPECT_EQ(depth.error().kind, core::ErrorKind::kInput);
+  EXPECT_THAT(depth.error().message, AllOf(HasSubstr("depth/2.png"), HasSubstr("truncated or damaged")));
+  const auto color = (*source)->read(3);
+  ASSERT_FALSE(color);
+  EXPECT_THAT(color.error().message, AllOf(HasSubstr("rgb/3.png"), HasSubstr("truncated or damaged")));
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST_F(Frames, SizesAndKindsAreChecked) {
+  write_tum(6);
+  write_image("rgb/1.png", color_image(1, {32, 24}));
+  write_image("depth/2.png", depth_image(10000, {32, 24}));
+  write_image("depth/3.png", cv::Mat(48, 64, CV_8UC1, cv::Scalar(100)));
+  write_image("depth/4.png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(100, 100, 100)));
+  write_image("rgb/5.png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(100, 100, 100)));
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  const auto message = [&](std::size_t i) {
+    const auto frame = (*source)->read(i);
+    EXPECT_FALSE(frame) << i;
+    return frame ? "" : frame.error().message;
+  };
+  EXPECT_TRUE((*source)->read(0));
+  EXPECT_THAT(message(1), AllOf(HasSubstr("rgb/1.png"), HasSubstr("32x24"), HasSubstr("64x48")));
+  EXPECT_THAT(message(2), AllOf(HasSubstr("depth/2.png"), HasSubstr("32x24"), HasSubstr("64x48")));
+  EXPECT_THAT(message(3), AllOf(HasSubstr("depth/3.png"), HasSubstr("8 bits"), HasSubstr("16-bit PNG")));
+  EXPECT_THAT(message(4), AllOf(HasSubstr("depth/4.png"), HasSubstr("3 channels")));
+  EXPECT_THAT(message(5), AllOf(HasSubstr("rgb/5.png"), HasSubstr("8 bits are needed")));
+}
+
+TEST_F(Frames, GreyAndTransparentColourAreTaken) {
+  write_tum(2);
+  write_image("rgb/0.png", cv::Mat(48, 64, CV_8UC1, cv::Scalar(77)));
+  write_image("rgb/1.png", cv::Mat(48, 64, CV_8UC4, cv::Scalar(1, 2, 3, 4)));
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->read(0)->color.at<cv::Vec3b>(5, 5), cv::Vec3b(77, 77, 77));
+  EXPECT_EQ((*source)->read(1)->color.at<cv::Vec3b>(5, 5), cv::Vec3b(1, 2, 3));
+}
+
+TEST_F(Frames, DepthOfItsOwnCameraIsRegistered) {
+  write_tum(2);
+  write_camera(
+      "color_from_depth: [1,0,0,0, 0,1,0,0, 0,0,1,0.5, 0,0,0,1]\n"
+      "depth: {width: 32, height: 24, fx: 26, fy: 26, cx: 15.5, cy: 11.5}\n");
+  for (const char* name : {"depth/0.png", "depth/1.png"}) write_image(name, depth_image(10000, {32, 24}));
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  const auto frame = (*source)->read(0);
+  ASSERT_TRUE(frame) << frame.error().message;
+  EXPECT_EQ(frame->depth.size(), cv::Size(64, 48));
+  EXPECT_FLOAT_EQ(frame->depth.at<float>(24, 32), 2.5F);
+}
+
+TEST_F(Frames, NothingUsable) {
+  write_tum(4);
+  for (int i = 0; i < 4; ++i) {
+    write_image("depth/" + std::to_string(i) + ".png", cv::Mat(48, 64, CV_8UC1, cv::Scalar(100)));
+  }
+  EXPECT_THAT(open_error(),
+              AllOf(HasSubstr("none of the 4 pairs"), HasSubstr("depth/0.png"), HasSubstr("16-bit")));
+  for (int i = 0; i < 4; ++i) {
+    write_image("depth/" + std::to_string(i) + ".png", depth_image(i % 2 == 0 ? 0 : 65535));
+  }
+  EXPECT_THAT(open_error(), HasSubstr("no measurement at all"));
+}
+
+TEST_F(Frames, OneGoodFrameIsEnoughToOpen) {
+  write_tum(30);
+  for (int i = 0; i < 30; ++i) {
+    if (i != 11) truncate("depth/" + std::to_string(i) + ".png", 0.5);
+  }
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_TRUE((*source)->read(11));
+}
+
+class DepthScale : public RecordingTest {
+ protected:
+  void write(int raw_depth, const std::string& scale) {
+    write_tum(3, raw_depth);
+    write_camera("depth_scale: " + scale + "\n");
+  }
+};
+
+TEST_F(DepthScale, ErrorNamesTheScaleThatFits) {
+  write(9500, "50000");
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("0.19 m"), HasSubstr("depth_scale 5000 would fit")));
+  write(9500, "1");
+  EXPECT_THAT(open_error(), HasSubstr("depth_scale 5000 would fit"));
+  write(14000, "1");
+  EXPECT_THAT(open_error(), HasSubstr("depth_scale 5000 would fit"));
+  write(1900, "100000");
+  EXPECT_THAT(open_error(), HasSubstr("depth_scale 1000 would fit"));
+  write(500, "5000");
+  EXPECT_THAT(open_error(), HasSubstr("depth_scale 256 would fit"));
+  write(2, "5000");
+  EXPECT_THAT(open_error(), HasSubstr("depth_scale 1 would fit"));
+}
+
+TEST_F(DepthScale, WarningNamesTheScaleThatFits) {
+  write(9500, "1000");
+  EXPECT_TRUE(open());
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("9.5 m"), HasSubstr("depth_scale 5000 would fit")));
+  write(2500, "5000");
+  EXPECT_TRUE(open());
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("0.5 m"), HasSubstr("depth_scale 1000 would fit")));
+}
+
+TEST_F(DepthScale, UsualDepthIsSilent) {
+  write(9500, "5000");
+  EXPECT_TRUE(open());
+  EXPECT_EQ(log_.warnings, "");
+}
+
+}  // namespace
+}  // namespace plumbline::dataset
