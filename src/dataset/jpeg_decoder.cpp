@@ -4,6 +4,7 @@
 #include <cstdio>  // jpeglib.h uses FILE and size_t without including them
 // clang-format off
 #include <jpeglib.h>
+#include <jerror.h>
 // clang-format on
 
 #include "image_decoders.hpp"
@@ -23,9 +24,20 @@ struct ErrorManager {
   std::longjmp(errors->jump, 1);
 }
 
-/// Level -1 is a warning about damaged data; libjpeg would go on with invented pixels.
+/// Level -1 is a warning. libjpeg goes on with invented pixels after those that mean lost data; the others
+/// (stray bytes between segments, odd version numbers) are harmless and some cameras' files are full of them.
 void on_message(j_common_ptr info, int level) {
-  if (level < 0) leave(info);
+  if (level >= 0) return;
+  switch (info->err->msg_code) {
+    case JWRN_JPEG_EOF:
+    case JWRN_HIT_MARKER:
+    case JWRN_HUFF_BAD_CODE:
+    case JWRN_ARITH_BAD_CODE:
+    case JWRN_MUST_RESYNC:
+      leave(info);
+    default:
+      return;
+  }
 }
 
 void be_quiet(j_common_ptr /*info*/) {}

@@ -80,6 +80,7 @@ bool all_stamped(const std::map<long long, NumberedFile>& images) {
 
 std::vector<StampedFile> by_stamp(const std::map<long long, NumberedFile>& images) {
   std::vector<StampedFile> files;
+  files.reserve(images.size());
   for (const auto& [number, image] : images) files.push_back({*image.stamp, image.file, 0});
   std::sort(files.begin(), files.end(),
             [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; });
