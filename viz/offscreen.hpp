@@ -7,8 +7,8 @@
 
 #include <memory>
 
-#include "plumbline/core/error.hpp"
 #include "image.hpp"
+#include "plumbline/core/error.hpp"
 
 namespace plumbline::viz {
 

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What is drawn over the points of a snapshot: camera paths, title, legend, scale bar, axes, colour bar.
+#include <string>
+
+#include "painter.hpp"
+#include "point_style.hpp"
+#include "view_frame.hpp"
+
+namespace plumbline::viz {
+
+struct OverlayContent {
+  const Scene* scene = nullptr;
+  const SnapshotOptions* options = nullptr;
+  Projection projection;
+  ColorScale color_scale;
+  bool empty = false;  ///< nothing to show: say so
+};
+
+void draw_paths(Painter& painter, const OverlayContent& content);
+void draw_annotations(Painter& painter, const OverlayContent& content);
+
+/// The greatest of 1, 2, 5 x 10^n that is at most `limit` (> 0).
+double nice_number_below(double limit);
+/// "20 cm", "5 m": a length as people say it.
+std::string length_text(double metres);
+
+}  // namespace plumbline::viz

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which points of a cloud a picture shows, how large and in what colour.
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "view_frame.hpp"
+
+namespace plumbline::viz {
+
+/// Indices of the finite points that face the viewer (all finite ones without culling, or when nearly none
+/// would be left, as with clouds whose normals point nowhere). Takes every `step`-th point.
+std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& projection, bool cull,
+                                          std::size_t step = 1);
+
+/// Typical distance between neighbouring points of the surfaces, metres; 0 for fewer than two points.
+double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points);
+
+/// What a colour bar beside the picture explains.
+struct ColorScale {
+  bool shown = false;
+  double low = 0.0;
+  double high = 1.0;
+  std::string label;
+};
+
+struct PointColors {
+  std::vector<Rgb> colors;  ///< one per chosen point
+  ColorScale scale;
+};
+
+PointColors color_points(const Scene& scene, const std::vector<std::uint32_t>& points,
+                         const SnapshotOptions& options, const SceneAxes& axes, const Projection& projection);
+
+}  // namespace plumbline::viz

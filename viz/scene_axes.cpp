@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which way is up, and which way do the walls run: peaks of the normals' distribution.
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "view_frame.hpp"
+
+namespace plumbline::viz {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+constexpr std::size_t kMaxNormals = 200000;
+
+/// Unit normals of an even sample of the cloud.
+std::vector<Eigen::Vector3d> sample_normals(const Scene& scene) {
+  std::vector<Eigen::Vector3d> normals;
+  if (scene.cloud == nullptr) return normals;
+  const std::size_t step = std::max<std::size_t>(1, scene.cloud->size() / kMaxNormals);
+  for (std::size_t i = 0; i < scene.cloud->size(); i += step) {
+    const auto& p = (*scene.cloud)[i];
+    const Eigen::Vector3d n(p.normal_x, p.normal_y, p.normal_z);
+    const double length = n.norm();
+    if (std::isfinite(length) && length > 0.1) normals.push_back(n / length);
+  }
+  return normals;
+}
+
+Eigen::Vector3d mean_camera_up(const Scene& scene) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const CameraPath& path : scene.paths) {
+    for (const auto& pose : path.trajectory) {
+      if (pose.world_from_camera.rotation.allFinite()) sum -= pose.world_from_camera.rotation.col(1);
+    }
+  }
+  return sum.norm() > 1e-6 ? sum.normalized() : Eigen::Vector3d(0.0, -1.0, 0.0);
+}
+
+/// Any unit vector perpendicular to v, preferring `wish`.
+Eigen::Vector3d perpendicular(const Eigen::Vector3d& v, const Eigen::Vector3d& wish) {
+  for (const Eigen::Vector3d& candidate :
+       {wish, Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0)}) {
+    const Eigen::Vector3d flat = candidate - candidate.dot(v) * v;
+    if (flat.norm() > 0.1) return flat.normalized();
+  }
+  return v.unitOrthogonal();
+}
+
+/// Mean of the normals (sign ignored) within `angle` of `axis`; repeated, it climbs to the peak.
+Eigen::Vector3d climb(const std::vector<Eigen::Vector3d>& normals, Eigen::Vector3d axis, double angle) {
+  const double limit = std::cos(angle);
+  for (int round = 0; round < 5; ++round) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& n : normals) {
+      const double c = n.dot(axis);
+      if (std::abs(c) > limit) sum += c > 0.0 ? n : Eigen::Vector3d(-n);
+    }
+    if (sum.norm() < 1e-6) break;
+    axis = sum.normalized();
+  }
+  return axis;
+}
+
+/// Fullest 3-degree cell (with its neighbours) of normals within 45 degrees of `prior`, sign ignored.
+Eigen::Vector3d fullest_direction(const std::vector<Eigen::Vector3d>& normals, const Eigen::Vector3d& prior) {
+  constexpr int kCells = 33;
+  constexpr double kCell = 3.0 * kDegree;
+  const Eigen::Vector3d a = perpendicular(prior, Eigen::Vector3d(1, 0, 0));
+  const Eigen::Vector3d b = prior.cross(a);
+  std::array<std::array<int, kCells>, kCells> count{};
+  for (const Eigen::Vector3d& normal : normals) {
+    const Eigen::Vector3d n = normal.dot(prior) < 0.0 ? Eigen::Vector3d(-normal) : normal;
+    const double tilt = std::acos(std::clamp(n.dot(prior), -1.0, 1.0));
+    if (tilt > 45.0 * kDegree) continue;
+    const double azimuth = std::atan2(n.dot(b), n.dot(a));
+    const int u = kCells / 2 + static_cast<int>(std::lround(tilt * std::cos(azimuth) / kCell));
+    const int v = kCells / 2 + static_cast<int>(std::lround(tilt * std::sin(azimuth) / kCell));
+    ++count[static_cast<std::size_t>(u)][static_cast<std::size_t>(v)];
+  }
+  int best = -1;
+  Eigen::Vector3d direction = prior;
+  for (int u = 1; u + 1 < kCells; ++u) {
+    for (int v = 1; v + 1 < kCells; ++v) {
+      int sum = 0;
+      for (int du = -1; du <= 1; ++du) {
+        for (int dv = -1; dv <= 1; ++dv) {
+          sum += count[static_cast<std::size_t>(u + du)][static_cast<std::size_t>(v + dv)];
+        }
+      }
+      if (sum <= best) continue;
+      best = sum;
+      const double x = (u - kCells / 2) * kCell;
+      const double y = (v - kCells / 2) * kCell;
+      const double tilt = std::hypot(x, y);
+      direction = tilt < 1e-9
+                      ? prior
+                      : Eigen::Vector3d(std::cos(tilt) * prior + std::sin(tilt) / tilt * (x * a + y * b));
+    }
+  }
+  return direction;
+}
+
+/// Turns `forward` about `up` by at most 45 degrees to where walls at right angles put most normals; leaves
+/// it when no such directions stand out.
+Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const Eigen::Vector3d& up,
+                            const Eigen::Vector3d& forward) {
+  const Eigen::Vector3d right = forward.cross(up);
+  std::array<double, 90> count{};
+  double total = 0.0;
+  std::vector<double> angles;
+  for (const Eigen::Vector3d& n : normals) {
+    if (std::abs(n.dot(up)) > 0.25) continue;
+    double angle = std::atan2(n.dot(right), n.dot(forward)) / kDegree;
+    angle -= 90.0 * std::floor(angle / 90.0);  // walls at right angles fall together
+    angles.push_back(angle);
+    count[std::min<std::size_t>(89, static_cast<std::size_t>(angle))] += 1.0;
+    total += 1.0;
+  }
+  std::size_t peak = 0;
+  double best = -1.0;
+  for (std::size_t i = 0; i < 90; ++i) {
+    double sum = 0.0;
+    for (std::size_t d = 0; d < 9; ++d) sum += count[(i + 86 + d) % 90];
+    if (sum > best) {
+      best = sum;
+      peak = i;
+    }
+  }
+  if (total < 100.0 || best < 1.6 * total * 9.0 / 90.0) return forward;
+  double offset_sum = 0.0;
+  double used = 0.0;
+  for (const double angle : angles) {
+    const double offset = std::remainder(angle - (static_cast<double>(peak) + 0.5), 90.0);
+    if (std::abs(offset) > 6.0) continue;
+    offset_sum += offset;
+    used += 1.0;
+  }
+  const double turn =
+      std::remainder(static_cast<double>(peak) + 0.5 + offset_sum / std::max(1.0, used), 90.0) * kDegree;
+  return (std::cos(turn) * forward + std::sin(turn) * right).normalized();
+}
+
+}  // namespace
+
+Eigen::Vector3d estimate_up(const Scene& scene) {
+  const Eigen::Vector3d prior = mean_camera_up(scene);
+  const std::vector<Eigen::Vector3d> normals = sample_normals(scene);
+  if (normals.empty()) return prior;
+  const Eigen::Vector3d up = climb(normals, fullest_direction(normals, prior), 8.0 * kDegree);
+  const auto support = std::count_if(normals.begin(), normals.end(), [&up](const Eigen::Vector3d& n) {
+    return std::abs(n.dot(up)) > std::cos(8.0 * kDegree);
+  });
+  const bool enough = static_cast<double>(support) > 0.03 * static_cast<double>(normals.size());
+  return enough ? up : prior;
+}
+
+SceneAxes scene_axes(const Scene& scene, const SnapshotOptions& options) {
+  SceneAxes axes;
+  const bool given = options.up.has_value() && options.up->allFinite() && options.up->norm() > 1e-9;
+  axes.up = given ? options.up->normalized() : estimate_up(scene);
+  Eigen::Vector3d looks(0.0, 0.0, 1.0);
+  for (const CameraPath& path : scene.paths) {
+    if (path.trajectory.empty()) continue;
+    const Eigen::Matrix3d& rotation = path.trajectory.front().world_from_camera.rotation;
+    // A camera that looks straight down has its heading in the picture's up direction.
+    const bool steep = std::abs(rotation.col(2).dot(axes.up)) > 0.9;
+    looks = steep ? Eigen::Vector3d(-rotation.col(1)) : Eigen::Vector3d(rotation.col(2));
+    break;
+  }
+  axes.forward = along_walls(sample_normals(scene), axes.up, perpendicular(axes.up, looks));
+  axes.right = axes.forward.cross(axes.up);
+  return axes;
+}
+
+}  // namespace plumbline::viz

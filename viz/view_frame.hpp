@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Directions and projection of a picture.
+#include <Eigen/Core>
+#include <vector>
+
+#include "plumbline/viz/snapshot.hpp"
+
+namespace plumbline::viz {
+
+/// Right-handed directions of a scene, unit length, in the scene's frame. `forward` is horizontal: the wall
+/// direction (if walls meet at right angles) nearest to where the first camera looks.
+struct SceneAxes {
+  Eigen::Vector3d right, forward, up;
+};
+SceneAxes scene_axes(const Scene& scene, const SnapshotOptions& options);
+
+/// Pinhole or orthographic projection onto a picture, y upwards.
+struct Projection {
+  Eigen::Vector3d right, up, forward;  ///< camera axes in the scene, unit
+  Eigen::Vector3d eye;                 ///< scene frame, metres
+  bool orthographic = true;
+  double focal_px = 1.0;  ///< perspective: pixels per unit of x/z; orthographic: pixels per metre
+  double width_px = 0.0;
+  double height_px = 0.0;
+  double near_m = 0.0;  ///< depth range along `forward`
+  double far_m = 1.0;
+
+  /// (x, y) in pixels from the lower left corner, z = depth along `forward`, metres.
+  [[nodiscard]] Eigen::Vector3d project(const Eigen::Vector3d& p) const;
+  [[nodiscard]] double pixels_per_metre(double depth_m) const;
+  /// From p towards the viewer, unit.
+  [[nodiscard]] Eigen::Vector3d to_viewer(const Eigen::Vector3d& p) const;
+};
+
+/// Directions of a view only (eye and scale unset), so that the points it can see may be chosen.
+Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes);
+
+/// Places the camera so that 99 % of `points` and all of `must_see` lie in the picture; sets the depth range.
+void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
+         const std::vector<Eigen::Vector3d>& must_see);
+
+/// The q-quantile; 0 for no values.
+double quantile(std::vector<double> values, double q);
+
+}  // namespace plumbline::viz
