@@ -133,7 +133,7 @@ core::Result<void> check_depth_scale(const FrameSource& source, const std::strin
   const double scale = source.camera().depth_scale;
   const double fit = fitting_depth_scale(*median * scale);
   const std::string what = fmt::format(
-      "{}: with depth_scale {} the median depth is {:.3g} m; depth_scale {} would "
+      "{}: with depth_scale {} the median depth is {:.4g} m; depth_scale {} would "
       "fit (median {:.2g} m)",
       folder, scale, *median, fit, *median * scale / fit);
   if (*median < 0.35 || *median > 20.0) return core::input_error(what + "; correct the camera file");
