@@ -62,7 +62,8 @@ TEST_F(Images, PngAgreesWithOpenCv) {
     for (const cv::Size size : {cv::Size(64, 48), cv::Size(1, 1), cv::Size(7, 3), cv::Size(1, 9)}) {
       for (const int strategy : {cv::IMWRITE_PNG_STRATEGY_DEFAULT, cv::IMWRITE_PNG_STRATEGY_FILTERED}) {
         const std::string name = std::to_string(made++) + ".png";
-        // with a compression level given, OpenCV leaves the row filters to libpng, which then uses all of them
+        // with a compression level given, OpenCV leaves the row filters to libpng, which then uses all of
+        // them
         ASSERT_TRUE(cv::imwrite((folder_ / name).string(), picture(type, size),
                                 {cv::IMWRITE_PNG_COMPRESSION, 6, cv::IMWRITE_PNG_STRATEGY, strategy}));
         expect_same_as_opencv(name);
