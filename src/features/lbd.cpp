@@ -14,9 +14,13 @@ namespace {
 constexpr int kBands = 9;      // m
 constexpr int kBandWidth = 7;  // w, rows
 constexpr int kRows = kBands * kBandWidth;
-constexpr int kMaxColumns = 32;  // samples along a line; longer lines are sampled more sparsely
-constexpr float kClip = 0.4F;    // no single entry may dominate
+constexpr int kMaxColumns = 32;       // samples along a line; longer lines are sampled more sparsely
+constexpr float kRowSpacing = 0.75F;  // px of the half image: the support is 94 px wide in the full one
+constexpr double kBlurSigma = 1.4;    // px of the half image; noise is what costs most recall
+constexpr float kClip = 0.4F;         // no single entry may dominate
 constexpr double kDirectionUnit = 4096.0;
+constexpr double kFixed = 65536.0;  // unit of sample places
+constexpr int kFixedBits = 16;
 
 // Row sums of the four gradients: along +, along -, across +, across -.
 using RowSums = std::array<std::array<float, 4>, kRows>;
@@ -42,14 +46,18 @@ struct Weights {
   }
 };
 
-// Central differences, (gx, gy) interleaved so that one 32-bit load fetches both.
+// Gradient of the blurred image at half resolution, (gx, gy) interleaved so that one 32-bit load fetches
+// both.
 cv::Mat gradients(const cv::Mat& gray) {
-  cv::Mat gx;
-  cv::Mat gy;
-  cv::Sobel(gray, gx, CV_16S, 1, 0, 3);
-  cv::Sobel(gray, gy, CV_16S, 0, 1, 3);
+  const cv::Size half(gray.cols / 2, gray.rows / 2);
+  cv::Mat image;
+  cv::resize(gray(cv::Rect(0, 0, half.width * 2, half.height * 2)), image, half, 0.0, 0.0, cv::INTER_AREA);
+  cv::GaussianBlur(image, image, cv::Size(7, 7), kBlurSigma, kBlurSigma, cv::BORDER_REPLICATE);
+  cv::Mat parts[2];
+  cv::Sobel(image, parts[0], CV_16S, 1, 0, 3);
+  cv::Sobel(image, parts[1], CV_16S, 0, 1, 3);
   cv::Mat both;
-  cv::merge(std::vector<cv::Mat>{gx, gy}, both);
+  cv::merge(parts, 2, both);
   return both;
 }
 
@@ -66,63 +74,75 @@ Support support_of(const LineSegment& segment) {
   Support s;
   s.direction = segment.direction();
   s.normal = {-s.direction.y(), s.direction.x()};
-  s.middle = segment.middle();
-  s.columns = std::clamp(static_cast<int>(segment.length() / 4.0F) * 4, 4, kMaxColumns);
-  s.step = std::max(segment.length() / static_cast<float>(s.columns), 0.25F);
+  s.middle = 0.5F * (segment.middle() - Eigen::Vector2f(0.5F, 0.5F));
+  const float length = 0.5F * segment.length();
+  s.columns = std::clamp(static_cast<int>(length / 4.0F) * 4, 4, kMaxColumns);
+  s.step = std::max(length / static_cast<float>(s.columns), 0.25F);
   return s;
-}
-
-Eigen::Vector2f row_start(const Support& s, int row) {
-  const float across = static_cast<float>(row) - 0.5F * static_cast<float>(kRows - 1);
-  const float along = -0.5F * static_cast<float>(s.columns - 1) * s.step;
-  return s.middle + across * s.normal + along * s.direction;
-}
-
-using Row = std::array<std::int32_t, kMaxColumns>;  // packed (gx, gy)
-
-const std::int32_t* packed(const cv::Mat& gradient) {
-  return reinterpret_cast<const std::int32_t*>(gradient.data);
 }
 
 bool inside(const Support& s, const cv::Mat& gradient) {
   const float along = 0.5F * static_cast<float>(s.columns) * s.step;
-  const float across = 0.5F * static_cast<float>(kRows);
-  const float reach_x = along * std::abs(s.direction.x()) + across * std::abs(s.direction.y()) + 2.0F;
-  const float reach_y = along * std::abs(s.direction.y()) + across * std::abs(s.direction.x()) + 2.0F;
+  const float across = 0.5F * static_cast<float>(kRows) * kRowSpacing;
+  const float reach_x = along * std::abs(s.direction.x()) + across * std::abs(s.direction.y()) + 1.0F;
+  const float reach_y = along * std::abs(s.direction.y()) + across * std::abs(s.direction.x()) + 1.0F;
   return s.middle.x() > reach_x && s.middle.y() > reach_y &&
          s.middle.x() < static_cast<float>(gradient.cols) - reach_x &&
          s.middle.y() < static_cast<float>(gradient.rows) - reach_y;
 }
 
-// Nearest samples of one row; `offsets` are the columns' places relative to the first, in elements.
-void fetch_inside(const cv::Mat& gradient, const Support& s, int row, const Row& offsets, Row& out) {
-  const Eigen::Vector2f p = row_start(s, row);
-  const std::int32_t* base =
-      packed(gradient) + static_cast<std::ptrdiff_t>(std::lround(p.y())) * gradient.cols + std::lround(p.x());
-  for (std::size_t k = 0; k < static_cast<std::size_t>(s.columns); ++k) out[k] = base[offsets[k]];
+using Row = std::array<std::int32_t, kMaxColumns>;  // packed (gx, gy)
+
+std::int32_t fixed(float value) {
+  return static_cast<std::int32_t>(std::lround(static_cast<double>(value) * kFixed));
 }
 
-// The same where the support region leaves the image: no gradient outside.
-void fetch_clipped(const cv::Mat& gradient, const Support& s, int row, Row& out) {
-  const Eigen::Vector2f start = row_start(s, row);
-  for (int k = 0; k < s.columns; ++k) {
-    const Eigen::Vector2f p = start + static_cast<float>(k) * s.step * s.direction;
-    const long x = std::lround(p.x());
-    const long y = std::lround(p.y());
-    const bool in = x >= 0 && y >= 0 && x < gradient.cols && y < gradient.rows;
-    out[static_cast<std::size_t>(k)] = in ? packed(gradient)[y * gradient.cols + x] : 0;
+// Walks the support row by row and fetches the nearest gradients.
+class Sampler {
+ public:
+  Sampler(const cv::Mat& gradient, const Support& s)
+      : data_(reinterpret_cast<const std::int32_t*>(gradient.data)),
+        columns_(s.columns),
+        stride_(gradient.cols),
+        last_x_(gradient.cols - 1),
+        last_y_(gradient.rows - 1),
+        inside_(inside(s, gradient)),
+        step_x_(fixed(s.step * s.direction.x())),
+        step_y_(fixed(s.step * s.direction.y())) {
+    const float along = -0.5F * static_cast<float>(s.columns - 1) * s.step;
+    corner_ = s.middle + along * s.direction - 0.5F * static_cast<float>(kRows - 1) * kRowSpacing * s.normal;
+    row_step_ = kRowSpacing * s.normal;
   }
-}
 
-Row column_offsets(const cv::Mat& gradient, const Support& s) {
-  Row offsets{};
-  for (int k = 0; k < s.columns; ++k) {
-    const Eigen::Vector2f p = static_cast<float>(k) * s.step * s.direction;
-    offsets[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::lround(p.y())) * gradient.cols +
-                                           static_cast<std::int32_t>(std::lround(p.x()));
+  void fetch(int row, Row& out) const {
+    const Eigen::Vector2f start = corner_ + static_cast<float>(row) * row_step_;
+    std::int32_t x = fixed(start.x() + 0.5F);
+    std::int32_t y = fixed(start.y() + 0.5F);
+    if (inside_) {
+      for (std::size_t k = 0; k < static_cast<std::size_t>(columns_); ++k, x += step_x_, y += step_y_) {
+        out[k] = data_[(y >> kFixedBits) * stride_ + (x >> kFixedBits)];
+      }
+      return;
+    }
+    // Where the support leaves the image, the border's gradient goes on.
+    for (std::size_t k = 0; k < static_cast<std::size_t>(columns_); ++k, x += step_x_, y += step_y_) {
+      out[k] =
+          data_[std::clamp(y >> kFixedBits, 0, last_y_) * stride_ + std::clamp(x >> kFixedBits, 0, last_x_)];
+    }
   }
-  return offsets;
-}
+
+ private:
+  const std::int32_t* data_;
+  int columns_;
+  int stride_;
+  int last_x_;
+  int last_y_;
+  bool inside_;
+  std::int32_t step_x_;
+  std::int32_t step_y_;
+  Eigen::Vector2f corner_;
+  Eigen::Vector2f row_step_;
+};
 
 // Gradients turned into the line's frame and summed by sign, in whole numbers: no rounding, any order.
 class RowSummer {
@@ -165,17 +185,12 @@ class RowSummer {
 
 RowSums row_sums(const cv::Mat& gradient, const LineSegment& segment) {
   const Support support = support_of(segment);
+  const Sampler sampler(gradient, support);
   const RowSummer summer(support);
-  const bool whole = inside(support, gradient);
-  const Row offsets = whole ? column_offsets(gradient, support) : Row{};
   RowSums sums;
   Row row{};
   for (int i = 0; i < kRows; ++i) {
-    if (whole) {
-      fetch_inside(gradient, support, i, offsets, row);
-    } else {
-      fetch_clipped(gradient, support, i, row);
-    }
+    sampler.fetch(i, row);
     sums[static_cast<std::size_t>(i)] = summer(row, support.columns);
   }
   return sums;
@@ -237,8 +252,8 @@ constexpr std::array<std::array<unsigned char, 2>, 32> kPairs = {
 
 std::vector<BandStatistics> band_statistics(const cv::Mat& gray, const std::vector<LineSegment>& segments) {
   std::vector<BandStatistics> result;
-  if (segments.empty() || gray.empty()) return result;
-  CV_Assert(gray.type() == CV_8UC1);
+  if (segments.empty()) return result;
+  CV_Assert(gray.type() == CV_8UC1 && gray.cols >= 2 && gray.rows >= 2);
   static const Weights weights;
   const cv::Mat gradient = gradients(gray);
   result.reserve(segments.size());
