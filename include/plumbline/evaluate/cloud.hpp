@@ -26,11 +26,11 @@ enum class CloudAlignment {
 
 /// What the distance to a sampled surface is. Triangles are always measured exactly.
 enum class SampleDistance {
-  /// Every sample stands for a small disc (its normal, 0.75 x the sampling distance), so that sampling
-  /// density does
-  /// not enter; normals are estimated where missing and where the surface is flat.
+  /// To the plane through the nearest sample where samples surround the foot of the perpendicular, so that
+  /// sampling
+  /// density does not enter; to the sample itself at borders and holes. Normals are estimated where missing.
   kSurface,
-  kPoint,  ///< to the nearest sample, as other tools do: has a floor of about half the sampling distance
+  kPoint,  ///< to the nearest sample, as many tools do; has a floor of about half the sampling distance
 };
 
 struct CloudOptions {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/types.hpp"
 #include "plumbline/core/error.hpp"
 
 namespace plumbline::evaluate {
@@ -34,20 +35,19 @@ struct Reference {
   TriangleMesh mesh;
 };
 
-/// Points of a PLY file and what was dropped.
-struct LoadedCloud {
-  SurfaceSamples samples;
-  std::size_t not_finite = 0;  ///< points dropped since a coordinate is NaN or infinite
-};
+/// Reads a PLY (x y z, optional nx ny nz, `visible`, and faces, polygons being split into fans) or, without
+/// faces and `visible`, whatever cloud::read_cloud reads. Errors (kInput) name the file and the place: not
+/// such a file, no points, the number of points whose coordinates are not finite, a file that ends before
+/// what its header promises, a face with a vertex out of range.
+core::Result<Reference> load_reference(const std::filesystem::path& file);
 
-/// Reads a PLY (ascii or binary, either byte order; x y z, optional nx ny nz, `visible`, and faces, polygons
-/// being split into fans). Errors name the file and the place: not a PLY, no points, the number of points
-/// whose coordinates are not finite, a file that ends before what its header promises, a face with a vertex
-/// out of range.
-core::Result<Reference> load_reference(const std::filesystem::path& ply);
+/// The cloud under test, in the order of the file; points that are not finite stay, evaluate_cloud counts
+/// them.
+core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file);
 
-/// The same for a cloud under test: faces are ignored, points that are not finite are dropped and counted.
-core::Result<LoadedCloud> load_cloud(const std::filesystem::path& ply);
+/// Points and normals of a cloud in memory, in its order; a normal is zero where it is unknown, all are left
+/// out when none is known.
+SurfaceSamples samples_of(const cloud::Cloud& cloud);
 
 /// Points spread evenly over the mesh, about one per spacing_m^2, with the normals of their triangles.
 /// Deterministic.

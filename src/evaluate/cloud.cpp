@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/evaluate/cloud.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "icp.hpp"
+#include "measured_surface.hpp"
+#include "plumbline/evaluate/trajectory.hpp"
+#include "plumbline/geometry/alignment.hpp"
+#include "point_index.hpp"
+#include "prepare.hpp"
+
+namespace plumbline::evaluate {
+namespace {
+
+using geometry::Rigid3;
+using Points = std::vector<Eigen::Vector3f>;
+
+constexpr std::array<double, 4> kThresholdsMm = {5.0, 10.0, 20.0, 50.0};
+constexpr double kSlackMm = 1e-3;           // for distances that lie on a threshold
+constexpr double kConsistencyReach = 0.05;  // m
+constexpr std::size_t kMostMeshSamples = 5000000;
+constexpr std::size_t kChunk = 4096;
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+/// What the reference is in all its forms.
+struct Truth {
+  std::unique_ptr<PointIndex> index;  ///< of samples; null for a mesh
+  std::unique_ptr<MeasuredSurface> surface;
+  SurfaceSamples counted;  ///< where completeness is measured
+  std::size_t hidden = 0;
+};
+
+SurfaceSamples visible_of(SurfaceSamples samples, std::size_t& hidden) {
+  SurfaceSamples out;
+  for (std::size_t i = 0; i < samples.points.size(); ++i) {
+    if (samples.visible[i] == 0) {
+      ++hidden;
+      continue;
+    }
+    out.points.push_back(samples.points[i]);
+    if (!samples.normals.empty()) out.normals.push_back(samples.normals[i]);
+  }
+  return out;
+}
+
+core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& options,
+                               const core::Executor& executor, CloudReport& report) {
+  Truth truth;
+  if (!reference.mesh.triangles.empty()) {
+    truth.surface = std::make_unique<MeshSurface>(reference.mesh);
+    const double coarsest = std::sqrt(surface_area(reference.mesh) / static_cast<double>(kMostMeshSamples));
+    if (coarsest > options.mesh_spacing_m) {
+      report.warnings.push_back(fmt::format("{}: so large that it is sampled every {:.1f} mm only",
+                                            reference.name, 1000.0 * coarsest));
+    }
+    truth.counted = sample_mesh(reference.mesh, std::max(options.mesh_spacing_m, coarsest));
+    if (truth.counted.points.empty()) {
+      return core::input_error(fmt::format("{}: the mesh has no area", reference.name));
+    }
+  } else {
+    truth.index = std::make_unique<PointIndex>(reference.samples.points);
+    const Density density = evaluate::density(*truth.index, executor);
+    Points normals = known_normals(reference.samples.normals, *truth.index, executor);
+    truth.surface =
+        std::make_unique<SampledSurface>(*truth.index, normals, density.cell_m(), options.distance);
+    truth.counted = {reference.samples.points, std::move(normals), reference.samples.visible};
+  }
+  if (options.visible_only && !truth.counted.visible.empty()) {
+    truth.counted = visible_of(std::move(truth.counted), truth.hidden);
+    report.visibility_used = true;
+    if (truth.counted.points.empty()) {
+      return core::input_error(fmt::format(
+          "{}: no point is marked visible; switch visible_only off to count all", reference.name));
+    }
+  }
+  report.reference_points = truth.counted.points.size();
+  report.reference_hidden = truth.hidden;
+  return truth;
+}
+
+/// Least squares over the matched positions of all robots together.
+core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& pairs, CloudReport& report) {
+  std::vector<Eigen::Vector3d> source;
+  std::vector<Eigen::Vector3d> target;
+  for (const TrajectoryPair& pair : pairs) {
+    TrajectoryOptions options;
+    options.align = TrajectoryAlignment::kNone;
+    const auto matched = evaluate_trajectory(pair.estimate, pair.truth, options);
+    if (!matched) return tl::unexpected(matched.error());
+    for (const PoseError& pose : matched->poses) {
+      source.push_back(pose.estimate.translation);
+      target.push_back(pose.truth.translation);
+    }
+  }
+  if (source.empty()) return Rigid3{};
+  if (source.size() < 3) {
+    return core::input_error(fmt::format(
+        "only {} poses match the truth in time; 3 are needed to start the alignment", source.size()));
+  }
+  const Rigid3 start = geometry::align_points(source, target);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < source.size(); ++i) squares += (start * source[i] - target[i]).squaredNorm();
+  report.alignment.trajectory_poses = source.size();
+  report.alignment.trajectory_rmse_m = std::sqrt(squares / static_cast<double>(source.size()));
+  return start;
+}
+
+core::Result<void> align(SurfaceSamples& cloud, const MeasuredSurface& surface, const CloudOptions& options,
+                         const std::vector<TrajectoryPair>& trajectories, const core::Executor& executor,
+                         CloudReport& report) {
+  report.alignment.align = options.align;
+  if (options.align == CloudAlignment::kNone) return {};
+  const auto start = start_from_trajectories(trajectories, report);
+  if (!start) return tl::unexpected(start.error());
+  const IcpResult icp =
+      align_icp(cloud.points, surface, *start, {options.icp_max_distance_m, options.icp_trim}, executor);
+  report.alignment.reference_from_cloud = icp.reference_from_cloud;
+  report.alignment.icp_iterations = icp.iterations;
+  report.alignment.icp_rmse_mm = 1000.0 * icp.rmse_m;
+  report.alignment.icp_overlap = icp.overlap;
+  report.alignment.icp_converged = icp.converged;
+  if (icp.overlap < 0.3) {
+    report.warnings.push_back(fmt::format(
+        "alignment: only {:.0f} % of the cloud found a partner within reach; the numbers are not to be "
+        "trusted{}",
+        100.0 * icp.overlap, trajectories.empty() ? ", give --trajectory and --truth to start from" : ""));
+  } else if (!icp.determined) {
+    report.warnings.push_back(
+        "alignment: the surfaces do not fix all directions (a single plane?); the others are left as they "
+        "started");
+  } else if (!icp.converged) {
+    report.warnings.push_back("alignment: ICP was still moving when it reached its last iteration");
+  }
+  move(icp.reference_from_cloud, cloud);
+  return {};
+}
+
+struct Distances {
+  std::vector<float> error_m;
+  std::vector<double> mm;
+  double cosines = 0.0;  ///< sum over pairs within reach whose normals are known
+  std::size_t cosine_count = 0;
+};
+
+/// From every point of `from`, visited in `order`, to `surface`.
+Distances measure(const Points& from, const Points& normals, const std::vector<std::uint32_t>& order,
+                  const MeasuredSurface& surface, const core::Executor& executor) {
+  Distances out;
+  out.error_m.resize(from.size());
+  out.mm.resize(from.size());
+  std::vector<float> cosines(normals.empty() ? 0 : from.size(), kNone);
+  for_chunks(executor, order.size(), kChunk, [&](std::size_t first, std::size_t last) {
+    MeasuredSurface::Scratch scratch;
+    for (std::size_t k = first; k < last; ++k) {
+      const std::uint32_t i = order[k];
+      const Foot foot = surface.foot(from[i].cast<double>(), scratch);
+      out.error_m[i] = static_cast<float>(foot.distance);
+      out.mm[i] = 1000.0 * foot.distance;
+      if (cosines.empty() || normals[i].isZero() || foot.normal.isZero()) continue;
+      if (foot.distance > kConsistencyReach) continue;
+      cosines[i] = static_cast<float>(std::min(1.0, std::abs(normals[i].cast<double>().dot(foot.normal))));
+    }
+  });
+  for (const float c : cosines) {
+    if (std::isnan(c)) continue;
+    out.cosines += static_cast<double>(c);
+    ++out.cosine_count;
+  }
+  return out;
+}
+
+double share_within(const std::vector<double>& mm, double threshold_mm) {
+  const auto near =
+      std::count_if(mm.begin(), mm.end(), [&](double d) { return d <= threshold_mm + kSlackMm; });
+  return static_cast<double>(near) / static_cast<double>(mm.size());
+}
+
+void add_scores(const std::vector<double>& cloud_mm, const std::vector<double>& reference_mm,
+                CloudReport& report) {
+  report.accuracy_mm = summarize(cloud_mm);
+  report.completeness_mm = summarize(reference_mm);
+  for (const double threshold : kThresholdsMm) {
+    ThresholdScore score{threshold, share_within(cloud_mm, threshold), share_within(reference_mm, threshold),
+                         0.0};
+    const double sum = score.precision + score.recall;
+    if (sum > 0.0) score.f = 2.0 * score.precision * score.recall / sum;
+    report.at.push_back(score);
+  }
+}
+
+void compare(const PreparedCloud& cloud, const PointIndex& index, const Density& density, const Truth& truth,
+             const CloudOptions& options, const core::Executor& executor, CloudReport& report) {
+  const bool own_normals = !cloud.samples.normals.empty();
+  Points surface_normals = options.distance == SampleDistance::kSurface
+                               ? known_normals(cloud.samples.normals, index, executor)
+                               : Points(index.size(), Eigen::Vector3f::Zero());
+  if (own_normals && options.distance == SampleDistance::kPoint) surface_normals = cloud.samples.normals;
+  const SampledSurface cloud_surface(index, std::move(surface_normals), density.cell_m(), options.distance);
+
+  const Distances accuracy =
+      measure(cloud.samples.points, cloud.samples.normals, index.order(), *truth.surface, executor);
+  // Both directions count towards consistency, if the cloud has normals of its own.
+  const PointIndex counted(truth.counted.points);
+  const Distances completeness = measure(truth.counted.points, own_normals ? truth.counted.normals : Points{},
+                                         counted.order(), cloud_surface, executor);
+  add_scores(accuracy.mm, completeness.mm, report);
+  if (own_normals && accuracy.cosine_count > 0 && completeness.cosine_count > 0) {
+    report.normal_consistency = 0.5 * (accuracy.cosines / static_cast<double>(accuracy.cosine_count) +
+                                       completeness.cosines / static_cast<double>(completeness.cosine_count));
+  }
+  for (std::size_t i = 0; i < cloud.source.size(); ++i) report.error_m[cloud.source[i]] = accuracy.error_m[i];
+  report.reference_samples = truth.counted.points;
+  report.reference_error_m = completeness.error_m;
+}
+
+}  // namespace
+
+void CloudOptions::declare(core::OptionTable& table) {
+  table.choice(
+      "align", align, {{"none", CloudAlignment::kNone}, {"se3", CloudAlignment::kSe3}},
+      "Lay the cloud on the reference first: not at all, or from the trajectories if given, then by ICP");
+  table.choice(
+      "distance", distance, {{"surface", SampleDistance::kSurface}, {"point", SampleDistance::kPoint}},
+      "Distance to a sampled surface: to the plane through the nearest sample, or to the sample itself");
+  table.boolean(
+      "visible_only", visible_only,
+      "Completeness counts only what cameras could see, if the reference says so (property visible)");
+  table.number("mesh_spacing", mesh_spacing_m, {1e-4, 1.0}, "m", "A reference mesh is sampled this densely");
+  table.number("icp_max_distance", icp_max_distance_m, {1e-3, 100.0}, "m",
+               "Farthest pairs that ICP starts with");
+  table.number("icp_trim", icp_trim, {0.1, 1.0}, "", "Share of the pairs that ICP keeps, the nearest ones");
+  wall.declare(table);
+}
+
+core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Reference* reference,
+                                         const CloudOptions& options,
+                                         const std::vector<TrajectoryPair>& trajectories,
+                                         const core::Executor& executor) {
+  if (const auto ok = check(options); !ok) return tl::unexpected(ok.error());
+  if (reference != nullptr) {
+    if (const auto ok = check(*reference); !ok) return tl::unexpected(ok.error());
+  }
+  CloudReport report;
+  auto prepared = prepare(cloud, executor, report);
+  if (!prepared) return tl::unexpected(prepared.error());
+
+  std::optional<Truth> truth;
+  if (reference != nullptr) {
+    auto made = make_truth(*reference, options, executor, report);
+    if (!made) return tl::unexpected(made.error());
+    truth = std::move(*made);
+  }
+  report.wall = wall_thickness(prepared->samples, prepared->density.spacing_m, options.wall, executor);
+  if (report.wall.patches == 0) {
+    report.warnings.push_back("no flat patch was found that is dense enough: wall thickness is not known");
+  }
+  if (!truth) return report;
+
+  report.has_reference = true;
+  report.error_m.assign(cloud.points.size(), kNone);
+  if (const auto ok = align(prepared->samples, *truth->surface, options, trajectories, executor, report);
+      !ok) {
+    return tl::unexpected(ok.error());
+  }
+  const PointIndex index(prepared->samples.points);
+  compare(*prepared, index, prepared->density, *truth, options, executor, report);
+  return report;
+}
+
+}  // namespace plumbline::evaluate

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "plumbline/evaluate/cloud.hpp"
+
+namespace plumbline::evaluate {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Statistics& s) {
+  return {{"mean", s.mean}, {"median", s.median}, {"rmse", s.rmse}, {"p90", s.p90}, {"max", s.max}};
+}
+
+Json json_of(const CloudAlignmentReport& a) {
+  const Eigen::Quaterniond q = a.reference_from_cloud.quaternion();
+  const Eigen::Vector3d& t = a.reference_from_cloud.translation;
+  Json out = {{"type", a.align == CloudAlignment::kSe3 ? "se3" : "none"},
+              {"translation_m", {t.x(), t.y(), t.z()}},
+              {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+  if (a.align == CloudAlignment::kNone) return out;
+  if (a.trajectory_poses > 0) {
+    out["trajectory"] = {{"poses", a.trajectory_poses}, {"rmse_m", a.trajectory_rmse_m}};
+  }
+  out["icp"] = {{"iterations", a.icp_iterations},
+                {"rmse_mm", a.icp_rmse_mm},
+                {"overlap", a.icp_overlap},
+                {"converged", a.icp_converged}};
+  return out;
+}
+
+Json json_of(const WallThickness& w) {
+  Json out = {{"rms", nullptr}, {"mean", nullptr}, {"median", nullptr}, {"p90", nullptr}};
+  if (w.patches > 0)
+    out = {{"rms", w.rms_mm}, {"mean", w.mean_mm}, {"median", w.median_mm}, {"p90", w.p90_mm}};
+  out["patches"] = w.patches;
+  out["layered_percent"] = w.layered_percent;
+  return out;
+}
+
+std::string row(const char* name, const Statistics& s) {
+  return fmt::format("{:<14} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f}  mm\n", name, s.mean, s.median,
+                     s.rmse, s.p90, s.max);
+}
+
+}  // namespace
+
+std::string to_json(const CloudReport& r) {
+  Json out;
+  if (r.has_reference) {
+    out["accuracy_mm"] = json_of(r.accuracy_mm);
+    out["completeness_mm"] = json_of(r.completeness_mm);
+    for (const ThresholdScore& s : r.at) {
+      out["at"][fmt::format("{:g}mm", s.threshold_mm)] = {
+          {"precision", s.precision}, {"recall", s.recall}, {"f", s.f}};
+    }
+    out["normal_consistency"] = r.normal_consistency ? Json(*r.normal_consistency) : Json(nullptr);
+  }
+  out["wall_thickness_mm"] = json_of(r.wall);
+  out["density"] = {{"points_per_m2", r.density_per_m2}, {"spacing_mm", r.spacing_mm}};
+  out["points"] = r.points;
+  out["points_not_finite"] = r.not_finite;
+  if (r.has_reference) {
+    out["reference_points"] = r.reference_points;
+    out["reference_hidden"] = r.reference_hidden;
+    out["visible_only"] = r.visibility_used;
+    out["alignment"] = json_of(r.alignment);
+  }
+  out["warnings"] = r.warnings;
+  return out.dump(2) + "\n";
+}
+
+std::string to_text(const CloudReport& r) {
+  std::string out =
+      fmt::format("{} points, {:.0f} per m2, {:.2f} mm apart\n", r.points, r.density_per_m2, r.spacing_mm);
+  if (r.has_reference) {
+    out += fmt::format("{} reference points{}\n", r.reference_points,
+                       r.visibility_used
+                           ? fmt::format(" that cameras could see, {} others left out", r.reference_hidden)
+                           : "");
+    if (r.alignment.align == CloudAlignment::kSe3) {
+      out +=
+          fmt::format("aligned by {}ICP: {} iterations, {:.3f} mm RMS, overlap {:.1f} %\n",
+                      r.alignment.trajectory_poses > 0 ? "trajectory and " : "", r.alignment.icp_iterations,
+                      r.alignment.icp_rmse_mm, 100.0 * r.alignment.icp_overlap);
+    }
+    out += fmt::format("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "", "mean", "median", "rmse", "p90", "max");
+    out += row("accuracy", r.accuracy_mm);
+    out += row("completeness", r.completeness_mm);
+    out += fmt::format("{:<14} {:>9} {:>9} {:>9}\n", "", "precision", "recall", "F");
+    for (const ThresholdScore& s : r.at) {
+      out += fmt::format("{:<14} {:>9.4f} {:>9.4f} {:>9.4f}\n", fmt::format("at {:g} mm", s.threshold_mm),
+                         s.precision, s.recall, s.f);
+    }
+    if (r.normal_consistency) out += fmt::format("normal consistency {:.4f}\n", *r.normal_consistency);
+  }
+  if (r.wall.patches > 0) {
+    out += fmt::format(
+        "wall thickness {:.2f} mm RMS, median {:.2f}, p90 {:.2f} over {} patches, {:.1f} % doubled\n",
+        r.wall.rms_mm, r.wall.median_mm, r.wall.p90_mm, r.wall.patches, r.wall.layered_percent);
+  }
+  for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
+  return out;
+}
+
+}  // namespace plumbline::evaluate

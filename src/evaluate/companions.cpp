@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/evaluate/companions.hpp"
+
+#include <algorithm>
+#include <system_error>
+
+namespace plumbline::evaluate {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+/// Names of subfolders that hold `file`, sorted; none if `folder` cannot be read.
+std::vector<std::string> subfolders_with(const fs::path& folder, const char* file) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (is_file(it->path() / file)) names.push_back(it->path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path folder_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+}  // namespace
+
+std::vector<TrajectoryFiles> find_trajectories(const fs::path& cloud, const fs::path& reference) {
+  const fs::path map = folder_of(cloud);
+  const fs::path world = folder_of(reference);
+  const std::vector<std::string> truths = subfolders_with(world, "groundtruth.txt");
+
+  if (is_file(map / "trajectory.txt")) {
+    const fs::path estimate = map / "trajectory.txt";
+    if (is_file(world / "groundtruth.txt")) return {{"", estimate, world / "groundtruth.txt"}};
+    if (truths.size() == 1) return {{"", estimate, world / truths.front() / "groundtruth.txt"}};
+    return {};
+  }
+  std::vector<TrajectoryFiles> pairs;
+  for (const std::string& robot : subfolders_with(map / "robots", "trajectory.txt")) {
+    if (!std::binary_search(truths.begin(), truths.end(), robot)) continue;
+    pairs.push_back({robot, map / "robots" / robot / "trajectory.txt", world / robot / "groundtruth.txt"});
+  }
+  return pairs;
+}
+
+}  // namespace plumbline::evaluate

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "layers.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace plumbline::evaluate {
+namespace {
+constexpr double kLeastSeparation = 1e-4;  // m; rounding of coordinates is no layer
+}
+
+double Layers::thickness() const { return std::sqrt(spread * spread + separation * separation); }
+
+Layers split_layers(std::vector<double>& heights) {
+  if (heights.empty()) return {};
+  std::sort(heights.begin(), heights.end());
+  const auto n = static_cast<double>(heights.size());
+  double sum = 0.0;
+  for (const double h : heights) sum += h;
+  const double mean = sum / n;
+  double total = 0.0;  // sum of squares about the mean
+  for (const double h : heights) total += (h - mean) * (h - mean);
+
+  const std::size_t least = std::max<std::size_t>(2, (heights.size() + 9) / 10);
+  double low_sum = 0.0;
+  double best_between = -1.0;
+  double best_separation = 0.0;
+  for (std::size_t k = 1; k < heights.size(); ++k) {
+    low_sum += heights[k - 1] - mean;
+    if (k < least || heights.size() - k < least) continue;
+    const auto low = static_cast<double>(k);
+    const double separation = -low_sum / (n - low) - low_sum / low;
+    const double between = low * (n - low) / n * separation * separation;
+    if (between > best_between) {
+      best_between = between;
+      best_separation = separation;
+    }
+  }
+  const double within = std::max(0.0, total - best_between) / n;  // mean square about the layers' means
+  const bool two = best_separation > kLeastSeparation && best_separation * best_separation >= 16.0 * within;
+  if (two) return {true, std::sqrt(within), best_separation};
+  return {false, std::sqrt(total / n), 0.0};
+}
+
+}  // namespace plumbline::evaluate

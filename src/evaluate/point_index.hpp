@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Exact nearest neighbours among points.
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "bounding_tree.hpp"
+#include "plumbline/core/executor.hpp"
+
+namespace plumbline::evaluate {
+
+struct Neighbor {
+  std::uint32_t index = 0;
+  double squared_distance = 0.0;
+  /// Nearer first; of equals the one with the lower number.
+  friend bool operator<(const Neighbor& a, const Neighbor& b) {
+    return a.squared_distance != b.squared_distance ? a.squared_distance < b.squared_distance
+                                                    : a.index < b.index;
+  }
+};
+
+/// `points` must outlive the index, be finite and not empty.
+class PointIndex {
+ public:
+  explicit PointIndex(const std::vector<Eigen::Vector3f>& points);
+
+  /// `guess`: any point's number; a good one makes the search faster and changes nothing else.
+  [[nodiscard]] Neighbor nearest(const Eigen::Vector3d& q, std::uint32_t guess) const;
+
+  /// The k nearest, nearest first (fewer if there are fewer points). `found` is reused storage.
+  void nearest(const Eigen::Vector3d& q, std::size_t k, std::vector<Neighbor>& found) const;
+
+  [[nodiscard]] std::size_t size() const { return points_.size(); }
+  [[nodiscard]] const std::vector<Eigen::Vector3f>& points() const { return points_; }
+  /// All numbers in an order in space.
+  [[nodiscard]] const std::vector<std::uint32_t>& order() const { return tree_.order(); }
+
+ private:
+  const std::vector<Eigen::Vector3f>& points_;
+  BoundingTree tree_;
+  std::vector<Eigen::Vector3f> in_order_;  ///< points by leaf, for the caches' sake
+};
+
+/// Calls body(first, last) for fixed chunks of [0, count), the same whatever the number of threads.
+template <typename Body>
+void for_chunks(const core::Executor& executor, std::size_t count, std::size_t chunk, const Body& body) {
+  executor.parallel_for((count + chunk - 1) / chunk,
+                        [&](std::size_t c) { body(c * chunk, std::min(count, (c + 1) * chunk)); });
+}
+
+/// How densely a surface is sampled.
+struct Density {
+  double spacing_m = 0.0;      ///< median distance to the nearest other place
+  double points_per_m2 = 0.0;  ///< median of 16 / (pi r16^2), r16 the distance to the 16th neighbour
+  /// Edge of the square that one sample stands for, 1 / sqrt(points_per_m2).
+  [[nodiscard]] double cell_m() const;
+};
+/// From up to 100 000 points spread over all. Zeros for fewer than 17 points, or when all are at one place.
+Density density(const PointIndex& index, const core::Executor& executor);
+
+/// Normal of the points `found` by principal components, up to sign; zero unless they are flat: their spread
+/// along the normal below a quarter of that across.
+Eigen::Vector3f flat_normal(const std::vector<Eigen::Vector3f>& points, const std::vector<Neighbor>& found);
+
+/// Normals by principal components of the 12 nearest points; zero where these are not flat. Up to sign.
+std::vector<Eigen::Vector3f> estimate_normals(const PointIndex& index, const core::Executor& executor);
+
+}  // namespace plumbline::evaluate

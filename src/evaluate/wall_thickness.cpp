@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/evaluate/wall_thickness.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "layers.hpp"
+#include "plumbline/evaluate/statistics.hpp"
+#include "point_index.hpp"
+#include "voxel_buckets.hpp"
+
+namespace plumbline::evaluate {
+namespace {
+
+using Points = std::vector<Eigen::Vector3f>;
+using Indices = std::vector<std::uint32_t>;
+
+constexpr std::size_t kLeastPatchPoints = 20;
+constexpr std::size_t kLeastCellPoints = 8;
+constexpr double kLeastMainShare = 0.3;  // a doubled wall's main layer may hold less than half of the points
+constexpr double kLeastCoverage = 0.5;   // of the patch's cells
+
+struct Plane {
+  Eigen::Vector3d normal;
+  Eigen::Vector3d center;
+  [[nodiscard]] double height(const Eigen::Vector3f& p) const {
+    return normal.dot(p.cast<double>() - center);
+  }
+};
+
+/// Small, fixed sequence of random numbers (splitmix64), seeded by the voxel's rank.
+class Draw {
+ public:
+  explicit Draw(std::uint64_t seed) : state_(seed) {}
+  std::size_t below(std::size_t n) {
+    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    return static_cast<std::size_t>((z ^ (z >> 31)) % n);
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+Plane fitted(const Points& points, const Indices& some) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const std::uint32_t i : some) mean += points[i].cast<double>();
+  mean /= static_cast<double>(some.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const std::uint32_t i : some) {
+    const Eigen::Vector3d d = points[i].cast<double>() - mean;
+    scatter += d * d.transpose();
+  }
+  return {Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0), mean};
+}
+
+Indices within(const Points& points, const Indices& some, const Plane& plane, double reach) {
+  Indices inside;
+  for (const std::uint32_t i : some) {
+    if (std::abs(plane.height(points[i])) <= reach) inside.push_back(i);
+  }
+  return inside;
+}
+
+/// MSAC over at most 400 of the points, then least squares over what lies within `flatness_m`.
+std::optional<Plane> main_plane(const Points& points, const Indices& voxel, double flatness_m, Draw draw) {
+  constexpr int kTrials = 80;
+  Indices some;
+  const std::size_t stride = (voxel.size() + 399) / 400;
+  for (std::size_t i = 0; i < voxel.size(); i += stride) some.push_back(voxel[i]);
+  double best_cost = static_cast<double>(some.size()) * flatness_m * flatness_m;
+  std::optional<Plane> best;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Eigen::Vector3d a = points[some[draw.below(some.size())]].cast<double>();
+    const Eigen::Vector3d b = points[some[draw.below(some.size())]].cast<double>();
+    const Eigen::Vector3d c = points[some[draw.below(some.size())]].cast<double>();
+    const Eigen::Vector3d normal = (b - a).cross(c - a);
+    const double area = normal.norm();
+    if (area < flatness_m * flatness_m) continue;  // too small a triangle to hold a plane
+    const Plane plane{normal / area, a};
+    double cost = 0.0;
+    for (const std::uint32_t i : some) {
+      const double h = plane.height(points[i]);
+      cost += std::min(h * h, flatness_m * flatness_m);
+    }
+    if (cost < best_cost) {
+      best_cost = cost;
+      best = plane;
+    }
+  }
+  for (int pass = 0; best && pass < 4; ++pass) {
+    const Indices inside = within(points, voxel, *best, flatness_m);
+    if (inside.size() < kLeastPatchPoints) return std::nullopt;
+    best = fitted(points, inside);
+  }
+  return best;
+}
+
+struct Patch {
+  double thickness_m = 0.0;
+  bool layered = false;
+};
+
+class PatchMeasure {
+ public:
+  PatchMeasure(const SurfaceSamples& cloud, double spacing_m, const WallThicknessOptions& options)
+      : cloud_(cloud), options_(options), buckets_(cloud.points, options.patch_m) {
+    const double cell = std::max(options.cell_m, 4.0 * spacing_m);  // some 16 points a cell and layer
+    cells_ =
+        std::clamp(static_cast<std::size_t>(options.patch_m / cell + 1e-9), std::size_t{1}, std::size_t{50});
+  }
+
+  [[nodiscard]] std::size_t voxels() const { return buckets_.size(); }
+
+  [[nodiscard]] std::optional<Patch> measure(std::size_t voxel) const {
+    const Indices own = buckets_.points_of(voxel);
+    if (own.size() < kLeastPatchPoints) return std::nullopt;
+    auto plane = main_plane(cloud_.points, own, options_.flatness_m, Draw(voxel));
+    if (!plane) return std::nullopt;
+    const Indices main = within(cloud_.points, own, *plane, options_.flatness_m);
+    if (static_cast<double>(main.size()) < kLeastMainShare * static_cast<double>(own.size()))
+      return std::nullopt;
+    if (!cloud_.normals.empty()) turn_to_majority(main, *plane);
+    return over_cells(heights_by_cell(voxel, *plane));
+  }
+
+ private:
+  void turn_to_majority(const Indices& main, Plane& plane) const {
+    std::size_t against = 0;
+    for (const std::uint32_t i : main)
+      against += cloud_.normals[i].cast<double>().dot(plane.normal) < 0.0 ? 1 : 0;
+    if (2 * against > main.size()) plane.normal = -plane.normal;
+  }
+
+  /// Points before and behind the plane, by cell; those of neighbouring voxels too, since a wall's second
+  /// layer may lie just beyond the voxel's border.
+  [[nodiscard]] std::vector<std::vector<double>> heights_by_cell(std::size_t voxel,
+                                                                 const Plane& plane) const {
+    const Eigen::Vector3d u = plane.normal.unitOrthogonal();
+    const Eigen::Vector3d v = plane.normal.cross(u);
+    const double half = 0.5 * options_.patch_m;
+    const auto per_side = static_cast<double>(cells_);
+    std::vector<std::vector<double>> heights(cells_ * cells_);
+    buckets_.for_neighborhood(voxel, [&](std::uint32_t i) {
+      const Eigen::Vector3d d = cloud_.points[i].cast<double>() - plane.center;
+      const double h = plane.normal.dot(d);
+      if (std::abs(h) > options_.max_spacing_m + 1e-6) return;
+      if (!cloud_.normals.empty() && !(cloud_.normals[i].cast<double>().dot(plane.normal) > 0.5)) return;
+      const double a = std::floor((u.dot(d) + half) / options_.patch_m * per_side);
+      const double b = std::floor((v.dot(d) + half) / options_.patch_m * per_side);
+      if (a < 0.0 || b < 0.0 || a >= per_side || b >= per_side) return;
+      heights[static_cast<std::size_t>(a) * cells_ + static_cast<std::size_t>(b)].push_back(h);
+    });
+    return heights;
+  }
+
+  [[nodiscard]] std::optional<Patch> over_cells(std::vector<std::vector<double>> heights) const {
+    std::vector<double> thickness;
+    std::size_t layered = 0;
+    for (std::vector<double>& cell : heights) {
+      if (cell.size() < kLeastCellPoints) continue;
+      const Layers layers = split_layers(cell);
+      thickness.push_back(layers.thickness());
+      layered += layers.two ? 1 : 0;
+    }
+    if (static_cast<double>(thickness.size()) < kLeastCoverage * static_cast<double>(heights.size())) {
+      return std::nullopt;
+    }
+    return Patch{summarize(thickness).median, 2 * layered > thickness.size()};
+  }
+
+  const SurfaceSamples& cloud_;
+  const WallThicknessOptions& options_;
+  VoxelBuckets buckets_;
+  std::size_t cells_ = 1;  ///< along one side of a patch
+};
+
+}  // namespace
+
+void WallThicknessOptions::declare(core::OptionTable& table) {
+  table.number("wall_patch", patch_m, {0.05, 5.0}, "m",
+               "Edge of the planar patches that wall thickness is taken on");
+  table.number("wall_cell", cell_m, {0.005, 1.0}, "m", "Edge of the cells of a patch");
+  table.number("wall_max_spacing", max_spacing_m, {0.005, 1.0}, "m", "Layers further apart are two walls");
+  table.number("wall_flatness", flatness_m, {0.001, 0.5}, "m", "A patch's main layer is this flat");
+}
+
+WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
+                             const WallThicknessOptions& options, const core::Executor& executor) {
+  const PatchMeasure measure(cloud, spacing_m, options);
+  std::vector<std::optional<Patch>> patches(measure.voxels());
+  for_chunks(executor, patches.size(), 16, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) patches[i] = measure.measure(i);
+  });
+  std::vector<double> thickness_mm;
+  std::size_t layered = 0;
+  for (const auto& patch : patches) {
+    if (!patch) continue;
+    thickness_mm.push_back(1000.0 * patch->thickness_m);
+    layered += patch->layered ? 1 : 0;
+  }
+  const Statistics s = summarize(thickness_mm);
+  WallThickness wall;
+  wall.patches = s.count;
+  wall.rms_mm = s.rmse;
+  wall.mean_mm = s.mean;
+  wall.median_mm = s.median;
+  wall.p90_mm = s.p90;
+  if (s.count > 0) wall.layered_percent = 100.0 * static_cast<double>(layered) / static_cast<double>(s.count);
+  return wall;
+}
+
+}  // namespace plumbline::evaluate
