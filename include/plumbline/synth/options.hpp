@@ -15,7 +15,7 @@ enum class Sensor { kIdeal, kKinect, kRealsense };
 enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene file says
 
 struct SynthOptions {
-  int frames = 0;                    ///< of each robot; 0 = the path once; more than the path: it goes on round it
+  int frames = -1;                   ///< of each robot; -1 = the path once; more than the path: it goes on round it
   int robots = 1;                    ///< how many recordings
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Puts solids together from flat faces: the alphabet of walls and furniture.
+#include <string>
+#include <vector>
+
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/synth/scene.hpp"
+
+namespace plumbline::synth {
+
+/// Upright frame: origin at (x, y, z), x axis turned by yaw from the world's x.
+geometry::Rigid3 upright(const Eigen::Vector3d& origin, double yaw_rad);
+
+/// Which texture a face carries.
+struct Skin {
+  std::string material;
+  bool stretched = false;  ///< one copy over the whole face instead of tiling
+  int seed = -1;           ///< -1: the object's
+};
+
+/// Adds faces of one object after the other to a scene.
+class Builder {
+ public:
+  explicit Builder(Scene& scene) : scene_(scene) {}
+
+  void begin_object(const std::string& type, const std::string& name, const core::ConfigMark& mark);
+  [[nodiscard]] int seed() const { return seed_; }
+  [[nodiscard]] Scene& scene() { return scene_; }
+
+  /// Convex flat polygon, counter-clockwise seen from outside; `u_hint` gives the texture's horizontal.
+  void polygon(const std::vector<Eigen::Vector3d>& corners, const Eigen::Vector3d& u_hint, const Skin& skin);
+
+  /// Axis-parallel box from `lo` to `hi` in the frame `world_from_box`. The front (-y) may have its own skin.
+  void box(const geometry::Rigid3& world_from_box, const Eigen::Vector3d& lo, const Eigen::Vector3d& hi,
+           const Skin& skin, const Skin* front = nullptr);
+
+  /// Upright cylinder or cone frustum in the frame: bottom centre, radii at bottom and top.
+  void cylinder(const geometry::Rigid3& world_from_cylinder, const Eigen::Vector3d& bottom, double radius,
+                double top_radius, double height, int segments, const Skin& skin);
+
+ private:
+  Scene& scene_;
+  int seed_ = 0;
+};
+
+// ---- furniture.cpp: things made of boxes; the frame stands on the floor, its -y side is the front ----
+
+void add_desk(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material);
+void add_table(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material);
+void add_chair(Builder& b, const geometry::Rigid3& frame, const std::string& material);
+void add_shelf(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material,
+               bool books);
+void add_cabinet(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size,
+                 const std::string& material, int doors);
+void add_sofa(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material);
+void add_monitor(Builder& b, const geometry::Rigid3& frame, double width, bool stand);
+void add_plant(Builder& b, const geometry::Rigid3& frame, double height);
+void add_floor_lamp(Builder& b, const geometry::Rigid3& frame, double height, double power);
+void add_ceiling_lamp(Builder& b, const geometry::Rigid3& frame, double width, double depth, double power);
+void add_clutter(Builder& b, const geometry::Rigid3& frame, double width, double depth, int count);
+void add_curtain(Builder& b, const geometry::Rigid3& frame, double width, double height, double fold,
+                 const std::string& material);
+/// Flat thing on a wall, centre of its back at the frame's origin, front to -y.
+void add_panel(Builder& b, const geometry::Rigid3& frame, double width, double height, double thickness,
+               const std::string& material, const std::string& rim, bool frame_bars);
+
+// ---- walls.cpp ----
+
+struct Opening {
+  double at = 0.0;      ///< m along the wall to the opening's near edge
+  double width = 0.9;   ///< m
+  double bottom = 0.0;  ///< m above the wall's foot
+  double height = 2.1;  ///< m
+  bool window = false;  ///< glazed: bright glass and a frame; else a doorway
+  double open_rad = 1.4;  ///< of the door leaf; < 0: no leaf
+  std::string material = "door";
+  core::ConfigMark mark;
+};
+
+struct Wall {
+  Eigen::Vector2d from = Eigen::Vector2d::Zero();
+  Eigen::Vector2d to = Eigen::Vector2d::Zero();
+  double bottom = 0.0;
+  double height = 2.6;
+  double thickness = 0.12;
+  std::string material = "plaster";
+  std::string skirting;  ///< material of a skirting board on both sides; "" = none
+  std::vector<Opening> openings;  ///< sorted by `at`, not overlapping
+};
+
+void add_wall(Builder& b, const Wall& wall);
+
+}  // namespace plumbline::synth

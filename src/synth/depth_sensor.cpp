@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "depth_sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "plumbline/sensor/depth_noise.hpp"
+#include "random.hpp"
+
+namespace plumbline::synth {
+
+namespace {
+
+constexpr int kTile = 512;  // a power of two
+
+/// Sensor constants; baseline and disparity step are those of the devices.
+struct Device {
+  float focal_baseline;  ///< px m
+  float step;            ///< px of disparity
+  float wander;          ///< px that borders wander to and fro
+  float flying;          ///< share of border pixels that float between front and back
+  float fixed_share;     ///< share of the noise variance that stays while the picture does not change
+};
+Device device(Sensor sensor) {
+  if (sensor == Sensor::kRealsense) return {31.0F, 1.0F / 32.0F, 1.6F, 0.35F, 0.5F};
+  return {43.5F, 1.0F / 8.0F, 1.1F, 0.06F, 0.5F};
+}
+
+cv::Mat1f white_tile(std::uint64_t seed) {
+  cv::Mat1f tile(kTile, kTile);
+  Rng rng(seed, 0x711e);
+  for (float& v : tile) v = static_cast<float>(rng.normal());
+  return tile;
+}
+
+/// Blurs round the edges and brings the variance back to 1.
+void correlate(cv::Mat1f& tile, double sigma) {
+  cv::Mat1f wide;
+  cv::copyMakeBorder(tile, wide, 64, 64, 64, 64, cv::BORDER_WRAP);
+  cv::GaussianBlur(wide, wide, {0, 0}, sigma);
+  tile = wide(cv::Rect(64, 64, kTile, kTile)).clone();
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(tile, mean, deviation);
+  tile = (tile - mean[0]) / deviation[0];
+}
+
+/// A tile with a shift of its own.
+class Field {
+ public:
+  Field(const cv::Mat1f& tile, std::uint64_t key) : tile_(tile), dx_(static_cast<int>(key & 511U)), dy_(static_cast<int>(key >> 9U & 511U)) {}
+  [[nodiscard]] const float* row(int y) const { return tile_[(y + dy_) & (kTile - 1)]; }
+  [[nodiscard]] int column(int x) const { return (x + dx_) & (kTile - 1); }
+  [[nodiscard]] float at(int x, int y) const { return row(y)[column(x)]; }
+
+ private:
+  const cv::Mat1f& tile_;
+  int dx_, dy_;
+};
+
+std::uint64_t frame_bits(const FrameKey& key, std::uint64_t purpose, std::int64_t frame) {
+  return mix(key.seed, purpose, static_cast<std::uint64_t>(frame));
+}
+
+/// Exact depth looked up where the matching window of the device really sat: borders become ragged.
+cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tiles, const FrameKey& key, cv::Mat1b& from) {
+  const Field still_x(tiles.coarse, mix(key.seed, 11)), still_y(tiles.coarse, mix(key.seed, 12));
+  const Field now_x(tiles.fine, frame_bits(key, 13, key.index)), now_y(tiles.fine, frame_bits(key, 14, key.index));
+  cv::Mat1f out(exact.size());
+  from.create(exact.size());  // 1 where the neighbourhood is not smooth
+  for (int y = 0; y < exact.rows; ++y) {
+    const float* row = exact[y];
+    const float *up = exact[std::max(0, y - 2)], *low = exact[std::min(exact.rows - 1, y + 2)];
+    for (int x = 0; x < exact.cols; ++x) {
+      const float z = row[x], tolerance = 0.02F + 0.02F * z;
+      const float left = row[std::max(0, x - 2)], right = row[std::min(exact.cols - 1, x + 2)];
+      const bool border = std::abs(left + right - 2.0F * z) > tolerance || std::abs(up[x] + low[x] - 2.0F * z) > tolerance;
+      from(y, x) = border ? 1 : 0;
+      if (!border) {
+        out(y, x) = z;
+        continue;
+      }
+      const float jx = d.wander * (0.6F * still_x.at(x, y) + 0.8F * now_x.at(x, y));
+      const float jy = d.wander * (0.6F * still_y.at(x, y) + 0.8F * now_y.at(x, y));
+      const int sx = std::clamp(x + static_cast<int>(std::lround(jx)), 0, exact.cols - 1);
+      const int sy = std::clamp(y + static_cast<int>(std::lround(jy)), 0, exact.rows - 1);
+      out(y, x) = exact(sy, sx);
+    }
+  }
+  return out;
+}
+
+/// Columns that the projector, to the right of the camera, cannot light: behind the left edge of near things.
+void cast_shadow(cv::Mat1f& depth, float focal_baseline) {
+  for (int y = 0; y < depth.rows; ++y) {
+    float* row = depth[y];
+    float nearest = 1e9F;
+    for (int x = depth.cols - 1; x >= 0; --x) {
+      if (row[x] <= 0.0F) continue;
+      const float column = static_cast<float>(x) - focal_baseline / row[x];
+      if (column > nearest + 1.2F) {
+        row[x] = 0.0F;
+      } else {
+        nearest = std::min(nearest, column);
+      }
+    }
+  }
+}
+
+/// How much light of the projector comes back from each face; the cosine is added per pixel.
+struct Return {
+  float infrared, gloss;
+};
+
+class Measurement {
+ public:
+  Measurement(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles, const FrameKey& key)
+      : world_(world), view_(view), device_(device(sensor)), range_(depth_range(sensor)), tiles_(tiles), key_(key) {}
+
+  cv::Mat1w run() {
+    cv::Mat1b border;
+    cv::Mat1f depth = wander(exact_depth(view_), device_, tiles_, key_, border);
+    cast_shadow(depth, device_.focal_baseline);
+    cv::Mat1w raw(depth.size());
+    for (int y = 0; y < raw.rows; ++y) row(y, depth, border, raw[y]);
+    return raw;
+  }
+
+ private:
+  /// Weight of the projector's light: 1 = plenty, under 0.05 nothing is measured.
+  [[nodiscard]] float signal(int face, int x, int y, float z) const {
+    const auto id = static_cast<std::size_t>(face);
+    const Material& m = *world_.materials[id];
+    const FaceView& f = view_.faces[id];
+    const auto px = static_cast<float>(x), py = static_cast<float>(y);
+    // 1/z = c.p with c = M^T n / h, so the cosine of incidence follows from n = M^-T c h.
+    const auto fx = static_cast<float>(view_.camera.fx), fy = static_cast<float>(view_.camera.fy);
+    const auto cx = static_cast<float>(view_.camera.cx), cy = static_cast<float>(view_.camera.cy);
+    const float nx = f.c[0] * fx, ny = f.c[1] * fy, nz = f.c[2] + f.c[0] * cx + f.c[1] * cy;
+    const float dx = (px - cx) / fx, dy = (py - cy) / fy;
+    const float cosine = std::abs(nx * dx + ny * dy + nz) /
+                         std::sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + 1.0F));
+    float s = m.infrared * cosine * (1.0F - m.gloss * (1.0F - cosine)) * 3.0F / (0.6F + 0.4F * z * z);
+    if (m.gloss > 0.25F && cosine > 0.997F) s = 0.0F;  // glint straight back
+    return s;
+  }
+
+  void row(int y, const cv::Mat1f& depth, const cv::Mat1b& border, std::uint16_t* out) const {
+    const Field still(tiles_.fine, mix(key_.seed, 21)), now(tiles_.fine, frame_bits(key_, 22, key_.index));
+    const Field before(tiles_.fine, frame_bits(key_, 22, key_.index - 1));
+    const Field blobs(tiles_.coarse, mix(key_.seed, 23)), flicker(tiles_.fine, frame_bits(key_, 24, key_.index));
+    const int* ids = view_.ids[y];
+    const float fixed = std::sqrt(device_.fixed_share), fresh = std::sqrt(0.5F * (1.0F - device_.fixed_share));
+    const float step2 = device_.step * device_.step / 12.0F;
+    for (int x = 0; x < depth.cols; ++x) {
+      out[x] = 0;
+      float z = depth(y, x);
+      if (!(z > 0.0F) || ids[x] < 0) continue;
+      const float chance = flicker.at(x, y);
+      if (border(y, x) != 0) {
+        if (chance > 0.9F) continue;  // the window saw two surfaces
+        if (chance < -1.0F && std::abs(chance + 1.0F) < 2.5F * device_.flying) {
+          const float other = depth(y, std::max(0, x - 2));
+          if (other > 0.0F) z = 0.5F * (z + other);
+        }
+      }
+      const float weak = signal(ids[x], x, y, z);
+      if (weak < 0.075F + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
+      const auto zd = static_cast<double>(z);
+      if (zd < range_.min || zd > range_.max + 0.15 * static_cast<double>(blobs.at(x, y))) continue;
+      const float per_metre = device_.focal_baseline / (z * z);
+      const float sigma = static_cast<float>(sensor::depth_sigma(zd)) * per_metre;
+      const float own = std::sqrt(std::max(0.15F * sigma * sigma, sigma * sigma - step2));
+      const float noise = fixed * still.at(x, y) + fresh * (now.at(x, y) + before.at(x, y));
+      const float disparity = device_.focal_baseline / z + own * noise;
+      const float stepped = std::round(disparity / device_.step) * device_.step;
+      if (stepped <= device_.step) continue;
+      const float raw = device_.focal_baseline / stepped * 5000.0F;
+      if (raw < 65534.5F) out[x] = static_cast<std::uint16_t>(raw + 0.5F);
+    }
+  }
+
+  const World& world_;
+  const View& view_;
+  Device device_;
+  DepthRange range_;
+  const NoiseTiles& tiles_;
+  FrameKey key_;
+};
+
+}  // namespace
+
+DepthRange depth_range(Sensor sensor) {
+  if (sensor == Sensor::kKinect) return {0.45, 7.0};
+  if (sensor == Sensor::kRealsense) return {0.25, 9.0};
+  return {0.05, 13.1};
+}
+
+NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
+  NoiseTiles tiles;
+  if (sensor == Sensor::kIdeal) return tiles;
+  tiles.fine = white_tile(mix(seed, 1));
+  correlate(tiles.fine, sensor == Sensor::kRealsense ? 1.5 : 0.8);
+  tiles.coarse = white_tile(mix(seed, 2));
+  correlate(tiles.coarse, 6.0);
+  tiles.color.create(kTile, kTile);
+  // Neighbouring colours are interpolated from a mosaic, hence smooth; the three channels share a part.
+  cv::Mat1f channel[4];
+  for (std::uint64_t k = 0; k < 4; ++k) {
+    channel[k] = white_tile(mix(seed, 3 + k));
+    correlate(channel[k], k == 3 ? 0.6 : 1.0);
+  }
+  for (int y = 0; y < kTile; ++y) {
+    for (int x = 0; x < kTile; ++x) {
+      for (int k = 0; k < 3; ++k) {
+        const float v = 16.0F * (0.75F * channel[3](y, x) + 0.66F * channel[k](y, x));
+        tiles.color(y, x)[k] = static_cast<std::int8_t>(std::clamp(std::lround(v), -120L, 120L));
+      }
+    }
+  }
+  return tiles;
+}
+
+cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles,
+                        const FrameKey& key) {
+  if (sensor != Sensor::kIdeal) return Measurement(world, view, sensor, tiles, key).run();
+  const cv::Mat1f exact = exact_depth(view);
+  cv::Mat1w raw(exact.size());
+  const auto range = depth_range(sensor);
+  const auto min = static_cast<float>(range.min), max = static_cast<float>(range.max);
+  for (int y = 0; y < raw.rows; ++y) {
+    const float* z = exact[y];
+    std::uint16_t* out = raw[y];
+    for (int x = 0; x < raw.cols; ++x) {
+      out[x] = z[x] > min && z[x] < max ? static_cast<std::uint16_t>(z[x] * 5000.0F + 0.5F) : std::uint16_t{0};
+    }
+  }
+  return raw;
+}
+
+void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles, const FrameKey& key) {
+  if (sensor == Sensor::kIdeal) return;
+  // Shot noise: after the square-root coding it is the same for all levels, but for the shadows; more gain, more noise.
+  const float sigma = std::clamp(1.1F * std::sqrt(std::max(gain, 0.3F)), 0.7F, 5.0F);
+  const int scale = static_cast<int>(std::lround(256.0F * sigma / 16.0F));
+  const std::uint64_t bits = frame_bits(key, 31, key.index);
+  const int dx = static_cast<int>(bits & 511U), dy = static_cast<int>(bits >> 9U & 511U);
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* noise = tiles.color[(y + dy) & (kTile - 1)];
+    auto* p = image.ptr<std::uint8_t>(y);
+    for (int x = 0; x < image.cols;) {
+      const int start = (x + dx) & (kTile - 1), run = std::min(kTile - start, image.cols - x);
+      const auto* n = reinterpret_cast<const std::int8_t*>(noise + start);
+      for (int i = 0; i < 3 * run; ++i) {
+        const int v = p[3 * x + i] + ((n[i] * scale + 128) >> 8);
+        p[3 * x + i] = static_cast<std::uint8_t>(v < 0 ? 0 : v > 255 ? 255 : v);
+      }
+      x += run;
+    }
+  }
+}
+
+cv::Mat3b motion_blur(const cv::Mat3b& image, const cv::Mat2f& flow) {
+  double longest = 0.0;
+  for (const cv::Vec2f& f : flow) longest = std::max(longest, static_cast<double>(std::hypot(f[0], f[1])));
+  if (longest < 0.8) return image;
+  const int taps = std::clamp(static_cast<int>(std::ceil(longest)) + 1, 3, 16);
+  cv::Mat3b out(image.size());
+  for (int y = 0; y < image.rows; ++y) {
+    const cv::Vec2f* cells = flow[std::min(y / 8, flow.rows - 1)];
+    for (int x = 0; x < image.cols; ++x) {
+      const cv::Vec2f f = cells[std::min(x / 8, flow.cols - 1)];
+      int sum[3] = {0, 0, 0};
+      for (int k = 0; k < taps; ++k) {
+        const float s = static_cast<float>(k) / static_cast<float>(taps - 1) - 0.5F;
+        const int sx = std::clamp(x + static_cast<int>(std::lround(s * f[0])), 0, image.cols - 1);
+        const int sy = std::clamp(y + static_cast<int>(std::lround(s * f[1])), 0, image.rows - 1);
+        const cv::Vec3b& c = image(sy, sx);
+        for (int i = 0; i < 3; ++i) sum[i] += c[i];
+      }
+      for (int i = 0; i < 3; ++i) out(y, x)[i] = static_cast<std::uint8_t>((sum[i] + taps / 2) / taps);
+    }
+  }
+  return out;
+}
+
+}  // namespace plumbline::synth

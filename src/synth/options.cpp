@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/synth/options.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <fmt/format.h>
+
+#include "plumbline/core/config.hpp"
+
+namespace plumbline::synth {
+
+void SynthOptions::declare(core::OptionTable& table) {
+  table.integer("frames", frames, {-1, 1000000}, "", "Frames of each robot; -1 = the path once");
+  table.integer("robots", robots, {1, 64}, "", "Number of recordings");
+  table.choice("texture", texture,
+               {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
+               "full; weak: faint; none: white cloth and grey floors");
+  table.choice("sensor", sensor,
+               {{"ideal", Sensor::kIdeal}, {"kinect", Sensor::kKinect}, {"realsense", Sensor::kRealsense}},
+               "ideal has no noise, no offset between stamps and no blur");
+  table.choice("motion", motion,
+               {{"scene", Motion::kScene}, {"handheld", Motion::kHandheld}, {"wheeled", Motion::kWheeled}},
+               "How the camera is carried; scene: as the scene file says");
+  table.integer("seed", seed, {0, 2147483647}, "", "Seed of textures, sway and noise");
+  table.integer("width", width, {64, 4096}, "px", "Picture width");
+  table.integer("height", height, {48, 4096}, "px", "Picture height");
+  table.number("fps", fps, {1.0, 240.0}, "Hz", "Frames a second");
+  table.number("speed", speed, {0.05, 20.0}, "", "Times the scene's own speed");
+  table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
+               "Distance between samples of reference.ply; 0 = 5 mm, more for large scenes");
+  table.text("events", events,
+             "Hard moments, kind@start+duration[*value] in seconds, separated by commas; kinds: whiteout, lampoff, "
+             "blur (value px), drop, cover, spin (value turns), nodepth");
+}
+
+namespace {
+
+struct KindName {
+  const char* name;
+  EventKind kind;
+  double default_value;
+};
+constexpr KindName kKinds[] = {
+    {"whiteout", EventKind::kWhiteout, 1.0}, {"lampoff", EventKind::kLampOff, 1.0}, {"blur", EventKind::kBlur, 8.0},
+    {"drop", EventKind::kDrop, 1.0},         {"cover", EventKind::kCover, 1.0},     {"spin", EventKind::kSpin, 1.0},
+    {"nodepth", EventKind::kNoDepth, 1.0},
+};
+
+bool read_number(const std::string& text, double& value) {
+  char* end = nullptr;
+  value = std::strtod(text.c_str(), &end);
+  return !text.empty() && end == text.c_str() + text.size() && std::isfinite(value);
+}
+
+std::string trim(const std::string& s) {
+  const auto first = s.find_first_not_of(" \t\n");
+  return first == std::string::npos ? "" : s.substr(first, s.find_last_not_of(" \t\n") - first + 1);
+}
+
+core::Result<Event> parse_event(const std::string& text) {
+  const auto at = text.find('@'), plus = text.find('+', at == std::string::npos ? 0 : at), star = text.find('*');
+  const std::string name = trim(text.substr(0, at));
+  std::vector<std::string> names;
+  const KindName* kind = nullptr;
+  for (const KindName& k : kKinds) {
+    names.emplace_back(k.name);
+    if (name == k.name) kind = &k;
+  }
+  if (kind == nullptr) {
+    const std::string near = core::did_you_mean(name, names);
+    return core::usage_error(fmt::format("events: '{}' is no kind of event (allowed: {}{})", name,
+                                         fmt::join(names, ", "),
+                                         near.empty() ? "" : fmt::format("; did you mean {}?", near)));
+  }
+  Event event{kind->kind, 0.0, 0.0, kind->default_value};
+  const bool formed = at != std::string::npos && plus != std::string::npos &&
+                      (star == std::string::npos || star > plus) &&
+                      read_number(trim(text.substr(at + 1, plus - at - 1)), event.start_s) &&
+                      read_number(trim(text.substr(plus + 1, star == std::string::npos ? star : star - plus - 1)),
+                                  event.duration_s) &&
+                      (star == std::string::npos || read_number(trim(text.substr(star + 1)), event.value));
+  if (!formed || event.start_s < 0.0 || event.duration_s <= 0.0 || std::abs(event.value) > 100.0) {
+    return core::usage_error(
+        fmt::format("events: '{}' is not kind@start+duration[*value] in seconds, such as blur@6+0.5*12", text));
+  }
+  return event;
+}
+
+}  // namespace
+
+core::Result<std::vector<Event>> parse_events(const std::string& text) {
+  std::vector<Event> events;
+  std::size_t from = 0;
+  while (from <= text.size()) {
+    std::size_t to = text.find(',', from);
+    if (to == std::string::npos) to = text.size();
+    const std::string piece = trim(text.substr(from, to - from));
+    if (!piece.empty()) {
+      auto event = parse_event(piece);
+      if (!event) return tl::unexpected<core::Error>(event.error());
+      events.push_back(*event);
+    }
+    from = to + 1;
+  }
+  return events;
+}
+
+core::Result<void> check(const SynthOptions& options) {
+  if (options.frames == 0) return core::usage_error("frames: zero frames make no recording (-1 = the path once)");
+  if (options.robots < 1) return core::usage_error("robots: at least one");
+  if (options.width < 64 || options.height < 48) return core::usage_error("width, height: at least 64 x 48 pixels");
+  if (!(options.fps > 0.0) || !(options.speed > 0.0)) return core::usage_error("fps, speed: must be positive");
+  if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
+  return {};
+}
+
+const char* to_string(Texture texture) {
+  return texture == Texture::kFull ? "full" : texture == Texture::kWeak ? "weak" : "none";
+}
+const char* to_string(Sensor sensor) {
+  return sensor == Sensor::kIdeal ? "ideal" : sensor == Sensor::kKinect ? "kinect" : "realsense";
+}
+const char* to_string(Motion motion) {
+  return motion == Motion::kScene ? "scene" : motion == Motion::kHandheld ? "handheld" : "wheeled";
+}
+
+}  // namespace plumbline::synth

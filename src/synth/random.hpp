@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Counter-based random numbers: a value is a pure function of its seed and counter, so that frames come out the
+// same in any order and on any number of threads. Mixing: splitmix64 (Steele, Lea, Flood 2014), public domain.
+#include <cmath>
+#include <cstdint>
+
+namespace plumbline::synth {
+
+inline std::uint64_t mix(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31U);
+}
+inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) { return mix(mix(a) ^ (b * 0xd1342543de82ef95ULL)); }
+inline std::uint64_t mix(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return mix(mix(a, b), c); }
+
+/// Stream of numbers for one purpose.
+class Rng {
+ public:
+  Rng(std::uint64_t seed, std::uint64_t purpose) : state_(mix(seed, purpose)) {}
+  std::uint64_t bits() { return mix(state_, ++counter_); }
+  double uniform() { return static_cast<double>(bits() >> 11U) * 0x1.0p-53; }  ///< [0, 1)
+  double uniform(double lo, double hi) { return lo + (hi - lo) * uniform(); }
+  double normal() {
+    const double u = 1.0 - uniform(), v = uniform();
+    return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * M_PI * v);
+  }
+
+ private:
+  std::uint64_t state_;
+  std::uint64_t counter_ = 0;
+};
+
+}  // namespace plumbline::synth

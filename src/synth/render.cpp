@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "render.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace plumbline::synth {
+
+using Eigen::Vector3d;
+
+namespace {
+
+using Vec4 = float __attribute__((vector_size(16)));
+using Byte4 = std::uint8_t __attribute__((vector_size(4)));
+
+constexpr int kChunk = 8;  // pixels that share level of detail and interpolated light
+
+/// Texels of level 0 per metre along u and v.
+struct TexelScale {
+  double u, v;
+};
+TexelScale texel_scale(const World& world, std::size_t face) {
+  const Face& f = world.scene.faces[face];
+  const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
+  const double tile = world.materials[face]->tile_m;
+  const bool tiled =
+      f.stretch_u <= 0.0 || (world.options.texture == Texture::kNone && world.materials[face]->large);
+  return {top.width / (tiled ? tile : f.stretch_u), top.height / (tiled ? tile : f.stretch_v)};
+}
+
+FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole& k,
+                   const geometry::Rigid3& camera_from_world) {
+  const Face& face = world.scene.faces[index];
+  const Vector3d n = camera_from_world.rotation * face.normal, origin = camera_from_world * face.origin;
+  const Vector3d ua = camera_from_world.rotation * face.u_axis, va = camera_from_world.rotation * face.v_axis;
+  // d = M p is the ray of pixel p with z = 1.
+  const auto through_pixels = [&k](const Vector3d& w) {
+    return Vector3d(w.x() / k.fx, w.y() / k.fy, w.z() - w.x() * k.cx / k.fx - w.y() * k.cy / k.fy);
+  };
+  const double h = n.dot(origin);
+  const Vector3d c = through_pixels(n) / (std::abs(h) > 1e-9 ? h : 1e-9);
+  const TexelScale scale = texel_scale(world, index);
+  const double shift_u = static_cast<double>(world.offset_u[index]) - ua.dot(origin);
+  const double shift_v = static_cast<double>(world.offset_v[index]) - va.dot(origin);
+  const Vector3d a = scale.u * (through_pixels(ua) + shift_u * c), b = -scale.v * (through_pixels(va) + shift_v * c);
+  FaceView out;
+  for (int i = 0; i < 3; ++i) {
+    out.a[i] = static_cast<float>(a[i]);
+    out.b[i] = static_cast<float>(b[i]);
+    out.c[i] = static_cast<float>(c[i]);
+  }
+  return out;
+}
+
+/// Collects rays and casts them eight at a time.
+class RayBatch {
+ public:
+  RayBatch(const World& world, const View& view) : world_(world) {
+    const geometry::Rigid3& pose = view.world_from_camera;
+    for (int k = 0; k < 3; ++k) {
+      origin_[k] = static_cast<float>(pose.translation[k]);
+      const double x = pose.rotation(k, 0) / view.camera.fx, y = pose.rotation(k, 1) / view.camera.fy;
+      right_[k] = static_cast<float>(x);
+      down_[k] = static_cast<float>(y);
+      corner_[k] = static_cast<float>(pose.rotation(k, 2) - x * view.camera.cx - y * view.camera.cy);
+    }
+  }
+  void add(float x, float y, int* target) {
+    dx_[count_] = corner_[0] + x * right_[0] + y * down_[0];
+    dy_[count_] = corner_[1] + x * right_[1] + y * down_[1];
+    dz_[count_] = corner_[2] + x * right_[2] + y * down_[2];
+    targets_[count_] = target;
+    if (++count_ == 8) flush();
+  }
+  void flush() {
+    if (count_ == 0) return;
+    for (int k = count_; k < 8; ++k) {
+      dx_[k] = dx_[0];
+      dy_[k] = dy_[0];
+      dz_[k] = dz_[0];
+    }
+    int faces[8];
+    world_.cast8(origin_, dx_, dy_, dz_, faces);
+    for (int k = 0; k < count_; ++k) *targets_[k] = faces[k];
+    count_ = 0;
+  }
+
+ private:
+  const World& world_;
+  float origin_[3], right_[3], down_[3], corner_[3];
+  float dx_[8], dy_[8], dz_[8];
+  int* targets_[8];
+  int count_ = 0;
+};
+
+void fill_between(const World& world, View& view) {
+  cv::Mat1i& ids = view.ids;
+  const int w = ids.cols, h = ids.rows;
+  RayBatch rays(world, view);
+  for (int y = 0; y < h; ++y) {
+    int* row = ids[y];
+    const bool cast_row = y % 2 == 0;
+    const int* up = ids[y - y % 2];
+    const int* low = cast_row || y + 1 >= h ? up : ids[y + 1];
+    for (int x = cast_row ? 1 : 0; x < w; x += cast_row ? 2 : 1) {
+      const int x0 = x - x % 2, x1 = x % 2 == 0 || x + 1 >= w ? x0 : x + 1;
+      const int id = up[x0];
+      if (id == up[x1] && id == low[x0] && id == low[x1]) {
+        row[x] = id;
+      } else {
+        rays.add(static_cast<float>(x), static_cast<float>(y), &row[x]);
+      }
+    }
+  }
+  rays.flush();
+}
+
+// ---- texture sampling ----
+
+Vec4 unpack(std::uint32_t texel) {
+  Byte4 bytes;
+  static_assert(sizeof bytes == sizeof texel);
+  __builtin_memcpy(&bytes, &texel, sizeof texel);
+  return __builtin_convertvector(bytes, Vec4);
+}
+
+Vec4 bilinear(const Texture2d::Level& level, float x, float y) {
+  x -= 0.5F;
+  y -= 0.5F;
+  const int ix = static_cast<int>(x) - (x < 0.0F ? 1 : 0), iy = static_cast<int>(y) - (y < 0.0F ? 1 : 0);
+  const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
+  const auto x0 = static_cast<std::size_t>(ix & (level.width - 1)), x1 = static_cast<std::size_t>((ix + 1) & (level.width - 1));
+  const std::uint32_t* top = level.texels.data() + static_cast<std::size_t>((iy & (level.height - 1)) * level.width);
+  const std::uint32_t* low =
+      level.texels.data() + static_cast<std::size_t>(((iy + 1) & (level.height - 1)) * level.width);
+  const Vec4 t0 = unpack(top[x0]), t1 = unpack(top[x1]), l0 = unpack(low[x0]), l1 = unpack(low[x1]);
+  const Vec4 t = t0 + sx * (t1 - t0), l = l0 + sx * (l1 - l0);
+  return t + sy * (l - t);
+}
+
+/// Where on the pyramid to read, and in how many places along the longer axis of the pixel's footprint.
+struct Footprint {
+  const Texture2d::Level* fine;
+  const Texture2d::Level* coarse;
+  float fine_x, fine_y, coarse_x, coarse_y;  ///< level 0 texels -> level texels
+  float blend;
+  int probes;
+  float step_x, step_y;  ///< between probes, level 0 texels
+};
+
+Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float y) {
+  const float z = 1.0F / (f.c[0] * x + f.c[1] * y + f.c[2]);
+  const float u = (f.a[0] * x + f.a[1] * y + f.a[2]) * z, v = (f.b[0] * x + f.b[1] * y + f.b[2]) * z;
+  const float ux = (f.a[0] - u * f.c[0]) * z, vx = (f.b[0] - v * f.c[0]) * z;
+  const float uy = (f.a[1] - u * f.c[1]) * z, vy = (f.b[1] - v * f.c[1]) * z;
+  // Axes of the footprint: eigenvalues of J J^T.
+  const float xx = ux * ux + uy * uy, yy = vx * vx + vy * vy, xy = ux * vx + uy * vy;
+  const float mean = 0.5F * (xx + yy), spread = std::sqrt(0.25F * (xx - yy) * (xx - yy) + xy * xy);
+  const float major = std::sqrt(std::max(mean + spread, 1e-12F)), minor = std::sqrt(std::max(mean - spread, 1e-12F));
+  Footprint out{};
+  out.probes = major > 3.0F * minor ? 4 : major > 1.5F * minor ? 2 : 1;
+  const float size = std::max(minor, major / static_cast<float>(out.probes));
+  if (out.probes > 1) {
+    const float angle = 0.5F * std::atan2(2.0F * xy, xx - yy);
+    out.step_x = std::cos(angle) * major / static_cast<float>(out.probes);
+    out.step_y = std::sin(angle) * major / static_cast<float>(out.probes);
+  }
+  const float last = static_cast<float>(texture.levels.size() - 1);
+  const float level = std::clamp(std::log2(size), 0.0F, last);
+  const auto fine = static_cast<std::size_t>(level), coarse = std::min(fine + 1, texture.levels.size() - 1);
+  out.fine = &texture.levels[fine];
+  out.coarse = &texture.levels[coarse];
+  out.blend = level - static_cast<float>(fine);
+  const auto width = static_cast<float>(texture.levels[0].width), height = static_cast<float>(texture.levels[0].height);
+  out.fine_x = static_cast<float>(out.fine->width) / width;
+  out.fine_y = static_cast<float>(out.fine->height) / height;
+  out.coarse_x = static_cast<float>(out.coarse->width) / width;
+  out.coarse_y = static_cast<float>(out.coarse->height) / height;
+  return out;
+}
+
+Vec4 sample(const Footprint& f, float u, float v) {
+  Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
+  float du = u - 0.5F * static_cast<float>(f.probes - 1) * f.step_x;
+  float dv = v - 0.5F * static_cast<float>(f.probes - 1) * f.step_y;
+  for (int i = 0; i < f.probes; ++i, du += f.step_x, dv += f.step_y) {
+    const Vec4 fine = bilinear(*f.fine, du * f.fine_x, dv * f.fine_y);
+    const Vec4 coarse = bilinear(*f.coarse, du * f.coarse_x, dv * f.coarse_y);
+    sum += fine + f.blend * (coarse - fine);
+  }
+  return sum * (1.0F / static_cast<float>(f.probes));
+}
+
+/// The camera's response: straight, then a shoulder, then white.
+std::uint8_t respond(float v) {
+  if (v > 185.0F) v = 185.0F + 70.0F * (1.0F - 1.0F / (1.0F + (v - 185.0F) * (1.0F / 70.0F)));
+  return static_cast<std::uint8_t>(v + 0.5F);
+}
+
+/// Shades pixels of one picture.
+class Shader {
+ public:
+  Shader(const World& world, const View& view, const Exposure& exposure)
+      : world_(world), view_(view), exposure_(exposure) {
+    scales_.reserve(view.faces.size());
+    for (std::size_t i = 0; i < view.faces.size(); ++i) {
+      const TexelScale s = texel_scale(world, i);
+      scales_.push_back({static_cast<float>(1.0 / s.u), static_cast<float>(1.0 / s.v)});
+    }
+    const double cx = 0.5 * view.camera.width, cy = 0.5 * view.camera.height;
+    center_x_ = static_cast<float>(cx);
+    center_y_ = static_cast<float>(cy);
+    per_radius2_ = static_cast<float>(1.0 / (cx * cx + cy * cy));
+  }
+
+  /// Light, lens and exposure together at a pixel of a face.
+  [[nodiscard]] float brightness(std::size_t id, float x, float y) const {
+    const FaceView& f = view_.faces[id];
+    const float z = 1.0F / (f.c[0] * x + f.c[1] * y + f.c[2]);
+    const float u = (f.a[0] * x + f.a[1] * y + f.a[2]) * z * scales_[id][0] - world_.offset_u[id];
+    const float v = -(f.b[0] * x + f.b[1] * y + f.b[2]) * z * scales_[id][1] - world_.offset_v[id];
+    const float dx = x - center_x_, dy = y - center_y_;
+    const float lens = 1.0F - exposure_.vignette * (dx * dx + dy * dy) * per_radius2_;
+    return world_.light[id].at(u, v) * lens * exposure_.gain;
+  }
+  [[nodiscard]] Footprint foot(std::size_t id, float x, float y) const {
+    return footprint(texture(id), view_.faces[id], x, y);
+  }
+  /// Radiance at one place, no interpolation.
+  [[nodiscard]] Vec4 at(int face, float x, float y) const {
+    if (face < 0) return Vec4{24.0F, 24.0F, 24.0F, 0.0F};
+    const auto id = static_cast<std::size_t>(face);
+    return color(id, foot(id, x, y), x, y) * brightness(id, x, y);
+  }
+  [[nodiscard]] Vec4 color(std::size_t id, const Footprint& foot, float x, float y) const {
+    const FaceView& f = view_.faces[id];
+    const float z = 1.0F / (f.c[0] * x + f.c[1] * y + f.c[2]);
+    return sample(foot, (f.a[0] * x + f.a[1] * y + f.a[2]) * z, (f.b[0] * x + f.b[1] * y + f.b[2]) * z);
+  }
+  static void store(const Vec4& v, std::uint8_t* bgr) {
+    bgr[0] = respond(v[0]);
+    bgr[1] = respond(v[1]);
+    bgr[2] = respond(v[2]);
+  }
+  void row(int y, std::uint8_t* bgr) const {
+    const int* ids = view_.ids[y];
+    const auto fy = static_cast<float>(y);
+    int x = 0;
+    while (x < view_.ids.cols) {
+      int end = x + 1;
+      while (end < view_.ids.cols && end < x + kChunk && ids[end] == ids[x]) ++end;
+      chunk(ids[x], x, end, fy, bgr);
+      x = end;
+    }
+  }
+
+ private:
+  [[nodiscard]] const Texture2d& texture(std::size_t id) const {
+    return world_.textures[static_cast<std::size_t>(world_.texture_of[id])];
+  }
+  void chunk(int face, int from, int to, float y, std::uint8_t* bgr) const {
+    if (face < 0) {
+      for (int x = from; x < to; ++x) store(at(face, 0.0F, 0.0F), bgr + 3 * x);
+      return;
+    }
+    const auto id = static_cast<std::size_t>(face);
+    const auto x0 = static_cast<float>(from), x1 = static_cast<float>(to - 1);
+    const Footprint here = foot(id, 0.5F * (x0 + x1), y);
+    const float start = brightness(id, x0, y);
+    const float slope = to - from > 1 ? (brightness(id, x1, y) - start) / (x1 - x0) : 0.0F;
+    for (int x = from; x < to; ++x) {
+      const auto fx = static_cast<float>(x);
+      store(color(id, here, fx, y) * (start + slope * (fx - x0)), bgr + 3 * x);
+    }
+  }
+
+  const World& world_;
+  const View& view_;
+  Exposure exposure_;
+  std::vector<std::array<float, 2>> scales_;
+  float center_x_ = 0.0F, center_y_ = 0.0F, per_radius2_ = 0.0F;
+};
+
+/// Pixels that a border between faces crosses are averages of four places.
+void smooth_borders(const World& world, const View& view, const Shader& shader, cv::Mat3b& image) {
+  constexpr float kSpots[4][2] = {{-0.125F, -0.375F}, {0.375F, -0.125F}, {-0.375F, 0.125F}, {0.125F, 0.375F}};
+  const cv::Mat1i& ids = view.ids;
+  std::vector<cv::Point> pixels;
+  for (int y = 0; y < ids.rows; ++y) {
+    const int *row = ids[y], *up = ids[std::max(0, y - 1)], *low = ids[std::min(ids.rows - 1, y + 1)];
+    for (int x = 0; x < ids.cols; ++x) {
+      const int id = row[x];
+      if (up[x] != id || low[x] != id || row[std::max(0, x - 1)] != id || row[std::min(ids.cols - 1, x + 1)] != id) {
+        pixels.emplace_back(x, y);
+      }
+    }
+  }
+  std::vector<std::array<int, 4>> seen(pixels.size());
+  RayBatch rays(world, view);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      rays.add(static_cast<float>(pixels[i].x) + kSpots[k][0], static_cast<float>(pixels[i].y) + kSpots[k][1],
+               &seen[i][k]);
+    }
+  }
+  rays.flush();
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
+    for (std::size_t k = 0; k < 4; ++k) {
+      sum += shader.at(seen[i][k], static_cast<float>(pixels[i].x) + kSpots[k][0],
+                       static_cast<float>(pixels[i].y) + kSpots[k][1]);
+    }
+    Shader::store(sum * 0.25F, image[pixels[i].y][pixels[i].x].val);
+  }
+}
+
+}  // namespace
+
+View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera) {
+  View view;
+  view.camera = camera;
+  view.world_from_camera = world_from_camera;
+  const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
+  view.faces.reserve(world.scene.faces.size());
+  for (std::size_t i = 0; i < world.scene.faces.size(); ++i) {
+    view.faces.push_back(view_face(world, i, camera, camera_from_world));
+  }
+  view.ids.create(camera.height, camera.width);
+  RayBatch rays(world, view);
+  for (int y = 0; y < camera.height; y += 2) {
+    int* row = view.ids[y];
+    for (int x = 0; x < camera.width; x += 2) rays.add(static_cast<float>(x), static_cast<float>(y), &row[x]);
+  }
+  rays.flush();
+  fill_between(world, view);
+  return view;
+}
+
+cv::Mat1f exact_depth(const View& view) {
+  cv::Mat1f depth(view.ids.size());
+  for (int y = 0; y < depth.rows; ++y) {
+    const int* ids = view.ids[y];
+    float* row = depth[y];
+    for (int x = 0; x < depth.cols; ++x) {
+      if (ids[x] < 0) {
+        row[x] = 0.0F;
+        continue;
+      }
+      const FaceView& f = view.faces[static_cast<std::size_t>(ids[x])];
+      row[x] = 1.0F / (f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
+    }
+  }
+  return depth;
+}
+
+cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure) {
+  cv::Mat3b image(view.ids.size());
+  const Shader shader(world, view, exposure);
+  for (int y = 0; y < image.rows; ++y) shader.row(y, image[y][0].val);
+  smooth_borders(world, view, shader, image);
+  return image;
+}
+
+float mean_level(const World& world, const View& view) {
+  const Shader shader(world, view, Exposure{});
+  double sum = 0.0;
+  for (int y = 0; y < view.ids.rows; ++y) {
+    for (int x = 0; x < view.ids.cols; ++x) {
+      const Vec4 v = shader.at(view.ids(y, x), static_cast<float>(x), static_cast<float>(y));
+      sum += static_cast<double>(std::min(1.5F, (v[0] + v[1] + v[2]) / 765.0F));
+    }
+  }
+  return static_cast<float>(sum / static_cast<double>(view.ids.total()));
+}
+
+}  // namespace plumbline::synth

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Pictures of a world from a pose. Const functions, no shared scratch: frames render side by side.
+#include <opencv2/core.hpp>
+
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "world.hpp"
+
+namespace plumbline::synth {
+
+/// How one face appears in one picture. With p = (x, y, 1) in pixels: 1/z = c.p, and texture coordinates (level 0
+/// texels) are (a.p) z and (b.p) z: flat faces need no rays but for who is in front.
+struct FaceView {
+  float a[3], b[3], c[3];
+};
+
+/// Everything one picture needs.
+struct View {
+  sensor::Pinhole camera;
+  geometry::Rigid3 world_from_camera;
+  std::vector<FaceView> faces;
+  cv::Mat1i ids;  ///< face per pixel, -1 = nothing
+};
+
+/// Casts rays at every second pixel of every second row, and at the pixels between where their neighbours differ.
+View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera);
+
+/// Metres along z of what `ids` names; 0 = nothing.
+cv::Mat1f exact_depth(const View& view);
+
+/// What the lens and the exposure do to light.
+struct Exposure {
+  float gain = 1.0F;      ///< multiplies the square root of radiance
+  float vignette = 0.0F;  ///< share of it lost in the corners
+};
+
+/// CV_8UC3 BGR with smoothed borders, before any noise.
+cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure);
+
+/// Mean square root of radiance of a picture (0-1 and more) for the automatic exposure.
+float mean_level(const World& world, const View& view);
+
+}  // namespace plumbline::synth
