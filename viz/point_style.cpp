@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace plumbline::viz {
 namespace {
@@ -130,6 +131,32 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   }
   const bool enough = facing.size() * 50 > all.size();
   return cull && enough ? facing : all;
+}
+
+std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vector<std::uint32_t>& points,
+                                            const Projection& projection, double cell_px) {
+  constexpr std::uint32_t kNone = 0xffffffffU;
+  constexpr double kBorderCells = 16.0;  // a point outside may still reach in with its size
+  const double columns = std::ceil(projection.width_px / cell_px) + 2.0 * kBorderCells;
+  const double rows = std::ceil(projection.height_px / cell_px) + 2.0 * kBorderCells;
+  const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  std::vector<std::uint32_t> nearest(cells, kNone);
+  std::vector<float> depth(cells, std::numeric_limits<float>::infinity());
+  for (const auto i : points) {
+    const Eigen::Vector3d at = projection.project(position((*scene.cloud)[i]));
+    const double column = std::floor(at.x() / cell_px) + kBorderCells;
+    const double row = std::floor(at.y() / cell_px) + kBorderCells;
+    const bool inside = column >= 0.0 && column < columns && row >= 0.0 && row < rows &&
+                        at.z() > projection.near_m && at.z() < projection.far_m;
+    if (!inside) continue;
+    const auto cell = static_cast<std::size_t>(row * columns + column);
+    if (static_cast<float>(at.z()) >= depth[cell]) continue;
+    depth[cell] = static_cast<float>(at.z());
+    nearest[cell] = i;
+  }
+  nearest.erase(std::remove(nearest.begin(), nearest.end(), kNone), nearest.end());
+  std::sort(nearest.begin(), nearest.end());
+  return nearest;
 }
 
 double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points) {

@@ -16,6 +16,12 @@ namespace plumbline::viz {
 std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& projection, bool cull,
                                           std::size_t step = 1);
 
+/// Of the points that fall into one cell of `cell_px` pixels the nearest; those outside the picture and its
+/// depth range are left out. What is dropped would be drawn over anyway: this bounds the drawing of huge
+/// clouds.
+std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vector<std::uint32_t>& points,
+                                            const Projection& projection, double cell_px);
+
 /// Typical distance between neighbouring points of the surfaces, metres; 0 for fewer than two points.
 double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points);
 

@@ -243,11 +243,12 @@ core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& op
   content.options = &options;
   content.projection = choose_projection(scene, large, axes);
   const Projection& projection = content.projection;
-  const auto points = visible_points(scene, projection, options.cull_back_faces);
+  const auto facing = visible_points(scene, projection, options.cull_back_faces);
+  const double spacing_m = point_spacing(scene, facing);
+  const auto points = nearest_per_cell(scene, facing, projection, kSupersampling);
   const PointColors styled = color_points(scene, points, options, axes, projection);
-  const double spacing_m = point_spacing(scene, points);
   content.color_scale = styled.scale;
-  content.empty = points.empty() && scene.segments.empty();
+  content.empty = facing.empty() && scene.segments.empty();
 
   auto window = OffscreenWindow::open(large.width_px, large.height_px);
   if (!window) return tl::unexpected(window.error());
