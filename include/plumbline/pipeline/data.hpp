@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What flows between the stages of this library.
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumbline/cloud/types.hpp"
+#include "plumbline/core/ids.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/maps/line_export.hpp"
+#include "plumbline/pipeline/stage.hpp"
+#include "plumbline/sensor/frame.hpp"
+
+namespace plumbline::pipeline {
+
+/// What tracking decided about one frame.
+struct TrackedFrame {
+  core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
+  double stamp = 0.0;         ///< seconds
+};
+
+/// One line of frames.csv.
+struct FrameRow {
+  std::size_t frame = 0;  ///< number within the run
+  std::string state;      ///< tracked, lost, initialising; unreadable is added by the writer
+  std::string columns;    ///< the rest, comma-separated, as MapResult::frame_columns names it
+};
+
+struct KeyframePose {
+  core::KeyframeId id;
+  double stamp = 0.0;  ///< seconds
+  geometry::Rigid3 world_from_camera;
+};
+
+/// The finished map but for its dense cloud; poses after all optimisation.
+struct MapResult {
+  geometry::Trajectory trajectory;      ///< tracked frames only
+  std::vector<KeyframePose> keyframes;  ///< by id
+  std::vector<maps::LineSegment3> lines;
+  std::string frame_columns;     ///< header of FrameRow::columns
+  std::vector<FrameRow> frames;  ///< by frame
+};
+
+/// Filtered cloud of one keyframe, camera frame.
+struct KeyframeCloud {
+  core::KeyframeId id;
+  cloud::CloudPtr cloud;
+};
+
+/// The merged cloud, map frame.
+struct DenseCloud {
+  cloud::CloudPtr cloud;
+  double voxel_m = 0.0;
+};
+
+/// The port types of this library.
+inline PortType frame_port() { return port_type<sensor::RgbdFrame>("frame"); }
+inline PortType features_port() { return port_type<features::FrameFeatures>("features"); }
+inline PortType track_port() { return port_type<TrackedFrame>("track"); }
+inline PortType keyframe_cloud_port() { return port_type<KeyframeCloud>("keyframe_cloud"); }
+inline PortType map_port() { return port_type<MapResult>("map", Rate::kEnd); }
+inline PortType cloud_port() { return port_type<DenseCloud>("cloud", Rate::kEnd); }
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a command's INPUT may be.
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+
+namespace plumbline::pipeline {
+
+/// A recording's folder, or "synth:SCENE?..." filmed on demand. `scenes_folder` holds the shipped scenes.
+core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string& input,
+                                                               const dataset::OpenOptions& options,
+                                                               const std::filesystem::path& scenes_folder,
+                                                               const core::Executor& executor,
+                                                               core::Log& log);
+
+/// Frames of `source` from `from_s` to `to_s` seconds after its first, every n-th. kUsage when none is left.
+core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
+    std::unique_ptr<dataset::FrameSource> source, double from_s, double to_s, int every);
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// `plumbline map` as a call: a recording in, a result folder out.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/core/stop.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/pipeline/run.hpp"
+#include "plumbline/pipeline/summary.hpp"
+
+namespace plumbline::pipeline {
+
+struct MapRequest {
+  std::string input;                       ///< folder or synth:...
+  std::filesystem::path output;            ///< the result folder
+  std::string pipeline = "rgbd";           ///< shipped name or file
+  std::vector<std::string> overrides;      ///< stage.key=value
+  std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
+  dataset::OpenOptions open;               ///< format, camera, from, to, every
+  bool replace = false;                    ///< replace an earlier result
+};
+
+/// Checks everything first (pipeline: kUsage, recording: kInput, output folder: kOutput), then maps. When the
+/// result is written but should not be trusted, the summary's `reason` says why. Errors leave an earlier
+/// result untouched. `progress` may be empty.
+core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
+                                       core::Log& log, const core::StopToken& stop, const Progress& progress);
+
+}  // namespace plumbline::pipeline

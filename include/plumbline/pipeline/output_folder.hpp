@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A result folder that appears whole or not at all.
+#include <filesystem>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::pipeline {
+
+/// Results are written to OUT.partial, which commit() renames to OUT; an earlier result is replaced only
+/// then. A run that fails leaves OUT as it was, and no OUT.partial.
+class OutputFolder {
+ public:
+  /// Checks and makes OUT.partial. kUsage: OUT exists and `replace` is false, or OUT is neither empty nor an
+  /// earlier result (then `replace` does not help: nothing else is ever deleted). kOutput: cannot be created
+  /// or written, or less than 64 MB are free.
+  static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace);
+
+  OutputFolder(OutputFolder&& other) noexcept;
+  OutputFolder& operator=(OutputFolder&&) = delete;
+  ~OutputFolder();
+
+  [[nodiscard]] const std::filesystem::path& path() const { return partial_; }  ///< where to write
+  core::Result<void> commit();
+
+ private:
+  OutputFolder(std::filesystem::path target, std::filesystem::path partial);
+  std::filesystem::path target_;
+  std::filesystem::path partial_;  ///< empty: nothing to clean up
+};
+
+/// Whether a folder holds the result of an earlier run.
+bool is_result_folder(const std::filesystem::path& folder);
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What is said of a finished run: summary.json and timing.csv.
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/pipeline/run.hpp"
+
+namespace plumbline::pipeline {
+
+struct RunSummary {
+  std::string input;
+  std::string pipeline;
+  std::string reason;    ///< why the result must not be trusted as it is; empty = nothing speaks against it
+  bool stopped = false;  ///< ended early on request
+  struct Frames {
+    std::size_t available = 0;   ///< in the recording, after --from --to --every
+    std::size_t read = 0;        ///< decoded
+    std::size_t unreadable = 0;  ///< skipped
+    std::size_t tracked = 0;
+    std::size_t lost = 0;  ///< read but not tracked
+    std::size_t longest_loss = 0;
+    [[nodiscard]] double tracked_percent() const;  ///< of read + unreadable
+  } frames;
+  std::size_t keyframes = 0;
+  std::size_t points = 0;  ///< point landmarks
+  std::size_t lines = 0;   ///< line landmarks
+  struct Loops {
+    std::size_t candidates = 0;
+    std::size_t verified = 0;
+    std::size_t accepted = 0;
+  } loops;
+  std::size_t cloud_points = 0;
+  double voxel_m = 0.0;
+  double wall_s = 0.0;    ///< the whole run
+  double map_s = 0.0;     ///< first frame read to last change of the map
+  double export_s = 0.0;  ///< clouds, pictures and tables
+  struct StageTime {
+    std::string name;
+    double median_ms = 0.0;
+    double p95_ms = 0.0;
+    double finish_ms = 0.0;
+  };
+  std::vector<StageTime> stages;
+  double peak_rss_mb = 0.0;
+  int threads = 0;
+  int seed = 0;
+
+  [[nodiscard]] double fps() const;  ///< frames read over map_s; 0 when nothing was read
+};
+
+/// Takes over counts and times of a run.
+void add_report(const RunReport& report, RunSummary& summary);
+
+/// Sets `reason` when tracking was lost for more than 10 % of the frames or the cloud is empty.
+void judge(RunSummary& summary);
+
+/// The one place that writes summary.json. Errors (kOutput) name the file.
+core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& summary);
+
+/// One line a frame: its number, stamp and the milliseconds of every stage (empty = nothing to do).
+core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
+                                const dataset::FrameSource& source);
+
+/// A few lines for people.
+std::string to_text(const RunSummary& summary);
+
+/// Most memory this process ever held, MB.
+double peak_rss_mb();
+
+}  // namespace plumbline::pipeline

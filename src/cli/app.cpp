@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "app.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <opencv2/core/utility.hpp>
+#include <utility>
+
+#include "paths.hpp"
+#include "plumbline/core/version.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+std::string version_text() { return fmt::format("plumbline {}", core::version()); }
+
+const char* const kFooter =
+    "Exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 input data, 4 done but not trustworthy,\n"
+    "5 output cannot be written. More about a command: plumbline COMMAND --help";
+
+}  // namespace
+
+core::Result<std::filesystem::path> Session::pipelines_folder() const {
+  return find_pipelines_folder(pipelines_dir);
+}
+
+Console& Session::console() {
+  if (!console_) console_ = std::make_unique<Console>(quiet, verbose);
+  return *console_;
+}
+
+const core::Executor& Session::executor() {
+  if (!executor_) executor_ = std::make_unique<core::Executor>(threads);
+  return *executor_;
+}
+
+int Session::fail(const core::Error& error) {
+  console().error(error.message);
+  return static_cast<int>(error.kind);
+}
+
+CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
+                      std::function<int()> run) {
+  CLI::App* command = parent.add_subcommand(name, help);
+  command->set_version_flag("--version", version_text());
+  CLI::Option* quiet = command->add_flag("-q,--quiet", session.quiet, "Only warnings and errors");
+  command->add_flag("-v,--verbose", session.verbose, "Tell more")->excludes(quiet);
+  command->add_option("--threads", session.threads, "Threads to use (default: one per core)")
+      ->check(CLI::Range(1, 256));
+  command->add_option("--pipelines-dir", session.pipelines_dir,
+                      "Folder of the shipped pipelines and cameras");
+  command->callback([&session, run = std::move(run)] { session.command = run; });
+  return command;
+}
+
+CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help) {
+  CLI::App* group = parent.add_subcommand(name, help);
+  group->set_version_flag("--version", version_text());
+  group->require_subcommand(1);
+  return group;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Plumbline: RGB-D recordings in, one dense coloured metric point cloud out.", "plumbline");
+  app.set_version_flag("--version", version_text());
+  app.require_subcommand(1);
+  app.footer(kFooter);
+  Session session;
+  add_map(app, session);
+  add_info(app, session);
+  add_render(app, session);
+  add_export(app, session);
+  add_evaluate(app, session);
+  add_synth(app, session);
+  add_filter(app, session);
+  add_pipelines(app, session);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : static_cast<int>(core::ErrorKind::kUsage);
+  }
+  ignore_write_signals();
+  cv::setNumThreads(1);  // threads come from the executor alone
+  try {
+    return session.command();
+  } catch (const std::bad_alloc&) {
+    session.console().error("not enough memory");
+  } catch (const std::exception& e) {
+    session.console().error(
+        fmt::format("internal error: {}; please report it with the command you gave", e.what()));
+  }
+  return static_cast<int>(core::ErrorKind::kInternal);
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The command line: one function per command, each in command_<name>.cpp.
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "console.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+
+namespace plumbline::cli {
+
+/// What every command shares. Values are there once the command line has been parsed.
+struct Session {
+  bool quiet = false;
+  bool verbose = false;
+  int threads = 0;  ///< 0 = one per core
+  std::string pipelines_dir;
+
+  std::function<int()> command;  ///< of the command that was named; returns the exit code
+
+  [[nodiscard]] core::Result<std::filesystem::path> pipelines_folder() const;
+  /// Made on first use: messages and progress on stderr.
+  Console& console();
+  /// Made on first use.
+  const core::Executor& executor();
+  /// Prints the error and gives its exit code.
+  int fail(const core::Error& error);
+
+ private:
+  std::unique_ptr<Console> console_;
+  std::unique_ptr<core::Executor> executor_;
+};
+
+/// A command below `parent` with --help, --version, -q, -v, --threads and --pipelines-dir.
+CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
+                      std::function<int()> run);
+/// A word that only groups commands, like `evaluate`.
+CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);
+
+void add_map(CLI::App& app, Session& session);
+void add_info(CLI::App& app, Session& session);
+void add_render(CLI::App& app, Session& session);
+void add_export(CLI::App& app, Session& session);
+void add_evaluate(CLI::App& app, Session& session);
+void add_synth(CLI::App& app, Session& session);
+void add_filter(CLI::App& app, Session& session);
+void add_pipelines(CLI::App& app, Session& session);
+
+/// Parses, runs the command and returns the exit code (see core::ErrorKind).
+int run(int argc, char** argv);
+
+}  // namespace plumbline::cli

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline info MAP|CLOUD|DATASET
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "app.hpp"
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/dataset/summary.hpp"
+#include "plumbline/pipeline/input.hpp"
+#include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/synth/source.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+struct InfoRequest {
+  std::string input;
+  dataset::OpenOptions open;
+};
+
+void print_json(const nlohmann::ordered_json& json, const std::string& prefix) {
+  for (const auto& [key, value] : json.items()) {
+    if (value.is_object()) {
+      print_json(value, prefix + key + ".");
+    } else {
+      fmt::print("{}{}: {}\n", prefix, key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+}
+
+core::Result<void> describe_result(const std::filesystem::path& folder) {
+  std::ifstream stream(folder / "summary.json");
+  const auto json = nlohmann::ordered_json::parse(stream, nullptr, false);
+  if (!json.is_object()) {
+    return core::input_error(
+        fmt::format("{}: is not valid JSON; map again", (folder / "summary.json").string()));
+  }
+  print_json(json, "");
+  return {};
+}
+
+core::Result<void> describe_cloud(const std::filesystem::path& file) {
+  const auto read = cloud::read_cloud(file);
+  if (!read) return tl::unexpected<core::Error>(read.error());
+  Eigen::Array3f low = Eigen::Array3f::Constant(INFINITY);
+  Eigen::Array3f high = Eigen::Array3f::Constant(-INFINITY);
+  for (const cloud::Point& p : *read->cloud) {
+    const Eigen::Array3f position(p.x, p.y, p.z);
+    if (!position.isFinite().all()) continue;
+    low = low.min(position);
+    high = high.max(position);
+  }
+  fmt::print("points: {}\nwithout position: {}\n", read->cloud->size(), read->nan_points);
+  if (read->cloud->isOrganized()) fmt::print("organised: {} x {}\n", read->cloud->width, read->cloud->height);
+  fmt::print("colour: {}\nnormals: {}\n", read->has_color ? "yes" : "no", read->has_normals ? "yes" : "no");
+  if (read->has_normals) fmt::print("without normal: {}\n", read->nan_normals);
+  if ((low <= high).all()) {
+    fmt::print("from: {:.3f} {:.3f} {:.3f} m\nto: {:.3f} {:.3f} {:.3f} m\n", low.x(), low.y(), low.z(),
+               high.x(), high.y(), high.z());
+  }
+  return {};
+}
+
+core::Result<void> describe_recording(Session& session, InfoRequest& request) {
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+  request.open.cameras_folder = *pipelines / "cameras";
+  const auto source = pipeline::open_input(request.input, request.open, *pipelines / "scenes",
+                                           session.executor(), session.console());
+  if (!source) return tl::unexpected<core::Error>(source.error());
+  fmt::print("{}", dataset::to_text(dataset::describe(**source)));
+  return {};
+}
+
+core::Result<void> info(Session& session, InfoRequest& request) {
+  if (synth::is_synth_url(request.input)) return describe_recording(session, request);
+  std::error_code ec;
+  const std::filesystem::path path = request.input;
+  if (!std::filesystem::exists(path, ec)) {
+    return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
+  }
+  if (!std::filesystem::is_directory(path, ec)) return describe_cloud(path);
+  if (pipeline::is_result_folder(path)) return describe_result(path);
+  return describe_recording(session, request);
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<InfoRequest>();
+  CLI::App* command =
+      add_command(app, session, "info", "Say what a recording, a map or a cloud holds", [&session, request] {
+        const auto done = info(session, *request);
+        return done ? 0 : session.fail(done.error());
+      });
+  command->add_option("INPUT", request->input, "A recording, a result folder, a cloud file or synth:SCENE")
+      ->required();
+  command->add_option("--camera", request->open.camera, "Shipped calibration or file")
+      ->type_name("NAME|FILE");
+  command->add_option("--format", request->open.format, "Layout of the recording (default: auto)")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline map INPUT -o OUT
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app.hpp"
+#include "plumbline/pipeline/map_recording.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+int map(Session& session, pipeline::MapRequest request) {
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return session.fail(pipelines.error());
+  request.pipelines_folder = *pipelines;
+  request.open.cameras_folder = *pipelines / "cameras";
+  const core::StopToken stop;
+  stop_on_signals(stop);
+  Console& console = session.console();
+  const auto summary = pipeline::map_recording(
+      request, session.executor(), console, stop,
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
+  console.end_progress();
+  if (!summary) return session.fail(summary.error());
+  if (!session.quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), request.output.string());
+  if (summary->reason.empty()) return 0;
+  console.warning("the result is not trustworthy: " + summary->reason);
+  return static_cast<int>(core::ErrorKind::kUntrustworthy);
+}
+
+}  // namespace
+
+void add_map(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<pipeline::MapRequest>();
+  CLI::App* command = add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
+                                  [&session, request] { return map(session, *request); });
+  command
+      ->add_option("INPUT", request->input,
+                   "A TUM RGB-D, 7-Scenes or Redwood folder, or synth:SCENE?frames=900&texture=none&seed=3")
+      ->required();
+  command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
+  command->add_option("-p,--pipeline", request->pipeline, "Shipped pipeline or file (default: rgbd)")
+      ->type_name("PIPELINE");
+  command->add_option("--camera", request->open.camera, "Shipped calibration or file")
+      ->type_name("NAME|FILE");
+  command->add_option("--set", request->overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+  command->add_option("--format", request->open.format, "Layout of INPUT (default: auto)")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
+  command->add_option("--from", request->open.from_s, "Start this many seconds after the first frame")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--to", request->open.to_s, "End this many seconds after the first frame")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--every", request->open.every, "Use every N-th frame")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000));
+  command->add_flag("--force", request->replace, "Replace an earlier result in OUT");
+}
+
+}  // namespace plumbline::cli

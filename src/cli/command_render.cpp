@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline render MAP|CLOUD -o FILE.png
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <memory>
+#include <optional>
+#include <system_error>
+
+#include "app.hpp"
+#include "option_flags.hpp"
+#include "paths.hpp"
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/ply.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/pipeline/result_folder.hpp"
+#include "plumbline/viz/snapshot.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RenderRequest {
+  fs::path input;
+  fs::path output;
+  std::string size;
+  bool lines = false;
+  viz::SnapshotOptions options;
+  core::OptionTable table;
+  std::unique_ptr<OptionFlags> flags;
+};
+
+/// "1600x1200"
+core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& options) {
+  int width = 0;
+  int height = 0;
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &used) != 2 ||
+      static_cast<std::size_t>(used) != text.size() || width < 1 || height < 1) {
+    return core::usage_error(fmt::format("--size: '{}' is no size; write it as 1600x1200", text));
+  }
+  options.width_px = width;
+  options.height_px = height;
+  return {};
+}
+
+/// The result folder that `input` is, or is map.ply or map.pcd of.
+std::optional<pipeline::ResultFolder> result_of(const fs::path& input) {
+  std::error_code ec;
+  const fs::path folder = fs::is_directory(input, ec) ? input : fs::absolute(input).parent_path();
+  const std::string name = input.filename().string();
+  if (!fs::is_directory(input, ec) && name != "map.ply" && name != "map.pcd") return std::nullopt;
+  if (!pipeline::is_result_folder(folder)) return std::nullopt;
+  return pipeline::ResultFolder{folder};
+}
+
+core::Result<void> add_paths(const pipeline::ResultFolder& result, bool lines, viz::Scene& scene) {
+  auto trajectory = dataset::read_trajectory(result.trajectory());
+  if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
+  viz::CameraPath path;
+  path.trajectory = std::move(*trajectory);
+  scene.paths.push_back(std::move(path));
+  if (!lines) return {};
+  const auto segments = pipeline::read_lines_ply(result.lines());
+  if (!segments) return tl::unexpected<core::Error>(segments.error());
+  for (const auto& [a, b] : *segments) scene.segments.push_back({a, b});
+  return {};
+}
+
+/// One value per point, as the colour mode wants.
+core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& input, viz::ColorMode mode,
+                               viz::Scene& scene) {
+  const auto missing = [&](const char* what) {
+    return core::usage_error(
+        fmt::format("--color {}: {} has no {} of its points; choose rgb, height or normal",
+                    viz::color_mode_name(mode), input.string(), what));
+  };
+  if (mode == viz::ColorMode::kConfidence) {
+    if (file.columns.confidence.empty()) return missing("confidence");
+    scene.scalars = file.columns.confidence;
+    scene.scalar_label = "confidence";
+  } else if (mode == viz::ColorMode::kRobot) {
+    if (file.columns.robot.empty()) return missing("robot");
+    scene.scalars.assign(file.columns.robot.begin(), file.columns.robot.end());
+  } else if (mode == viz::ColorMode::kError) {
+    const auto data = input.extension() == ".ply" ? cloud::read_ply(input) : core::Result<cloud::PlyData>();
+    const std::vector<float>* errors = data ? data->floats("error") : nullptr;
+    if (errors == nullptr || errors->size() != file.cloud->size()) return missing("error");
+    scene.scalars = *errors;
+    scene.scalar_label = "error (m)";
+  }
+  return {};
+}
+
+core::Result<void> render(RenderRequest& request) {
+  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (!request.size.empty()) {
+    if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
+  }
+  if (request.output.extension() != ".png") {
+    return core::usage_error(
+        fmt::format("{}: pictures are PNG; let the name end in .png", request.output.string()));
+  }
+  std::error_code ec;
+  if (!fs::exists(request.input, ec)) {
+    return core::input_error(fmt::format("{}: no such map or cloud", request.input.string()));
+  }
+  const auto result = result_of(request.input);
+  if (!result && fs::is_directory(request.input, ec)) {
+    return core::input_error(fmt::format("{}: is no result of plumbline map", request.input.string()));
+  }
+  const bool folder = fs::is_directory(request.input, ec);
+  const auto file = folder ? pipeline::read_result_cloud(*result) : cloud::read_cloud(request.input);
+  if (!file) return tl::unexpected<core::Error>(file.error());
+  viz::Scene scene;
+  scene.cloud = file->cloud;
+  scene.title = display_name(result ? result->folder : request.input);
+  if (result) {
+    if (auto added = add_paths(*result, request.lines, scene); !added) return added;
+  } else if (request.lines) {
+    return core::usage_error("--lines: only a result folder has lines");
+  }
+  if (auto added = add_scalars(*file, folder ? result->ply() : request.input, request.options.color, scene);
+      !added) {
+    return added;
+  }
+  return viz::render_snapshot(scene, request.options, request.output);
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<RenderRequest>();
+  request->options.declare(request->table);
+  CLI::App* command =
+      add_command(app, session, "render", "Draw a map or cloud; needs no display", [&session, request] {
+        const auto done = render(*request);
+        return done ? 0 : session.fail(done.error());
+      });
+  command->add_option("INPUT", request->input, "A result folder, or a PLY, PCD or XYZ file")->required();
+  command->add_option("-o,--output", request->output, "Picture to write")->required()->type_name("FILE.png");
+  command->add_option("--size", request->size, "Size of the picture, like 1600x1200")->type_name("WxH");
+  command->add_flag("--lines", request->lines, "Draw the map's 3D lines, too");
+  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+}
+
+}  // namespace plumbline::cli

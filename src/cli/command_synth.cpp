@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline synth SCENE -o DIR
+#include <fmt/format.h>
+
+#include <memory>
+#include <system_error>
+
+#include "app.hpp"
+#include "option_flags.hpp"
+#include "plumbline/synth/recording.hpp"
+#include "plumbline/synth/scene.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+struct SynthRequest {
+  std::string scene;
+  std::filesystem::path output;
+  synth::SynthOptions options;
+  core::OptionTable table;
+  std::unique_ptr<OptionFlags> flags;
+};
+
+core::Result<void> film(SynthRequest& request, Session& session) {
+  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (auto checked = synth::check(request.options); !checked) return checked;
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+  const auto scene = synth::load_scene(request.scene, *pipelines / "scenes");
+  if (!scene) return tl::unexpected<core::Error>(scene.error());
+  std::error_code ec;
+  if (std::filesystem::exists(request.output, ec) && !std::filesystem::is_empty(request.output, ec)) {
+    return core::usage_error(
+        fmt::format("{}: is there already and not empty; name a new folder", request.output.string()));
+  }
+  const core::StopToken stop;
+  stop_on_signals(stop);
+  Console& console = session.console();
+  const auto summary = synth::write_recordings(
+      *scene, request.options, request.output, session.executor(), stop, console,
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
+  console.end_progress();
+  if (!summary) return tl::unexpected<core::Error>(summary.error());
+  if (!session.quiet) {
+    fmt::print("{}{} robots, {} frames, {:.1f} m of path, {} reference points in {}\n",
+               summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
+               summary->reference_samples, request.output.string());
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_synth(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<SynthRequest>();
+  request->options.declare(request->table);
+  CLI::App* command = add_command(app, session, "synth",
+                                  "Film a generated world: recordings with exact truth", [&session, request] {
+                                    const auto done = film(*request, session);
+                                    return done ? 0 : session.fail(done.error());
+                                  });
+  command->add_option("SCENE", request->scene, "Shipped scene or file")->required();
+  command->add_option("-o,--output", request->output, "Folder for the recordings")
+      ->required()
+      ->type_name("DIR");
+  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "console.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace plumbline::cli {
+namespace {
+
+constexpr double kBarEvery_s = 0.1;
+constexpr double kLineEvery_s = 5.0;
+constexpr std::size_t kBarWidth = 30;
+
+void put(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+
+const char* label(core::LogLevel level) {
+  switch (level) {
+    case core::LogLevel::kWarning:
+      return "warning: ";
+    case core::LogLevel::kError:
+      return "error: ";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+std::string clock_text(double seconds) {
+  const auto total = static_cast<long>(std::min(std::max(seconds, 0.0), 1e8));
+  const long hours = total / 3600;
+  if (hours > 0) return fmt::format("{}:{:02}:{:02}", hours, total / 60 % 60, total % 60);
+  return fmt::format("{}:{:02}", total / 60, total % 60);
+}
+
+Console::Console(bool quiet, bool verbose)
+    : quiet_(quiet),
+      threshold_(quiet     ? core::LogLevel::kWarning
+                 : verbose ? core::LogLevel::kDebug
+                           : core::LogLevel::kInfo),
+      terminal_(isatty(STDERR_FILENO) != 0) {}
+
+Console::~Console() { end_progress(); }
+
+void Console::write(core::LogLevel level, const std::string& message) {
+  if (level < threshold_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clear_bar();
+  put(fmt::format("plumbline: {}{}\n", label(level), message));
+}
+
+void Console::progress(std::size_t done, std::size_t total, const char* what) {
+  if (quiet_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto now = Clock::now();
+  if (!started_) {
+    started_ = true;
+    start_ = last_ = now;
+  }
+  const double since_last_s = std::chrono::duration<double>(now - last_).count();
+  if (done < total && since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
+  last_ = now;
+  const double elapsed_s = std::chrono::duration<double>(now - start_).count();
+  if (terminal_) {
+    clear_bar();
+    draw_bar(done, total, what, elapsed_s);
+    bar_shown_ = true;
+  } else {
+    const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+    const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
+    put(fmt::format("plumbline: {} of {} {}, {:.1f} a second, {} left\n", done, total, what, rate,
+                    clock_text(left_s)));
+  }
+}
+
+void Console::draw_bar(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
+  const double share = total > 0 ? static_cast<double>(done) / static_cast<double>(total) : 1.0;
+  const auto filled = static_cast<std::size_t>(std::lround(share * static_cast<double>(kBarWidth)));
+  const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+  const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
+  put(fmt::format("[{}{}] {}/{} {}  {:.1f} fps  ETA {}", std::string(filled, '='),
+                  std::string(kBarWidth - filled, ' '), done, total, what, rate, clock_text(left_s)));
+  std::fflush(stderr);
+}
+
+void Console::clear_bar() {
+  if (!bar_shown_) return;
+  put("\r\033[K");
+  bar_shown_ = false;
+}
+
+void Console::end_progress() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (bar_shown_) put("\n");
+  bar_shown_ = false;
+  started_ = false;
+}
+
+}  // namespace plumbline::cli

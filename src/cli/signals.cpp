@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "signals.hpp"
+
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+
+namespace plumbline::cli {
+namespace {
+
+// A signal handler can reach nothing but what is static.
+const core::StopToken* stop_token = nullptr;
+
+void on_signal(int signal) {
+  if (stop_token->stop_requested()) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+    return;
+  }
+  stop_token->request_stop();
+  const char* const text =
+      "\nplumbline: stopping; what is done so far will be written (once more: give up without writing)\n";
+  [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, text, std::strlen(text));
+}
+
+}  // namespace
+
+void stop_on_signals(const core::StopToken& stop) {
+  static core::StopToken kept;
+  kept = stop;
+  stop_token = &kept;
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+void ignore_write_signals() {
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/input.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "plumbline/synth/source.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class SelectedFrames : public dataset::FrameSource {
+ public:
+  SelectedFrames(std::unique_ptr<dataset::FrameSource> source, std::vector<std::size_t> indices)
+      : source_(std::move(source)), indices_(std::move(indices)) {}
+
+  [[nodiscard]] const std::string& name() const override { return source_->name(); }
+  [[nodiscard]] const std::string& format() const override { return source_->format(); }
+  [[nodiscard]] const sensor::Camera& camera() const override { return source_->camera(); }
+  [[nodiscard]] std::size_t size() const override { return indices_.size(); }
+  [[nodiscard]] dataset::PairInfo info(std::size_t index) const override {
+    return source_->info(indices_.at(index));
+  }
+  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
+    return source_->read(indices_.at(index));
+  }
+  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return source_->truth(); }
+
+ private:
+  std::unique_ptr<dataset::FrameSource> source_;
+  std::vector<std::size_t> indices_;
+};
+
+}  // namespace
+
+core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
+    std::unique_ptr<dataset::FrameSource> source, double from_s, double to_s, int every) {
+  if (every < 1)
+    return core::usage_error(fmt::format("every: {} is out of range (allowed: at least 1)", every));
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < source->size(); i += static_cast<std::size_t>(every)) {
+    const double elapsed = source->info(i).stamp - source->info(0).stamp;
+    if (elapsed >= from_s && elapsed <= to_s) indices.push_back(i);
+  }
+  if (indices.empty()) {
+    return core::usage_error(fmt::format("{}: no frame lies between {:g} s and {:g} s after the first",
+                                         source->name(), from_s, to_s));
+  }
+  if (indices.size() == source->size()) return source;
+  return std::make_unique<SelectedFrames>(std::move(source), std::move(indices));
+}
+
+core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string& input,
+                                                               const dataset::OpenOptions& options,
+                                                               const std::filesystem::path& scenes_folder,
+                                                               const core::Executor& executor,
+                                                               core::Log& log) {
+  if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);
+  auto source = synth::open_synth(input, scenes_folder, executor, log);
+  if (!source) return source;
+  return select_frames(std::move(*source), options.from_s, options.to_s, options.every);
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/map_recording.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/version.hpp"
+#include "plumbline/pipeline/graph.hpp"
+#include "plumbline/pipeline/input.hpp"
+#include "plumbline/pipeline/output_folder.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "\"";
+}
+
+/// The effective configuration: a pipeline file that gives the same result again, and how it was run.
+core::Result<void> write_config(const std::filesystem::path& file, const MapRequest& request,
+                                const Graph& graph, int threads) {
+  cloud::OutputFile out(file);
+  out.write(fmt::format(
+      "# What plumbline {} ran with. A pipeline file itself: plumbline map INPUT -p config.yaml\n",
+      core::version()));
+  out.write("run:\n");
+  out.write(fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline)));
+  out.write(
+      fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format)));
+  out.write(fmt::format("  from: {} s\n  to: {} s\n  every: {}\n  threads: {}\n", request.open.from_s,
+                        request.open.to_s, request.open.every, threads));
+  out.write(to_yaml(graph));
+  return out.commit();
+}
+
+}  // namespace
+
+core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
+                                       core::Log& log, const core::StopToken& stop,
+                                       const Progress& progress) {
+  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+  const auto start = std::chrono::steady_clock::now();
+
+  const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
+  if (!pipeline_file) return fail(pipeline_file.error());
+  StageRegistry registry;
+  register_stages(registry);
+  auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
+  if (!graph) return fail(graph.error());
+  const auto source =
+      open_input(request.input, request.open, request.pipelines_folder / "scenes", executor, log);
+  if (!source) return fail(source.error());
+  auto output = OutputFolder::prepare(request.output, request.replace);
+  if (!output) return fail(output.error());
+  if (auto written = write_config(output->path() / "config.yaml", request, *graph, executor.threads());
+      !written) {
+    return fail(written.error());
+  }
+
+  RunContext context;
+  context.source = source->get();
+  context.executor = &executor;
+  context.log = &log;
+  context.stop = stop;
+  context.output_folder = output->path();
+  const auto report = run_graph(*graph, context, progress);
+  if (!report) return fail(report.error());
+
+  RunSummary summary;
+  summary.input = request.input;
+  summary.pipeline = request.pipeline;
+  summary.threads = executor.threads();
+  add_report(*report, summary);
+  for (const Node& node : graph->nodes) node.stage->summarise(summary);
+  judge(summary);
+  if (auto written = write_timing(output->path() / "timing.csv", *report, **source); !written) {
+    return fail(written.error());
+  }
+  summary.peak_rss_mb = peak_rss_mb();
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (auto written = write_summary(output->path() / "summary.json", summary); !written)
+    return fail(written.error());
+  if (auto committed = output->commit(); !committed) return fail(committed.error());
+  return summary;
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/output_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+namespace plumbline::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMegabyte = 1'000'000;
+constexpr std::uintmax_t kLeastFreeMb = 64;
+/// In every OUT.partial, so that what an interrupted run left behind can be told from anything else.
+const char* const kMarker = ".plumbline-unfinished";
+
+fs::path with_ending(const fs::path& folder, const char* ending) {
+  fs::path path = folder;
+  path += ending;
+  return path;
+}
+
+/// Absolute, without "." or a trailing slash, links followed: what can be renamed.
+fs::path normal(const fs::path& out) {
+  std::error_code ec;
+  fs::path path = fs::weakly_canonical(fs::absolute(out), ec);
+  if (ec) path = fs::absolute(out).lexically_normal();
+  return path.has_filename() ? path : path.parent_path();
+}
+
+core::Result<void> check_target(const fs::path& target, bool replace) {
+  std::error_code ec;
+  if (!fs::exists(target, ec)) return {};
+  if (!fs::is_directory(target, ec)) {
+    return core::usage_error(
+        fmt::format("{}: is a file; name a folder that does not exist yet", target.string()));
+  }
+  if (fs::is_empty(target, ec)) return {};
+  if (!is_result_folder(target)) {
+    return core::usage_error(
+        fmt::format("{}: exists, is not empty and is no earlier result; name a folder that does not exist "
+                    "yet (only earlier "
+                    "results are ever replaced)",
+                    target.string()));
+  }
+  if (!replace) {
+    return core::usage_error(fmt::format(
+        "{}: holds an earlier result; name another folder or add --force to replace it", target.string()));
+  }
+  return {};
+}
+
+/// Removes what an interrupted run left, and nothing else.
+core::Result<void> clear_leftover(const fs::path& partial) {
+  std::error_code ec;
+  if (!fs::exists(partial, ec)) return {};
+  if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
+    return core::usage_error(
+        fmt::format("{}: is in the way; results are written there first. Remove it or name "
+                    "another output folder",
+                    partial.string()));
+  }
+  fs::remove_all(partial, ec);
+  if (ec)
+    return core::output_error(fmt::format("{}: cannot be removed ({})", partial.string(), ec.message()));
+  return {};
+}
+
+}  // namespace
+
+bool is_result_folder(const fs::path& folder) {
+  std::error_code ec;
+  return fs::is_regular_file(folder / "summary.json", ec) && fs::is_regular_file(folder / "config.yaml", ec);
+}
+
+OutputFolder::OutputFolder(fs::path target, fs::path partial)
+    : target_(std::move(target)), partial_(std::move(partial)) {}
+
+OutputFolder::OutputFolder(OutputFolder&& other) noexcept
+    : target_(std::move(other.target_)), partial_(std::exchange(other.partial_, {})) {}
+
+OutputFolder::~OutputFolder() {
+  if (partial_.empty()) return;
+  std::error_code ignored;
+  fs::remove_all(partial_, ignored);
+}
+
+core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace) {
+  if (out.empty()) return core::usage_error("the output folder has no name");
+  const fs::path target = normal(out);
+  if (auto checked = check_target(target, replace); !checked)
+    return tl::unexpected<core::Error>(checked.error());
+  const fs::path partial = with_ending(target, ".partial");
+  if (auto cleared = clear_leftover(partial); !cleared) return tl::unexpected<core::Error>(cleared.error());
+  std::error_code ec;
+  fs::create_directories(partial, ec);
+  if (ec) {
+    return core::output_error(fmt::format("{}: cannot be created ({}); name a folder where you may write",
+                                          out.string(), ec.message()));
+  }
+  OutputFolder folder(target, partial);
+  std::ofstream marker(partial / kMarker);
+  if (!(marker << "An unfinished result of plumbline; may be removed.\n" << std::flush)) {
+    return core::output_error(fmt::format("{}: cannot be written", out.string()));
+  }
+  const fs::space_info space = fs::space(partial, ec);
+  if (!ec && space.available < kLeastFreeMb * kMegabyte) {
+    return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
+                                          out.string(), space.available / kMegabyte, kLeastFreeMb));
+  }
+  return folder;
+}
+
+core::Result<void> OutputFolder::commit() {
+  std::error_code ec;
+  fs::remove(partial_ / kMarker, ec);
+  const fs::path old = with_ending(target_, ".replaced");
+  const bool replaces = fs::exists(target_, ec) && !fs::is_empty(target_, ec);
+  if (replaces) {
+    if (is_result_folder(old)) fs::remove_all(old, ec);
+    fs::rename(target_, old, ec);
+    if (ec)
+      return core::output_error(fmt::format("{}: cannot be replaced ({})", target_.string(), ec.message()));
+  }
+  fs::rename(partial_, target_, ec);
+  if (ec) {
+    std::error_code ignored;
+    if (replaces) fs::rename(old, target_, ignored);
+    return core::output_error(fmt::format("{}: cannot be created ({})", target_.string(), ec.message()));
+  }
+  partial_.clear();
+  if (replaces) fs::remove_all(old, ec);
+  return {};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "plumbline/pipeline/summary.hpp"
+#include "stages.hpp"
+
+namespace plumbline::pipeline {
+
+void register_stages(StageRegistry& registry) {
+  registry.add(read_stage());
+  registry.add(features_stage());
+  registry.add(poses_stage());
+  registry.add(cloud_stage());
+  registry.add(fuse_stage());
+  registry.add(output_stage());
+}
+
+void count_frames(const std::vector<FrameRow>& rows, RunSummary& summary) {
+  std::size_t loss = 0;
+  for (const FrameRow& row : rows) {
+    if (row.state == "tracked") {
+      ++summary.frames.tracked;
+      loss = 0;
+    } else {
+      ++summary.frames.lost;
+      summary.frames.longest_loss = std::max(summary.frames.longest_loss, ++loss);
+    }
+  }
+}
+
+}  // namespace plumbline::pipeline

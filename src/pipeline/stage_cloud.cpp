@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cloud: the filtered cloud of every keyframe.
+#include <memory>
+#include <utility>
+
+#include "chain_option.hpp"
+#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class CloudStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    options_.declare(table);
+    filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
+  }
+  void check(const CheckContext& context, const core::ConfigMark& mark, const std::string& path,
+             core::ConfigProblems& problems) override {
+    filters_.check(context, mark, path, problems);
+  }
+  core::Result<void> start(const RunContext& context) override {
+    camera_ = context.source->camera().color;
+    return {};
+  }
+
+  core::Result<void> process(StageIo& io) override {
+    const auto track = io.input<TrackedFrame>("track");
+    if (!track->keyframe.valid()) return {};
+    const auto frame = io.input<sensor::RgbdFrame>("frame");
+    cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera_, options_);
+    cloud::FilterContext context;
+    context.viewpoint = Eigen::Vector3f::Zero();
+    auto filtered = filters_.chain().apply(cloud, context);
+    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    auto result = std::make_shared<KeyframeCloud>();
+    result->id = track->keyframe;
+    result->cloud = std::move(*filtered);
+    io.output<KeyframeCloud>("cloud", result);
+    return {};
+  }
+
+ private:
+  cloud::KeyframeCloudOptions options_;
+  ChainOption filters_{"filters/keyframe.yaml"};
+  sensor::Pinhole camera_;
+};
+
+}  // namespace
+
+StageType cloud_stage() {
+  return {"cloud",
+          "Turns a keyframe's depth into a filtered cloud with colour and normals",
+          Mode::kStateless,
+          {{"frame", frame_port()}, {"track", track_port()}},
+          {{"cloud", keyframe_cloud_port()}},
+          [] { return std::make_unique<CloudStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

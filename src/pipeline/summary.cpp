@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/summary.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/version.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+constexpr double kMostLostPercent = 10.0;
+
+/// Numbers are for people: 4 decimals are more than any of them is good for.
+double rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+core::Result<void> write_text(const std::filesystem::path& file, const std::string& text) {
+  cloud::OutputFile out(file);
+  out.write(text);
+  return out.commit();
+}
+
+}  // namespace
+
+double RunSummary::Frames::tracked_percent() const {
+  const std::size_t all = read + unreadable;
+  return all == 0 ? 0.0 : 100.0 * static_cast<double>(tracked) / static_cast<double>(all);
+}
+
+double RunSummary::fps() const { return map_s > 0.0 ? static_cast<double>(frames.read) / map_s : 0.0; }
+
+void add_report(const RunReport& report, RunSummary& summary) {
+  summary.stopped = report.stopped;
+  summary.frames.available = report.frames_available;
+  summary.map_s = report.map_s;
+  summary.export_s = report.export_s;
+  summary.stages.clear();
+  for (const StageTiming& stage : report.stages) {
+    summary.stages.push_back({stage.name, stage.quantile_ms(0.5), stage.quantile_ms(0.95), stage.finish_ms});
+  }
+}
+
+void judge(RunSummary& summary) {
+  const RunSummary::Frames& frames = summary.frames;
+  const std::size_t all = frames.read + frames.unreadable;
+  const double lost_percent = 100.0 - frames.tracked_percent();
+  summary.reason.clear();
+  if (all > 0 && lost_percent > kMostLostPercent) {
+    summary.reason = fmt::format(
+        "{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would be trusted): {} lost, {} unreadable; "
+        "the "
+        "longest loss is {} frames",
+        all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
+        frames.longest_loss);
+  } else if (all > 0 && summary.cloud_points == 0) {
+    summary.reason = "the cloud is empty: no keyframe had usable depth";
+  }
+}
+
+core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& s) {
+  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
+  for (const RunSummary::StageTime& stage : s.stages) {
+    stages[stage.name] = {{"median", rounded(stage.median_ms)},
+                          {"p95", rounded(stage.p95_ms)},
+                          {"finish", rounded(stage.finish_ms)}};
+  }
+  const nlohmann::ordered_json json = {
+      {"input", s.input},
+      {"pipeline", s.pipeline},
+      {"trustworthy", s.reason.empty()},
+      {"reason", s.reason},
+      {"stopped", s.stopped},
+      {"frames",
+       {{"available", s.frames.available},
+        {"read", s.frames.read},
+        {"unreadable", s.frames.unreadable},
+        {"tracked", s.frames.tracked},
+        {"lost", s.frames.lost},
+        {"longest_loss", s.frames.longest_loss},
+        {"tracked_percent", rounded(s.frames.tracked_percent())}}},
+      {"keyframes", s.keyframes},
+      {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
+      {"loops",
+       {{"candidates", s.loops.candidates}, {"verified", s.loops.verified}, {"accepted", s.loops.accepted}}},
+      {"merges", nlohmann::ordered_json::array()},
+      {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},
+      {"timing",
+       {{"wall_s", rounded(s.wall_s)},
+        {"map_s", rounded(s.map_s)},
+        {"fps", rounded(s.fps())},
+        {"export_s", rounded(s.export_s)},
+        {"stages_ms", stages},
+        {"threads", s.threads}}},
+      {"memory", {{"peak_rss_mb", rounded(s.peak_rss_mb)}}},
+      {"version", core::version()},
+      {"seed", s.seed}};
+  // Names of files need not be UTF-8: replace what JSON cannot hold.
+  return write_text(file, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
+                                const dataset::FrameSource& source) {
+  std::string text = "frame,stamp";
+  for (const StageTiming& stage : report.stages) text += "," + stage.name + "_ms";
+  text += '\n';
+  for (std::size_t f = 0; f < report.frames; ++f) {
+    text += fmt::format("{},{:.6f}", f, source.info(f).stamp);
+    for (const StageTiming& stage : report.stages) {
+      text += std::isnan(stage.frame_ms[f]) ? "," : fmt::format(",{:.3f}", stage.frame_ms[f]);
+    }
+    text += '\n';
+  }
+  return write_text(file, text);
+}
+
+std::string to_text(const RunSummary& s) {
+  std::string text;
+  if (s.stopped) {
+    text += fmt::format("stopped after {} of {} frames; what was mapped so far is written\n",
+                        s.frames.read + s.frames.unreadable, s.frames.available);
+  }
+  text += fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable\n", s.frames.read,
+                      s.frames.tracked, s.frames.tracked_percent(), s.frames.unreadable);
+  text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n", s.keyframes, s.points,
+                      s.lines, s.loops.accepted);
+  text += fmt::format("cloud      {} points, {:g} mm voxels\n", s.cloud_points, s.voxel_m * 1000.0);
+  text +=
+      fmt::format("time       {:.1f} s in all, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n",
+                  s.wall_s, s.map_s, s.fps(), s.export_s);
+  text += fmt::format("memory     {:.0f} MB at most\n", s.peak_rss_mb);
+  return text;
+}
+
+double peak_rss_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts in kB
+}
+
+}  // namespace plumbline::pipeline
