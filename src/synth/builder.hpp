@@ -92,4 +92,8 @@ struct Wall {
 
 void add_wall(Builder& b, const Wall& wall);
 
+/// Panel `index` of a zigzag through `points`: mitred with its neighbours, so that no seam shows at the corners.
+/// Thickness, heights and material are those of `wall`.
+void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vector2d>& points, std::size_t index);
+
 }  // namespace plumbline::synth

@@ -213,8 +213,9 @@ void add_curtain(Builder& b, const Rigid3& f, double width, double height, doubl
     const double y0 = i % 2 == 0 ? 0.0 : -deep, y1 = i % 2 == 0 ? -deep : 0.0;
     const Vector3d a = f * Vector3d(x0, y0, 0.0), c = f * Vector3d(x1, y1, 0.0);
     const Vector3d up = f.rotation.col(2) * height;
-    b.polygon({a, c, c + up, a + up}, c - a, {material});
-    b.polygon({c, a, a + up, c + up}, a - c, {material});
+    const Vector3d half = f.rotation.col(1) * 0.0015;
+    b.polygon({a - half, c - half, c + up - half, a + up - half}, c - a, {material});
+    b.polygon({c + half, a + half, a + up + half, c + up + half}, a - c, {material});
   }
 }
 

@@ -30,13 +30,47 @@ const std::array<Vector3d, kDome>& dome() {
   return kDirections;
 }
 
+/// Negative when the place is inside a solid.
 double ambient_at(const World& world, const Vector3d& p, const Face& face) {
   double open = 0.0;
+  int insides = 0;
   for (const Vector3d& d : dome()) {
     const Vector3d direction = d.x() * face.u_axis + d.y() * face.v_axis + d.z() * face.normal;
-    open += std::sqrt(world.free_distance(p, direction, kReach) / kReach);
+    const Hit hit = world.cast(p, direction, kReach);
+    if (hit.face >= 0 && !hit.front) ++insides;
+    open += std::sqrt((hit.face >= 0 ? hit.distance : kReach) / kReach);
   }
-  return open / kDome;
+  return insides > kDome / 2 ? -1.0 : open / kDome;
+}
+
+/// Nodes inside solids take the mean of their neighbours, so that no darkness leaks out of walls.
+void fill_hidden(LightMap& map, std::vector<char>& hidden) {
+  for (bool changed = true; changed;) {
+    changed = false;
+    std::vector<std::pair<std::size_t, float>> found;
+    for (int j = 0; j < map.rows; ++j) {
+      for (int i = 0; i < map.columns; ++i) {
+        const auto at = static_cast<std::size_t>(j * map.columns + i);
+        if (hidden[at] == 0) continue;
+        float sum = 0.0F;
+        int count = 0;
+        for (int y = std::max(0, j - 1); y <= std::min(map.rows - 1, j + 1); ++y) {
+          for (int x = std::max(0, i - 1); x <= std::min(map.columns - 1, i + 1); ++x) {
+            const auto k = static_cast<std::size_t>(y * map.columns + x);
+            if (hidden[k] != 0) continue;
+            sum += map.nodes[k];
+            ++count;
+          }
+        }
+        if (count > 0) found.emplace_back(at, sum / static_cast<float>(count));
+      }
+    }
+    for (const auto& [at, value] : found) {
+      map.nodes[at] = value;
+      hidden[at] = 0;
+      changed = true;
+    }
+  }
 }
 
 double lamps_at(const World& world, const Vector3d& p, const Face& face) {
@@ -79,17 +113,21 @@ LightMap light_face(const World& world, std::size_t index) {
   map.v0 = static_cast<float>(v0);
   map.per_u = static_cast<float>((map.columns - 1) / w);
   map.per_v = static_cast<float>((map.rows - 1) / h);
+  std::vector<char> hidden;
   const double inset_u = std::min(0.012, 0.3 * w), inset_v = std::min(0.012, 0.3 * h);
   for (int j = 0; j < map.rows; ++j) {
     for (int i = 0; i < map.columns; ++i) {
       const double u = std::clamp(u0 + i / static_cast<double>(map.per_u), u0 + inset_u, u1 - inset_u);
       const double v = std::clamp(v0 + j / static_cast<double>(map.per_v), v0 + inset_v, v1 - inset_v);
       const Vector3d p = face.at(u, v) + 0.003 * face.normal;
-      const double ambient = world.scene.ambient * ambient_at(world, p, face);
+      const double open = ambient_at(world, p, face);
+      hidden.push_back(open < 0.0 ? 1 : 0);
+      const double ambient = world.scene.ambient * std::max(0.0, open);
       const double glow = static_cast<double>(world.materials[index]->glow);
       map.nodes.push_back(static_cast<float>(std::sqrt(ambient + lamps_at(world, p, face) + glow)));
     }
   }
+  fill_hidden(map, hidden);
   return map;
 }
 

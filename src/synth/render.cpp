@@ -362,6 +362,16 @@ cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure) 
   return image;
 }
 
+cv::Vec3b surface_color(const World& world, std::size_t face, double u, double v) {
+  const TexelScale scale = texel_scale(world, face);
+  const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
+  const Vec4 texel = bilinear(top, static_cast<float>((u + static_cast<double>(world.offset_u[face])) * scale.u),
+                              static_cast<float>(-(v + static_cast<double>(world.offset_v[face])) * scale.v));
+  cv::Vec3b bgr;
+  Shader::store(texel * world.light[face].at(static_cast<float>(u), static_cast<float>(v)), bgr.val);
+  return bgr;
+}
+
 float mean_level(const World& world, const View& view) {
   const Shader shader(world, view, Exposure{});
   double sum = 0.0;

@@ -39,6 +39,9 @@ struct Exposure {
 /// CV_8UC3 BGR with smoothed borders, before any noise.
 cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure);
 
+/// BGR of a spot of a face at unit gain.
+cv::Vec3b surface_color(const World& world, std::size_t face, double u, double v);
+
 /// Mean square root of radiance of a picture (0-1 and more) for the automatic exposure.
 float mean_level(const World& world, const View& view);
 

@@ -187,7 +187,6 @@ void read_panels(const Context& c) {
   ObjectReader r(c.node, c.path, c.problems);
   r.length("height", wall.height, 0.01, 50.0).length("bottom", wall.bottom, -50.0, 50.0);
   r.length("thickness", wall.thickness, 0.001, 5.0).material("material", wall.material);
-  std::string skirting;
   if (!r.read({"points"})) return;
   const ConfigNode* list = c.node.find("points");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
@@ -210,9 +209,7 @@ void read_panels(const Context& c) {
   }
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
     c.builder.begin_object(c.type, r.name.empty() ? "" : fmt::format("{} {}", r.name, i + 1), c.node.mark);
-    wall.from = points[i];
-    wall.to = points[i + 1];
-    add_wall(c.builder, wall);
+    add_zigzag_panel(c.builder, wall, points, i);
   }
 }
 

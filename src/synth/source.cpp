@@ -36,7 +36,7 @@ namespace {
 constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing ones
 
 /// Whole microseconds: what six decimals in a file can say.
-double whole_us(double t) { return std::round(t * 1e6) * 1e-6; }
+double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
 
 struct Stamps {
   std::int64_t number;  ///< of the frame before any were dropped; the noise's counter
@@ -244,7 +244,7 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
   frame.color = color;
   cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
   cv::Mat1w raw;
-  if (impl_->event(EventKind::kNoDepth, at.depth) != 0.0 || impl_->event(EventKind::kCover, at.depth) != 0.0) {
+  if (blind(index)) {
     raw = cv::Mat1w::zeros(color.size());
   } else {
     const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth));
@@ -274,6 +274,11 @@ ExactFrame SynthSource::exact(std::size_t index) const {
   out.depth = exact_depth(view);
   out.face = view.ids;
   return out;
+}
+
+bool SynthSource::blind(std::size_t index) const {
+  const double stamp = impl_->frames.at(index).depth;
+  return impl_->event(EventKind::kNoDepth, stamp) != 0.0 || impl_->event(EventKind::kCover, stamp) != 0.0;
 }
 
 double SynthSource::path_length() const {

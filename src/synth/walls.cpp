@@ -90,4 +90,34 @@ void add_wall(Builder& b, const Wall& wall) {
   }
 }
 
+namespace {
+/// Half the thickness to the left of corner `i`, along the bisector of the angle.
+Eigen::Vector2d mitre(const std::vector<Eigen::Vector2d>& points, std::size_t i, double half) {
+  const auto left = [](const Eigen::Vector2d& d) { return Eigen::Vector2d(-d.y(), d.x()).normalized(); };
+  const bool first = i == 0, last = i + 1 == points.size();
+  const Eigen::Vector2d before = left(points[first ? 1 : i] - points[first ? 0 : i - 1]);
+  const Eigen::Vector2d after = left(points[last ? i : i + 1] - points[last ? i - 1 : i]);
+  const Eigen::Vector2d middle = (before + after).normalized();
+  return half / std::max(0.2, middle.dot(before)) * middle;
+}
+}  // namespace
+
+void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vector2d>& points, std::size_t index) {
+  const double half = 0.5 * wall.thickness;
+  const Eigen::Vector2d a = points[index], c = points[index + 1];
+  const Eigen::Vector2d ma = mitre(points, index, half), mc = mitre(points, index + 1, half);
+  const auto lift = [](const Eigen::Vector2d& p, double z) { return Vector3d(p.x(), p.y(), z); };
+  const double z0 = wall.bottom, z1 = wall.bottom + wall.height;
+  const Vector3d u = lift(c - a, 0.0);
+  const Skin skin{wall.material};
+  b.polygon({lift(a - ma, z0), lift(c - mc, z0), lift(c - mc, z1), lift(a - ma, z1)}, u, skin);
+  b.polygon({lift(c + mc, z0), lift(a + ma, z0), lift(a + ma, z1), lift(c + mc, z1)}, -u, skin);
+  b.polygon({lift(a - ma, z1), lift(c - mc, z1), lift(c + mc, z1), lift(a + ma, z1)}, u, skin);
+  b.polygon({lift(a + ma, z0), lift(c + mc, z0), lift(c - mc, z0), lift(a - ma, z0)}, u, skin);
+  if (index == 0) b.polygon({lift(a + ma, z0), lift(a - ma, z0), lift(a - ma, z1), lift(a + ma, z1)}, lift(-ma, 0.0), skin);
+  if (index + 2 == points.size()) {
+    b.polygon({lift(c - mc, z0), lift(c + mc, z0), lift(c + mc, z1), lift(c - mc, z1)}, lift(mc, 0.0), skin);
+  }
+}
+
 }  // namespace plumbline::synth

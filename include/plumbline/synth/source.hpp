@@ -45,6 +45,8 @@ class SynthSource final : public dataset::FrameSource {
   /// Exact pose at any time between first and last stamp (clamped to them).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double stamp) const;
   [[nodiscard]] ExactFrame exact(std::size_t index) const;
+  /// Whether an event blinds the depth sensor in this frame (covered camera, no depth).
+  [[nodiscard]] bool blind(std::size_t index) const;
   /// Metres of path from the first to the last frame.
   [[nodiscard]] double path_length() const;
 
