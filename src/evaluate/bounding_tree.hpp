@@ -37,7 +37,8 @@ class BoundingTree {
 
   /// Calls `leaf(first, last)` (a range of order()) for every leaf that may hold something at squared
   /// distance
-  /// <= `bound`, near ones first. `leaf` lowers `bound` as it finds nearer items.
+  /// < `bound`, near ones first (not <=: heaps of equal points would all be visited). `leaf` lowers `bound`
+  /// as it finds nearer items.
   template <typename Leaf>
   void search(const Eigen::Vector3d& q, const double& bound, const Leaf& leaf) const;
 
@@ -77,7 +78,7 @@ void BoundingTree::search(const Eigen::Vector3d& q, const double& bound, const L
   stack[size++] = {nodes_[0].box.squared_distance(q), 0};
   while (size > 0) {
     const Entry entry = stack[--size];
-    if (entry.squared_distance > bound) continue;
+    if (entry.squared_distance >= bound) continue;
     const Node& node = nodes_[entry.node];
     if (node.right == 0) {
       leaf(node.first, node.last);
@@ -86,8 +87,8 @@ void BoundingTree::search(const Eigen::Vector3d& q, const double& bound, const L
     Entry near{nodes_[entry.node + 1].box.squared_distance(q), entry.node + 1};
     Entry far{nodes_[node.right].box.squared_distance(q), node.right};
     if (far.squared_distance < near.squared_distance) std::swap(near, far);
-    if (far.squared_distance <= bound) stack[size++] = far;
-    if (near.squared_distance <= bound) stack[size++] = near;
+    if (far.squared_distance < bound) stack[size++] = far;
+    if (near.squared_distance < bound) stack[size++] = near;
   }
 }
 

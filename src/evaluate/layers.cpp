@@ -3,11 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace plumbline::evaluate {
 namespace {
 constexpr double kLeastSeparation = 1e-4;  // m; rounding of coordinates is no layer
+
+double spread(std::vector<double>::const_iterator first, std::vector<double>::const_iterator last) {
+  const auto n = static_cast<double>(last - first);
+  const double mean = std::accumulate(first, last, 0.0) / n;
+  double squares = 0.0;
+  for (auto h = first; h != last; ++h) squares += (*h - mean) * (*h - mean);
+  return std::sqrt(squares / n);
 }
+}  // namespace
 
 double Layers::thickness() const { return std::sqrt(spread * spread + separation * separation); }
 
@@ -25,6 +34,7 @@ Layers split_layers(std::vector<double>& heights) {
   double low_sum = 0.0;
   double best_between = -1.0;
   double best_separation = 0.0;
+  std::size_t best_split = 0;
   for (std::size_t k = 1; k < heights.size(); ++k) {
     low_sum += heights[k - 1] - mean;
     if (k < least || heights.size() - k < least) continue;
@@ -34,12 +44,17 @@ Layers split_layers(std::vector<double>& heights) {
     if (between > best_between) {
       best_between = between;
       best_separation = separation;
+      best_split = k;
     }
   }
-  const double within = std::max(0.0, total - best_between) / n;  // mean square about the layers' means
-  const bool two = best_separation > kLeastSeparation && best_separation * best_separation >= 16.0 * within;
-  if (two) return {true, std::sqrt(within), best_separation};
-  return {false, std::sqrt(total / n), 0.0};
+  if (best_split == 0) return {false, std::sqrt(total / n), 0.0, 0.0};  // too few for two
+  const double within = std::max(0.0, total - best_between) / n;        // mean square about the layers' means
+  const auto split = heights.begin() + static_cast<std::ptrdiff_t>(best_split);
+  const double widest = std::max(spread(heights.begin(), split), spread(split, heights.end()));
+  if (best_separation > kLeastSeparation && best_separation >= 4.0 * widest) {
+    return {true, std::sqrt(within), best_separation, *split};
+  }
+  return {false, std::sqrt(total / n), 0.0, 0.0};
 }
 
 }  // namespace plumbline::evaluate

@@ -27,7 +27,8 @@ class PointIndex {
  public:
   explicit PointIndex(const std::vector<Eigen::Vector3f>& points);
 
-  /// `guess`: any point's number; a good one makes the search faster and changes nothing else.
+  /// `guess`: any point's number; a good one makes the search faster. Of equally near points any may be
+  /// returned, the same one for the same guess.
   [[nodiscard]] Neighbor nearest(const Eigen::Vector3d& q, std::uint32_t guess) const;
 
   /// The k nearest, nearest first (fewer if there are fewer points). `found` is reused storage.

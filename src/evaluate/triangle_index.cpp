@@ -61,8 +61,7 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q, std::uint32_t guess) 
   tree_.search(q, best.squared_distance, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t i = first; i < last; ++i) {
       const MeshPoint p = on(tree_.order()[i], q);
-      const bool nearer = p.squared_distance < best.squared_distance;
-      if (nearer || (p.squared_distance == best.squared_distance && p.triangle < best.triangle)) best = p;
+      if (p.squared_distance < best.squared_distance) best = p;
     }
   });
   return best;

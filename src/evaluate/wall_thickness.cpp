@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -24,7 +25,9 @@ using Indices = std::vector<std::uint32_t>;
 constexpr std::size_t kLeastPatchPoints = 20;
 constexpr std::size_t kLeastCellPoints = 8;
 constexpr double kLeastMainShare = 0.3;  // a doubled wall's main layer may hold less than half of the points
-constexpr double kLeastCoverage = 0.5;   // of the patch's cells
+constexpr double kLeastCoverage = 0.75;  // of the patch's cells
+constexpr double kLeastReach = 5e-4;     // m, of the fit
+constexpr double kSlack = 1e-4;          // m, for layers exactly max_spacing_m apart
 
 struct Plane {
   Eigen::Vector3d normal;
@@ -49,16 +52,28 @@ class Draw {
   std::uint64_t state_;
 };
 
-Plane fitted(const Points& points, const Indices& some) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const std::uint32_t i : some) mean += points[i].cast<double>();
-  mean /= static_cast<double>(some.size());
+/// Least squares for one layer, or for two parallel ones with a common normal; goes through the fuller one.
+Plane fitted(const Points& points, const Indices& some, const Plane& before) {
+  std::vector<double> heights;
+  for (const std::uint32_t i : some) heights.push_back(before.height(points[i]));
+  const Layers layers = split_layers(heights);
+  const double border = layers.two ? layers.border : std::numeric_limits<double>::infinity();
+  std::array<Eigen::Vector3d, 2> mean = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::array<double, 2> count = {0.0, 0.0};
+  const auto layer = [&](std::uint32_t i) { return before.height(points[i]) < border ? std::size_t{0} : 1; };
+  for (const std::uint32_t i : some) {
+    mean[layer(i)] += points[i].cast<double>();
+    count[layer(i)] += 1.0;
+  }
+  for (std::size_t k = 0; k < 2; ++k) mean[k] /= std::max(count[k], 1.0);
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::uint32_t i : some) {
-    const Eigen::Vector3d d = points[i].cast<double>() - mean;
+    const Eigen::Vector3d d = points[i].cast<double>() - mean[layer(i)];
     scatter += d * d.transpose();
   }
-  return {Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0), mean};
+  Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0);
+  if (normal.dot(before.normal) < 0.0) normal = -normal;
+  return {normal, count[0] > count[1] ? mean[0] : mean[1]};
 }
 
 Indices within(const Points& points, const Indices& some, const Plane& plane, double reach) {
@@ -69,7 +84,7 @@ Indices within(const Points& points, const Indices& some, const Plane& plane, do
   return inside;
 }
 
-/// MSAC over at most 400 of the points, then least squares over what lies within `flatness_m`.
+/// MSAC over at most 400 of the points.
 std::optional<Plane> main_plane(const Points& points, const Indices& voxel, double flatness_m, Draw draw) {
   constexpr int kTrials = 80;
   Indices some;
@@ -94,11 +109,6 @@ std::optional<Plane> main_plane(const Points& points, const Indices& voxel, doub
       best_cost = cost;
       best = plane;
     }
-  }
-  for (int pass = 0; best && pass < 4; ++pass) {
-    const Indices inside = within(points, voxel, *best, flatness_m);
-    if (inside.size() < kLeastPatchPoints) return std::nullopt;
-    best = fitted(points, inside);
   }
   return best;
 }
@@ -125,13 +135,27 @@ class PatchMeasure {
     auto plane = main_plane(cloud_.points, own, options_.flatness_m, Draw(voxel));
     if (!plane) return std::nullopt;
     const Indices main = within(cloud_.points, own, *plane, options_.flatness_m);
+    if (main.size() < kLeastPatchPoints) return std::nullopt;
     if (static_cast<double>(main.size()) < kLeastMainShare * static_cast<double>(own.size()))
       return std::nullopt;
+    plane->center = mean_of(main);
     if (!cloud_.normals.empty()) turn_to_majority(main, *plane);
-    return over_cells(heights_by_cell(voxel, *plane));
+    const Indices near = gather(voxel, *plane);
+    for (int pass = 0; pass < 4; ++pass) {
+      const auto refined = refine(near, *plane);
+      if (!refined) return std::nullopt;
+      plane = refined;
+    }
+    return over_cells(heights_by_cell(near, *plane));
   }
 
  private:
+  [[nodiscard]] Eigen::Vector3d mean_of(const Indices& some) const {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const std::uint32_t i : some) mean += cloud_.points[i].cast<double>();
+    return mean / static_cast<double>(some.size());
+  }
+
   void turn_to_majority(const Indices& main, Plane& plane) const {
     std::size_t against = 0;
     for (const std::uint32_t i : main)
@@ -139,38 +163,84 @@ class PatchMeasure {
     if (2 * against > main.size()) plane.normal = -plane.normal;
   }
 
-  /// Points before and behind the plane, by cell; those of neighbouring voxels too, since a wall's second
+  /// Points around the patch, before and behind it; those of neighbouring voxels too, since a wall's second
   /// layer may lie just beyond the voxel's border.
-  [[nodiscard]] std::vector<std::vector<double>> heights_by_cell(std::size_t voxel,
+  [[nodiscard]] Indices gather(std::size_t voxel, const Plane& plane) const {
+    constexpr double kMargin = 1.2;  // the plane still turns a little
+    Indices near;
+    buckets_.for_neighborhood(voxel, [&](std::uint32_t i) {
+      const Eigen::Vector3d d = cloud_.points[i].cast<double>() - plane.center;
+      const double h = plane.normal.dot(d);
+      if (std::abs(h) > kMargin * options_.max_spacing_m) return;
+      if ((d - h * plane.normal).squaredNorm() > kMargin * 0.5 * options_.patch_m * options_.patch_m) return;
+      if (!cloud_.normals.empty() && !(cloud_.normals[i].cast<double>().dot(plane.normal) > 0.5)) return;
+      near.push_back(i);
+    });
+    return near;
+  }
+
+  /// Fits again to both layers if there are two; else to what lies near the plane by its own measure, so that
+  /// a corner does not tilt it. Takes points all round the centre, which moves along the normal only.
+  [[nodiscard]] std::optional<Plane> refine(const Indices& near, const Plane& plane) const {
+    const double radius_sq = 0.25 * options_.patch_m * options_.patch_m;
+    Indices round;
+    std::vector<double> heights;
+    for (const std::uint32_t i : near) {
+      const double h = plane.height(cloud_.points[i]);
+      const double across_sq = (cloud_.points[i].cast<double>() - plane.center).squaredNorm() - h * h;
+      if (std::abs(h) > options_.max_spacing_m + kSlack || across_sq > radius_sq) continue;
+      round.push_back(i);
+      heights.push_back(h);
+    }
+    if (!split_layers(heights).two) round = within(cloud_.points, round, plane, own_reach(heights));
+    if (round.size() < kLeastPatchPoints) return std::nullopt;
+    Plane refined = fitted(cloud_.points, round, plane);
+    refined.center = plane.center + refined.normal * refined.normal.dot(refined.center - plane.center);
+    return refined;
+  }
+
+  /// Three robust standard deviations of the main layer.
+  [[nodiscard]] double own_reach(const std::vector<double>& heights) const {
+    std::vector<double> off;
+    for (const double h : heights) {
+      if (std::abs(h) <= options_.flatness_m) off.push_back(std::abs(h));
+    }
+    return std::clamp(3.0 * 1.4826 * summarize(off).median, kLeastReach, options_.flatness_m);
+  }
+
+  [[nodiscard]] std::vector<std::vector<double>> heights_by_cell(const Indices& near,
                                                                  const Plane& plane) const {
     const Eigen::Vector3d u = plane.normal.unitOrthogonal();
     const Eigen::Vector3d v = plane.normal.cross(u);
     const double half = 0.5 * options_.patch_m;
     const auto per_side = static_cast<double>(cells_);
     std::vector<std::vector<double>> heights(cells_ * cells_);
-    buckets_.for_neighborhood(voxel, [&](std::uint32_t i) {
+    for (const std::uint32_t i : near) {
       const Eigen::Vector3d d = cloud_.points[i].cast<double>() - plane.center;
       const double h = plane.normal.dot(d);
-      if (std::abs(h) > options_.max_spacing_m + 1e-6) return;
-      if (!cloud_.normals.empty() && !(cloud_.normals[i].cast<double>().dot(plane.normal) > 0.5)) return;
       const double a = std::floor((u.dot(d) + half) / options_.patch_m * per_side);
       const double b = std::floor((v.dot(d) + half) / options_.patch_m * per_side);
-      if (a < 0.0 || b < 0.0 || a >= per_side || b >= per_side) return;
+      if (std::abs(h) > options_.max_spacing_m + kSlack) continue;
+      if (a < 0.0 || b < 0.0 || a >= per_side || b >= per_side) continue;
       heights[static_cast<std::size_t>(a) * cells_ + static_cast<std::size_t>(b)].push_back(h);
-    });
+    }
     return heights;
   }
 
   [[nodiscard]] std::optional<Patch> over_cells(std::vector<std::vector<double>> heights) const {
     std::vector<double> thickness;
     std::size_t layered = 0;
+    std::size_t covered = 0;  // by the main layer
     for (std::vector<double>& cell : heights) {
       if (cell.size() < kLeastCellPoints) continue;
+      const auto main = std::count_if(cell.begin(), cell.end(),
+                                      [this](double h) { return std::abs(h) <= options_.flatness_m; });
+      covered += 2 * static_cast<std::size_t>(main) >= kLeastCellPoints ? 1 : 0;
       const Layers layers = split_layers(cell);
       thickness.push_back(layers.thickness());
       layered += layers.two ? 1 : 0;
     }
-    if (static_cast<double>(thickness.size()) < kLeastCoverage * static_cast<double>(heights.size())) {
+    if (static_cast<double>(covered) < kLeastCoverage * static_cast<double>(heights.size())) {
       return std::nullopt;
     }
     return Patch{summarize(thickness).median, 2 * layered > thickness.size()};

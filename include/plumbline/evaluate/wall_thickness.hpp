@@ -21,10 +21,11 @@ struct WallThicknessOptions {
 /// Definition. The cloud is cut into voxels of `patch_m`; in each the main plane is found by RANSAC. Points
 /// within max_spacing_m of that plane, and facing its way if the cloud has normals, are divided along the
 /// plane into cells of `cell_m`. In a cell with one layer the thickness t is the RMS spread along the normal;
-/// in a cell with two layers (1-D two-means; separation d at least four times their own spread s, each with a
-/// tenth of the points) t = sqrt(s^2 + d^2), so that a doubled wall counts with its whole spacing, however
-/// many points each layer has. A patch's thickness is the median over its cells, which passes over corners
-/// and things that stand before the wall.
+/// in a cell with two layers (1-D two-means; means at least 0.1 mm and four times the spread of either apart,
+/// each with a tenth of the points) t = sqrt(s^2 + d^2), s the RMS spread within the layers and d their
+/// separation, so that a doubled wall counts with its whole spacing, however many points each layer has. A
+/// patch's thickness is the median over its cells, which passes over corners and things that stand before the
+/// wall.
 struct WallThickness {
   std::size_t patches = 0;
   double rms_mm = 0.0;  ///< over patches: sqrt(mean t^2)
