@@ -52,7 +52,8 @@ class FilterRegistry {
   /// Throws std::invalid_argument on a type that is there already.
   void add(FilterInfo info);
   [[nodiscard]] const FilterInfo* find(const std::string& type) const;
-  [[nodiscard]] const std::vector<FilterInfo>& filters() const { return filters_; }  ///< sorted by type
+  [[nodiscard]] const std::vector<FilterInfo>& filters() const& { return filters_; }  ///< sorted by type
+  const std::vector<FilterInfo>& filters() const&& = delete;
   [[nodiscard]] std::vector<std::string> types() const;
 
  private:

@@ -24,12 +24,14 @@ struct VoxelMapOptions {
 
 struct VoxelExtractOptions {
   int min_observations = 1;  ///< views that must have seen a voxel
+
+  void declare(core::OptionTable& table);
 };
 
 /// A fused cloud and what is known of each of its points.
 struct FusedCloud {
   CloudPtr cloud;
-  CloudColumns columns;         ///< observations and confidence of each point
+  CloudColumns columns;         ///< observations and confidence (weight / (weight + 1)) of each point
   std::vector<float> spread_m;  ///< standard deviation of the measurements along the normal
 };
 
@@ -72,12 +74,14 @@ class VoxelMap {
     float scatter = 0.0F;  ///< weighted sum of squared distances from the mean along the normal
     std::uint32_t observations = 0;
     std::uint32_t last_view = 0;
+    std::uint32_t last_observations = 0;  ///< what the last view added
   };
   struct Sample;
 
   void add(const Sample& sample);
   Side* find_or_add(std::uint64_t key);
   void grow();
+  [[nodiscard]] Eigen::Vector3d position(const Side& side) const;
   [[nodiscard]] bool voxel_of(const Eigen::Vector3d& point, std::uint64_t& key,
                               Eigen::Vector3f& offset) const;
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Named columns of a file on their way into a cloud; what the readers of all formats have in common.
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/cloud_io.hpp"
+
+namespace plumbline::cloud {
+
+/// What a column of a file means for a point.
+enum class Meaning {
+  kNone,
+  kX,
+  kY,
+  kZ,
+  kNormalX,
+  kNormalY,
+  kNormalZ,
+  kRed,
+  kGreen,
+  kBlue,
+  kPackedColor,
+  kCurvature,
+  kConfidence,
+  kObservations,
+  kRobot
+};
+
+/// By the names in use: x y z, nx/normal_x, r/red/diffuse_red, rgb/rgba (packed), ...; case is ignored.
+Meaning meaning_of(const std::string& name);
+
+/// Takes values point by point.
+class CloudBuilder {
+ public:
+  /// `meanings`: of the columns; prepares the columns that the file has.
+  CloudBuilder(const std::vector<Meaning>& meanings, std::size_t points);
+  /// False when x, y or z is missing.
+  [[nodiscard]] bool has_position() const { return position_; }
+  void set(std::size_t row, Meaning meaning, double value);
+  void set_packed_color(std::size_t row, std::uint32_t bits);
+  void shape(std::uint32_t width, std::uint32_t height);
+  [[nodiscard]] CloudFile finish();
+
+ private:
+  CloudFile file_;
+  bool position_ = false;
+};
+
+core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file);
+core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file);
+core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file);
+
+}  // namespace plumbline::cloud

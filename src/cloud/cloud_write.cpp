@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/output_file.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+bool finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+
+void check_columns(const Cloud& cloud, const CloudColumns& columns) {
+  const auto fits = [&cloud](std::size_t n) { return n == 0 || n == cloud.size(); };
+  if (!fits(columns.confidence.size()) || !fits(columns.observations.size()) || !fits(columns.robot.size())) {
+    throw std::invalid_argument("cloud columns have another length than the cloud");
+  }
+}
+
+std::size_t count_finite(const Cloud& cloud) {
+  std::size_t count = 0;
+  for (const Point& p : cloud.points) count += finite(p) ? 1 : 0;
+  return count;
+}
+
+}  // namespace
+
+core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
+                             const CloudColumns& columns) {
+  check_columns(cloud, columns);
+  OutputFile out(file);
+  out.write(
+      fmt::format("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\nelement vertex {}\n",
+                  count_finite(cloud)));
+  out.write(
+      "property float x\nproperty float y\nproperty float z\n"
+      "property float nx\nproperty float ny\nproperty float nz\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+  if (!columns.confidence.empty()) out.write("property float confidence\n");
+  if (!columns.observations.empty()) out.write("property int observations\n");
+  if (!columns.robot.empty()) out.write("property uchar robot\n");
+  out.write("end_header\n");
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Point& p = cloud[i];
+    if (!finite(p)) continue;
+    const bool normal = std::isfinite(p.normal_x + p.normal_y + p.normal_z);
+    const float zero = 0.0F;
+    for (float value : {p.x, p.y, p.z}) out.put(value);
+    for (float value : {p.normal_x, p.normal_y, p.normal_z}) out.put(normal ? value : zero);
+    for (std::uint8_t value : {p.r, p.g, p.b}) out.put(value);
+    if (!columns.confidence.empty()) out.put(columns.confidence[i]);
+    if (!columns.observations.empty()) out.put(columns.observations[i]);
+    if (!columns.robot.empty()) out.put(columns.robot[i]);
+  }
+  return out.commit();
+}
+
+core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
+                             const CloudColumns& columns) {
+  check_columns(cloud, columns);
+  const bool organised = cloud.height > 1;
+  const std::size_t points = organised ? cloud.size() : count_finite(cloud);
+  std::string fields = "x y z rgb normal_x normal_y normal_z curvature";
+  std::string sizes = "4 4 4 4 4 4 4 4";
+  std::string types = "F F F F F F F F";
+  std::string counts = "1 1 1 1 1 1 1 1";
+  const auto field = [&](bool present, const char* name, const char* size, const char* type) {
+    if (!present) return;
+    fields += std::string(" ") + name;
+    sizes += std::string(" ") + size;
+    types += std::string(" ") + type;
+    counts += " 1";
+  };
+  field(!columns.confidence.empty(), "confidence", "4", "F");
+  field(!columns.observations.empty(), "observations", "4", "U");
+  field(!columns.robot.empty(), "robot", "1", "U");
+
+  OutputFile out(file);
+  const auto& t = cloud.sensor_origin_;
+  const auto& q = cloud.sensor_orientation_;
+  out.write(
+      fmt::format("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\n"
+                  "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
+                  fields, sizes, types, counts, organised ? cloud.width : points,
+                  organised ? cloud.height : 1, t[0], t[1], t[2], q.w(), q.x(), q.y(), q.z(), points));
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Point& p = cloud[i];
+    if (!organised && !finite(p)) continue;
+    for (float value : {p.x, p.y, p.z}) out.put(value);
+    out.put(static_cast<std::uint32_t>(p.r) << 16 | static_cast<std::uint32_t>(p.g) << 8 |
+            static_cast<std::uint32_t>(p.b));
+    for (float value : {p.normal_x, p.normal_y, p.normal_z, p.curvature}) out.put(value);
+    if (!columns.confidence.empty()) out.put(columns.confidence[i]);
+    if (!columns.observations.empty()) out.put(columns.observations[i]);
+    if (!columns.robot.empty()) out.put(columns.robot[i]);
+  }
+  return out.commit();
+}
+
+core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
+                               const CloudColumns& columns) {
+  const std::string ending = file.extension().string();
+  if (ending == ".ply") return write_ply(file, cloud, columns);
+  if (ending == ".pcd") return write_pcd(file, cloud, columns);
+  return core::usage_error(fmt::format(
+      "{}: ending '{}' is not one that clouds are written as; use .ply or .pcd", file.string(), ending));
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/filter_chain.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "filter_tools.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+using core::ConfigNode;
+using core::ConfigProblems;
+
+std::string near_word(const std::string& word, const std::vector<std::string>& candidates) {
+  const std::string near = core::did_you_mean(word, candidates);
+  return near.empty() ? "" : fmt::format("; did you mean {}?", near);
+}
+
+/// Reports keys of `map` that are not in `known`.
+void refuse_unknown_keys(const ConfigNode& map, const std::string& path,
+                         const std::vector<std::string>& known, ConfigProblems& problems) {
+  for (std::size_t i = 0; i < map.entries.size(); ++i) {
+    const std::string& key = map.entries[i].first;
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    problems.push_back(
+        {map.key_marks[i], path.empty() ? key : path + "." + key,
+         fmt::format("unknown key (allowed: {}{})", fmt::join(known, ", "), near_word(key, known))});
+  }
+}
+
+std::size_t count_finite(const Cloud& cloud) {
+  std::size_t count = 0;
+  for (const Point& p : cloud.points) count += finite(p) ? 1U : 0U;
+  return count;
+}
+
+std::string entry_yaml(const std::string& type, const core::OptionTable& table) {
+  std::string text = fmt::format("  - type: {}\n", type);
+  for (const auto& option : table.specs())
+    text += fmt::format("    {}: {}\n", option.key, table.value(option.key));
+  return text;
+}
+
+const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, const FilterRegistry& registry,
+                            ConfigProblems& problems) {
+  if (entry.kind != ConfigNode::Kind::kMap) {
+    problems.push_back({entry.mark, path, "is not a filter (a map that begins with type: NAME)"});
+    return nullptr;
+  }
+  const std::string types = fmt::format("{}", fmt::join(registry.types(), ", "));
+  const ConfigNode* type = entry.find("type");
+  if (type == nullptr) {
+    problems.push_back({entry.mark, path, fmt::format("has no type (allowed: {})", types)});
+    return nullptr;
+  }
+  const FilterInfo* info = registry.find(type->scalar);
+  if (info == nullptr || type->kind != ConfigNode::Kind::kScalar) {
+    problems.push_back({type->mark, path + ".type",
+                        fmt::format("'{}' is not a filter (allowed: {}{})", type->scalar.substr(0, 40), types,
+                                    near_word(type->scalar, registry.types()))});
+    return nullptr;
+  }
+  return info;
+}
+
+}  // namespace
+
+FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
+                               const FilterRegistry& registry, ConfigProblems& problems) {
+  FilterChain chain;
+  if (node.kind != ConfigNode::Kind::kMap) {
+    problems.push_back({node.mark, path, "is not a filter chain (a map with the keys chain and filters)"});
+    return chain;
+  }
+  refuse_unknown_keys(node, path, {"chain", "description", "filters"}, problems);
+  const std::string prefix = path.empty() ? "" : path + ".";
+  const ConfigNode* name = node.find("chain");
+  if (name == nullptr || name->kind != ConfigNode::Kind::kScalar || name->scalar.empty()) {
+    problems.push_back(
+        {name == nullptr ? node.mark : name->mark, prefix + "chain", "the chain needs a name"});
+  } else {
+    chain.name_ = name->scalar;
+  }
+  const ConfigNode* filters = node.find("filters");
+  if (filters == nullptr || filters->kind != ConfigNode::Kind::kSequence) {
+    problems.push_back(
+        {filters == nullptr ? node.mark : filters->mark, prefix + "filters", "must be a list of filters"});
+    return chain;
+  }
+  for (std::size_t i = 0; i < filters->items.size(); ++i) {
+    const ConfigNode& entry = filters->items[i];
+    const std::string place = fmt::format("{}filters[{}]", prefix, i);
+    const FilterInfo* info = find_type(entry, place, registry, problems);
+    if (info == nullptr) continue;
+    const std::shared_ptr<Filter> filter = info->make();
+    core::OptionTable table;
+    filter->declare(table);
+    const std::size_t before = problems.size();
+    table.set_all(entry, place, problems, {"type"});
+    if (problems.size() == before) {
+      const std::string wrong = filter->check();
+      if (!wrong.empty()) problems.push_back({entry.mark, place, wrong});
+    }
+    chain.filters_.push_back({info->type, filter, entry_yaml(info->type, table)});
+  }
+  return chain;
+}
+
+core::Result<FilterChain> FilterChain::load(const std::filesystem::path& file,
+                                            const FilterRegistry& registry) {
+  const auto node = core::read_yaml(file);
+  if (!node) return tl::unexpected<core::Error>(node.error());
+  ConfigProblems problems;
+  FilterChain chain = parse(*node, "", registry, problems);
+  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  return chain;
+}
+
+std::string FilterChain::to_yaml() const {
+  std::string text = fmt::format("chain: {}\nfilters:{}\n", name_, filters_.empty() ? " []" : "");
+  for (const auto& step : filters_) text += step.yaml;
+  return text;
+}
+
+core::Result<CloudPtr> FilterChain::apply(const CloudConstPtr& input, const FilterContext& context,
+                                          std::vector<FilterReport>* reports) const {
+  if (filters_.empty()) return std::make_shared<Cloud>(*input);
+  CloudPtr output;
+  CloudConstPtr current = input;
+  for (std::size_t i = 0; i < filters_.size(); ++i) {
+    const Step& step = filters_[i];
+    const auto start = std::chrono::steady_clock::now();
+    auto result = step.filter->apply(current, context);
+    const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
+    if (!result) {
+      return core::failure(result.error().kind, fmt::format("chain {}: filters[{}] ({}): {}", name_, i,
+                                                            step.type, result.error().message));
+    }
+    output = *result;
+    if (reports != nullptr) {
+      reports->push_back({step.type, count_finite(*current), count_finite(*output), elapsed.count()});
+    }
+    current = output;
+  }
+  return output;
+}
+
+std::string to_table(const std::vector<FilterReport>& reports) {
+  std::string text = fmt::format("{:<24}{:>12}{:>12}{:>10}\n", "filter", "points in", "points out", "ms");
+  for (const auto& r : reports) {
+    text += fmt::format("{:<24}{:>12}{:>12}{:>10.1f}\n", r.type, r.points_in, r.points_out, r.ms);
+  }
+  return text;
+}
+
+}  // namespace plumbline::cloud

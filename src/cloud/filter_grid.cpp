@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <pcl/filters/approximate_voxel_grid.h>
+#include <pcl/filters/uniform_sampling.h>
+#include <pcl/filters/voxel_grid.h>
+
+#include <algorithm>
+
+#include "filter_tools.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+/// "" or why PCL's grids, which number their cells with 31 bits, cannot hold this cloud. PCL itself only
+/// prints a warning and hands the cloud back unfiltered.
+std::string check_extent(const Cloud& cloud, double leaf) {
+  if (cloud.empty()) return "";
+  Eigen::Vector3d min = cloud[0].getVector3fMap().cast<double>();
+  Eigen::Vector3d max = min;
+  for (const Point& p : cloud.points) {
+    min = min.cwiseMin(p.getVector3fMap().cast<double>());
+    max = max.cwiseMax(p.getVector3fMap().cast<double>());
+  }
+  constexpr double kMost = 2147483647.0;
+  const Eigen::Array3d cells = ((max - min) / leaf).array().floor() + 2.0;
+  const double furthest = std::max(max.cwiseAbs().maxCoeff(), min.cwiseAbs().maxCoeff()) / leaf;
+  if (cells.prod() <= kMost && furthest < kMost / 4.0) return "";
+  double needed = leaf;
+  const auto fits = [&](double l) {
+    return (((max - min) / l).array().floor() + 2.0).prod() <= kMost && furthest * leaf / l < kMost / 4.0;
+  };
+  while (!fits(needed)) needed *= 1.1;
+  const Eigen::Vector3d size = max - min;
+  return fmt::format(
+      "leaf {:g} m is too small for a cloud of {:.4g} x {:.4g} x {:.4g} m ({:.2g} cells, at most 2.1e9); "
+      "use a leaf of {:.2g} m or more, or remove far points first (crop_box, range)",
+      leaf, size.x(), size.y(), size.z(), cells.prod(), needed);
+}
+
+/// Unknown normals become 0, so that they do not spoil the mean normal of their cell.
+void forget_unknown_normals(Cloud& cloud) {
+  for (Point& p : cloud.points) {
+    if (!has_normal(p)) p.normal_x = p.normal_y = p.normal_z = 0.0F;
+    if (!std::isfinite(p.curvature)) p.curvature = 0.0F;
+  }
+}
+
+/// Unit normals again; NaN where no point of the cell had one.
+void restore_normals(Cloud& cloud) {
+  for (Point& p : cloud.points) {
+    const float length = p.getNormalVector3fMap().norm();
+    const float scale = length > 1e-6F ? 1.0F / length : std::numeric_limits<float>::quiet_NaN();
+    p.getNormalVector3fMap() *= scale;
+  }
+}
+
+class GridFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.number("leaf", leaf_m_, {1e-4, 1000.0}, "m", "Edge length of a cell");
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    CloudPtr points = finite_list(*input);
+    const std::string problem = check_extent(*points, leaf_m_);
+    if (!problem.empty()) return core::usage_error(problem);
+    if (points->empty()) return points;
+    CloudPtr output = resample(points);
+    output->sensor_origin_ = input->sensor_origin_;
+    output->sensor_orientation_ = input->sensor_orientation_;
+    make_list(*output);
+    return output;
+  }
+
+ protected:
+  /// `points`: finite, not empty, owned by the caller; may be changed.
+  virtual CloudPtr resample(const CloudPtr& points) const = 0;
+  [[nodiscard]] float leaf() const { return static_cast<float>(leaf_m_); }
+
+ private:
+  double leaf_m_ = 0.01;
+};
+
+class VoxelGridFilter : public GridFilter {
+ public:
+  void declare(core::OptionTable& table) override {
+    GridFilter::declare(table);
+    table.integer("min_points", min_points_, {1, 100000}, "", "Cells with fewer points give none");
+  }
+  CloudPtr resample(const CloudPtr& points) const override {
+    forget_unknown_normals(*points);
+    pcl::VoxelGrid<Point> grid;
+    grid.setLeafSize(leaf(), leaf(), leaf());
+    grid.setMinimumPointsNumberPerVoxel(static_cast<unsigned>(min_points_));
+    grid.setInputCloud(points);
+    auto output = std::make_shared<Cloud>();
+    grid.filter(*output);
+    restore_normals(*output);
+    return output;
+  }
+
+ private:
+  int min_points_ = 1;
+};
+
+class ApproximateVoxelGridFilter : public GridFilter {
+ public:
+  CloudPtr resample(const CloudPtr& points) const override {
+    forget_unknown_normals(*points);
+    pcl::ApproximateVoxelGrid<Point> grid;
+    grid.setLeafSize(leaf(), leaf(), leaf());
+    grid.setInputCloud(points);
+    auto output = std::make_shared<Cloud>();
+    grid.filter(*output);
+    restore_normals(*output);
+    return output;
+  }
+};
+
+class UniformSamplingFilter : public GridFilter {
+ public:
+  /// PCL gives the points in the order of a hash table; here they stay in the order of the input.
+  CloudPtr resample(const CloudPtr& points) const override {
+    pcl::UniformSampling<Point> sampling(true);
+    sampling.setRadiusSearch(static_cast<double>(leaf()));
+    sampling.setInputCloud(points);
+    Cloud unordered;
+    sampling.filter(unordered);
+    std::vector<bool> removed(points->size(), false);
+    for (const auto index : *sampling.getRemovedIndices()) removed[static_cast<std::size_t>(index)] = true;
+    auto output = std::make_shared<Cloud>();
+    for (std::size_t i = 0; i < points->size(); ++i) {
+      if (!removed[i]) output->points.push_back((*points)[i]);
+    }
+    return output;
+  }
+};
+
+}  // namespace
+
+FilterInfo voxel_grid_filter() {
+  return {
+      "voxel_grid", "Replaces the points of every grid cell by their mean.",
+      "PCL's VoxelGrid: positions, normals and colours are averaged. Where PCL would warn and hand the cloud "
+      "back "
+      "unfiltered because the cells cannot be numbered, this is an error that names a leaf size which fits.",
+      "- type: voxel_grid\n  leaf: 1 cm\n", [] { return std::make_unique<VoxelGridFilter>(); }};
+}
+
+FilterInfo approximate_voxel_grid_filter() {
+  return {"approximate_voxel_grid", "Like voxel_grid in one pass; a cell may give more than one point.",
+          "PCL's ApproximateVoxelGrid: faster on clouds whose neighbours in space are neighbours in memory.",
+          "- type: approximate_voxel_grid\n  leaf: 1 cm\n",
+          [] { return std::make_unique<ApproximateVoxelGridFilter>(); }};
+}
+
+FilterInfo uniform_sampling_filter() {
+  return {"uniform_sampling", "Keeps of every grid cell the point nearest to its centre.",
+          "PCL's UniformSampling: points are chosen, never averaged. They stay in the order of the input.",
+          "- type: uniform_sampling\n  leaf: 2 cm\n",
+          [] { return std::make_unique<UniformSamplingFilter>(); }};
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <pcl/filters/radius_outlier_removal.h>
+#include <pcl/filters/statistical_outlier_removal.h>
+
+#include <algorithm>
+
+#include "filter_tools.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+class StatisticalOutlierFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.integer("neighbours", neighbours_, {1, 1000}, "", "Nearest neighbours looked at");
+    table.number("deviations", deviations_, {0.0, 100.0}, "",
+                 "Points whose mean distance exceeds the mean of all by this many standard deviations go");
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    const CloudPtr points = finite_list(*input);
+    if (points->size() < 3) return points;
+    pcl::StatisticalOutlierRemoval<Point> removal;
+    // PCL reads past its buffers when it is asked for more neighbours than there are points.
+    removal.setMeanK(std::min(neighbours_, static_cast<int>(points->size()) - 1));
+    removal.setStddevMulThresh(deviations_);
+    removal.setInputCloud(points);
+    auto output = std::make_shared<Cloud>();
+    removal.filter(*output);
+    make_list(*output);
+    return output;
+  }
+
+ private:
+  int neighbours_ = 16;
+  double deviations_ = 2.0;
+};
+
+class RadiusOutlierFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.number("radius", radius_m_, {1e-4, 100.0}, "m", "How far a neighbour may be");
+    table.integer("min_neighbours", min_neighbours_, {1, 100000}, "", "Points with fewer neighbours go");
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    const CloudPtr points = finite_list(*input);
+    if (points->size() <= static_cast<std::size_t>(min_neighbours_)) return like(*input);
+    pcl::RadiusOutlierRemoval<Point> removal;
+    removal.setRadiusSearch(radius_m_);
+    removal.setMinNeighborsInRadius(min_neighbours_);
+    removal.setInputCloud(points);
+    auto output = std::make_shared<Cloud>();
+    removal.filter(*output);
+    make_list(*output);
+    return output;
+  }
+
+ private:
+  double radius_m_ = 0.05;
+  int min_neighbours_ = 5;
+};
+
+}  // namespace
+
+FilterInfo statistical_outlier_filter() {
+  return {"statistical_outlier", "Removes points that lie further from their neighbours than most do.",
+          "PCL's StatisticalOutlierRemoval. Points without measurement are left out of the statistics; the "
+          "result is "
+          "a list, not organised.",
+          "- type: statistical_outlier\n  neighbours: 16\n  deviations: 2\n",
+          [] { return std::make_unique<StatisticalOutlierFilter>(); }};
+}
+
+FilterInfo radius_outlier_filter() {
+  return {"radius_outlier", "Removes points with few neighbours within a radius.",
+          "PCL's RadiusOutlierRemoval. The result is a list, not organised.",
+          "- type: radius_outlier\n  radius: 3 cm\n  min_neighbours: 6\n",
+          [] { return std::make_unique<RadiusOutlierFilter>(); }};
+}
+
+}  // namespace plumbline::cloud

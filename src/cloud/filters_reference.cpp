@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "plumbline/cloud/filter.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr const char* kIntroduction =
+    "<!-- Made from the filters' own declarations by plumbline::cloud::filters_reference(); a test compares. "
+    "-->\n"
+    "# Filters\n\n"
+    "A filter chain is a YAML file: a name and a list of filters, applied from top to bottom. Lengths and "
+    "angles may\n"
+    "carry a unit (`5 mm`, `75 deg`). Every problem of a file is told at once, with line and column.\n\n"
+    "```yaml\nchain: keyframe\nfilters:\n  - type: range\n    max: 3.5 m\n  - type: voxel_grid\n    leaf: 1 "
+    "cm\n```\n\n"
+    "Filters that only choose points keep an organised cloud (one that still has the rows and columns of the "
+    "depth\n"
+    "picture) organised: rejected points become NaN. The others give a list of points without NaN.\n";
+
+std::string allowed(const core::OptionSpec& option) {
+  if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));
+  switch (option.type) {
+    case core::OptionType::kBoolean:
+      return "on, off";
+    case core::OptionType::kNumbers:
+      return fmt::format("{} numbers, {:g} to {:g}", option.length, option.min, option.max);
+    case core::OptionType::kInteger:
+    case core::OptionType::kNumber:
+      return fmt::format("{:g} to {:g}", option.min, option.max);
+    default:
+      return "text";
+  }
+}
+
+std::string entry(const FilterInfo& info) {
+  std::string text = fmt::format("\n## {}\n\n{}\n\n{}\n\n", info.type, info.summary, info.details);
+  text += fmt::format("```yaml\n{}```\n\n| option | default | allowed | unit | |\n|---|---|---|---|---|\n",
+                      info.example);
+  const auto filter = info.make();
+  core::OptionTable table;
+  filter->declare(table);
+  for (const auto& option : table.specs()) {
+    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", option.key, option.default_value, allowed(option),
+                        option.unit, option.help);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string filters_reference(const FilterRegistry& registry) {
+  std::string text = kIntroduction;
+  for (const auto& info : registry.filters()) text += entry(info);
+  return text;
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Edge-aware smoothing and differentiation of inverse depth on a grid of every stride-th pixel. On a plane
+// the inverse depth is linear in the pixel and the noise of structured light is almost the same everywhere,
+// so means and differences of it are unbiased where those of depth are not.
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace plumbline::cloud {
+
+/// Standard deviation of w = 1/z for the sensor's depth noise, sigma_w = sigma_z(z) w^2, as a polynomial in
+/// w.
+inline float inverse_depth_sigma(float w) {
+  const float bend = 1.0F - 0.4F * w;
+  return 0.0012F * w * w + 0.0019F * bend * bend;
+}
+
+/// A grid of floats, row after row.
+struct Grid {
+  int width = 0;
+  int height = 0;
+  std::vector<float> values;
+
+  [[nodiscard]] float* row(int j) { return values.data() + static_cast<std::ptrdiff_t>(j) * width; }
+  [[nodiscard]] const float* row(int j) const {
+    return values.data() + static_cast<std::ptrdiff_t>(j) * width;
+  }
+};
+
+/// Mean of 1/z over window x window pixels (odd) around every stride-th pixel, over the pixels that lie on
+/// the same surface as far as depth tells. 0 where the pixel itself has no depth within [min, max].
+Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float min_depth, float max_depth,
+                          float focal);
+
+/// For every cell how many cells the surface goes on in a direction without a jump, at most `longest`.
+struct Reach {
+  std::vector<std::uint8_t> left, right, up, down;
+};
+Reach surface_reach(const Grid& inverse_depth, int stride, float focal, int longest);
+
+/// Slope of the surface along one axis at a cell.
+struct Slope {
+  bool known = false;
+  float value = 0.0F;  ///< inverse depth per cell
+  float bend = 0.0F;   ///< slope after minus slope before the cell
+};
+/// `centre` points at the cell, `step` to the next cell along the axis; `before` and `after` are the reaches.
+/// Central difference over +-base cells, less where a jump is nearer; at a crease the straighter side alone.
+Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int after, int base, float sigma);
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/voxel_map.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plumbline/sensor/depth_noise.hpp"
+#include "scalar.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr int kAxisBits = 21;
+constexpr std::int64_t kHalf = std::int64_t{1} << (kAxisBits - 1);
+constexpr std::size_t kFirstTable = 1024;
+constexpr float kOpposed = -0.2F;  // a fold of up to 100 degrees is still one side
+
+/// Spreads neighbouring keys over the table (finaliser of MurmurHash3, public domain).
+std::size_t mix(std::uint64_t key) {
+  key ^= key >> 33;
+  key *= 0xff51afd7ed558ccdULL;
+  key ^= key >> 33;
+  key *= 0xc4ceb9fe1a85ec53ULL;
+  key ^= key >> 33;
+  return static_cast<std::size_t>(key);
+}
+
+}  // namespace
+
+void VoxelMapOptions::declare(core::OptionTable& table) {
+  table.number("voxel", voxel_m, {0.001, 1.0}, "m", "Edge length of a voxel");
+  table.number("min_cos_incidence", min_cos_incidence, {0.0, 1.0}, "",
+               "Measurements seen more obliquely than this cosine are left out");
+}
+
+void VoxelExtractOptions::declare(core::OptionTable& table) {
+  table.integer("min_observations", min_observations, {1, 1000}, "", "Views that must have seen a voxel");
+}
+
+/// One measurement, or one fused side of another map, in this map's frame.
+struct VoxelMap::Sample {
+  Eigen::Vector3d position{0, 0, 0};
+  Eigen::Vector3f normal{0, 0, 0};  ///< unit, or zero when not known
+  Eigen::Vector3f facing{0, 0, 0};  ///< unit: the normal, or the direction to the camera
+  Eigen::Vector3f color{0, 0, 0};
+  float weight = 0.0F;
+  float scatter = 0.0F;            ///< within the sample itself
+  std::uint32_t observations = 1;  ///< views it stands for
+};
+
+VoxelMap::VoxelMap(const VoxelMapOptions& options) : options_(options), table_(kFirstTable, 0) {}
+
+void VoxelMap::clear() {
+  sides_.clear();
+  table_.assign(kFirstTable, 0);
+  view_ = 0;
+  dropped_ = 0;
+}
+
+std::size_t VoxelMap::bytes() const {
+  return sides_.capacity() * sizeof(Side) + table_.capacity() * sizeof(std::uint32_t);
+}
+
+bool VoxelMap::voxel_of(const Eigen::Vector3d& point, std::uint64_t& key, Eigen::Vector3f& offset) const {
+  key = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double cell = std::floor(point[axis] / options_.voxel_m);
+    if (!(cell >= static_cast<double>(-kHalf) && cell < static_cast<double>(kHalf))) return false;
+    offset[axis] = static_cast<float>(point[axis] - (cell + 0.5) * options_.voxel_m);
+    key = key << kAxisBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + kHalf);
+  }
+  key <<= 1;  // the lowest bit is the side
+  return true;
+}
+
+void VoxelMap::grow() {
+  std::vector<std::uint32_t> larger(table_.size() * 2, 0);
+  const std::size_t mask = larger.size() - 1;
+  for (std::size_t i = 0; i < sides_.size(); ++i) {
+    std::size_t slot = mix(sides_[i].key) & mask;
+    while (larger[slot] != 0) slot = (slot + 1) & mask;
+    larger[slot] = static_cast<std::uint32_t>(i + 1);
+  }
+  table_ = std::move(larger);
+}
+
+VoxelMap::Side* VoxelMap::find_or_add(std::uint64_t key) {
+  if ((sides_.size() + 1) * 2 > table_.size()) grow();
+  const std::size_t mask = table_.size() - 1;
+  std::size_t slot = mix(key) & mask;
+  while (table_[slot] != 0) {
+    Side& side = sides_[table_[slot] - 1];
+    if (side.key == key) return &side;
+    slot = (slot + 1) & mask;
+  }
+  Side side;
+  side.key = key;
+  sides_.push_back(side);
+  table_[slot] = static_cast<std::uint32_t>(sides_.size());
+  return &sides_.back();
+}
+
+void VoxelMap::add(const Sample& sample) {
+  std::uint64_t key = 0;
+  Eigen::Vector3f offset;
+  if (!voxel_of(sample.position, key, offset)) {
+    ++dropped_;
+    return;
+  }
+  Side* side = find_or_add(key);
+  const Eigen::Vector3f& facing = side->normal.isZero() ? side->facing : side->normal;
+  if (side->weight > 0.0F && facing.dot(sample.facing) < kOpposed * facing.norm())
+    side = find_or_add(key | 1U);
+
+  if (side->weight == 0.0F) side->facing = sample.facing;
+  // West's weighted update of mean and scatter; the scatter along the normal known so far.
+  const float total = side->weight + sample.weight;
+  const Eigen::Vector3f before = offset - side->mean;
+  const float share = sample.weight / total;
+  if (side->weight > 0.0F) {
+    const Eigen::Vector3f direction = (side->normal.isZero() ? side->facing : side->normal).normalized();
+    const float distance = before.dot(direction);
+    side->scatter += distance * distance * side->weight * share;
+  }
+  side->scatter += sample.scatter;
+  side->mean += share * before;
+  side->color += share * (sample.color - side->color);
+  side->normal += sample.weight * sample.normal;
+  side->weight = total;
+  // Several samples of one view are one observation (of a merged map: those of its most seen voxel).
+  if (side->last_view != view_) side->last_observations = 0;
+  side->last_view = view_;
+  if (sample.observations > side->last_observations) {
+    side->observations += sample.observations - side->last_observations;
+    side->last_observations = sample.observations;
+  }
+}
+
+void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud) {
+  ++view_;
+  const double unit = sensor::depth_sigma(1.0);
+  for (const Point& p : camera_cloud.points) {
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !(p.z > 0.0F) || !std::isfinite(p.z)) continue;
+    const Eigen::Vector3d point(p.x, p.y, p.z);
+    const Eigen::Vector3d to_camera = -point.normalized();
+    Eigen::Vector3d normal(p.normal_x, p.normal_y, p.normal_z);
+    const bool known = normal.allFinite() && normal.squaredNorm() > 0.25;
+    double cosine = 0.5;
+    if (known) {
+      normal.normalize();
+      cosine = std::abs(normal.dot(to_camera));
+      if (cosine < options_.min_cos_incidence) continue;
+    }
+    const double sigma = sensor::depth_sigma(point.z());
+    Sample sample;
+    sample.position = world_from_cloud * point;
+    if (known) sample.normal = (world_from_cloud.rotation * normal).cast<float>();
+    sample.facing = (world_from_cloud.rotation * (known ? normal : to_camera)).cast<float>();
+    sample.color = Eigen::Vector3f(p.r, p.g, p.b);
+    sample.weight = static_cast<float>(std::max(cosine, 1e-3) * unit * unit / (sigma * sigma));
+    add(sample);
+  }
+}
+
+void VoxelMap::merge(const VoxelMap& other, const geometry::Rigid3& this_from_other) {
+  const Eigen::Matrix3f rotation = this_from_other.rotation.cast<float>();
+  ++view_;
+  for (const Side& side : other.sides_) {
+    Sample sample;
+    sample.position = this_from_other * other.position(side);
+    if (!side.normal.isZero()) sample.normal = rotation * side.normal.normalized();
+    sample.facing = side.normal.isZero() ? Eigen::Vector3f(rotation * side.facing) : sample.normal;
+    sample.color = side.color;
+    sample.weight = side.weight;
+    sample.scatter = side.scatter;
+    sample.observations = side.observations;
+    add(sample);
+  }
+}
+
+Eigen::Vector3d VoxelMap::position(const Side& side) const {
+  Eigen::Vector3d centre;
+  std::uint64_t cells = side.key >> 1;
+  for (int axis = 2; axis >= 0; --axis) {
+    const auto cell = static_cast<std::int64_t>(cells & ((std::uint64_t{1} << kAxisBits) - 1)) - kHalf;
+    centre[axis] = (static_cast<double>(cell) + 0.5) * options_.voxel_m;
+    cells >>= kAxisBits;
+  }
+  return centre + side.mean.cast<double>();
+}
+
+FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+  for (std::size_t i = 0; i < sides_.size(); ++i) {
+    if (sides_[i].weight > 0.0F &&
+        sides_[i].observations >= static_cast<std::uint32_t>(options.min_observations)) {
+      order.emplace_back(sides_[i].key, static_cast<std::uint32_t>(i));
+    }
+  }
+  std::sort(order.begin(), order.end());
+
+  FusedCloud fused;
+  fused.cloud = std::make_shared<Cloud>();
+  fused.cloud->points.reserve(order.size());
+  for (const auto& [key, index] : order) {
+    const Side& side = sides_[index];
+    const Eigen::Vector3f position = this->position(side).cast<float>();
+    Point p;
+    p.x = position.x();
+    p.y = position.y();
+    p.z = position.z();
+    const bool known = side.normal.squaredNorm() > 0.0F;
+    const Eigen::Vector3f normal =
+        known ? side.normal.normalized().eval()
+              : Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()).eval();
+    p.normal_x = normal.x();
+    p.normal_y = normal.y();
+    p.normal_z = normal.z();
+    p.r = to_byte(static_cast<double>(side.color.x()));
+    p.g = to_byte(static_cast<double>(side.color.y()));
+    p.b = to_byte(static_cast<double>(side.color.z()));
+    p.a = 255;
+    fused.cloud->points.push_back(p);
+    fused.columns.observations.push_back(side.observations);
+    fused.columns.confidence.push_back(side.weight / (side.weight + 1.0F));
+    fused.spread_m.push_back(std::sqrt(side.scatter / side.weight));
+  }
+  fused.cloud->width = static_cast<std::uint32_t>(fused.cloud->size());
+  fused.cloud->height = 1;
+  fused.cloud->is_dense = true;
+  return fused;
+}
+
+}  // namespace plumbline::cloud

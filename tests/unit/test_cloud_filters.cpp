@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <pcl/filters/statistical_outlier_removal.h>
+#include <pcl/filters/voxel_grid.h>
+
+#include <set>
+
+#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "test_cloud_worlds.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+using worlds::finite_points;
+using worlds::point;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+/// Runs one filter written as YAML list entry.
+core::Result<CloudPtr> run(const std::string& entry, const CloudConstPtr& input,
+                           const FilterContext& context = {}) {
+  core::ConfigProblems problems;
+  const auto node = core::parse_yaml("chain: test\nfilters:\n  - " + entry, "test.yaml");
+  if (!node) return tl::unexpected<core::Error>(node.error());
+  const auto chain = FilterChain::parse(*node, "", builtin_filters(), problems);
+  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  return chain.apply(input, context);
+}
+
+CloudPtr must(const std::string& entry, const CloudConstPtr& input, const FilterContext& context = {}) {
+  auto result = run(entry, input, context);
+  EXPECT_TRUE(result) << (result ? "" : result.error().message);
+  return result ? *result : std::make_shared<Cloud>();
+}
+
+CloudPtr list(const std::vector<Point>& points) {
+  auto cloud = std::make_shared<Cloud>();
+  for (const Point& p : points) cloud->push_back(p);
+  return cloud;
+}
+
+/// Points of a square plane in z = 1, `n` x `n`, `step` metres apart.
+CloudPtr square(int n, float step) {
+  auto cloud = std::make_shared<Cloud>();
+  for (int i = 0; i < n * n; ++i) {
+    cloud->push_back(point(static_cast<float>(i % n) * step, static_cast<float>(i / n) * step, 1.0F));
+  }
+  return cloud;
+}
+
+TEST(Filters, RangeByDepthAndByDistance) {
+  const auto cloud =
+      list({point(0, 0, 0.1F), point(0, 0, 1), point(3, 0, 1), point(0, 0, 5), point(kNan, 0, 1)});
+  EXPECT_EQ(must("{type: range, min: 20 cm, max: 2 m}", cloud)->size(), 2U);
+  EXPECT_EQ(must("{type: range, min: 20 cm, max: 2 m, along: distance}", cloud)->size(), 1U);
+  FilterContext context;
+  context.viewpoint = Eigen::Vector3f(3, 0, 0);
+  const auto seen = must("{type: range, min: 20 cm, max: 2 m, along: distance}", cloud, context);
+  ASSERT_EQ(seen->size(), 1U);
+  EXPECT_EQ((*seen)[0].x, 3.0F);
+}
+
+TEST(Filters, ChoosingFiltersKeepAnOrganisedCloudOrganised) {
+  auto cloud = std::make_shared<Cloud>(3, 2, point(0, 0, 1));
+  (*cloud)(1, 0).z = 9.0F;
+  (*cloud)(2, 1).x = kNan;
+  for (const std::string entry :
+       {"{type: range, max: 2 m}", "{type: crop_box, min: [-1, -1, 0], max: [1, 1, 2]}",
+        "{type: pass_through, field: z, max: 2}"}) {
+    const auto output = must(entry, cloud);
+    EXPECT_EQ(output->width, 3U) << entry;
+    EXPECT_EQ(output->height, 2U) << entry;
+    EXPECT_EQ(finite_points(*output), 4U) << entry;
+    EXPECT_TRUE(std::isnan((*output)(1, 0).z)) << entry;
+    EXPECT_FALSE(output->is_dense) << entry;
+  }
+  EXPECT_EQ((*cloud)(1, 0).z, 9.0F) << "the input is never changed";
+}
+
+TEST(Filters, CropBoxAndPassThroughOutside) {
+  const auto cloud = list({point(0, 0, 0), point(2, 0, 0), point(0, -3, 0)});
+  EXPECT_EQ(must("{type: crop_box}", cloud)->size(), 1U);
+  EXPECT_EQ(must("{type: crop_box, inside: off}", cloud)->size(), 2U);
+  EXPECT_EQ(must("{type: pass_through, field: x, min: 1, max: 3}", cloud)->size(), 1U);
+  EXPECT_EQ(must("{type: pass_through, field: x, min: 1, max: 3, inside: off}", cloud)->size(), 2U);
+  EXPECT_EQ(must("{type: pass_through, field: normal_z, max: 0}", cloud)->size(), 3U);
+}
+
+/// A box in front of a wall, with the pixels between them hanging in the air.
+cv::Mat step_edge() {
+  cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(3.0));
+  depth(cv::Rect(200, 150, 200, 200)) = 1.5F;
+  depth(cv::Rect(198, 150, 2, 200)) = 2.1F;
+  depth(cv::Rect(400, 150, 2, 200)) = 2.6F;
+  return depth;
+}
+
+TEST(Filters, FlyingPixelsGoAndSurfacesStay) {
+  for (int stride : {1, 2}) {
+    KeyframeCloudOptions options;
+    options.stride_px = stride;
+    const auto cloud = organised_cloud(worlds::frame_of(step_edge()), worlds::camera(), options);
+    const auto output = must("{type: flying_pixels}", cloud);
+    std::size_t hanging = 0;
+    for (const Point& p : output->points) hanging += p.z > 1.6F && p.z < 2.9F ? 1U : 0U;
+    EXPECT_EQ(hanging, 0U);
+    const double kept =
+        static_cast<double>(finite_points(*output)) / static_cast<double>(finite_points(*cloud));
+    EXPECT_GT(kept, 0.97);
+    const auto at = [&](int u, int v) { return (*output)(u / stride, v / stride).z; };
+    EXPECT_EQ(at(208, 250), 1.5F);
+    EXPECT_EQ(at(190, 250), 3.0F);
+  }
+}
+
+TEST(Filters, FlyingPixelsLeavesANoisyObliquePlaneAlone) {
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.0, 0.9397, 0.342);  // 70 degrees, like a floor
+  const auto cloud =
+      organised_cloud(worlds::frame_of(worlds::plane_depth(normal, 0.342 * 1.5, 1.0)), worlds::camera());
+  const auto near = must("{type: range, max: 3 m}", cloud);
+  const auto output = must("{type: flying_pixels}", near);
+  EXPECT_GT(static_cast<double>(finite_points(*output)), 0.98 * static_cast<double>(finite_points(*near)));
+}
+
+TEST(Filters, FlyingPixelsNeedsAnOrganisedCloudAndRemovesSpecks) {
+  const auto result = run("{type: flying_pixels}", square(4, 0.1F));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().kind, core::ErrorKind::kUsage);
+  EXPECT_NE(result.error().message.find("chain test: filters[0] (flying_pixels): needs an organised cloud"),
+            std::string::npos)
+      << result.error().message;
+  auto speck = std::make_shared<Cloud>(5, 5, point(kNan, kNan, kNan));
+  (*speck)(2, 2) = point(0, 0, 1);
+  EXPECT_EQ(finite_points(*must("{type: flying_pixels}", speck)), 0U);
+  EXPECT_EQ(finite_points(*must("{type: flying_pixels, min_neighbours: 0}", speck)), 1U);
+}
+
+TEST(Filters, IncidenceAngle) {
+  const Eigen::Vector3f oblique(std::sin(1.4F), 0, -std::cos(1.4F));
+  const auto cloud = list({point(0, 0, 2), point(0, 0, 2, oblique), point(0, 0, 2, {kNan, kNan, kNan}),
+                           point(0, 0, 2, {0, 0, 1})});
+  EXPECT_EQ(must("{type: incidence_angle, max: 70 deg}", cloud)->size(), 2U);
+  EXPECT_EQ(must("{type: incidence_angle, max: 70 deg, keep_unknown: on}", cloud)->size(), 3U);
+  EXPECT_EQ(must("{type: incidence_angle, max: 85 deg}", cloud)->size(), 3U);
+}
+
+TEST(Filters, VoxelGridIsPclsPointForPoint) {
+  const auto cloud = square(40, 0.007F);
+  const auto output = must("{type: voxel_grid, leaf: 2 cm}", cloud);
+  pcl::VoxelGrid<Point> grid;
+  grid.setLeafSize(0.02F, 0.02F, 0.02F);
+  grid.setInputCloud(cloud);
+  Cloud expected;
+  grid.filter(expected);
+  ASSERT_EQ(output->size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ((*output)[i].getVector3fMap(), expected[i].getVector3fMap());
+    EXPECT_NEAR((*output)[i].normal_z, -1.0F, 1e-5F);
+    EXPECT_EQ((*output)[i].r, 100);
+  }
+}
+
+TEST(Filters, UnknownNormalsDoNotSpoilTheMeanOfACell) {
+  const auto cloud =
+      list({point(0, 0, 0), point(0.001F, 0, 0, {kNan, kNan, kNan}), point(1, 0, 0, {kNan, kNan, kNan})});
+  for (const std::string entry :
+       {"{type: voxel_grid, leaf: 1 cm}", "{type: approximate_voxel_grid, leaf: 1 cm}"}) {
+    const auto output = must(entry, cloud);
+    ASSERT_EQ(output->size(), 2U) << entry;
+    for (const Point& p : output->points) {
+      if (p.x > 0.5F) {
+        EXPECT_TRUE(std::isnan(p.normal_z)) << entry;
+      }
+      if (p.x < 0.5F) {
+        EXPECT_NEAR(p.normal_z, -1.0F, 1e-5F) << entry;
+      }
+    }
+  }
+}
+
+TEST(Filters, AGridWithTooManyCellsIsAnErrorThatNamesALeafThatFits) {
+  const auto cloud = list({point(0, 0, 0), point(100, 100, 100)});
+  for (const std::string type : {"voxel_grid", "approximate_voxel_grid", "uniform_sampling"}) {
+    const auto result = run("{type: " + type + ", leaf: 1 mm}", cloud);
+    ASSERT_FALSE(result) << type;
+    EXPECT_NE(result.error().message.find("use a leaf of 0.08"), std::string::npos) << result.error().message;
+    EXPECT_TRUE(run("{type: " + type + ", leaf: 85 mm}", cloud)) << type;
+  }
+  EXPECT_FALSE(run("{type: voxel_grid, leaf: 0.1 mm}", list({point(1e8F, 0, 0)})));
+}
+
+TEST(Filters, SamplingChoosesPointsOfTheInput) {
+  const auto cloud = square(30, 0.01F);
+  const auto uniform = must("{type: uniform_sampling, leaf: 5 cm}", cloud);
+  EXPECT_EQ(uniform->size(), 36U);
+  const auto random = must("{type: random_sampling, count: 100, seed: 5}", cloud);
+  const auto again = must("{type: random_sampling, count: 100, seed: 5}", cloud);
+  const auto other = must("{type: random_sampling, count: 100, seed: 6}", cloud);
+  ASSERT_EQ(random->size(), 100U);
+  std::set<std::pair<float, float>> known;
+  for (const Point& p : cloud->points) known.insert({p.x, p.y});
+  bool differs = false;
+  for (std::size_t i = 0; i < 100; ++i) {
+    EXPECT_EQ((*random)[i].getVector3fMap(), (*again)[i].getVector3fMap());
+    EXPECT_EQ(known.count({(*random)[i].x, (*random)[i].y}), 1U);
+    differs = differs || (*random)[i].getVector3fMap() != (*other)[i].getVector3fMap();
+  }
+  EXPECT_TRUE(differs);
+  EXPECT_EQ(must("{type: random_sampling, count: 1000}", cloud)->size(), 900U);
+}
+
+TEST(Filters, OutliersGoWithNanPointsAndOrganisedClouds) {
+  auto cloud = std::make_shared<Cloud>(30, 31, point(kNan, kNan, kNan));
+  const auto plane = square(30, 0.01F);
+  std::copy(plane->begin(), plane->end(), cloud->begin());
+  (*cloud)(0, 30) = point(0.15F, 0.15F, 2.0F);
+  cloud->is_dense = false;
+  for (const std::string entry : {"{type: statistical_outlier, neighbours: 8, deviations: 3}",
+                                  "{type: radius_outlier, radius: 2 cm, min_neighbours: 3}"}) {
+    const auto output = must(entry, cloud);
+    EXPECT_EQ(output->size(), 900U) << entry;
+    EXPECT_EQ(output->height, 1U) << entry;
+    for (const Point& p : output->points) EXPECT_EQ(p.z, 1.0F) << entry;
+  }
+}
+
+TEST(Filters, StatisticalOutlierIsPclsPointForPoint) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> gauss(0.0F, 1.0F);
+  auto cloud = std::make_shared<Cloud>();
+  for (int i = 0; i < 2000; ++i) cloud->push_back(point(gauss(random), gauss(random), gauss(random)));
+  const auto output = must("{type: statistical_outlier, neighbours: 10, deviations: 1}", cloud);
+  pcl::StatisticalOutlierRemoval<Point> removal;
+  removal.setMeanK(10);
+  removal.setStddevMulThresh(1.0);
+  removal.setInputCloud(cloud);
+  Cloud expected;
+  removal.filter(expected);
+  ASSERT_EQ(output->size(), expected.size());
+  ASSERT_LT(expected.size(), 1990U);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ((*output)[i].getVector3fMap(), expected[i].getVector3fMap());
+  }
+}
+
+TEST(Filters, NormalsPointToTheViewpoint) {
+  const auto plane = square(20, 0.01F);
+  for (Point& p : plane->points) p.normal_x = p.normal_y = p.normal_z = kNan;
+  FilterContext behind;
+  behind.viewpoint = Eigen::Vector3f(0, 0, 3);
+  const auto expect_normal_z = [](const CloudPtr& cloud, float z) {
+    ASSERT_EQ(cloud->size(), 400U);
+    for (const Point& p : cloud->points) EXPECT_NEAR(p.normal_z, z, 1e-3F);
+  };
+  expect_normal_z(must("{type: normals}", plane), -1.0F);
+  expect_normal_z(must("{type: normals, neighbours: 0, radius: 25 mm}", plane, behind), 1.0F);
+  plane->sensor_origin_ = Eigen::Vector4f(0, 0, 3, 0);
+  expect_normal_z(must("{type: normals}", plane), 1.0F);
+}
+
+TEST(Filters, TransformMovesPointsNormalsAndViewpoint) {
+  const auto output = must("{type: transform, rotation: [90 deg, 0 deg, 0 deg], translation: [0, 0, 1 m]}",
+                           list({point(1, 2, 3), point(kNan, 0, 0)}));
+  EXPECT_LT(((*output)[0].getVector3fMap() - Eigen::Vector3f(1, -3, 3)).norm(), 1e-5F);
+  EXPECT_LT(((*output)[0].getNormalVector3fMap() - Eigen::Vector3f(0, 1, 0)).norm(), 1e-5F);
+  EXPECT_LT((output->sensor_origin_.head<3>() - Eigen::Vector3f(0, 0, 1)).norm(), 1e-6F);
+  EXPECT_FALSE(std::isfinite((*output)[1].x));
+}
+
+TEST(Filters, EveryFilterBearsEmptySingleDuplicateAndNanClouds) {
+  const auto nan = point(kNan, kNan, kNan, {kNan, kNan, kNan});
+  std::vector<CloudPtr> clouds = {std::make_shared<Cloud>(),
+                                  list({point(1, 2, 3)}),
+                                  list({nan}),
+                                  list(std::vector<Point>(50, point(1, 2, 3))),
+                                  list({point(0, 0, 1), nan, point(0, 0, 1)}),
+                                  std::make_shared<Cloud>(4, 4, nan),
+                                  std::make_shared<Cloud>(4, 4, point(0, 0, 1))};
+  const auto registry = builtin_filters();
+  for (const auto& info : registry.filters()) {
+    for (const auto& cloud : clouds) {
+      const bool refused = info.type == "flying_pixels" && cloud->height == 1 && !cloud->empty();
+      const auto result = run("{type: " + info.type + "}", cloud);
+      EXPECT_EQ(static_cast<bool>(result), !refused) << info.type;
+      if (!result) continue;
+      EXPECT_LE(finite_points(**result), finite_points(*cloud)) << info.type;
+      EXPECT_EQ((*result)->size(), std::size_t{(*result)->width} * (*result)->height) << info.type;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plumbline::cloud
