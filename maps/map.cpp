@@ -142,6 +142,19 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int 
   return result;
 }
 
+void Map::add_edge(const SurfaceEdge& edge) {
+  if (edge.a == edge.b) throw std::invalid_argument("add_edge: both ends are one keyframe");
+  keyframes_.at(edge.a).edges.push_back(edges_.size());
+  keyframes_.at(edge.b).edges.push_back(edges_.size());
+  edges_.push_back(edge);
+}
+
+std::vector<SurfaceEdge> Map::edges_of(KeyframeId keyframe) const {
+  std::vector<SurfaceEdge> result;
+  for (std::size_t i : keyframes_.at(keyframe).edges) result.push_back(edges_[i]);
+  return result;
+}
+
 void Map::refresh_point(PointId id) {
   MapPoint& p = points_.at(id);
   if (p.observations.empty()) return;

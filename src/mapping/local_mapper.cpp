@@ -12,6 +12,13 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                "Landmarks found in a smaller share of the frames that should see them are removed");
   table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
                 "Frames that should have seen a landmark before it is judged");
+  table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
+  table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
+  table.boolean("edges", edges, "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
+  table.integer("edges.keyframes", edge_keyframes, {1, 100}, "", "Neighbours that a new keyframe is aligned with");
+  table.number("edges.min_overlap", edge_min_overlap, {0.0, 1.0}, "",
+               "Share of a neighbour's surface in view that must be confirmed");
+  bundle_options.declare(table);
   surface.declare(table);
 }
 
@@ -80,6 +87,38 @@ void LocalMapper::count_sightings(maps::Map& map, const tracking::TrackResult& t
   for (core::LineId id : track.visible_lines) ++map.line(id).visible;
   for (const tracking::PointMatch& m : track.points) ++map.point(m.point).found;
   for (const tracking::LineMatch& m : track.lines) ++map.line(m.line).found;
+}
+
+void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const cv::Mat& depth,
+                                    const geometry::Rigid3& depth_from_camera,
+                                    const std::vector<core::KeyframeId>& neighbours) {
+  int made = 0;
+  for (core::KeyframeId other : neighbours) {
+    if (made >= options_.edge_keyframes) break;
+    if (other == id || map.keyframe(other).surface.empty()) continue;
+    std::vector<tracking::WorldSurface> surface;  // "world" is the other keyframe's camera here
+    for (const maps::SurfaceSample& s : map.keyframe(other).surface) {
+      surface.push_back({s.point.cast<double>(), s.normal.cast<double>(), static_cast<double>(s.sigma)});
+    }
+    geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
+    optimize::PoseProblem problem;
+    problem.camera = camera_;
+    optimize::PoseSolverOptions solver;
+    solver.max_iterations = 3;
+    optimize::PoseSummary summary;
+    for (const double distance : {0.08, 0.05, 0.03, 0.03}) {
+      tracking::SurfaceAssociationOptions association;
+      association.max_distance_m = distance;
+      problem.planes =
+          tracking::associate_surface(surface, depth, camera_, id_from_other, depth_from_camera, association);
+      summary = optimize::solve_pose(problem, id_from_other, solver);
+      id_from_other = summary.camera_from_world;
+    }
+    const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());
+    if (overlap < options_.edge_min_overlap) continue;
+    map.add_edge({other, id, id_from_other, summary.information, overlap, summary.planes.rms});
+    ++made;
+  }
 }
 
 void LocalMapper::cull(maps::Map& map) {

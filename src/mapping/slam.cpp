@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "plumbline/mapping/local_bundle.hpp"
+
 namespace plumbline::mapping {
 
 using geometry::Rigid3;
@@ -60,9 +62,20 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const 
     if (report.decision.wanted) {
       report.keyframe = mapper_.insert(map_, robot_, frame, features, track);
       report.reference = report.keyframe;
+      if (options_.mapper.edges && options_.tracker.depth) {
+        mapper_.add_surface_edges(map_, report.keyframe, frame.depth, track.depth_from_camera,
+                                  tracker_.local_map().keyframes);
+      }
       mapper_.cull(map_);
+      if (options_.mapper.bundle) {
+        LocalBundle bundle = take_local_bundle(map_, report.keyframe, options_.mapper.bundle_keyframes, camera_,
+                                               options_.tracker.association.scale_factor);
+        if (optimize::adjust_bundle(bundle.problem, options_.mapper.bundle_options).usable) put_back(bundle, map_);
+      }
       rule_.keyframe_made();
-      tracker_.map_changed(map_, report.keyframe, track.camera_from_world);
+      tracker_.map_changed(map_, report.keyframe, map_.camera_from_world(report.keyframe));
+      remember_pose(frame.stamp, map_.camera_from_world(report.keyframe), true);
+      return report;
     }
   }
   remember_pose(frame.stamp, track.camera_from_world, tracked);

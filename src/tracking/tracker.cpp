@@ -125,6 +125,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
   TrackResult result;
   Rigid3 pose = guess;
   const Rigid3 depth_from_colour = depth_from_camera(frame);
+  result.depth_from_camera = depth_from_colour;
   optimize::PoseProblem problem;
   problem.camera = camera_;
   SurfaceAssociationOptions surface;

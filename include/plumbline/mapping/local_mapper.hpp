@@ -8,6 +8,7 @@
 #include "plumbline/core/options.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/maps/map.hpp"
+#include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/frame.hpp"
 #include "plumbline/tracking/surface_sampler.hpp"
 #include "plumbline/tracking/tracker.hpp"
@@ -18,6 +19,12 @@ struct LocalMapperOptions {
   double max_landmark_depth_m = 8.0;
   double min_found_share = 0.3;
   int min_visible = 10;
+  bool bundle = true;
+  int bundle_keyframes = 12;
+  bool edges = true;
+  int edge_keyframes = 5;
+  double edge_min_overlap = 0.4;
+  optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
   void declare(core::OptionTable& table);
 };
@@ -33,6 +40,11 @@ class LocalMapper {
 
   /// Counts which landmarks a tracked frame should have seen and did.
   void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
+
+  /// Aligns the surfaces of neighbouring keyframes with the depth image of the new one; what they say about its
+  /// pose stays in the map as edges.
+  void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
+                         const geometry::Rigid3& depth_from_camera, const std::vector<core::KeyframeId>& neighbours);
 
   /// Removes landmarks that were made lately and are seldom found where they should be.
   void cull(maps::Map& map);

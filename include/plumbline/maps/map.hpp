@@ -66,6 +66,17 @@ struct MapLine {
   int found = 0;
 };
 
+/// How two keyframes lie to each other as their surfaces say (dense alignment). The information of
+/// xi = log(b_from_a_estimate * b_from_a^-1) may be singular: directions that the surfaces do not hold.
+struct SurfaceEdge {
+  KeyframeId a;
+  KeyframeId b;
+  geometry::Rigid3 b_from_a;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();
+  double overlap = 0.0;  ///< share of a's samples in b's view that b confirms
+  double rms = 0.0;      ///< of the confirmed samples, standard deviations
+};
+
 class Map {
  public:
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
@@ -110,6 +121,10 @@ class Map {
   /// are none, the ones that share most.
   [[nodiscard]] std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId keyframe, int min_shared) const;
 
+  void add_edge(const SurfaceEdge& edge);
+  /// Edges that have `keyframe` at one end, in order of creation.
+  [[nodiscard]] std::vector<SurfaceEdge> edges_of(KeyframeId keyframe) const;
+
   /// Recomputes view direction and the most typical descriptor from the observations.
   void refresh_point(PointId id);
 
@@ -120,12 +135,14 @@ class Map {
     std::vector<PointId> points;  ///< by feature
     std::vector<LineId> lines;    ///< by feature
     std::map<KeyframeId, int> shared;
+    std::vector<std::size_t> edges;
   };
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
 
   IdMap<KeyframeId, KeyframeEntry> keyframes_;
   IdMap<PointId, MapPoint> points_;
   IdMap<LineId, MapLine> lines_;
+  std::vector<SurfaceEdge> edges_;
 };
 
 }  // namespace plumbline::maps

@@ -36,7 +36,7 @@ struct PoseSolverOptions {
   double plane_loss = 1.5;
   double point_weight = 1.0;  ///< of the whole family: its terms are not quite independent
   double line_weight = 1.0;
-  double plane_weight = 0.2;  ///< depth noise is correlated between neighbouring pixels
+  double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
   double min_step = 1e-6;     ///< metres and radians: a smaller step ends the iteration
 
   void declare(core::OptionTable& table);

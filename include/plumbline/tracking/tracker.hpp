@@ -40,7 +40,8 @@ struct TrackerOptions {
 struct TrackResult {
   TrackState state = TrackState::kLost;
   geometry::Rigid3 camera_from_world;
-  std::vector<PointMatch> points;  ///< inliers
+  geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
+  std::vector<PointMatch> points;      ///< inliers
   std::vector<LineMatch> lines;
   std::vector<core::PointId> visible_points;  ///< landmarks that should have been seen
   std::vector<core::LineId> visible_lines;

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Bundle adjustment over poses, points and lines, with relative-pose edges from dense alignment (METHOD sections
+// 2 and 3). Plain structs in, plain structs out; Ceres inside. Deterministic: one thread, fixed order.
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/geometry/plucker.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::optimize {
+
+struct BundlePose {
+  geometry::Rigid3 camera_from_world;
+  bool fixed = false;
+};
+
+/// Pose `pose` sees point `point` at `pixel`; with depth if depth > 0.
+struct BundlePointObservation {
+  int pose = -1;
+  int point = -1;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double pixel_sigma = 1.0;
+  double depth = 0.0;        ///< metres
+  double depth_sigma = 1.0;  ///< metres
+  bool outlier = false;      ///< set by the solver; outliers on input are left out
+};
+
+/// Pose `pose` sees line `line` as the segment start-end, with 3D endpoints if has_depth.
+struct BundleLineObservation {
+  int pose = -1;
+  int line = -1;
+  Eigen::Vector2d start = Eigen::Vector2d::Zero();  ///< pixels
+  Eigen::Vector2d end = Eigen::Vector2d::Zero();
+  double pixel_sigma = 1.0;
+  bool has_depth = false;
+  Eigen::Vector3d start_camera = Eigen::Vector3d::Zero();  ///< metres, camera frame
+  Eigen::Vector3d end_camera = Eigen::Vector3d::Zero();
+  double start_sigma = 0.02;  ///< metres, in the plane of the line and the camera, across the line
+  double end_sigma = 0.02;
+  bool outlier = false;
+};
+
+/// b_from_a was measured; xi = log(b_from_a_estimate * measured^-1) has this information (may be singular: what
+/// the surfaces do not hold stays free).
+struct BundleEdge {
+  int a = -1;
+  int b = -1;
+  geometry::Rigid3 b_from_a;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();
+};
+
+struct BundleProblem {
+  sensor::Pinhole camera;
+  std::vector<BundlePose> poses;
+  std::vector<Eigen::Vector3d> points;       ///< world, metres
+  std::vector<geometry::PluckerLine> lines;  ///< world
+  std::vector<BundlePointObservation> point_observations;
+  std::vector<BundleLineObservation> line_observations;
+  std::vector<BundleEdge> edges;
+};
+
+struct BundleOptions {
+  int max_iterations = 8;     ///< of each round
+  int rounds = 2;             ///< after each, outliers are put aside and the solve is repeated
+  double point_loss = 2.45;   ///< Huber, standard deviations
+  double line_loss = 2.45;
+  double edge_loss = 4.0;
+  double point_gate = 7.8;    ///< squared standard deviations; beyond: outlier
+  double line_gate = 9.2;
+  void declare(core::OptionTable& table);
+};
+
+struct BundleSummary {
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+  int iterations = 0;
+  int point_outliers = 0;
+  int line_outliers = 0;
+  bool usable = false;  ///< poses, points and lines were updated
+  std::string message;
+};
+
+/// Updates poses that are not fixed, points, lines and the outlier flags. Poses without any observation stay.
+/// At least one pose must be fixed; nothing is changed (usable = false, message says why) otherwise.
+BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options);
+
+}  // namespace plumbline::optimize

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/optimize/bundle_adjustment.hpp"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "cost_edge.hpp"
+#include "cost_line.hpp"
+#include "cost_point.hpp"
+#include "manifolds.hpp"
+
+namespace plumbline::optimize {
+namespace {
+
+PointTerm to_term(const BundlePointObservation& o) {
+  PointTerm term;
+  term.pixel = o.pixel;
+  term.pixel_sigma = o.pixel_sigma;
+  term.depth = o.depth;
+  term.depth_sigma = o.depth_sigma;
+  return term;
+}
+
+/// The problem's numbers as Ceres wants them, and back.
+struct Blocks {
+  std::vector<PoseBlock> poses;
+  std::vector<LineBlock> lines;
+
+  explicit Blocks(const BundleProblem& problem) : poses(problem.poses.size()), lines(problem.lines.size()) {
+    for (std::size_t i = 0; i < poses.size(); ++i) from_rigid(problem.poses[i].camera_from_world, poses[i].data());
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      from_line(geometry::to_orthonormal(problem.lines[i]), lines[i].data());
+    }
+  }
+  void write_back(BundleProblem& problem) const {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      if (!problem.poses[i].fixed) problem.poses[i].camera_from_world = to_rigid(poses[i].data());
+    }
+    for (std::size_t i = 0; i < lines.size(); ++i) problem.lines[i] = geometry::to_plucker(to_line(lines[i].data()));
+  }
+};
+
+/// Builds and solves one round; the Ceres problem does not outlive it.
+ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const BundleOptions& options) {
+  ceres::Problem::Options problem_options;
+  problem_options.cost_function_ownership = ceres::TAKE_OWNERSHIP;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::HuberLoss point_loss(options.point_loss);
+  ceres::HuberLoss line_loss(options.line_loss);
+  ceres::HuberLoss edge_loss(options.edge_loss);
+  PoseManifold pose_manifold;
+  LineManifold line_manifold;
+  ceres::Problem ceres_problem(problem_options);
+  auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
+
+  for (std::size_t i = 0; i < blocks.poses.size(); ++i) {
+    ceres_problem.AddParameterBlock(blocks.poses[i].data(), 7, &pose_manifold);
+    if (problem.poses[i].fixed) ceres_problem.SetParameterBlockConstant(blocks.poses[i].data());
+    ordering->AddElementToGroup(blocks.poses[i].data(), 1);
+  }
+  for (const BundlePointObservation& o : problem.point_observations) {
+    if (o.outlier) continue;
+    double* point = problem.points[static_cast<std::size_t>(o.point)].data();
+    ceres_problem.AddResidualBlock(new PointCost(to_term(o), problem.camera), &point_loss,
+                                   blocks.poses[static_cast<std::size_t>(o.pose)].data(), point);
+    ordering->AddElementToGroup(point, 0);
+  }
+  for (const BundleLineObservation& o : problem.line_observations) {
+    if (o.outlier) continue;
+    double* line = blocks.lines[static_cast<std::size_t>(o.line)].data();
+    if (!ceres_problem.HasParameterBlock(line)) {
+      ceres_problem.AddParameterBlock(line, 6, &line_manifold);
+      ordering->AddElementToGroup(line, 0);
+    }
+    ceres_problem.AddResidualBlock(new LineCost(o, problem.camera), &line_loss,
+                                   blocks.poses[static_cast<std::size_t>(o.pose)].data(), line);
+  }
+  for (const BundleEdge& edge : problem.edges) {
+    ceres_problem.AddResidualBlock(new EdgeCost(edge), &edge_loss, blocks.poses[static_cast<std::size_t>(edge.a)].data(),
+                                   blocks.poses[static_cast<std::size_t>(edge.b)].data());
+  }
+
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = problem.poses.size() <= 60 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  solver.linear_solver_ordering.reset(ordering);
+  solver.num_threads = 1;  // sums in a fixed order
+  solver.max_num_iterations = options.max_iterations;
+  solver.function_tolerance = 1e-5;
+  solver.parameter_tolerance = 1e-7;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &ceres_problem, &summary);
+  return summary;
+}
+
+void mark_outliers(BundleProblem& problem, const Blocks& blocks, const BundleOptions& options) {
+  for (BundlePointObservation& o : problem.point_observations) {
+    PointTerm term = to_term(o);
+    term.world = problem.points[static_cast<std::size_t>(o.point)];
+    Eigen::Vector3d r;
+    const int rows = point_residual(term, to_rigid(blocks.poses[static_cast<std::size_t>(o.pose)].data()),
+                                    problem.camera, r, nullptr);
+    o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= options.point_gate);
+  }
+  for (BundleLineObservation& o : problem.line_observations) {
+    const LineCost cost(o, problem.camera);
+    const double* parameters[2] = {blocks.poses[static_cast<std::size_t>(o.pose)].data(),
+                                   blocks.lines[static_cast<std::size_t>(o.line)].data()};
+    Eigen::Vector4d r;
+    cost.Evaluate(parameters, r.data(), nullptr);
+    o.outlier = !(r.head<2>().squaredNorm() <= options.line_gate);
+  }
+}
+
+}  // namespace
+
+void BundleOptions::declare(core::OptionTable& table) {
+  table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "", "Iterations of each round at most");
+  table.integer("bundle.rounds", rounds, {1, 10}, "", "Solves; between them outliers are put aside");
+  table.number("bundle.point_loss", point_loss, {0.1, 100.0}, "", "Huber threshold of points, standard deviations");
+  table.number("bundle.line_loss", line_loss, {0.1, 100.0}, "", "Huber threshold of lines, standard deviations");
+  table.number("bundle.edge_loss", edge_loss, {0.1, 1000.0}, "",
+               "Huber threshold of relative poses, standard deviations");
+}
+
+BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options) {
+  BundleSummary summary;
+  const bool anchored =
+      std::any_of(problem.poses.begin(), problem.poses.end(), [](const BundlePose& p) { return p.fixed; });
+  if (!anchored) {
+    summary.message = "no pose is fixed: the solution would float";
+    return summary;
+  }
+  Blocks blocks(problem);
+  const std::vector<Eigen::Vector3d> points_before = problem.points;
+  for (int round = 0; round < options.rounds; ++round) {
+    const ceres::Solver::Summary ceres_summary = solve_round(problem, blocks, options);
+    if (round == 0) summary.initial_cost = ceres_summary.initial_cost;
+    if (!ceres_summary.IsSolutionUsable()) {
+      problem.points = points_before;
+      summary.message = ceres_summary.message;
+      return summary;
+    }
+    summary.final_cost = ceres_summary.final_cost;
+    summary.iterations += static_cast<int>(ceres_summary.iterations.size());
+    summary.message = ceres_summary.message;
+    mark_outliers(problem, blocks, options);
+  }
+  blocks.write_back(problem);
+  summary.usable = true;
+  for (const auto& o : problem.point_observations) summary.point_outliers += o.outlier ? 1 : 0;
+  for (const auto& o : problem.line_observations) summary.line_outliers += o.outlier ? 1 : 0;
+  return summary;
+}
+
+}  // namespace plumbline::optimize
