@@ -196,21 +196,29 @@ void add_scores(const std::vector<double>& cloud_mm, const std::vector<double>& 
   }
 }
 
-void compare(const PreparedCloud& cloud, const PointIndex& index, const Density& density, const Truth& truth,
-             const CloudOptions& options, const core::Executor& executor, CloudReport& report) {
-  const bool own_normals = !cloud.samples.normals.empty();
+/// In what order to visit the points that completeness is measured at.
+std::vector<std::uint32_t> order_in_space(const Truth& truth) {
+  if (truth.index && truth.hidden == 0) return truth.index->order();
+  return PointIndex(truth.counted.points).order();
+}
+
+void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions& options,
+             const core::Executor& executor, CloudReport& report) {
+  const PointIndex& index = *cloud.index;
+  const bool own_normals = !cloud.samples->normals.empty();
   Points surface_normals = options.distance == SampleDistance::kSurface
-                               ? known_normals(cloud.samples.normals, index, executor)
+                               ? known_normals(cloud.samples->normals, index, executor)
                                : Points(index.size(), Eigen::Vector3f::Zero());
-  if (own_normals && options.distance == SampleDistance::kPoint) surface_normals = cloud.samples.normals;
-  const SampledSurface cloud_surface(index, std::move(surface_normals), density.cell_m(), options.distance);
+  if (own_normals && options.distance == SampleDistance::kPoint) surface_normals = cloud.samples->normals;
+  const SampledSurface cloud_surface(index, std::move(surface_normals), cloud.density.cell_m(),
+                                     options.distance);
 
   const Distances accuracy =
-      measure(cloud.samples.points, cloud.samples.normals, index.order(), *truth.surface, executor);
+      measure(cloud.samples->points, cloud.samples->normals, index.order(), *truth.surface, executor);
   // Both directions count towards consistency, if the cloud has normals of its own.
-  const PointIndex counted(truth.counted.points);
+  const auto order = order_in_space(truth);
   const Distances completeness = measure(truth.counted.points, own_normals ? truth.counted.normals : Points{},
-                                         counted.order(), cloud_surface, executor);
+                                         order, cloud_surface, executor);
   add_scores(accuracy.mm, completeness.mm, report);
   if (own_normals && accuracy.cosine_count > 0 && completeness.cosine_count > 0) {
     report.normal_consistency = 0.5 * (accuracy.cosines / static_cast<double>(accuracy.cosine_count) +
@@ -258,7 +266,7 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
     if (!made) return tl::unexpected(made.error());
     truth = std::move(*made);
   }
-  report.wall = wall_thickness(prepared->samples, prepared->density.spacing_m, options.wall, executor);
+  report.wall = wall_thickness(*prepared->samples, prepared->density.spacing_m, options.wall, executor);
   if (report.wall.patches == 0) {
     report.warnings.push_back("no flat patch was found that is dense enough: wall thickness is not known");
   }
@@ -266,12 +274,13 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
 
   report.has_reference = true;
   report.error_m.assign(cloud.points.size(), kNone);
-  if (const auto ok = align(prepared->samples, *truth->surface, options, trajectories, executor, report);
+  if (const auto ok = align(*prepared->samples, *truth->surface, options, trajectories, executor, report);
       !ok) {
     return tl::unexpected(ok.error());
   }
-  const PointIndex index(prepared->samples.points);
-  compare(*prepared, index, prepared->density, *truth, options, executor, report);
+  if (options.align != CloudAlignment::kNone)
+    prepared->index = std::make_unique<PointIndex>(prepared->samples->points);
+  compare(*prepared, *truth, options, executor, report);
   return report;
 }
 

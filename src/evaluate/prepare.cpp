@@ -83,13 +83,14 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
     return core::input_error("the cloud has not as many normals as points");
   }
   PreparedCloud out;
+  out.samples = std::make_unique<SurfaceSamples>();
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     if (!cloud.points[i].allFinite()) continue;
-    out.samples.points.push_back(cloud.points[i]);
-    if (normals) out.samples.normals.push_back(unit_or_zero(cloud.normals[i]));
+    out.samples->points.push_back(cloud.points[i]);
+    if (normals) out.samples->normals.push_back(unit_or_zero(cloud.normals[i]));
     out.source.push_back(static_cast<std::uint32_t>(i));
   }
-  report.points = out.samples.points.size();
+  report.points = out.samples->points.size();
   report.not_finite = cloud.points.size() - report.points;
   if (report.points == 0) {
     return core::input_error(
@@ -100,13 +101,13 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
     report.warnings.push_back(fmt::format("{} of {} points of the cloud are not finite and were left out",
                                           report.not_finite, cloud.points.size()));
   }
-  const PointIndex index(out.samples.points);
-  out.density = density(index, executor);
+  out.index = std::make_unique<PointIndex>(out.samples->points);
+  out.density = density(*out.index, executor);
   report.density_per_m2 = out.density.points_per_m2;
   report.spacing_mm = 1000.0 * out.density.spacing_m;
-  auto& own = out.samples.normals;
+  auto& own = out.samples->normals;
   const bool any = std::any_of(own.begin(), own.end(), [](const Eigen::Vector3f& n) { return !n.isZero(); });
-  if (any && !plausible(own, index)) {
+  if (any && !plausible(own, *out.index)) {
     report.warnings.push_back("the cloud's normals do not fit its points and were not used");
     own.clear();
   }

@@ -3,6 +3,7 @@
 
 // Checks and tidies what comes in before it is measured.
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
@@ -17,7 +18,8 @@ core::Result<void> check(const Reference& reference);
 
 /// Finite points of a cloud; normals unit or zero, all left out when there are none worth the name.
 struct PreparedCloud {
-  SurfaceSamples samples;
+  std::unique_ptr<SurfaceSamples> samples;
+  std::unique_ptr<PointIndex> index;  ///< of samples->points
   std::vector<std::uint32_t> source;  ///< number of each point in the cloud as given
   Density density;
 };
