@@ -29,6 +29,15 @@ std::size_t mix(std::uint64_t key) {
   return static_cast<std::size_t>(key);
 }
 
+/// The bits of a key that tell the voxels of a block of 2 x 2 x 2 and their sides apart.
+constexpr std::uint64_t kBlockBits =
+    1U | 1U << 1 | std::uint64_t{1} << (1 + kAxisBits) | std::uint64_t{1} << (1 + 2 * kAxisBits);
+
+std::size_t place_in_block(std::uint64_t key) {
+  return static_cast<std::size_t>((key & 3U) | (key >> (1 + kAxisBits) & 1U) << 2 |
+                                  (key >> (1 + 2 * kAxisBits) & 1U) << 3);
+}
+
 }  // namespace
 
 void VoxelMapOptions::declare(core::OptionTable& table) {
@@ -43,13 +52,14 @@ void VoxelExtractOptions::declare(core::OptionTable& table) {
 
 /// One measurement, or one fused side of another map, in this map's frame.
 struct VoxelMap::Sample {
-  Eigen::Vector3d position{0, 0, 0};
-  Eigen::Vector3f normal{0, 0, 0};  ///< unit, or zero when not known
-  Eigen::Vector3f facing{0, 0, 0};  ///< unit: the normal, or the direction to the camera
+  std::uint64_t key = 0;
+  Eigen::Vector3f offset{0, 0, 0};  ///< from the voxel's centre
+  Eigen::Vector3f normal{0, 0, 0};  ///< unit: the normal, or the direction to the camera
   Eigen::Vector3f color{0, 0, 0};
   float weight = 0.0F;
   float scatter = 0.0F;            ///< within the sample itself
   std::uint32_t observations = 1;  ///< views it stands for
+  bool normal_known = false;
 };
 
 VoxelMap::VoxelMap(const VoxelMapOptions& options) : options_(options), table_(kFirstTable, 0) {}
@@ -65,33 +75,41 @@ std::size_t VoxelMap::bytes() const {
   return sides_.capacity() * sizeof(Side) + table_.capacity() * sizeof(std::uint32_t);
 }
 
-bool VoxelMap::voxel_of(const Eigen::Vector3d& point, std::uint64_t& key, Eigen::Vector3f& offset) const {
-  key = 0;
+bool VoxelMap::locate(const Eigen::Vector3d& position, Sample& sample) {
+  sample.key = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double cell = std::floor(point[axis] / options_.voxel_m);
-    if (!(cell >= static_cast<double>(-kHalf) && cell < static_cast<double>(kHalf))) return false;
-    offset[axis] = static_cast<float>(point[axis] - (cell + 0.5) * options_.voxel_m);
-    key = key << kAxisBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + kHalf);
+    const double cell = std::floor(position[axis] / options_.voxel_m);
+    if (!(cell >= static_cast<double>(-kHalf) && cell < static_cast<double>(kHalf))) {
+      ++dropped_;
+      return false;
+    }
+    sample.offset[axis] = static_cast<float>(position[axis] - (cell + 0.5) * options_.voxel_m);
+    sample.key =
+        sample.key << kAxisBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + kHalf);
   }
-  key <<= 1;  // the lowest bit is the side
+  sample.key <<= 1;  // the lowest bit is the side
   return true;
 }
 
+/// Where the search for a key starts. The voxels of a block share a cache line of the table.
+std::size_t VoxelMap::home(std::uint64_t key) const {
+  return (mix(key & ~kBlockBits) << 4 | place_in_block(key)) & (table_.size() - 1);
+}
+
 void VoxelMap::grow() {
-  std::vector<std::uint32_t> larger(table_.size() * 2, 0);
-  const std::size_t mask = larger.size() - 1;
+  table_.assign(table_.size() * 2, 0);
+  const std::size_t mask = table_.size() - 1;
   for (std::size_t i = 0; i < sides_.size(); ++i) {
-    std::size_t slot = mix(sides_[i].key) & mask;
-    while (larger[slot] != 0) slot = (slot + 1) & mask;
-    larger[slot] = static_cast<std::uint32_t>(i + 1);
+    std::size_t slot = home(sides_[i].key);
+    while (table_[slot] != 0) slot = (slot + 1) & mask;
+    table_[slot] = static_cast<std::uint32_t>(i + 1);
   }
-  table_ = std::move(larger);
 }
 
 VoxelMap::Side* VoxelMap::find_or_add(std::uint64_t key) {
   if ((sides_.size() + 1) * 2 > table_.size()) grow();
   const std::size_t mask = table_.size() - 1;
-  std::size_t slot = mix(key) & mask;
+  std::size_t slot = home(key);
   while (table_[slot] != 0) {
     Side& side = sides_[table_[slot] - 1];
     if (side.key == key) return &side;
@@ -104,82 +122,99 @@ VoxelMap::Side* VoxelMap::find_or_add(std::uint64_t key) {
   return &sides_.back();
 }
 
-void VoxelMap::add(const Sample& sample) {
-  std::uint64_t key = 0;
-  Eigen::Vector3f offset;
-  if (!voxel_of(sample.position, key, offset)) {
-    ++dropped_;
-    return;
+void VoxelMap::add_all(const std::vector<Sample>& samples) {
+  // A large map lies outside the caches: ask for table and voxels a few samples ahead.
+  constexpr std::size_t kTableAhead = 24;
+  constexpr std::size_t kSideAhead = 12;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (i + kTableAhead < samples.size()) __builtin_prefetch(&table_[home(samples[i + kTableAhead].key)]);
+    if (i + kSideAhead < samples.size()) {
+      const std::uint32_t side = table_[home(samples[i + kSideAhead].key)];
+      if (side != 0) __builtin_prefetch(&sides_[side - 1]);
+    }
+    add(samples[i]);
   }
-  Side* side = find_or_add(key);
-  const Eigen::Vector3f& facing = side->normal.isZero() ? side->facing : side->normal;
-  if (side->weight > 0.0F && facing.dot(sample.facing) < kOpposed * facing.norm())
-    side = find_or_add(key | 1U);
+}
 
-  if (side->weight == 0.0F) side->facing = sample.facing;
-  // West's weighted update of mean and scatter; the scatter along the normal known so far.
+void VoxelMap::add(const Sample& sample) {
+  Side* side = find_or_add(sample.key);
+  if (side->weight > 0.0F && side->normal.dot(sample.normal) < kOpposed * side->normal.norm()) {
+    side = find_or_add(sample.key | 1U);
+  }
   const float total = side->weight + sample.weight;
-  const Eigen::Vector3f before = offset - side->mean;
+  const Eigen::Vector3f before = sample.offset - side->mean;
   const float share = sample.weight / total;
   if (side->weight > 0.0F) {
-    const Eigen::Vector3f direction = (side->normal.isZero() ? side->facing : side->normal).normalized();
-    const float distance = before.dot(direction);
-    side->scatter += distance * distance * side->weight * share;
+    // West's weighted update of the scatter along the normal known so far.
+    const float squared = side->normal.squaredNorm();
+    const float distance = before.dot(side->normal);
+    if (squared > 0.0F) side->scatter += distance * distance / squared * side->weight * share;
+  }
+  if (side->weight == 0.0F || (sample.normal_known && side->normal_known == 0)) {
+    side->normal = sample.weight * sample.normal;
+    side->normal_known = sample.normal_known ? 1U : 0U;
+  } else if (sample.normal_known) {
+    side->normal += sample.weight * sample.normal;
   }
   side->scatter += sample.scatter;
   side->mean += share * before;
   side->color += share * (sample.color - side->color);
-  side->normal += sample.weight * sample.normal;
   side->weight = total;
   // Several samples of one view are one observation (of a merged map: those of its most seen voxel).
   if (side->last_view != view_) side->last_observations = 0;
   side->last_view = view_;
   if (sample.observations > side->last_observations) {
     side->observations += sample.observations - side->last_observations;
-    side->last_observations = sample.observations;
+    side->last_observations = sample.observations & 0x7FFFFFFFU;
   }
 }
 
 void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud) {
   ++view_;
   const double unit = sensor::depth_sigma(1.0);
+  std::vector<Sample> samples;
+  samples.reserve(camera_cloud.size());
   for (const Point& p : camera_cloud.points) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !(p.z > 0.0F) || !std::isfinite(p.z)) continue;
     const Eigen::Vector3d point(p.x, p.y, p.z);
     const Eigen::Vector3d to_camera = -point.normalized();
     Eigen::Vector3d normal(p.normal_x, p.normal_y, p.normal_z);
-    const bool known = normal.allFinite() && normal.squaredNorm() > 0.25;
+    Sample sample;
+    sample.normal_known = normal.allFinite() && normal.squaredNorm() > 0.25;
     double cosine = 0.5;
-    if (known) {
+    if (sample.normal_known) {
       normal.normalize();
       cosine = std::abs(normal.dot(to_camera));
       if (cosine < options_.min_cos_incidence) continue;
     }
-    const double sigma = sensor::depth_sigma(point.z());
-    Sample sample;
-    sample.position = world_from_cloud * point;
-    if (known) sample.normal = (world_from_cloud.rotation * normal).cast<float>();
-    sample.facing = (world_from_cloud.rotation * (known ? normal : to_camera)).cast<float>();
+    if (!locate(world_from_cloud * point, sample)) continue;
+    const double ratio = unit / sensor::depth_sigma(point.z());
+    sample.normal = (world_from_cloud.rotation * (sample.normal_known ? normal : to_camera)).cast<float>();
     sample.color = Eigen::Vector3f(p.r, p.g, p.b);
-    sample.weight = static_cast<float>(std::max(cosine, 1e-3) * unit * unit / (sigma * sigma));
-    add(sample);
+    sample.weight = static_cast<float>(std::max(cosine, 1e-3) * ratio * ratio);
+    samples.push_back(sample);
   }
+  add_all(samples);
 }
 
 void VoxelMap::merge(const VoxelMap& other, const geometry::Rigid3& this_from_other) {
   const Eigen::Matrix3f rotation = this_from_other.rotation.cast<float>();
   ++view_;
+  std::vector<Sample> samples;
+  samples.reserve(other.sides_.size());
   for (const Side& side : other.sides_) {
+    if (!(side.weight > 0.0F)) continue;
     Sample sample;
-    sample.position = this_from_other * other.position(side);
-    if (!side.normal.isZero()) sample.normal = rotation * side.normal.normalized();
-    sample.facing = side.normal.isZero() ? Eigen::Vector3f(rotation * side.facing) : sample.normal;
+    if (!locate(this_from_other * other.position(side), sample)) continue;
+    sample.normal = rotation * side.normal.normalized();
+    sample.normal_known = side.normal_known != 0;
     sample.color = side.color;
     sample.weight = side.weight;
     sample.scatter = side.scatter;
     sample.observations = side.observations;
-    add(sample);
+    samples.push_back(sample);
   }
+  add_all(samples);
 }
 
 Eigen::Vector3d VoxelMap::position(const Side& side) const {
@@ -195,6 +230,7 @@ Eigen::Vector3d VoxelMap::position(const Side& side) const {
 
 FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+  order.reserve(sides_.size());
   for (std::size_t i = 0; i < sides_.size(); ++i) {
     if (sides_[i].weight > 0.0F &&
         sides_[i].observations >= static_cast<std::uint32_t>(options.min_observations)) {
@@ -206,6 +242,9 @@ FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
   FusedCloud fused;
   fused.cloud = std::make_shared<Cloud>();
   fused.cloud->points.reserve(order.size());
+  fused.columns.observations.reserve(order.size());
+  fused.columns.confidence.reserve(order.size());
+  fused.spread_m.reserve(order.size());
   for (const auto& [key, index] : order) {
     const Side& side = sides_[index];
     const Eigen::Vector3f position = this->position(side).cast<float>();
@@ -213,7 +252,7 @@ FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
     p.x = position.x();
     p.y = position.y();
     p.z = position.z();
-    const bool known = side.normal.squaredNorm() > 0.0F;
+    const bool known = side.normal_known != 0 && side.normal.squaredNorm() > 0.0F;
     const Eigen::Vector3f normal =
         known ? side.normal.normalized().eval()
               : Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()).eval();

@@ -63,27 +63,32 @@ class VoxelMap {
   void clear();
 
  private:
-  /// Running weighted means of one side of one voxel.
+  /// Running weighted means of one side of one voxel; 64 bytes.
   struct Side {
-    std::uint64_t key = 0;            ///< voxel and side, ordered as the output
-    Eigen::Vector3f mean{0, 0, 0};    ///< metres from the voxel's centre
-    Eigen::Vector3f normal{0, 0, 0};  ///< weighted sum
-    Eigen::Vector3f color{0, 0, 0};   ///< weighted mean, 0-255
-    Eigen::Vector3f facing{0, 0, 0};  ///< normal or viewing direction of the first measurement
+    std::uint64_t key = 0;          ///< voxel and side, ordered as the output
+    Eigen::Vector3f mean{0, 0, 0};  ///< metres from the voxel's centre
+    Eigen::Vector3f normal{0, 0,
+                           0};       ///< weighted sum; while none is known, the direction to the first camera
+    Eigen::Vector3f color{0, 0, 0};  ///< weighted mean, 0-255
     float weight = 0.0F;
     float scatter = 0.0F;  ///< weighted sum of squared distances from the mean along the normal
     std::uint32_t observations = 0;
     std::uint32_t last_view = 0;
-    std::uint32_t last_observations = 0;  ///< what the last view added
+    std::uint32_t last_observations : 31;  ///< what the last view added
+    std::uint32_t normal_known : 1;
+
+    Side() : last_observations(0), normal_known(0) {}
   };
   struct Sample;
 
+  /// Finds the sample's voxel; false (and counted) when it is out of reach.
+  bool locate(const Eigen::Vector3d& position, Sample& sample);
+  void add_all(const std::vector<Sample>& samples);
   void add(const Sample& sample);
+  [[nodiscard]] std::size_t home(std::uint64_t key) const;
   Side* find_or_add(std::uint64_t key);
   void grow();
   [[nodiscard]] Eigen::Vector3d position(const Side& side) const;
-  [[nodiscard]] bool voxel_of(const Eigen::Vector3d& point, std::uint64_t& key,
-                              Eigen::Vector3f& offset) const;
 
   VoxelMapOptions options_;
   std::vector<Side> sides_;
