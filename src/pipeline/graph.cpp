@@ -160,10 +160,10 @@ class GraphBuilder {
   // ---- inputs
 
   void connect(Draft& draft) {
-    if (draft.node.type == nullptr) return;
+    const ConfigNode* inputs = draft.body->find("inputs");
+    if (draft.node.type == nullptr) return note_uses(draft, inputs);
     const std::vector<Port>& ports = draft.node.type->inputs;
     draft.node.inputs.resize(ports.size());
-    const ConfigNode* inputs = draft.body->find("inputs");
     const std::string path = draft.path + ".inputs";
     if (inputs != nullptr && inputs->kind != Kind::kMap && inputs->kind != Kind::kNull) {
       return problem(inputs->mark, path, "must be a map, e.g. {frame: read}");
@@ -179,6 +179,15 @@ class GraphBuilder {
         problem(inputs != nullptr ? inputs->mark : draft.mark, path,
                 fmt::format("the input {} is missing ({})", port.name, givers(port.type)));
       }
+    }
+  }
+
+  /// What a stage of unknown type reads from is not unused.
+  void note_uses(Draft& draft, const ConfigNode* inputs) {
+    if (inputs == nullptr) return;
+    for (const auto& [name, from] : inputs->entries) {
+      const std::size_t giver = find_draft(from.scalar.substr(0, from.scalar.find('.')));
+      if (giver < drafts_.size()) draft.reads_from.push_back(giver);
     }
   }
 

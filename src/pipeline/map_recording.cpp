@@ -35,8 +35,10 @@ core::Result<void> write_config(const std::filesystem::path& file, const MapRequ
   out.write(fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline)));
   out.write(
       fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format)));
-  out.write(fmt::format("  from: {} s\n  to: {} s\n  every: {}\n  threads: {}\n", request.open.from_s,
-                        request.open.to_s, request.open.every, threads));
+  out.write(fmt::format("  from: {} s\n", request.open.from_s));
+  constexpr double kNoEnd_s = 1e299;
+  if (request.open.to_s < kNoEnd_s) out.write(fmt::format("  to: {} s\n", request.open.to_s));
+  out.write(fmt::format("  every: {}\n  threads: {}\n", request.open.every, threads));
   out.write(to_yaml(graph));
   return out.commit();
 }

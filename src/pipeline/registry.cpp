@@ -9,6 +9,7 @@ namespace plumbline::pipeline {
 void register_stages(StageRegistry& registry) {
   registry.add(read_stage());
   registry.add(features_stage());
+  registry.add(track_stage());
   registry.add(poses_stage());
   registry.add(cloud_stage());
   registry.add(fuse_stage());

@@ -43,6 +43,10 @@ class FuseStage : public Stage {
     filters_.check(context, mark, path, problems);
   }
 
+  core::Result<void> start(const RunContext& context) override {
+    log_ = context.log;
+    return {};
+  }
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("cloud");
     clouds_.push_back({keyframe->id, compact(*keyframe->cloud)});
@@ -63,8 +67,10 @@ class FuseStage : public Stage {
     }
     cloud::VoxelExtractOptions extract;
     extract.min_observations = min_observations_;
-    auto filtered = filters_.chain().apply(voxels.extract(extract).cloud);
+    std::vector<cloud::FilterReport> reports;
+    auto filtered = filters_.chain().apply(voxels.extract(extract).cloud, {}, &reports);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!reports.empty()) log_->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
     auto dense = std::make_shared<DenseCloud>();
     dense->cloud = compact(**filtered);
     dense->voxel_m = options_.voxel_m;
@@ -79,6 +85,7 @@ class FuseStage : public Stage {
   }
 
  private:
+  core::Log* log_ = nullptr;
   cloud::VoxelMapOptions options_;
   int min_observations_ = 1;
   ChainOption filters_{"filters/map.yaml"};

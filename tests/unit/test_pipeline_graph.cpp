@@ -125,6 +125,14 @@ TEST_F(GraphFile, UnusedAndMissingStagesAreTold) {
   expect_told("stages:\n  a: {n: 3}\n", "needs a type (allowed: collect, count, scale, sum)");
 }
 
+TEST_F(GraphFile, AnUnknownTypeIsToldOnceAndNotForEveryNeighbour) {
+  EXPECT_EQ(
+      refusal("stages:\n  a: {type: count}\n  b: {type: scael, inputs: {number: a}}\n"
+              "  c: {type: sum, inputs: {number: b}}\n  d: {type: collect, inputs: {total: c}}\n"),
+      "g.yaml:3:13: stages.b.type: unknown stage type 'scael' (allowed: collect, count, scale, sum; did you "
+      "mean scale?)");
+}
+
 TEST_F(GraphFile, FilesAreFoundBesideThePipelineAndAmongTheShipped) {
   const auto folder = std::filesystem::path(testing::TempDir()) / "plumbline_graph";
   std::filesystem::create_directories(folder / "shipped");

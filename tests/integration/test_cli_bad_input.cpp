@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Broken recordings and broken configuration: one line that names place and remedy, the right exit code.
+#include "program.hpp"
+#include "wall_recording.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+const char* const kMap = "map wall -o out -p known_poses --set output.views='' ";
+
+class BadInput : public ProgramTest {
+ protected:
+  void truncate(const std::string& name) const { fs::resize_file(path(name), fs::file_size(path(name)) / 2); }
+  void expect_refused(const Outcome& o, int code, const std::vector<std::string>& told) const {
+    EXPECT_EQ(o.code, code) << o;
+    for (const std::string& text : told) EXPECT_TRUE(o.told(text)) << text << "\nnot in\n" << o;
+    EXPECT_FALSE(fs::exists(path("out")));
+    EXPECT_FALSE(fs::exists(path("out.partial")));
+  }
+};
+
+TEST_F(BadInput, FolderMissing) { expect_refused(run(kMap), 3, {"wall", "no such"}); }
+
+TEST_F(BadInput, FolderEmpty) {
+  fs::create_directory(path("wall"));
+  expect_refused(run(kMap), 3, {"wall"});
+}
+
+TEST_F(BadInput, ListNamesFilesThatAreNotThere) {
+  write_wall(path("wall"));
+  fs::remove_all(path("wall/rgb"));
+  expect_refused(run(kMap), 3, {"rgb"});
+}
+
+TEST_F(BadInput, OneTruncatedPictureIsSkipped) {
+  write_wall(path("wall"));
+  truncate("wall/rgb/005.png");
+  const Outcome o = run(kMap);
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("005.png")) << o;
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["frames"]["read"], 11);
+  EXPECT_EQ(summary["frames"]["unreadable"], 1);
+  EXPECT_NE(slurp(path("out/frames.csv")).find("\n5,unreadable,"), std::string::npos);
+}
+
+TEST_F(BadInput, ManyBadFramesAreSummarisedAndNotTrusted) {
+  WallRecording wall;
+  wall.frames = 30;
+  write_wall(path("wall"), wall);
+  for (int f = 5; f < 25; ++f) truncate("wall/depth/" + frame_name(f));
+  const Outcome o = run(kMap);
+  EXPECT_EQ(o.code, 4) << o;
+  EXPECT_TRUE(o.told("20 of 30 frames could not be read")) << o;
+  EXPECT_TRUE(o.told("not trustworthy")) << o;
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["trustworthy"], false);
+  EXPECT_NE(summary["reason"].get<std::string>().find("20 unreadable"), std::string::npos) << summary;
+}
+
+TEST_F(BadInput, NothingUsable) {
+  write_wall(path("wall"));
+  for (int f = 0; f < 12; ++f) truncate("wall/rgb/" + frame_name(f));
+  expect_refused(run(kMap), 3, {"wall"});
+}
+
+TEST_F(BadInput, DepthOfAnotherSize) {
+  write_wall(path("wall"));
+  cv::imwrite(path("wall/depth/004.png").string(), cv::Mat(100, 100, CV_16UC1, cv::Scalar(10000)));
+  const Outcome o = run(kMap);
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("004.png")) << o;
+  EXPECT_EQ(read_json(path("out/summary.json"))["frames"]["unreadable"], 1);
+}
+
+TEST_F(BadInput, EightBitDepth) {
+  write_wall(path("wall"));
+  for (int f = 0; f < 12; ++f) {
+    cv::imwrite((path("wall/depth") / frame_name(f)).string(),
+                cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(100)));
+  }
+  expect_refused(run(kMap), 3, {"depth/", "16"});
+}
+
+TEST_F(BadInput, CameraWithoutFocalLength) {
+  WallRecording wall;
+  wall.camera_without = "fx";
+  write_wall(path("wall"), wall);
+  expect_refused(run(kMap), 2, {"camera.yaml", "fx"});
+  expect_refused(run(std::string(kMap) + "--camera tum_fr9"), 2, {"tum_fr9", "tum_fr"});
+}
+
+TEST_F(BadInput, ImpossibleDepthScales) {
+  for (const double scale : {1.0, 50000.0}) {
+    WallRecording wall;
+    wall.camera_scale = scale;
+    fs::remove_all(path("wall"));
+    write_wall(path("wall"), wall);
+    expect_refused(run(kMap), 3, {"depth_scale"});
+  }
+}
+
+TEST_F(BadInput, DoubtfulDepthScaleIsAWarningThatNamesTheLikelyOne) {
+  WallRecording wall;
+  wall.camera_scale = 1000.0;
+  write_wall(path("wall"), wall);
+  const Outcome o = run(kMap);
+  EXPECT_TRUE(o.told("warning")) << o;
+  EXPECT_TRUE(o.told("5000")) << o;
+}
+
+TEST_F(BadInput, NothingInCommonInTime) {
+  WallRecording wall;
+  wall.depth_offset_s = 1000.0;
+  write_wall(path("wall"), wall);
+  expect_refused(run(kMap), 3, {"depth.txt"});
+}
+
+TEST_F(BadInput, ConfigurationIsRefusedBeforeAnythingIsStarted) {
+  write_wall(path("wall"));
+  write("p.yaml",
+        "stages:\n  read: {type: read}\n  poses: {type: poses, inputs: {frame: raed}, keyframe_distnce: 3}\n"
+        "  fuse: {type: fuse, inputs: {cloud: read, map: poses}, voxel: 5 s}\n"
+        "  output: {type: output, inputs: {map: poses, cloud: fuse}, views: iso tpo}\n");
+  expect_refused(
+      run("map wall -o out -p p.yaml --set fuse.voxel=0 --set fsue.voxel=5mm --set fuse"), 2,
+      {"p.yaml:3:42: stages.poses.inputs.frame: there is no stage 'raed'", "did you mean read?",
+       "p.yaml:3:49: stages.poses.keyframe_distnce: unknown key", "did you mean keyframe_distance?",
+       "p.yaml:4:38: stages.fuse.inputs.cloud: 'read' does not give the keyframe_cloud",
+       "p.yaml:4:64: stages.fuse.voxel: '5 s': the unit 's' does not fit", "there is no view 'tpo'",
+       "--set fuse.voxel: 0 is out of range", "--set fsue.voxel: there is no stage 'fsue'",
+       "--set fuse: write it as stage.key=value"});
+  expect_refused(run("map wall -o out -p nothing.yaml"), 2, {"nothing.yaml: no such pipeline"});
+  write("twice.yaml", "stages:\n  read: {type: read}\n  read: {type: read}\n");
+  expect_refused(run("map wall -o out -p twice.yaml"), 2,
+                 {"twice.yaml:3:3: stages.read: the key is given twice"});
+}
+
+TEST_F(BadInput, UsageErrors) {
+  for (const char* arguments :
+       {"", "mpa", "map", "map wall", "map wall -o", "map wall -o out --evry 2", "map wall -o out --every 0",
+        "map wall -o out --threads 0", "map wall -o out -q -v", "evaluate", "render wall -o x.png --size 3",
+        "map a b -o out"}) {
+    const Outcome o = run(arguments);
+    EXPECT_EQ(o.code, 2) << arguments << "\n" << o;
+    EXPECT_FALSE(o.err.empty()) << arguments;
+  }
+}
+
+}  // namespace
+}  // namespace plumbline::integration

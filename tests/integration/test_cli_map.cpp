@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline map: what comes out, that it is the same every time, and what happens to OUT.
+#include <sys/stat.h>
+
+#include <csignal>
+#include <thread>
+
+#include "program.hpp"
+#include "wall_recording.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+const char* const kNoPictures = " --set output.views=''";
+
+class MapCommand : public ProgramTest {
+ protected:
+  MapCommand() { write_wall(path("wall")); }
+};
+
+TEST_F(MapCommand, WritesTheWholeResultFolder) {
+  const Outcome o = run("map wall -o out -p known_poses", "env -u DISPLAY ");
+  ASSERT_EQ(o.code, 0) << o;
+  for (const char* file :
+       {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "lines.ply", "summary.json", "config.yaml",
+        "frames.csv", "timing.csv", "snapshots/iso.png", "snapshots/top.png", "snapshots/front.png"}) {
+    EXPECT_GT(fs::file_size(path("out") / file), 0U) << file;
+  }
+  EXPECT_FALSE(fs::exists(path("out.partial")));
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["frames"]["read"], 12);
+  EXPECT_EQ(summary["frames"]["tracked"], 12);
+  EXPECT_EQ(summary["frames"]["tracked_percent"], 100.0);
+  EXPECT_GT(summary["cloud"]["points"], 1000);
+  EXPECT_GT(summary["timing"]["fps"], 0.0);
+  EXPECT_GT(summary["timing"]["stages_ms"]["read"]["median"], 0.0);
+  EXPECT_GT(summary["memory"]["peak_rss_mb"], 1.0);
+  EXPECT_TRUE(o.told("12 of 12 frames")) << o;
+}
+
+TEST_F(MapCommand, TracksTheWall) {
+  const Outcome o = run(std::string("map wall -o out -q") + kNoPictures);
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_EQ(o.out, "");
+  EXPECT_EQ(o.err, "");
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["frames"]["tracked"], 12);
+  EXPECT_GT(summary["landmarks"]["points"], 50);
+  const Outcome e = run("evaluate trajectory out wall --frames wall/rgb.txt --json");
+  ASSERT_EQ(e.code, 0) << e;
+  const auto report = nlohmann::json::parse(e.out);
+  EXPECT_LT(report["ate_m"]["rmse"], 0.01) << e;
+  EXPECT_EQ(report["matched"], 12);
+  EXPECT_EQ(report["tracked_percent"], 100.0);
+}
+
+TEST_F(MapCommand, SameBytesForAnyNumberOfThreadsAndFromItsOwnConfiguration) {
+  for (const char* pipeline : {"rgbd", "known_poses"}) {
+    const std::string name = pipeline;
+    const std::string common = "map wall -q --set fuse.voxel=20mm" + std::string(kNoPictures);
+    ASSERT_EQ(run(common + " -p " + name + " -o a_" + name + " --threads 1").code, 0);
+    ASSERT_EQ(run(common + " -p " + name + " -o b_" + name + " --threads 3").code, 0);
+    const Outcome again = run("map wall -q -o c_" + name + " -p a_" + name + "/config.yaml");
+    ASSERT_EQ(again.code, 0) << again;
+    for (const char* file :
+         {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "lines.ply", "frames.csv"}) {
+      const std::string bytes = slurp(path("a_" + name) / file);
+      EXPECT_EQ(bytes, slurp(path("b_" + name) / file)) << name << " " << file;
+      EXPECT_EQ(bytes, slurp(path("c_" + name) / file)) << name << " " << file;
+    }
+  }
+}
+
+TEST_F(MapCommand, TakesPartOfTheRecording) {
+  const Outcome o =
+      run(std::string("map wall -o out -p known_poses --from 0.1 --to 0.3 --every 2") + kNoPictures);
+  ASSERT_EQ(o.code, 0) << o;
+  const int read = read_json(path("out/summary.json"))["frames"]["read"];
+  EXPECT_GE(read, 3);
+  EXPECT_LE(read, 4);
+  EXPECT_EQ(run("map wall -o none --from 100").code, 3);
+}
+
+TEST_F(MapCommand, AnEarlierResultIsReplacedOnlyWithForce) {
+  const std::string map = std::string("map wall -p known_poses -q -o out") + kNoPictures;
+  ASSERT_EQ(run(map + " --every 3").code, 0);
+  const std::string before = slurp(path("out/summary.json"));
+  const Outcome refused = run(map);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_TRUE(refused.told("--force")) << refused;
+  EXPECT_EQ(slurp(path("out/summary.json")), before);
+  ASSERT_EQ(run(map + " --force").code, 0);
+  EXPECT_EQ(read_json(path("out/summary.json"))["frames"]["read"], 12);
+  EXPECT_FALSE(fs::exists(path("out.partial")));
+  EXPECT_FALSE(fs::exists(path("out.replaced")));
+
+  // A run that fails leaves the earlier result alone.
+  const std::string good = slurp(path("out/summary.json"));
+  EXPECT_EQ(run(map + " --force --set poses.file=missing.txt").code, 3);
+  EXPECT_EQ(slurp(path("out/summary.json")), good);
+  EXPECT_FALSE(fs::exists(path("out.partial")));
+}
+
+TEST_F(MapCommand, NeverDeletesWhatIsNoResult) {
+  const std::string map = std::string("map wall -p known_poses -q --force") + kNoPictures;
+  fs::create_directory(path("thesis"));
+  write("thesis/chapter1.txt", "years of work");
+  EXPECT_EQ(run(map + " -o thesis").code, 2);
+  EXPECT_EQ(slurp(path("thesis/chapter1.txt")), "years of work");
+  EXPECT_EQ(run(map + " -o wall").code, 2);
+  EXPECT_TRUE(fs::exists(path("wall/rgb.txt")));
+  EXPECT_EQ(run(map + " -o thesis/chapter1.txt").code, 2);
+  fs::create_directory(path("empty"));
+  EXPECT_EQ(run(map + " -o empty/").code, 0);
+  EXPECT_TRUE(fs::exists(path("empty/map.ply")));
+  fs::create_directory(path("new.partial"));
+  write("new.partial/mine.txt", "x");
+  EXPECT_EQ(run(map + " -o new").code, 2);
+  EXPECT_TRUE(fs::exists(path("new.partial/mine.txt")));
+}
+
+TEST_F(MapCommand, OutputThatCannotBeWrittenIsToldBeforeTheRun) {
+  const Outcome o = run("map wall -p known_poses -o /proc/nothing/out");
+  EXPECT_EQ(o.code, 5);
+  EXPECT_TRUE(o.told("/proc/nothing/out")) << o;
+  EXPECT_FALSE(o.told("frames")) << o;
+}
+
+TEST_F(MapCommand, AFullDiskIsAnErrorAndLeavesNothing) {
+  // The shell's file size limit stands in for the disk's end: 40 blocks of 1024 bytes (512 in some shells).
+  const Outcome o = run(std::string("map wall -p known_poses -o out") + kNoPictures, "ulimit -f 40; ");
+  EXPECT_EQ(o.code, 5) << o;
+  EXPECT_TRUE(o.told("map.ply")) << o;
+  EXPECT_FALSE(fs::exists(path("out")));
+  EXPECT_FALSE(fs::exists(path("out.partial")));
+}
+
+TEST_F(MapCommand, CtrlCWritesWhatWasMapped) {
+  WallRecording slow;
+  slow.frames = 200;
+  write_wall(path("long"), slow);
+  // The program runs below the shell; its own process id is what must get the signal.
+  const Outcome started =
+      run("map long -o out --set output.views='' & echo $! > pid.txt; wait $! ; echo $? > code.txt #",
+          "( sleep 0.7; kill -INT $(cat pid.txt) ) & ");
+  EXPECT_EQ(slurp(path("code.txt")), "0\n") << started;
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["stopped"], true) << summary;
+  EXPECT_GT(summary["frames"]["read"], 0);
+  EXPECT_LT(summary["frames"]["read"], 200);
+  EXPECT_TRUE(fs::exists(path("out/map.ply")));
+}
+
+TEST_F(MapCommand, AGeneratedWorldIsARecordingToo) {
+  const Outcome o =
+      run(std::string("map 'synth:room?frames=4&width=160&height=120&seed=3' -o out -p known_poses") +
+          kNoPictures);
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_EQ(read_json(path("out/summary.json"))["frames"]["read"], 4);
+  const Outcome typo = run("map 'synth:rom?frames=4' -o out2");
+  EXPECT_EQ(typo.code, 2) << typo;
+  EXPECT_TRUE(typo.told("room")) << typo;
+}
+
+}  // namespace
+}  // namespace plumbline::integration
