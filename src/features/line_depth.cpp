@@ -5,6 +5,7 @@
 #include "plumbline/features/line_depth.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -17,6 +18,7 @@ namespace {
 
 constexpr double kMinDepth = 0.1;      // m
 constexpr int kCoverageBins = 10;      // stretches of a segment that should each hold support
+constexpr int kMaxSide = 10;           // px
 constexpr double kSameSurface = 0.02;  // of depth: spread across a few pixels of one (slanted) surface
 constexpr std::uint32_t kSeed = 0x9E3779B9U;
 constexpr int kRefinements = 3;
@@ -41,29 +43,38 @@ float depth_at(const cv::Mat& depth, double x, double y) {
   return depth.at<float>(v, u);
 }
 
+// Largest depth that may belong to the same surface as `z` a few pixels away.
+double same_surface_limit(double z) { return z * (1.0 + kSameSurface) + 4.0 * sensor::depth_sigma(z); }
+
 // Depth of the foreground surface at one place of the line: where depth jumps between the two sides, samples
 // of the nearer surface only; of those the one nearest to the line. 0 if there is none.
 double foreground_depth(const cv::Mat& depth, const Eigen::Vector2d& p, const Eigen::Vector2d& normal,
                         const LineDepthOptions& options) {
-  double nearest = 0.0;
-  const auto usable = [&](double z) { return z >= kMinDepth && z <= options.max_depth_m; };  // false for NaN
-  const auto sample = [&](int offset) {
-    return static_cast<double>(depth_at(depth, p.x() + offset * normal.x(), p.y() + offset * normal.y()));
-  };
-  for (int o = -options.side_px; o <= options.side_px; ++o) {
-    const double z = sample(o);
-    if (usable(z) && (nearest == 0.0 || z < nearest)) nearest = z;
+  std::array<double, 2 * kMaxSide + 1> across{};  // 0 = not usable
+  std::array<double, 2 * kMaxSide + 1> sorted{};
+  const int side = std::min(options.side_px, kMaxSide);
+  std::size_t count = 0;
+  for (int o = -side; o <= side; ++o) {
+    const auto z = static_cast<double>(depth_at(depth, p.x() + o * normal.x(), p.y() + o * normal.y()));
+    if (!(z >= kMinDepth && z <= options.max_depth_m)) continue;  // NaN too
+    across[static_cast<std::size_t>(o + kMaxSide)] = z;
+    std::size_t at = count++;
+    for (; at > 0 && sorted[at - 1] > z; --at) sorted[at] = sorted[at - 1];
+    sorted[at] = z;
   }
-  if (nearest == 0.0) return 0.0;
-  const double limit = nearest + kSameSurface * nearest + 4.0 * sensor::depth_sigma(nearest);
-  for (int o = 0; o <= options.side_px; ++o) {
-    const double a = sample(o);
-    const double b = o == 0 ? a : sample(-o);
-    const bool a_ok = usable(a) && a <= limit;
-    const bool b_ok = usable(b) && b <= limit;
+  // Sensors scatter single wild depths along a jump: a surface is what two samples agree on.
+  std::size_t nearest = 0;
+  while (nearest + 1 < count && sorted[nearest + 1] > same_surface_limit(sorted[nearest])) ++nearest;
+  if (nearest + 1 >= count) return 0.0;
+  const double low = sorted[nearest];
+  const double high = same_surface_limit(low);
+  const auto usable = [&](double z) { return z >= low && z <= high; };
+  for (int o = 0; o <= side; ++o) {
+    const double a = across[static_cast<std::size_t>(kMaxSide + o)];
+    const double b = across[static_cast<std::size_t>(kMaxSide - o)];
     // Both sides: their mean is the depth on the line of a slanted surface.
-    if (a_ok && b_ok) return 0.5 * (a + b);
-    if (a_ok || b_ok) return a_ok ? a : b;
+    if (usable(a) && usable(b)) return 0.5 * (a + b);
+    if (usable(a) || usable(b)) return usable(a) ? a : b;
   }
   return 0.0;
 }
@@ -176,7 +187,7 @@ Eigen::Matrix3d point_covariance(const Eigen::Vector3d& ray, double inverse, dou
 
 void LineDepthOptions::declare(core::OptionTable& table) {
   table.integer("depth_samples", samples, {8, 400}, "", "Depth samples along a line, at most");
-  table.integer("depth_side", side_px, {0, 10}, "px", "Depth is looked for this far beside a line");
+  table.integer("depth_side", side_px, {1, 10}, "px", "Depth is looked for this far beside a line");
   table.number("depth_max", max_depth_m, {0.5, 100.0}, "m", "Depth beyond this does not make 3D lines");
   table.number("depth_inlier_sigmas", inlier_sigmas, {1.0, 10.0}, "",
                "Inlier gate in standard deviations of depth");

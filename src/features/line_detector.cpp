@@ -7,21 +7,42 @@
 #include <opencv2/ximgproc/fast_line_detector.hpp>
 
 #include "line_geometry.hpp"
+#include "line_lsd.hpp"
 #include "plumbline/features/line_border.hpp"
 
 namespace plumbline::features {
 namespace {
 
-constexpr int kSmallestImage = 32;    // px; nothing of min_length to be found below
-constexpr double kPieceShare = 0.4;   // pieces this long, relative to min_length, may still be joined
-constexpr float kMinResponse = 1.0F;  // grey levels per px
+constexpr int kSmallestImage = 32;       // px; nothing of min_length to be found below
+constexpr double kPieceShare = 0.4;      // pieces this long, relative to min_length, may still be joined
+constexpr double kHalfScaleBlur = 0.5;   // px of the half image
+constexpr double kFullScaleBlur = 0.75;  // px
+constexpr float kMinResponse = 1.0F;     // grey levels per px
+
+// The picture that lines are looked for in: the region at the asked scale, smoothed.
+cv::Mat detection_image(const cv::Mat& region, const LineDetectorOptions& options) {
+  const bool half = options.scale == LineScale::kHalf;
+  cv::Mat image = region;
+  if (half) {
+    // An odd last row or column has no partner to be averaged with.
+    const cv::Size even(region.cols / 2, region.rows / 2);
+    cv::resize(region(cv::Rect(0, 0, even.width * 2, even.height * 2)), image, even, 0.0, 0.0,
+               cv::INTER_AREA);
+  }
+  if (options.method != LineMethod::kLsd) return image;  // the others smooth by themselves
+  // Pixel noise tears regions apart: at a noise of 8 grey levels this doubles the length of what is found.
+  const double sigma = half ? kHalfScaleBlur : kFullScaleBlur;
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, cv::Size(5, 5), sigma, sigma, cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  return smooth;
+}
 
 // Detectors keep scratch state, so each call has its own.
-std::vector<cv::Vec4f> run(LineMethod method, const cv::Mat& image, float min_length) {
+std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& image, float min_length) {
   std::vector<cv::Vec4f> lines;
-  switch (method) {
+  switch (options.method) {
     case LineMethod::kLsd:
-      cv::createLineSegmentDetector(cv::LSD_REFINE_STD, 1.0)->detect(image, lines);
+      lines = detect_lsd(image, min_length, static_cast<float>(options.min_gradient));
       break;
     case LineMethod::kEdlines: {
       auto drawing = cv::ximgproc::createEdgeDrawing();
@@ -62,6 +83,9 @@ void LineDetectorOptions::declare(core::OptionTable& table) {
   table.choice(
       "scale", scale, {{"half", LineScale::kHalf}, {"full", LineScale::kFull}},
       "Resolution at which edges are looked for; positions are refined at full resolution either way");
+  table.number("min_gradient", min_gradient, {0.5, 100.0}, "",
+               "LSD: weakest gradient, grey levels per pixel of the detection image; under 5.2 only where "
+               "strong ones are few");
   table.number("min_length", min_length_px, {5.0, 1000.0}, "px", "Shorter lines are dropped");
   table.number("border", border_px, {0.0, 100.0}, "px",
                "Lines that run within this margin of a side are dropped");
@@ -78,14 +102,8 @@ void LineDetectorOptions::declare(core::OptionTable& table) {
 std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
   if (gray.empty() || std::min(gray.cols, gray.rows) < kSmallestImage) return {};
   CV_Assert(gray.type() == CV_8UC1);
-  cv::Rect region = valid_region(gray);
+  const cv::Rect region = valid_region(gray);
   const bool half = options_.scale == LineScale::kHalf;
-  cv::Mat image = gray(region);
-  if (half) {
-    // An odd last row or column has no partner to be averaged with.
-    const cv::Size even(region.width / 2, region.height / 2);
-    cv::resize(image(cv::Rect(0, 0, even.width * 2, even.height * 2)), image, even, 0.0, 0.0, cv::INTER_AREA);
-  }
   // A pixel of the half image is centred between four pixels: full = 2 half + 0.5.
   const float factor = half ? 2.0F : 1.0F;
   const float shift = half ? 0.5F : 0.0F;
@@ -94,7 +112,8 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
   const float piece = options_.join ? static_cast<float>(kPieceShare) * min_length : min_length;
 
   std::vector<LineSegment> segments;
-  for (const cv::Vec4f& line : run(options_.method, image, std::max(4.0F, piece / factor))) {
+  for (const cv::Vec4f& line :
+       run(options_, detection_image(gray(region), options_), std::max(4.0F, piece / factor))) {
     LineSegment s;
     s.start = factor * Eigen::Vector2f(line[0], line[1]) + origin;
     s.end = factor * Eigen::Vector2f(line[2], line[3]) + origin;

@@ -152,6 +152,31 @@ TEST(LineDetector, KeepsTheTwoEdgesOfAThinLineApart) {
   EXPECT_NEAR(std::abs(lines[0].middle().y() - lines[1].middle().y()), 5.0F, 0.3F);
 }
 
+TEST(LineDetector, SeesFaintEdgesWhereThereIsNothingElse) {
+  // A white wall's corner: 7 grey levels under a little noise.
+  const std::vector<Polygon> wall = {turned_square(320.0, 240.0, 120.0, 0.4, 227.0)};
+  const cv::Mat image = world::disturb(world::render(640, 480, 220.0, wall), 0.7, 1.0, 0.0, 3);
+  double length = 0.0;
+  for (const LineSegment& l : LineDetector().detect(image)) {
+    EXPECT_GE(world::edge_of(l, wall, 2.5), 0);
+    length += static_cast<double>(l.length());
+  }
+  EXPECT_GT(length, 0.6 * 4.0 * 240.0);
+  LineDetectorOptions published;
+  published.min_gradient = 5.2;
+  double strong = 0.0;
+  for (const LineSegment& l : LineDetector(published).detect(image))
+    strong += static_cast<double>(l.length());
+  EXPECT_LT(strong, 0.5 * length);
+}
+
+TEST(LineDetector, FindsNoLinesInNoise) {
+  for (const double sigma : {2.0, 6.0, 15.0}) {
+    const cv::Mat image = world::disturb(cv::Mat(480, 640, CV_8U, cv::Scalar(128)), sigma, 1.0, 0.0, 11);
+    EXPECT_TRUE(LineDetector().detect(image).empty()) << "noise " << sigma;
+  }
+}
+
 TEST(LineJoin, JoinsCollinearPiecesAndNothingElse) {
   const LineDetectorOptions o;
   // Two pieces 6 px apart, one of the opposite step, one parallel 5 px beside, one too far along, one turned.

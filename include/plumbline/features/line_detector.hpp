@@ -21,6 +21,8 @@ enum class LineScale { kHalf, kFull };
 struct LineDetectorOptions {
   LineMethod method = LineMethod::kLsd;
   LineScale scale = LineScale::kHalf;
+  double min_gradient =
+      3.0;  ///< LSD: grey levels per px at the detection scale; under 5.2 where strong ones are few
   double min_length_px = 25.0;
   double border_px = 4.0;
   int max_count = 0;
