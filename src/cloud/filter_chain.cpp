@@ -15,6 +15,8 @@ namespace {
 using core::ConfigNode;
 using core::ConfigProblems;
 
+constexpr const char* kNameCharacters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+
 std::string near_word(const std::string& word, const std::vector<std::string>& candidates) {
   const std::string near = core::did_you_mean(word, candidates);
   return near.empty() ? "" : fmt::format("; did you mean {}?", near);
@@ -82,6 +84,8 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
   if (name == nullptr || name->kind != ConfigNode::Kind::kScalar || name->scalar.empty()) {
     problems.push_back(
         {name == nullptr ? node.mark : name->mark, prefix + "chain", "the chain needs a name"});
+  } else if (name->scalar.find_first_not_of(kNameCharacters) != std::string::npos) {
+    problems.push_back({name->mark, prefix + "chain", "a name is made of letters, digits, '_', '-' and '.'"});
   } else {
     chain.name_ = name->scalar;
   }

@@ -46,8 +46,8 @@ TEST(FilterChain, AllProblemsAreToldAtOnceWithTheirPlace) {
 }
 
 TEST(FilterChain, NotAChain) {
-  for (const std::string text :
-       {"", "filters: []\n", "chain: a\n", "- 1\n", "chain: a\nfilters: 3\n", "chain: [\n"}) {
+  for (const std::string text : {"", "filters: []\n", "chain: a\n", "- 1\n", "chain: a\nfilters: 3\n",
+                                 "chain: a b\nfilters: []\n", "chain: [\n"}) {
     EXPECT_FALSE(load(text)) << text;
   }
   EXPECT_FALSE(FilterChain::load("/no/such/chain.yaml", builtin_filters()));
