@@ -97,6 +97,47 @@ TEST(EvaluateCloud, DensityOfRandomSamplesDoesNotEnter) {
   EXPECT_GT(run(cloud, reference_of(truth), options)->accuracy_mm.mean, 6.0);
 }
 
+TEST(EvaluateCloud, DistancesToAMeshAreThoseOfTheBox) {
+  const Eigen::Vector3d size(1.0, 0.6, 0.4);
+  Random random(12);
+  SurfaceSamples cloud;
+  for (int i = 0; i < 4000; ++i) {
+    const Eigen::Vector3d p(3.0 * random() - 1.0, 2.0 * random() - 0.7, 1.6 * random() - 0.6);
+    cloud.points.emplace_back(p.cast<float>());
+  }
+  const auto report = run(cloud, reference_of(box_mesh(size.cast<float>())));
+  ASSERT_TRUE(report);
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const Eigen::Vector3d p = cloud.points[i].cast<double>();
+    const Eigen::Vector3d beyond = (p - size).cwiseMax(-p);  // > 0 outside
+    const double expected = beyond.maxCoeff() > 0.0 ? beyond.cwiseMax(0.0).norm() : -beyond.maxCoeff();
+    ASSERT_NEAR(report->error_m[i], expected, 1e-6) << i;
+  }
+}
+
+TEST(EvaluateCloud, DistancesToPointsAreThoseOfASearchThroughAll) {
+  Random random(13);
+  SurfaceSamples cloud, truth;
+  for (int i = 0; i < 700; ++i) {
+    const double x = random(), y = random();
+    cloud.points.emplace_back(Eigen::Vector3d(x, y, random()).cast<float>());
+    truth.points.emplace_back(Eigen::Vector3d(2.0 * y, x, random()).cast<float>());
+  }
+  CloudOptions options;
+  options.distance = SampleDistance::kPoint;
+  const auto report = run(cloud, reference_of(truth), options);
+  ASSERT_TRUE(report);
+  const auto nearest = [](const Eigen::Vector3f& q, const SurfaceSamples& among) {
+    float best = 1e9F;
+    for (const auto& p : among.points) best = std::min(best, (p - q).norm());
+    return best;
+  };
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    ASSERT_NEAR(report->error_m[i], nearest(cloud.points[i], truth), 1e-6F);
+    ASSERT_NEAR(report->reference_error_m[i], nearest(truth.points[i], cloud), 1e-6F);
+  }
+}
+
 TEST(EvaluateCloud, ADistanceOnTheThresholdCounts) {
   const auto report = run(plane(0.5, 0.010, 0.01), reference_of(square_mesh(0.5F)));
   ASSERT_TRUE(report);
@@ -291,11 +332,11 @@ TEST(EvaluateCloud, SameBytesForAnyNumberOfThreads) {
 }
 
 TEST(AlignCloud, IcpFindsAMovedRoom) {
-  const SurfaceSamples room = box({3.0, 2.0, 2.4}, 0.03);
+  const SurfaceSamples room = box({3.0, 2.0, 2.4}, 0.04);
   const Eigen::Isometry3d reference_from_cloud =
       Eigen::Translation3d(0.06, -0.05, 0.04) *
       Eigen::AngleAxisd(0.02, Eigen::Vector3d(1, 2, -1).normalized());
-  const SurfaceSamples cloud = moved(box({3.0, 2.0, 2.4}, 0.025), reference_from_cloud.inverse());
+  const SurfaceSamples cloud = moved(box({3.0, 2.0, 2.4}, 0.05), reference_from_cloud.inverse());
   CloudOptions options;
   options.align = CloudAlignment::kSe3;
   for (const Reference& reference : {reference_of(room), reference_of(box_mesh({3.0F, 2.0F, 2.4F}))}) {
@@ -311,7 +352,7 @@ TEST(AlignCloud, IcpFindsAMovedRoom) {
 }
 
 TEST(AlignCloud, TrajectoriesBridgeWhatIcpCannot) {
-  const SurfaceSamples room = box({3.0, 2.0, 2.4}, 0.03);
+  const SurfaceSamples room = box({3.0, 2.0, 2.4}, 0.04);
   const Eigen::Isometry3d reference_from_cloud =
       Eigen::Translation3d(20.0, -7.0, 1.0) *
       Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.2, 0.1, 1.0).normalized());

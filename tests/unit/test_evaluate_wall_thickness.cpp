@@ -32,9 +32,9 @@ TEST(WallThickness, OfTwoSheetsIsTheirSpacing) {
     for (const bool normals : {true, false}) {
       for (const bool tilted : {true, false}) {
         SCOPED_TRACE(spacing);
-        SurfaceSamples cloud = plane(1.5, 0.0, 0.01);
+        SurfaceSamples cloud = plane(1.2, 0.0, 0.01);
         append(cloud,
-               plane(1.5, spacing, 0.01));  // not tilted, the voxels' border at 0 parts them from below
+               plane(1.2, spacing, 0.01));  // not tilted, the voxels' border at 0 parts them from below
         if (!normals) cloud.normals.clear();
         const WallThickness wall = thickness(tilted ? moved(cloud, tilt()) : cloud, 0.01);
         EXPECT_GE(wall.patches, 20U);
@@ -46,14 +46,14 @@ TEST(WallThickness, OfTwoSheetsIsTheirSpacing) {
 }
 
 TEST(WallThickness, SheetsOnBothSidesOfAVoxelBorder) {
-  SurfaceSamples cloud = plane(1.5, 0.25 - 0.008, 0.01);
-  append(cloud, plane(1.5, 0.25 + 0.008, 0.01));
+  SurfaceSamples cloud = plane(1.2, 0.25 - 0.008, 0.01);
+  append(cloud, plane(1.2, 0.25 + 0.008, 0.01));
   EXPECT_NEAR(thickness(cloud, 0.01).rms_mm, 16.0, 0.01);
 }
 
 TEST(WallThickness, AThinSecondSheetCountsWithTheWholeSpacing) {
-  SurfaceSamples cloud = plane(1.5, 0.0, 0.005);
-  append(cloud, plane(1.5, 0.03, 0.01));  // a quarter as dense
+  SurfaceSamples cloud = plane(1.2, 0.0, 0.005);
+  append(cloud, plane(1.2, 0.03, 0.01));  // a quarter as dense
   const WallThickness wall = thickness(cloud, 0.005);
   EXPECT_NEAR(wall.rms_mm, 30.0, 0.05);
 }
@@ -62,7 +62,7 @@ TEST(WallThickness, OfANoisyWallIsItsNoise) {
   for (const double sigma : {0.002, 0.005, 0.010}) {
     SCOPED_TRACE(sigma);
     Random random(7);
-    SurfaceSamples cloud = plane(2.0, 0.0, 0.005);
+    SurfaceSamples cloud = plane(1.6, 0.0, 0.005);
     cloud.normals.clear();
     for (auto& p : cloud.points) p.z() += static_cast<float>(sigma * random.gauss());
     const WallThickness wall = thickness(moved(cloud, tilt()), 0.005);
