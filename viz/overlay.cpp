@@ -170,43 +170,21 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
   }
 }
 
-void draw_color_bar(Painter& painter, const OverlayContent& content) {
+void draw_value_scale(Painter& painter, const OverlayContent& content) {
   const ColorScale& scale = content.color_scale;
   if (!scale.shown) return;
-  constexpr int kSteps = 128;
   const double s = painter.scale();
   const double height = 0.42 * content.projection.height_px;
   const Eigen::Vector2d corner(content.projection.width_px - 140.0 * s,
                                content.projection.height_px - 100.0 * s - height);
   painter.rectangle(corner - Eigen::Vector2d(16.0 * s, 22.0 * s), {136.0 * s, height + 90.0 * s}, kGround,
                     0.8);
-  const double step = height / kSteps;
-  for (int i = 0; i < kSteps; ++i) {
-    painter.rectangle(corner + Eigen::Vector2d(0.0, i * step), {24.0 * s, 1.02 * step},
-                      sequential_color((i + 0.5) / kSteps));
-  }
-  const double span = scale.high - scale.low;
-  const double tick = nice_number_below(span / 3.0);
-  const int digits = std::max(0, static_cast<int>(std::ceil(-std::log10(tick) - 1e-9)));
-  for (double v = std::ceil(scale.low / tick - 1e-6) * tick; v <= scale.high + 1e-6 * span; v += tick) {
-    const double y = corner.y() + height * (v - scale.low) / span;
-    painter.polyline({{corner.x() + 24.0 * s, y}, {corner.x() + 31.0 * s, y}}, kInk, 1.5);
-    painter.text({corner.x() + 37.0 * s, y},
-                 fmt::format("{:.{}f}", std::abs(v) < 1e-9 * span ? 0.0 : v, digits), 19.0, kInk);
-  }
+  draw_color_bar(painter, scale, corner, height, kTextSize);
   painter.text({content.projection.width_px - 28.0 * s, corner.y() + height + 34.0 * s}, scale.label,
                kTextSize, kInk, Anchor::kRight);
 }
 
 }  // namespace
-
-double nice_number_below(double limit) {
-  const double decade = std::pow(10.0, std::floor(std::log10(limit)));
-  for (const double factor : {5.0, 2.0}) {
-    if (factor * decade <= limit) return factor * decade;
-  }
-  return decade;
-}
 
 std::string length_text(double metres) {
   if (metres >= 1000.0) return fmt::format("{:g} km", metres / 1000.0);
@@ -226,7 +204,7 @@ void draw_annotations(Painter& painter, const OverlayContent& content) {
   }
   if (!content.options->annotations) return;
   draw_title_and_legend(painter, content);
-  draw_color_bar(painter, content);
+  draw_value_scale(painter, content);
   if (content.empty) return;
   draw_scale_bar(painter, content);
   draw_axes(painter, content);

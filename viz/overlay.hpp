@@ -4,6 +4,7 @@
 // What is drawn over the points of a snapshot: camera paths, title, legend, scale bar, axes, colour bar.
 #include <string>
 
+#include "color_bar.hpp"
 #include "painter.hpp"
 #include "point_style.hpp"
 #include "view_frame.hpp"
@@ -21,8 +22,6 @@ struct OverlayContent {
 void draw_paths(Painter& painter, const OverlayContent& content);
 void draw_annotations(Painter& painter, const OverlayContent& content);
 
-/// The greatest of 1, 2, 5 x 10^n that is at most `limit` (> 0).
-double nice_number_below(double limit);
 /// "20 cm", "5 m": a length as people say it.
 std::string length_text(double metres);
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "color_bar.hpp"
 #include "view_frame.hpp"
 
 namespace plumbline::viz {
@@ -24,14 +25,6 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
 
 /// Typical distance between neighbouring points of the surfaces, metres; 0 for fewer than two points.
 double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points);
-
-/// What a colour bar beside the picture explains.
-struct ColorScale {
-  bool shown = false;
-  double low = 0.0;
-  double high = 1.0;
-  std::string label;
-};
 
 struct PointColors {
   std::vector<Rgb> colors;  ///< one per chosen point

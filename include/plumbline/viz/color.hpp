@@ -16,8 +16,8 @@ struct Rgb {
 inline bool operator==(const Rgb& a, const Rgb& b) { return a.r == b.r && a.g == b.g && a.b == b.b; }
 inline bool operator!=(const Rgb& a, const Rgb& b) { return !(a == b); }
 
-/// Colour of the i-th robot, path or series: eight colours that stay apart for colour-blind eyes too
-/// (Okabe and Ito 2008, without yellow on white), then repeated.
+/// Colour of the i-th robot, path or series: eight colours that stay apart for colour-blind eyes too,
+/// dark enough for white ground (after Okabe and Ito 2008), then repeated.
 Rgb category_color(std::size_t index);
 
 /// Perceptually even map from dark blue over green to yellow (viridis), s in [0, 1] (clamped; NaN is grey).

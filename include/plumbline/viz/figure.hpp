@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Charts as plain data, drawn by VTK's charts off-screen. One Figure gives the same drawing as PNG and SVG.
+// Charts as plain data, drawn by VTK's 2D painter off-screen. One Figure gives the same drawing as PNG and
+// SVG.
 #include <filesystem>
 #include <optional>
 #include <string>
