@@ -47,7 +47,7 @@ const Unit* find_unit(std::string_view name) {
 }
 
 std::string allowed_units(const std::string& unit) {
-  if (unit.empty()) return "a number without unit";
+  if (unit.empty()) return "a number";
   const Unit* own = find_unit(unit);
   if (own == nullptr) return "a number in " + unit;
   std::vector<std::string_view> names;
@@ -98,7 +98,7 @@ Parsed parse_number(const ConfigNode& node, const std::string& unit) {
   const Unit* to = find_unit(unit);
   if (from == nullptr || to == nullptr || from->quantity != to->quantity) {
     return {0.0, fmt::format("{}: the unit '{}' does not fit (allowed: {})", describe(node), text,
-                             allowed_units(unit))};
+                             unit.empty() ? "a number without unit" : allowed_units(unit))};
   }
   parsed.value = parsed.value * (from->numerator * to->denominator) / (from->denominator * to->numerator);
   return parsed;

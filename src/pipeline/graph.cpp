@@ -59,6 +59,7 @@ std::vector<Override> parse_overrides(const std::vector<std::string>& texts, Con
       problems.push_back({mark, text.substr(0, equals), "the value is not valid YAML"});
       continue;
     }
+    if (equals + 1 == text.size()) value->kind = Kind::kScalar;  // "stage.key=" is the empty text
     place_on_command_line(*value);
     overrides.push_back({text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), std::move(*value)});
   }

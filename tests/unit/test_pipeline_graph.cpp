@@ -53,6 +53,11 @@ TEST_F(GraphFile, IsSortedWhateverTheOrderInTheFile) {
   EXPECT_EQ(graph->nodes[1].options.value("by"), "3");
 }
 
+TEST_F(GraphFile, NothingAfterTheEqualsSignIsTheEmptyText) {
+  EXPECT_EQ(refusal(kGood, {"twice.file="}), "accepted");
+  EXPECT_EQ(refusal(kGood, {"twice.by="}), "--set twice.by: '' is not a number");
+}
+
 TEST_F(GraphFile, EffectiveConfigurationReadsBackTheSame) {
   const auto graph = parse(kGood, {"twice.by=-4", "count.n=9"});
   ASSERT_TRUE(graph) << graph.error().message;
