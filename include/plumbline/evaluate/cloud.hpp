@@ -27,8 +27,8 @@ enum class CloudAlignment {
 /// What the distance to a sampled surface is. Triangles are always measured exactly.
 enum class SampleDistance {
   /// To the plane through the nearest sample where samples surround the foot of the perpendicular, so that
-  /// sampling
-  /// density does not enter; to the sample itself at borders and holes. Normals are estimated where missing.
+  /// sampling density does not enter; to the sample itself at borders and holes. Normals are estimated where
+  /// missing.
   kSurface,
   kPoint,  ///< to the nearest sample, as many tools do; has a floor of about half the sampling distance
 };
