@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that the code keeps to its layers.
+
+check_layers.py ROOT prints every offence as "file:line: what is wrong" and returns 1 if there is one.
+Includes and CMake dependencies must point to lower layers only, heavy libraries stay in their one module,
+libraries leave the process alone (no printing, no exit, no environment), every file has its SPDX line.
+"""
+import re
+import sys
+from pathlib import Path
+
+# Lowest first. Modules of one layer do not see each other.
+LAYERS = [
+    ["core"],
+    ["geometry"],
+    ["sensor"],
+    ["dataset", "features", "cloud", "optimize"],
+    ["maps"],
+    ["tracking", "places", "evaluate", "synth"],
+    ["mapping"],
+    ["viz"],
+    ["pipeline"],
+    ["net"],
+    ["cli"],
+]
+LAYER_OF = {module: height for height, layer in enumerate(LAYERS) for module in layer}
+TOP_LEVEL = {"maps", "viz"}  # modules whose folder is not below src/
+
+# A library that only one module may include or link. Both patterns match from the start of the name.
+CONFINED = [
+    ("VTK", "viz", r"vtk", r"VTK|vtk"),
+    ("Ceres", "optimize", r"ceres/", r"Ceres::|ceres\b"),
+    ("yaml-cpp", "core", r"yaml-cpp/", r"yaml-cpp"),
+    ("CycloneDDS", "net", r"dds/|ddsc/|org/eclipse/cyclonedds", r"CycloneDDS"),
+    ("CLI11", "cli", r"CLI/", r"CLI11"),
+]
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+OWN = re.compile(r"plumbline/([a-z]+)/")
+# What a library must leave to the program; `allowed` are the files whose very job it is.
+FORBIDDEN = [
+    (re.compile(r"\bstd::(cout|cerr|clog)\b|(?<![\w.>])(std::)?(f?printf|puts)\s*\(|\bfmt::print\s*\("),
+     "libraries do not print"),
+    (re.compile(r"(?<![\w.>:])(std::)?(_?exit|quick_exit|abort)\s*\("), "libraries do not end the process"),
+    (re.compile(r"(?<![\w.>:])(std::)?(secure_)?getenv\s*\("), "libraries do not read the environment"),
+    (re.compile(r"\bstd::(rand|srand|random_device)\b|(?<![\w.>:])s?rand\s*\("),
+     "random choices take a seed"),
+]
+PROGRAM = {"cli"}
+CODE = {".cpp", ".hpp", ".h", ".c"}
+SPDX = "SPDX-License-Identifier: BSD-3-Clause"
+SPDX_SUFFIXES = CODE | {".cmake", ".py", ".yaml", ".idl"}
+SKIPPED = {"build", "out", "demo", ".git", ".cache"}
+
+
+def folder_of(module):
+    return Path(module) if module in TOP_LEVEL else Path("src") / module
+
+
+def code_of(root, module):
+    """All source files of a module, public headers included."""
+    files = []
+    for folder in (root / folder_of(module), root / "include" / "plumbline" / module):
+        files += [f for f in folder.rglob("*") if f.suffix in CODE]
+    return sorted(files)
+
+
+def without_comment(line):
+    return re.sub(r'"(\\.|[^"\\])*"', '""', line).split("//")[0]
+
+
+def check_include(module, bracket, path, reachable):
+    """What is wrong with one #include, or None."""
+    own = OWN.match(path)
+    if own:
+        other = own.group(1)
+        if other not in LAYER_OF:
+            return f"includes {path}, whose module is in no layer"
+        if other != module and LAYER_OF[other] >= LAYER_OF[module]:
+            side = "its own layer" if LAYER_OF[other] == LAYER_OF[module] else "a higher layer"
+            return f"{module} includes {path}, which is in {side}"
+        if other != module and other not in reachable:
+            return f"{module} includes {path} but does not depend on {other} in its CMakeLists.txt"
+        return None
+    if bracket == '"' and ".." in Path(path).parts:
+        return f"includes {path}: only a module's own folder and public headers"
+    for library, home, header, _ in CONFINED:
+        if module != home and re.match(header, path):
+            return f"{module} includes {path}: {library} belongs to {home} only"
+    return None
+
+
+def read_cmake(root, module):
+    """(modules it depends on, problems) of a module's CMakeLists.txt."""
+    file = root / folder_of(module) / "CMakeLists.txt"
+    if not file.is_file():
+        return set(), [f"{file.relative_to(root)}:1: is missing"]
+    depends, problems = set(), []
+    text = re.sub(r"#[^\n]*", "", file.read_text())
+
+    def where(position):
+        return f"{file.relative_to(root)}:{text.count(chr(10), 0, position) + 1}"
+
+    named = [(m.start(1), m.group(1)) for m in re.finditer(r"plumbline::([a-z]+)", text)]
+    for listed in re.finditer(r"\bDEPENDS\s+([a-z_\s]+)", text):
+        named += [(listed.start(1) + m.start(), m.group()) for m in re.finditer(r"\w+", listed.group(1))]
+    for position, other in named:
+        if other not in LAYER_OF or other == module:
+            continue
+        depends.add(other)
+        if LAYER_OF[other] >= LAYER_OF[module]:
+            problems.append(f"{where(position)}: {module} depends on {other}, which is not in a lower layer")
+    for library, home, _, target in CONFINED:
+        found = re.search(rf"(?<![\w:/])(?:{target})", text)
+        if module != home and found:
+            problems.append(f"{where(found.start())}: {module} links {library}, which belongs to {home} only")
+    return depends, problems
+
+
+def closure(depends):
+    """Everything a module sees through its dependencies."""
+    def walk(module, seen):
+        for other in depends[module]:
+            if other not in seen:
+                seen.add(other)
+                walk(other, seen)
+        return seen
+    return {module: walk(module, set()) for module in depends}
+
+
+def check_code(root, module, reachable):
+    problems = []
+    for file in code_of(root, module):
+        for number, line in enumerate(file.read_text(errors="replace").splitlines(), 1):
+            where = f"{file.relative_to(root)}:{number}"
+            include = INCLUDE.match(line)
+            if include:
+                wrong = check_include(module, include.group(1), include.group(2), reachable)
+                if wrong:
+                    problems.append(f"{where}: {wrong}")
+            elif module not in PROGRAM:
+                text = without_comment(line)
+                problems += [f"{where}: {why}" for what, why in FORBIDDEN if what.search(text)]
+    return problems
+
+
+def check_folders(root):
+    """A module without a layer would escape every other check."""
+    problems = []
+    for parent in (root / "src", root / "include" / "plumbline"):
+        for folder in sorted(parent.glob("*")):
+            if folder.is_dir() and folder.name not in LAYER_OF:
+                problems.append(f"{folder.relative_to(root)}:1: this module is in no layer")
+    return problems
+
+
+def check_spdx(root):
+    problems = []
+    for file in sorted(root.rglob("*")):
+        relative = file.relative_to(root)
+        if set(relative.parts[:-1]) & SKIPPED or not file.is_file():
+            continue
+        script = relative.parts[0] in ("scripts", ".ci")
+        if file.suffix not in SPDX_SUFFIXES and file.name != "CMakeLists.txt" and not script:
+            continue
+        if not any(SPDX in line for line in file.read_text(errors="replace").splitlines()[:2]):
+            problems.append(f"{relative}:1: no '{SPDX}' in the first two lines")
+    return problems
+
+
+def check(root):
+    """(problems, number of source files looked at)"""
+    problems = check_folders(root) + check_spdx(root)
+    depends = {}
+    for module in LAYER_OF:
+        depends[module], wrong = read_cmake(root, module)
+        problems += wrong
+    reachable = closure(depends)
+    for module in LAYER_OF:
+        problems += check_code(root, module, reachable[module])
+    return problems, sum(len(code_of(root, module)) for module in LAYER_OF)
+
+
+def main(root):
+    problems, files = check(root)
+    print("\n".join(problems + [f"{files} source files, {len(problems)} problems"]))
+    return 1 if problems or files == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).resolve()))
