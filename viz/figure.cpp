@@ -13,6 +13,7 @@
 #include "chart.hpp"
 #include "image.hpp"
 #include "offscreen.hpp"
+#include "overlay_actor.hpp"
 
 namespace plumbline::viz {
 namespace {
@@ -84,7 +85,8 @@ core::Result<void> write_figure_svg(const Figure& figure, const std::filesystem:
   std::filesystem::path partial = file;
   partial += ".drawing";
   if (!std::ofstream(partial)) {
-    return core::output_error("cannot write " + file.string() + ": no such folder or no right to write there");
+    return core::output_error("cannot write " + file.string() +
+                              ": no such folder or no right to write there");
   }
   vtkNew<vtkSVGExporter> exporter;
   exporter->SetRenderWindow((*window)->window());

@@ -14,6 +14,8 @@
 #include <cmath>
 #include <utility>
 
+#include "overlay_actor.hpp"
+
 namespace plumbline::viz {
 namespace {
 

@@ -2,17 +2,13 @@
 #pragma once
 
 // Two-dimensional drawing on top of a picture: pixels from the lower left corner.
-#include <vtkSmartPointer.h>
-
 #include <Eigen/Core>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "plumbline/viz/color.hpp"
 
 class vtkContext2D;
-class vtkContextActor;
 
 namespace plumbline::viz {
 
@@ -42,8 +38,5 @@ class Painter {
   vtkContext2D* context_;
   double scale_;
 };
-
-/// An actor that calls `paint` whenever the window is drawn.
-vtkSmartPointer<vtkContextActor> make_overlay(std::function<void(vtkContext2D*)> paint);
 
 }  // namespace plumbline::viz

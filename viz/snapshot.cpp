@@ -27,6 +27,7 @@
 #include "image.hpp"
 #include "offscreen.hpp"
 #include "overlay.hpp"
+#include "overlay_actor.hpp"
 #include "point_style.hpp"
 #include "view_frame.hpp"
 
