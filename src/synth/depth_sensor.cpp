@@ -21,10 +21,13 @@ struct Device {
   float wander;          ///< px that borders wander to and fro
   float flying;          ///< share of border pixels that float between front and back
   float fixed_share;     ///< share of the noise variance that stays while the picture does not change
+  /// The depth camera sees less than the colour camera it is registered to: shares of width (left, right) and height
+  /// (top, bottom) without depth.
+  float left, right, top, bottom;
 };
 Device device(Sensor sensor) {
-  if (sensor == Sensor::kRealsense) return {31.0F, 1.0F / 32.0F, 1.6F, 0.35F, 0.5F};
-  return {43.5F, 1.0F / 8.0F, 1.1F, 0.06F, 0.5F};
+  if (sensor == Sensor::kRealsense) return {31.0F, 1.0F / 32.0F, 1.6F, 0.35F, 0.5F, 0.03F, 0.0F, 0.0F, 0.0F};
+  return {43.5F, 1.0F / 8.0F, 1.2F, 0.06F, 0.5F, 0.010F, 0.046F, 0.026F, 0.023F};
 }
 
 cv::Mat1f white_tile(std::uint64_t seed) {
@@ -65,7 +68,7 @@ std::uint64_t frame_bits(const FrameKey& key, std::uint64_t purpose, std::int64_
 /// Exact depth looked up where the matching window of the device really sat: borders become ragged.
 cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tiles, const FrameKey& key, cv::Mat1b& from) {
   const Field still_x(tiles.coarse, mix(key.seed, 11)), still_y(tiles.coarse, mix(key.seed, 12));
-  const Field now_x(tiles.fine, frame_bits(key, 13, key.index)), now_y(tiles.fine, frame_bits(key, 14, key.index));
+  const Field now_x(tiles.medium, frame_bits(key, 13, key.index)), now_y(tiles.medium, frame_bits(key, 14, key.index));
   cv::Mat1f out(exact.size());
   from.create(exact.size());  // 1 where the neighbourhood is not smooth
   for (int y = 0; y < exact.rows; ++y) {
@@ -147,13 +150,18 @@ class Measurement {
 
   void row(int y, const cv::Mat1f& depth, const cv::Mat1b& border, std::uint16_t* out) const {
     const Field still(tiles_.fine, mix(key_.seed, 21)), now(tiles_.fine, frame_bits(key_, 22, key_.index));
-    const Field before(tiles_.fine, frame_bits(key_, 22, key_.index - 1));
-    const Field blobs(tiles_.coarse, mix(key_.seed, 23)), flicker(tiles_.fine, frame_bits(key_, 24, key_.index));
+    const Field blobs(tiles_.coarse, mix(key_.seed, 23)), flicker(tiles_.medium, frame_bits(key_, 24, key_.index));
     const int* ids = view_.ids[y];
-    const float fixed = std::sqrt(device_.fixed_share), fresh = std::sqrt(0.5F * (1.0F - device_.fixed_share));
+    const float fixed = std::sqrt(device_.fixed_share), fresh = std::sqrt(1.0F - device_.fixed_share);
     const float step2 = device_.step * device_.step / 12.0F;
-    for (int x = 0; x < depth.cols; ++x) {
-      out[x] = 0;
+    std::fill(out, out + depth.cols, std::uint16_t{0});
+    const auto w = static_cast<float>(depth.cols), h = static_cast<float>(depth.rows), fy = static_cast<float>(y);
+    // The registered picture's edge is a little askew.
+    if (fy < h * device_.top || fy > h * (1.0F - device_.bottom)) return;
+    const float lean = 0.3F * fy / h;
+    const int first = static_cast<int>(w * device_.left * (0.7F + lean));
+    const int end = depth.cols - static_cast<int>(w * device_.right * (0.9F + 0.6F * lean));
+    for (int x = first; x < end; ++x) {
       float z = depth(y, x);
       if (!(z > 0.0F) || ids[x] < 0) continue;
       const float chance = flicker.at(x, y);
@@ -171,7 +179,7 @@ class Measurement {
       const float per_metre = device_.focal_baseline / (z * z);
       const float sigma = static_cast<float>(sensor::depth_sigma(zd)) * per_metre;
       const float own = std::sqrt(std::max(0.15F * sigma * sigma, sigma * sigma - step2));
-      const float noise = fixed * still.at(x, y) + fresh * (now.at(x, y) + before.at(x, y));
+      const float noise = fixed * still.at(x, y) + fresh * now.at(x, y);
       const float disparity = device_.focal_baseline / z + own * noise;
       const float stepped = std::round(disparity / device_.step) * device_.step;
       if (stepped <= device_.step) continue;
@@ -200,7 +208,9 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   NoiseTiles tiles;
   if (sensor == Sensor::kIdeal) return tiles;
   tiles.fine = white_tile(mix(seed, 1));
-  correlate(tiles.fine, sensor == Sensor::kRealsense ? 1.5 : 0.8);
+  correlate(tiles.fine, sensor == Sensor::kRealsense ? 1.8 : 1.1);
+  tiles.medium = white_tile(mix(seed, 7));
+  correlate(tiles.medium, 2.2);
   tiles.coarse = white_tile(mix(seed, 2));
   correlate(tiles.coarse, 6.0);
   tiles.color.create(kTile, kTile);
@@ -210,6 +220,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
     channel[k] = white_tile(mix(seed, 3 + k));
     correlate(channel[k], k == 3 ? 0.6 : 1.0);
   }
+  tiles.fine = 0.78 * tiles.fine + 0.62 * tiles.medium;  // a sharp core with a skirt, as measured
   for (int y = 0; y < kTile; ++y) {
     for (int x = 0; x < kTile; ++x) {
       for (int k = 0; k < 3; ++k) {
@@ -241,7 +252,7 @@ cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, con
 void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles, const FrameKey& key) {
   if (sensor == Sensor::kIdeal) return;
   // Shot noise: after the square-root coding it is the same for all levels, but for the shadows; more gain, more noise.
-  const float sigma = std::clamp(1.1F * std::sqrt(std::max(gain, 0.3F)), 0.7F, 5.0F);
+  const float sigma = std::clamp(1.0F * std::sqrt(std::max(gain, 0.3F)), 0.7F, 5.0F);
   const int scale = static_cast<int>(std::lround(256.0F * sigma / 16.0F));
   const std::uint64_t bits = frame_bits(key, 31, key.index);
   const int dx = static_cast<int>(bits & 511U), dy = static_cast<int>(bits >> 9U & 511U);

@@ -13,6 +13,7 @@ namespace plumbline::synth {
 /// Ready-made noise, drawn once per source. Tiles wrap round; a frame looks at them with its own shift.
 struct NoiseTiles {
   cv::Mat1f fine;    ///< unit variance, correlated over a pixel or two
+  cv::Mat1f medium;  ///< unit variance, correlated over some five pixels
   cv::Mat1f coarse;  ///< unit variance, correlated over some ten pixels
   cv::Mat_<cv::Vec<std::int8_t, 3>> color;  ///< 16 = one standard deviation
 };

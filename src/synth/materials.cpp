@@ -46,7 +46,7 @@ constexpr std::array kMaterials = {
     Material{"tiles", Print::kTiles, 0.62F, 0.60F, 0.55F, 1.2, 512, 0.6F, 0.3F, 0.0F, true},
     Material{"books", Print::kBooks, 0.4F, 0.3F, 0.25F, 0.5, 256, 0.5F, 0.0F, 0.0F, false},
     Material{"whiteboard", Print::kWhiteboard, 0.85F, 0.86F, 0.86F, 1.8, 1024, 0.8F, 0.5F, 0.0F, false},
-    Material{"window_view", Print::kWindow, 0.8F, 0.85F, 0.9F, 1.2, 512, 0.0F, 0.9F, 2.2F, false},
+    Material{"window_view", Print::kWindow, 0.8F, 0.85F, 0.9F, 1.2, 512, 0.0F, 0.9F, 1.3F, false},
     Material{"wood", Print::kWood, 0.56F, 0.39F, 0.23F, 1.0, 512, 0.6F, 0.1F, 0.0F, false},
     Material{"wood_dark", Print::kWood, 0.26F, 0.15F, 0.08F, 1.0, 512, 0.4F, 0.1F, 0.0F, false},
     Material{"planks", Print::kPlanks, 0.50F, 0.33F, 0.19F, 1.6, 1024, 0.5F, 0.15F, 0.0F, true},

@@ -23,7 +23,7 @@ struct TexelScale {
 TexelScale texel_scale(const World& world, std::size_t face) {
   const Face& f = world.scene.faces[face];
   const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
-  const double tile = world.materials[face]->tile_m;
+  const double tile = world.tile_m[face];
   const bool tiled =
       f.stretch_u <= 0.0 || (world.options.texture == Texture::kNone && world.materials[face]->large);
   return {top.width / (tiled ? tile : f.stretch_u), top.height / (tiled ? tile : f.stretch_v)};

@@ -131,7 +131,7 @@ void SynthSource::Impl::set_exposure() {
     const double t = static_cast<double>(i * kGainStep) / world->options.fps;
     const float now = std::max(0.02F, mean_level(*world, look(*world, small.color, path->world_from_camera(t))));
     level = i == 0 ? now : level + 0.25F * (now - level);
-    gains.push_back(std::clamp(0.56F / level, 0.35F, 3.0F));
+    gains.push_back(std::clamp(0.68F / level, 0.35F, 3.0F));
   }
 }
 

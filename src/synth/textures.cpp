@@ -189,6 +189,35 @@ Canvas brick(const Material& m, cv::Size size, std::uint64_t seed) {
   return canvas;
 }
 
+/// Short creases where the cloth was folded or pulled.
+void add_creases(cv::Mat1f& field, Rng& rng) {
+  cv::Mat1f creases(field.size(), 0.0F);
+  for (int i = 0; i < 70; ++i) {
+    cv::Point p(static_cast<int>(rng.uniform(0, field.cols)), static_cast<int>(rng.uniform(0, field.rows)));
+    double angle = rng.uniform(0.0, M_PI);
+    const double depth = rng.uniform(0.05, 0.16) * (rng.uniform() < 0.5 ? 1.0 : -1.0);
+    for (int k = 0; k < 5; ++k) {
+      const cv::Point q = p + cv::Point(static_cast<int>(7 * std::cos(angle)), static_cast<int>(7 * std::sin(angle)));
+      cv::line(creases, p, q, depth * (1.0 - 0.15 * k), 2, cv::LINE_8);
+      p = q;
+      angle += rng.uniform(-0.5, 0.5);
+    }
+  }
+  cv::GaussianBlur(creases, creases, {0, 0}, 1.0);
+  field += creases;
+}
+
+/// The sewn edge near the floor, held down by strips of tape.
+void add_hem(Canvas& canvas, double pixels_per_m, Rng& rng) {
+  const int bottom = canvas.rows, seam = bottom - static_cast<int>(0.055 * pixels_per_m);
+  canvas.rowRange(seam - 1, seam + 1) *= 0.86;
+  canvas.rowRange(seam + 1, bottom) *= 1.04;
+  for (double x = 0.0; x + 0.1 < canvas.cols / pixels_per_m; x += rng.uniform(0.3, 0.6)) {
+    const int size = static_cast<int>(0.05 * pixels_per_m), left = static_cast<int>(x * pixels_per_m);
+    canvas(cv::Rect(left, bottom - size, size, size)).setTo(cv::Scalar(0.72, 0.55, 0.50));
+  }
+}
+
 /// Hung white cloth: broad soft folds from top to bottom and a faint weave.
 Canvas cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
@@ -204,6 +233,10 @@ Canvas cloth(const Material& m, cv::Size size, std::uint64_t seed) {
     folds.push_back({static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform(0.004, 0.018)),
                      static_cast<float>(rng.uniform(0.015, 0.085) * (rng.uniform() < 0.6 ? 1.0 : -0.6))});
   }
+  for (int i = 0; i < 9; ++i) {  // narrow, nearly sharp ones
+    folds.push_back({static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform(0.0012, 0.0028)),
+                     static_cast<float>(rng.uniform(0.06, 0.15) * (rng.uniform() < 0.5 ? 1.0 : -1.0))});
+  }
   cv::Mat1f field(size, 0.0F);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -218,8 +251,15 @@ Canvas cloth(const Material& m, cv::Size size, std::uint64_t seed) {
       field(y, x) = sum;
     }
   }
+  add_creases(field, rng);
   modulate(canvas, field, 1.0F);
-  modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.008F);
+  modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.012F);
+  for (int i = 0; i < 24; ++i) {  // stains and pin holes
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    cv::ellipse(canvas, c, {1 + static_cast<int>(rng.uniform(0, 2.0)), 1}, rng.uniform(0, 180), 0, 360,
+                scalar(tone(m) * rng.uniform(0.4, 0.75)), -1, cv::LINE_AA);
+  }
+  add_hem(canvas, size.height / m.tile_m, rng);
   return canvas;
 }
 
@@ -456,6 +496,11 @@ Canvas cardboard(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, fractal(size, 3, 64, 3, 0.7F, seed), 0.05F);
   modulate(canvas, fractal(size, 4, 4, 4, 0.6F, seed + 4), 0.05F);
   modulate(canvas, grain(size, seed + 5), 0.05F);
+  Rng rng(seed, 17);
+  for (int i = 0; i < 26; ++i) {  // staples and scratches
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    cv::circle(canvas, c, 2, scalar(tone(m) * (rng.uniform() < 0.5 ? 0.3 : 1.7)), -1, cv::LINE_AA);
+  }
   return canvas;
 }
 
@@ -520,7 +565,16 @@ Texture2d::Level encode(const Canvas& canvas) {
   return level;
 }
 
-Material undressed(const Material& material) {
+int power_of_two(double pixels) {
+  int n = 16;
+  while (n < pixels * 0.75 && n < 2048) n *= 2;
+  return n;
+}
+
+}  // namespace
+
+Material worn(const Material& material, Texture texture) {
+  if (texture != Texture::kNone) return material;
   Material m = material;
   if (m.large) {
     const bool floor = m.print == Print::kCarpet || m.print == Print::kPlanks || m.print == Print::kTiles ||
@@ -531,16 +585,8 @@ Material undressed(const Material& material) {
   return m;
 }
 
-int power_of_two(double pixels) {
-  int n = 16;
-  while (n < pixels * 0.75 && n < 2048) n *= 2;
-  return n;
-}
-
-}  // namespace
-
 Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t seed, double aspect) {
-  const Material m = texture == Texture::kNone ? undressed(material) : material;
+  const Material m = worn(material, texture);
   cv::Size size(m.pixels, m.pixels);
   if (aspect > 0.0) size = {power_of_two(m.pixels * std::min(1.0, aspect)), power_of_two(m.pixels / std::max(1.0, aspect))};
   Canvas canvas;

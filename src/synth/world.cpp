@@ -152,6 +152,7 @@ void World::build_textures(const core::Executor& executor) {
       jobs.push_back({materials[i], mix(seed, name_hash, static_cast<std::uint64_t>(variant)), aspect});
     }
     texture_of[i] = entry->second;
+    tile_m.push_back(worn(*materials[i], options.texture).tile_m);
     if (tiled) {
       Rng rng(static_cast<std::uint64_t>(face.seed), 0x0ff5e7);
       offset_u[i] = static_cast<float>(rng.uniform(0.0, 8.0));

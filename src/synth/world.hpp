@@ -61,6 +61,7 @@ class World {
   std::vector<LightMap> light;             ///< per face
   std::vector<Texture2d> textures;
   std::vector<int> texture_of;  ///< per face
+  std::vector<double> tile_m;   ///< per face: metres one copy of a tiled texture covers
   std::vector<float> offset_u;  ///< per face: shift of tiled textures, metres
   std::vector<float> offset_v;
 
