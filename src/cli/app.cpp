@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <algorithm>
 #include <exception>
 #include <opencv2/core/utility.hpp>
 #include <utility>
@@ -38,7 +38,9 @@ const core::Executor& Session::executor() {
 }
 
 int Session::fail(const core::Error& error) {
-  console().error(error.message);
+  const auto problems = std::count(error.message.begin(), error.message.end(), '\n') + 1;
+  // Several problems stand on lines of their own, so that an editor can follow file:line:column.
+  console().error(problems > 1 ? fmt::format("{} problems\n{}", problems, error.message) : error.message);
   return static_cast<int>(error.kind);
 }
 
