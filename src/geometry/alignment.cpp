@@ -2,6 +2,7 @@
 #include "plumbline/geometry/alignment.hpp"
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <stdexcept>
 
 namespace plumbline::geometry {
@@ -17,6 +18,18 @@ Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vecto
     b.col(i) = target[static_cast<std::size_t>(i)];
   }
   if (n < 3) return {Eigen::Matrix3d::Identity(), (b.rowwise().mean() - a.rowwise().mean()).eval()};
+  const Eigen::Vector3d a_mean = a.rowwise().mean();
+  const Eigen::Vector3d b_mean = b.rowwise().mean();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd((b.colwise() - b_mean) * (a.colwise() - a_mean).transpose(),
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (svd.singularValues()(1) <= 1e-9 * svd.singularValues()(0)) {
+    // On one line (or in one point) the turn about it is free: the smallest rotation from line to line.
+    Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
+    if (svd.singularValues()(0) > 0.0) {
+      r = Eigen::Quaterniond::FromTwoVectors(svd.matrixV().col(0), svd.matrixU().col(0)).toRotationMatrix();
+    }
+    return {r, b_mean - r * a_mean};
+  }
   const Eigen::Matrix4d t = Eigen::umeyama(a, b, false);
   return {t.topLeftCorner<3, 3>(), t.topRightCorner<3, 1>()};
 }
