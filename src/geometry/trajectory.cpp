@@ -2,14 +2,16 @@
 #include "plumbline/geometry/trajectory.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace plumbline::geometry {
 
 std::optional<Rigid3> pose_at(const Trajectory& trajectory, double stamp, double max_gap_s) {
   const auto after = std::lower_bound(trajectory.begin(), trajectory.end(), stamp,
                                       [](const StampedPose& pose, double s) { return pose.stamp < s; });
-  if (after != trajectory.end() && std::abs(after->stamp - stamp) < 1e-6) return after->world_from_camera;
+  // Seconds since 1970 as a double are good to 2e-7: such a difference is none, before and after.
+  constexpr double kSame = 1e-6;
+  if (after != trajectory.end() && after->stamp - stamp < kSame) return after->world_from_camera;
+  if (after != trajectory.begin() && stamp - (after - 1)->stamp < kSame) return (after - 1)->world_from_camera;
   if (after == trajectory.begin() || after == trajectory.end()) return std::nullopt;
   const StampedPose& a = *(after - 1);
   const StampedPose& b = *after;
