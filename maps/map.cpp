@@ -144,8 +144,10 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int 
 
 void Map::add_edge(const SurfaceEdge& edge) {
   if (edge.a == edge.b) throw std::invalid_argument("add_edge: both ends are one keyframe");
-  keyframes_.at(edge.a).edges.push_back(edges_.size());
-  keyframes_.at(edge.b).edges.push_back(edges_.size());
+  KeyframeEntry& a = keyframes_.at(edge.a);  // both must be there before either is changed
+  KeyframeEntry& b = keyframes_.at(edge.b);
+  a.edges.push_back(edges_.size());
+  b.edges.push_back(edges_.size());
   edges_.push_back(edge);
 }
 
