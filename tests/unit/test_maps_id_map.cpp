@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "plumbline/core/ids.hpp"
+#include "plumbline/maps/id_map.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using core::PointId;
+using Names = IdMap<PointId, std::string>;
+
+TEST(IdMap, StartsEmpty) {
+  const Names names;
+  EXPECT_EQ(names.size(), 0U);
+  EXPECT_TRUE(names.ids().empty());
+  EXPECT_EQ(names.find({0, 0}), nullptr);
+  EXPECT_EQ(names.find({0, -1}), nullptr);
+  EXPECT_THROW((void)names.at({0, 0}), std::out_of_range);
+  EXPECT_EQ(names.next_id(3), (PointId{3, 0}));
+}
+
+TEST(IdMap, InsertsReplacesAndErases) {
+  Names names;
+  names.insert({0, 2}, "two");
+  names.insert({0, 0}, "zero");
+  EXPECT_EQ(names.size(), 2U);
+  EXPECT_FALSE(names.contains({0, 1}));  // the hole between
+  names.insert({0, 2}, "deux");
+  EXPECT_EQ(names.size(), 2U);
+  EXPECT_EQ(names.at({0, 2}), "deux");
+  names.at({0, 2}) = "zwei";
+  EXPECT_EQ(*names.find({0, 2}), "zwei");
+  names.erase({0, 2});
+  names.erase({0, 2});
+  names.erase({7, 0});
+  EXPECT_EQ(names.size(), 1U);
+  EXPECT_FALSE(names.contains({0, 2}));
+}
+
+TEST(IdMap, RobotsDoNotMixAndIdsComeInOrder) {
+  Names names;
+  names.insert({2, 0}, "c");
+  names.insert({0, 1}, "b");
+  names.insert({-1, 4}, "z");
+  names.insert({0, 0}, "a");
+  const std::vector<PointId> expected{{-1, 4}, {0, 0}, {0, 1}, {2, 0}};
+  EXPECT_EQ(names.ids(), expected);
+  EXPECT_FALSE(names.contains({1, 0}));
+  EXPECT_EQ(names.next_id(2), (PointId{2, 1}));
+  EXPECT_EQ(names.next_id(-1), (PointId{-1, 5}));
+}
+
+TEST(IdMap, IdsOfWhatIsGoneAreNotGivenAgain) {
+  Names names;
+  names.insert(names.next_id(0), "a");
+  names.insert(names.next_id(0), "b");
+  names.erase({0, 1});
+  EXPECT_EQ(names.next_id(0), (PointId{0, 2}));
+}
+
+}  // namespace
+}  // namespace plumbline::maps
