@@ -30,8 +30,8 @@ std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe, int
 
 class Builder {
  public:
-  Builder(const maps::Map& map, const sensor::Pinhole& camera, double scale_factor)
-      : map_(map), scale_factor_(scale_factor) {
+  Builder(const maps::Map& map, const sensor::Pinhole& camera, const LocalBundleOptions& options)
+      : map_(map), options_(options) {
     bundle_.problem.camera = camera;
   }
 
@@ -43,6 +43,7 @@ class Builder {
     }
     return found->second;
   }
+  [[nodiscard]] bool calm(KeyframeId id) const { return map_.keyframe(id).turn_rate <= options_.max_turn_rate; }
   [[nodiscard]] bool has(KeyframeId id) const { return index_.count(id) != 0; }
 
   /// The landmarks of the window; keyframes outside that see them are held.
@@ -120,14 +121,14 @@ class Builder {
     bundle_.points.push_back(id);
     bundle_.problem.points.push_back(point.position);
     for (const maps::Observation& o : point.observations) {
-      if (!has(o.keyframe)) continue;
+      if (!has(o.keyframe) || !calm(o.keyframe)) continue;
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
       optimize::BundlePointObservation seen;
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
       seen.pixel = f.pixel.cast<double>();
-      seen.pixel_sigma = std::pow(scale_factor_, f.octave);
+      seen.pixel_sigma = std::pow(options_.orb_scale_factor, f.octave);
       seen.depth = static_cast<double>(f.depth);
       seen.depth_sigma = f.depth > 0.0F ? sensor::depth_sigma(seen.depth) : 1.0;
       bundle_.problem.point_observations.push_back(seen);
@@ -141,7 +142,7 @@ class Builder {
     bundle_.lines.push_back(id);
     bundle_.problem.lines.push_back(geometry::line_through(line.start, line.end));
     for (const maps::Observation& o : line.observations) {
-      if (!has(o.keyframe)) continue;
+      if (!has(o.keyframe) || !calm(o.keyframe)) continue;
       const features::LineFeature& f = map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
       optimize::BundleLineObservation seen;
       seen.pose = index_.at(o.keyframe);
@@ -162,7 +163,7 @@ class Builder {
   }
 
   const maps::Map& map_;
-  double scale_factor_;
+  LocalBundleOptions options_;
   LocalBundle bundle_;
   std::map<KeyframeId, int> index_;
 };
@@ -183,11 +184,11 @@ void carry_single_landmarks(maps::Map& map, KeyframeId id, const Rigid3& new_fro
 
 }  // namespace
 
-LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, int wanted, const sensor::Pinhole& camera,
-                              double orb_scale_factor) {
-  Builder builder(map, camera, orb_scale_factor);
-  const std::vector<KeyframeId> window = window_of(map, keyframe, wanted);
-  for (KeyframeId id : window) builder.add_pose(id, id.index == 0);
+LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const sensor::Pinhole& camera,
+                              const LocalBundleOptions& options) {
+  Builder builder(map, camera, options);
+  const std::vector<KeyframeId> window = window_of(map, keyframe, options.keyframes);
+  for (KeyframeId id : window) builder.add_pose(id, id.index == 0 || !builder.calm(id));
   builder.add_landmarks(window);
   builder.add_edges();
   return builder.take();

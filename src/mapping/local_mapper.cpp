@@ -14,6 +14,9 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                 "Frames that should have seen a landmark before it is judged");
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
+  table.number("bundle.max_turn_rate", bundle_max_turn_rate, {0.0, 100.0}, "rad/s",
+               "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: they keep "
+               "the pose of the tracker and move no landmark");
   table.boolean("edges", edges, "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
   table.integer("edges.keyframes", edge_keyframes, {1, 100}, "", "Neighbours that a new keyframe is aligned with");
   table.number("edges.min_overlap", edge_min_overlap, {0.0, 1.0}, "",
@@ -24,11 +27,12 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
 
 core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                                      const std::shared_ptr<const features::FrameFeatures>& features,
-                                     const tracking::TrackResult& track) {
+                                     const tracking::TrackResult& track, double turn_rate) {
   auto keyframe = std::make_shared<maps::Keyframe>();
   keyframe->id = map.next_keyframe_id(robot);
   keyframe->frame_index = frame.index;
   keyframe->stamp = frame.stamp;
+  keyframe->turn_rate = turn_rate;
   keyframe->features = features;
   keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
   const core::KeyframeId id = map.add_keyframe(keyframe, track.camera_from_world);

@@ -30,7 +30,7 @@ Slam::~Slam() = default;
 void Slam::start_map(const sensor::RgbdFrame& frame, const std::shared_ptr<const features::FrameFeatures>& features,
                      FrameReport& report) {
   tracking::TrackResult origin;
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin);
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, 0.0);
   report.reference = report.keyframe;
   report.state = tracking::TrackState::kTracked;
   rule_.keyframe_made();
@@ -60,16 +60,17 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const 
     mapper_.count_sightings(map_, track);
     report.decision = rule_.decide(map_, tracker_.reference(), track, camera_);
     if (report.decision.wanted) {
-      report.keyframe = mapper_.insert(map_, robot_, frame, features, track);
+      report.keyframe = mapper_.insert(map_, robot_, frame, features, track, tracker_.turn_rate());
       report.reference = report.keyframe;
       if (options_.mapper.edges && options_.tracker.depth) {
         mapper_.add_surface_edges(map_, report.keyframe, frame.depth, track.depth_from_camera,
                                   tracker_.local_map().keyframes);
       }
       mapper_.cull(map_);
-      if (options_.mapper.bundle) {
-        LocalBundle bundle = take_local_bundle(map_, report.keyframe, options_.mapper.bundle_keyframes, camera_,
-                                               options_.tracker.association.scale_factor);
+      if (options_.mapper.bundle && tracker_.turn_rate() <= options_.mapper.bundle_max_turn_rate) {
+        const LocalBundleOptions window{options_.mapper.bundle_keyframes, options_.mapper.bundle_max_turn_rate,
+                                        options_.tracker.association.scale_factor};
+        LocalBundle bundle = take_local_bundle(map_, report.keyframe, camera_, window);
         if (optimize::adjust_bundle(bundle.problem, options_.mapper.bundle_options).usable) put_back(bundle, map_);
       }
       rule_.keyframe_made();

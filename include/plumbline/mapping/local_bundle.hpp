@@ -24,10 +24,16 @@ struct LocalBundle {
   std::vector<Seen> line_seen;
 };
 
-/// `wanted`: how many keyframes may move; those around them that see the same landmarks are held. Without any of
-/// these the oldest keyframe is held.
-LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, int wanted,
-                              const sensor::Pinhole& camera, double orb_scale_factor);
+struct LocalBundleOptions {
+  int keyframes = 12;           ///< how many may move
+  double max_turn_rate = 0.6;   ///< rad/s; keyframes taken while turning faster are held, and do not speak
+  double orb_scale_factor = 1.2;
+};
+
+/// Keyframes around those that may move, that see the same landmarks, are held. Without any of these the oldest
+/// keyframe is held.
+LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, const sensor::Pinhole& camera,
+                              const LocalBundleOptions& options);
 
 /// Poses, landmarks and outliers back into the map. Landmarks that only one keyframe sees move with it.
 void put_back(const LocalBundle& bundle, maps::Map& map);

@@ -21,6 +21,7 @@ struct LocalMapperOptions {
   int min_visible = 10;
   bool bundle = true;
   int bundle_keyframes = 12;
+  double bundle_max_turn_rate = 0.6;
   bool edges = true;
   int edge_keyframes = 5;
   double edge_min_overlap = 0.4;
@@ -36,7 +37,7 @@ class LocalMapper {
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth.
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                           const std::shared_ptr<const features::FrameFeatures>& features,
-                          const tracking::TrackResult& track);
+                          const tracking::TrackResult& track, double turn_rate);
 
   /// Counts which landmarks a tracked frame should have seen and did.
   void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;

@@ -34,6 +34,7 @@ struct Keyframe {
   KeyframeId id;
   std::int64_t frame_index = -1;
   double stamp = 0.0;  ///< seconds
+  double turn_rate = 0.0;  ///< rad/s: how fast the camera turned while the picture was taken
   std::shared_ptr<const features::FrameFeatures> features;
   std::vector<SurfaceSample> surface;  ///< well spread over directions and over the picture
 };

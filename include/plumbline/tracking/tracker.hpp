@@ -64,6 +64,8 @@ class Tracker {
   /// The map has changed (keyframe added, poses corrected). `corrected_from_old`: where the last pose went.
   void map_changed(const maps::Map& map, core::KeyframeId reference, const geometry::Rigid3& last_camera_from_world);
 
+  /// How fast the camera turned between the last two frames, rad/s.
+  [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
   [[nodiscard]] const LocalMap& local_map() const { return local_map_; }
 
