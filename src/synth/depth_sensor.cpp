@@ -181,7 +181,7 @@ class Measurement {
       const float own = std::sqrt(std::max(0.15F * sigma * sigma, sigma * sigma - step2));
       const float noise = fixed * still.at(x, y) + fresh * now.at(x, y);
       const float disparity = device_.focal_baseline / z + own * noise;
-      const float stepped = std::round(disparity / device_.step) * device_.step;
+      const float stepped = static_cast<float>(static_cast<int>(disparity / device_.step + 0.5F)) * device_.step;
       if (stepped <= device_.step) continue;
       const float raw = device_.focal_baseline / stepped * 5000.0F;
       if (raw < 65534.5F) out[x] = static_cast<std::uint16_t>(raw + 0.5F);
@@ -271,25 +271,48 @@ void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTil
   }
 }
 
+namespace {
+/// Mean of `taps` copies of a cell's pixels, shifted along `f`.
+void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int taps, cv::Mat3b& out) {
+  int dx[16], dy[16];
+  for (int k = 0; k < taps; ++k) {
+    const float s = static_cast<float>(k) / static_cast<float>(taps - 1) - 0.5F;
+    dx[k] = static_cast<int>(std::lround(s * f[0]));
+    dy[k] = static_cast<int>(std::lround(s * f[1]));
+  }
+  const int divide = (65536 + taps / 2) / taps;
+  for (int y = cell.y; y < cell.y + cell.height; ++y) {
+    int sum[3 * 8] = {};
+    for (int k = 0; k < taps; ++k) {
+      const auto* row = image.ptr<std::uint8_t>(std::clamp(y + dy[k], 0, image.rows - 1));
+      if (cell.x + dx[k] >= 0 && cell.x + dx[k] + cell.width <= image.cols) {
+        const std::uint8_t* p = row + 3 * (cell.x + dx[k]);
+        for (int i = 0; i < 3 * cell.width; ++i) sum[i] += p[i];
+      } else {
+        for (int i = 0; i < cell.width; ++i) {
+          const std::uint8_t* p = row + 3 * std::clamp(cell.x + i + dx[k], 0, image.cols - 1);
+          for (int c = 0; c < 3; ++c) sum[3 * i + c] += p[c];
+        }
+      }
+    }
+    auto* q = out.ptr<std::uint8_t>(y) + 3 * cell.x;
+    for (int i = 0; i < 3 * cell.width; ++i) q[i] = static_cast<std::uint8_t>(std::min(255, (sum[i] * divide + 32768) >> 16));
+  }
+}
+}  // namespace
+
 cv::Mat3b motion_blur(const cv::Mat3b& image, const cv::Mat2f& flow) {
   double longest = 0.0;
   for (const cv::Vec2f& f : flow) longest = std::max(longest, static_cast<double>(std::hypot(f[0], f[1])));
   if (longest < 0.8) return image;
+  constexpr int kCell = 8;  // pixels that share a direction
   const int taps = std::clamp(static_cast<int>(std::ceil(longest)) + 1, 3, 16);
   cv::Mat3b out(image.size());
-  for (int y = 0; y < image.rows; ++y) {
-    const cv::Vec2f* cells = flow[std::min(y / 8, flow.rows - 1)];
-    for (int x = 0; x < image.cols; ++x) {
-      const cv::Vec2f f = cells[std::min(x / 8, flow.cols - 1)];
-      int sum[3] = {0, 0, 0};
-      for (int k = 0; k < taps; ++k) {
-        const float s = static_cast<float>(k) / static_cast<float>(taps - 1) - 0.5F;
-        const int sx = std::clamp(x + static_cast<int>(std::lround(s * f[0])), 0, image.cols - 1);
-        const int sy = std::clamp(y + static_cast<int>(std::lround(s * f[1])), 0, image.rows - 1);
-        const cv::Vec3b& c = image(sy, sx);
-        for (int i = 0; i < 3; ++i) sum[i] += c[i];
-      }
-      for (int i = 0; i < 3; ++i) out(y, x)[i] = static_cast<std::uint8_t>((sum[i] + taps / 2) / taps);
+  for (int y0 = 0; y0 < image.rows; y0 += kCell) {
+    for (int x0 = 0; x0 < image.cols; x0 += kCell) {
+      const cv::Vec2f f = flow[std::min(y0 / kCell, flow.rows - 1)][std::min(x0 / kCell, flow.cols - 1)];
+      const cv::Rect cell = cv::Rect(x0, y0, kCell, kCell) & cv::Rect({0, 0}, image.size());
+      smear(image, cell, f, taps, out);
     }
   }
   return out;

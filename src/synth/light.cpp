@@ -77,7 +77,10 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
   double sum = 0.0;
   for (const Lamp& lamp : world.scene.lamps) {
     const double area = 4.0 * lamp.half_u.norm() * lamp.half_v.norm();
-    if ((lamp.center - p).dot(face.normal) < -1.0 || (lamp.center - p).norm() > 12.0) continue;
+    const Vector3d to_lamp = lamp.center - p;
+    const double far2 = to_lamp.squaredNorm();
+    // Behind the face, or too faint to be seen.
+    if (to_lamp.dot(face.normal) < -1.0 || lamp.power * area < 0.012 * far2) continue;
     double part = 0.0;
     for (int i = -1; i <= 1; ++i) {
       for (int k = -1; k <= 1; ++k) {

@@ -188,7 +188,8 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
 SynthSource::SynthSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SynthSource::~SynthSource() = default;
 
-core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<const World> world, int robot) {
+/// Everything that needs no picture: motion, stamps, and the check of the way.
+core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_ptr<const World> world, int robot) {
   const SynthOptions& o = world->options;
   if (auto ok = check(o); !ok) return tl::unexpected<core::Error>(ok.error());
   if (robot < 0 || robot >= o.robots) {
@@ -216,9 +217,26 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<c
   impl->frames = make_stamps(o, world->events, frames, impl->seed);
   if (impl->frames.empty()) return core::usage_error("events: every frame is dropped, nothing is left to film");
   if (auto free = impl->check_way(); !free) return tl::unexpected<core::Error>(free.error());
-  impl->tiles = make_noise(o.sensor, impl->seed);
+  return impl;
+}
+
+core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<const World> world, int robot) {
+  auto planned = plan(std::move(world), robot);
+  if (!planned) return tl::unexpected<core::Error>(planned.error());
+  std::unique_ptr<Impl> impl = std::move(*planned);
+  impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
   impl->set_exposure();
   return std::unique_ptr<SynthSource>(new SynthSource(std::move(impl)));
+}
+
+core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) {
+  if (auto ok = check(options); !ok) return ok;
+  if (scene.faces.empty() || scene.robots.empty()) return core::usage_error(fmt::format("scene '{}' is empty", scene.name));
+  const auto world = std::make_shared<const World>(scene, options);
+  for (int robot = 0; robot < options.robots; ++robot) {
+    if (auto planned = SynthSource::plan(world, robot); !planned) return tl::unexpected<core::Error>(planned.error());
+  }
+  return {};
 }
 
 const std::string& SynthSource::name() const { return impl_->name; }

@@ -14,34 +14,39 @@ namespace {
 
 using Canvas = cv::Mat_<cv::Vec3f>;  // reflectance, B G R
 
-/// Smooth noise in [-1, 1] on a lattice of `period` cells that wraps round; x, y in cells.
-float value_noise(float x, float y, int period_x, int period_y, std::uint64_t seed) {
-  const float fx = std::floor(x), fy = std::floor(y);
-  const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
-  const auto at = [&](int dx, int dy) {
-    const int cx = ((ix + dx) % period_x + period_x) % period_x, cy = ((iy + dy) % period_y + period_y) % period_y;
-    const std::uint64_t h = mix(seed, static_cast<std::uint64_t>(cx) << 32U | static_cast<std::uint32_t>(cy));
-    return static_cast<float>(h >> 40U) * 0x1.0p-23F - 1.0F;
-  };
-  const float tx = x - fx, ty = y - fy;
-  const float sx = tx * tx * (3.0F - 2.0F * tx), sy = ty * ty * (3.0F - 2.0F * ty);
-  const float top = at(0, 0) + sx * (at(1, 0) - at(0, 0)), low = at(0, 1) + sx * (at(1, 1) - at(0, 1));
-  return top + sy * (low - top);
-}
-
-/// Sum of octaves; `cx`, `cy` cells over the whole image at the lowest one.
+/// Sum of octaves of smooth noise on lattices that wrap round; `cx`, `cy` cells over the whole image at the lowest one.
 cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std::uint64_t seed) {
   cv::Mat1f out(size, 0.0F);
   float gain = 1.0F, sum = 0.0F;
+  std::vector<float> lattice;
+  std::vector<int> cell(static_cast<std::size_t>(size.width));
+  std::vector<float> ease(static_cast<std::size_t>(size.width));
   for (int o = 0; o < octaves; ++o) {
     const int px = cx << o, py = cy << o;
     if (px > size.width && py > size.height) break;
+    const std::uint64_t key = mix(seed + static_cast<std::uint64_t>(o));
+    lattice.resize(static_cast<std::size_t>(px) * static_cast<std::size_t>(py));
+    for (std::size_t i = 0; i < lattice.size(); ++i) {
+      lattice[i] = gain * (static_cast<float>(mix(key ^ i) >> 40U) * 0x1.0p-23F - 1.0F);
+    }
+    const auto smooth = [](float t) { return t * t * (3.0F - 2.0F * t); };
+    for (int x = 0; x < size.width; ++x) {
+      const float u = static_cast<float>(x) * static_cast<float>(px) / static_cast<float>(size.width);
+      cell[static_cast<std::size_t>(x)] = std::min(px - 1, static_cast<int>(u));
+      ease[static_cast<std::size_t>(x)] = smooth(u - std::floor(u));
+    }
     for (int y = 0; y < size.height; ++y) {
-      float* row = out[y];
       const float v = static_cast<float>(y) * static_cast<float>(py) / static_cast<float>(size.height);
+      const int iy = std::min(py - 1, static_cast<int>(v));
+      const float sy = smooth(v - std::floor(v));
+      const float* top = lattice.data() + static_cast<std::size_t>(iy) * static_cast<std::size_t>(px);
+      const float* low = lattice.data() + static_cast<std::size_t>((iy + 1) % py) * static_cast<std::size_t>(px);
+      float* row = out[y];
       for (int x = 0; x < size.width; ++x) {
-        const float u = static_cast<float>(x) * static_cast<float>(px) / static_cast<float>(size.width);
-        row[x] += gain * value_noise(u, v, px, py, seed + static_cast<std::uint64_t>(o));
+        const int i = cell[static_cast<std::size_t>(x)], k = i + 1 == px ? 0 : i + 1;
+        const float sx = ease[static_cast<std::size_t>(x)];
+        const float a = top[i] + sx * (top[k] - top[i]), b = low[i] + sx * (low[k] - low[i]);
+        row[x] += a + sy * (b - a);
       }
     }
     sum += gain * gain;

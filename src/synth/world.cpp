@@ -175,6 +175,8 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
       return core::usage_error(fmt::format("scene '{}': no material '{}'", scene.name, face.material));
     }
   }
+  // The cheap things that can go wrong come before the second or two of drawing.
+  if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());
   auto world = std::make_shared<World>(scene, options);
   world->build_textures(executor);
   world->build_light(executor);

@@ -52,9 +52,14 @@ class SynthSource final : public dataset::FrameSource {
 
  private:
   struct Impl;
+  friend core::Result<void> check_paths(const Scene& scene, const SynthOptions& options);
+  static core::Result<std::unique_ptr<Impl>> plan(std::shared_ptr<const World> world, int robot);
   explicit SynthSource(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+/// Whether every robot's path is free, without building textures and light. The error names the segment and the thing.
+core::Result<void> check_paths(const Scene& scene, const SynthOptions& options);
 
 /// Opens "synth:SCENE?key=value&..."; keys are those of SynthOptions and `robot` (0 .. robots-1).
 /// Unknown scenes and keys are errors with a suggestion.
