@@ -24,23 +24,46 @@ PointTerm to_term(const BundlePointObservation& o) {
   return term;
 }
 
-/// The problem's numbers as Ceres wants them, and back.
-struct Blocks {
-  std::vector<PoseBlock> poses;
-  std::vector<LineBlock> lines;
+/// The problem's numbers as Ceres wants them, and back. All in one buffer: within an elimination group Ceres
+/// goes by the blocks' addresses, so that with points and lines in buffers of their own the order of its
+/// sums, and with it the last digits of the result, would hang on where the heap put them.
+class Blocks {
+ public:
+  explicit Blocks(const BundleProblem& problem)
+      : poses_(problem.poses.size()), points_(problem.points.size()), lines_(problem.lines.size()) {
+    numbers_.resize(7 * poses_ + 3 * points_ + 6 * lines_);
+    for (std::size_t i = 0; i < poses_; ++i)
+      from_rigid(problem.poses[i].camera_from_world, pose(static_cast<int>(i)));
+    for (std::size_t i = 0; i < points_; ++i) {
+      std::copy_n(problem.points[i].data(), 3, point(static_cast<int>(i)));
+    }
+    for (std::size_t i = 0; i < lines_; ++i) {
+      from_line(geometry::to_orthonormal(problem.lines[i]), line(static_cast<int>(i)));
+    }
+  }
+  [[nodiscard]] double* pose(int i) { return numbers_.data() + 7 * static_cast<std::size_t>(i); }
+  [[nodiscard]] double* point(int i) {
+    return numbers_.data() + 7 * poses_ + 3 * static_cast<std::size_t>(i);
+  }
+  [[nodiscard]] double* line(int i) {
+    return numbers_.data() + 7 * poses_ + 3 * points_ + 6 * static_cast<std::size_t>(i);
+  }
+  void write_back(BundleProblem& problem) {
+    for (std::size_t i = 0; i < poses_; ++i) {
+      if (!problem.poses[i].fixed) problem.poses[i].camera_from_world = to_rigid(pose(static_cast<int>(i)));
+    }
+    for (std::size_t i = 0; i < points_; ++i)
+      std::copy_n(point(static_cast<int>(i)), 3, problem.points[i].data());
+    for (std::size_t i = 0; i < lines_; ++i) {
+      problem.lines[i] = geometry::to_plucker(to_line(line(static_cast<int>(i))));
+    }
+  }
 
-  explicit Blocks(const BundleProblem& problem) : poses(problem.poses.size()), lines(problem.lines.size()) {
-    for (std::size_t i = 0; i < poses.size(); ++i) from_rigid(problem.poses[i].camera_from_world, poses[i].data());
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-      from_line(geometry::to_orthonormal(problem.lines[i]), lines[i].data());
-    }
-  }
-  void write_back(BundleProblem& problem) const {
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      if (!problem.poses[i].fixed) problem.poses[i].camera_from_world = to_rigid(poses[i].data());
-    }
-    for (std::size_t i = 0; i < lines.size(); ++i) problem.lines[i] = geometry::to_plucker(to_line(lines[i].data()));
-  }
+ private:
+  std::size_t poses_;
+  std::size_t points_;
+  std::size_t lines_;
+  std::vector<double> numbers_;
 };
 
 /// Builds and solves one round; the Ceres problem does not outlive it.
@@ -57,31 +80,30 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
   ceres::Problem ceres_problem(problem_options);
   auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
 
-  for (std::size_t i = 0; i < blocks.poses.size(); ++i) {
-    ceres_problem.AddParameterBlock(blocks.poses[i].data(), 7, &pose_manifold);
-    if (problem.poses[i].fixed) ceres_problem.SetParameterBlockConstant(blocks.poses[i].data());
-    ordering->AddElementToGroup(blocks.poses[i].data(), 1);
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    double* pose = blocks.pose(static_cast<int>(i));
+    ceres_problem.AddParameterBlock(pose, 7, &pose_manifold);
+    if (problem.poses[i].fixed) ceres_problem.SetParameterBlockConstant(pose);
+    ordering->AddElementToGroup(pose, 1);
   }
   for (const BundlePointObservation& o : problem.point_observations) {
     if (o.outlier) continue;
-    double* point = problem.points[static_cast<std::size_t>(o.point)].data();
+    double* point = blocks.point(o.point);
     ceres_problem.AddResidualBlock(new PointCost(to_term(o), problem.camera), &point_loss,
-                                   blocks.poses[static_cast<std::size_t>(o.pose)].data(), point);
+                                   blocks.pose(o.pose), point);
     ordering->AddElementToGroup(point, 0);
   }
   for (const BundleLineObservation& o : problem.line_observations) {
     if (o.outlier) continue;
-    double* line = blocks.lines[static_cast<std::size_t>(o.line)].data();
+    double* line = blocks.line(o.line);
     if (!ceres_problem.HasParameterBlock(line)) {
       ceres_problem.AddParameterBlock(line, 6, &line_manifold);
       ordering->AddElementToGroup(line, 0);
     }
-    ceres_problem.AddResidualBlock(new LineCost(o, problem.camera), &line_loss,
-                                   blocks.poses[static_cast<std::size_t>(o.pose)].data(), line);
+    ceres_problem.AddResidualBlock(new LineCost(o, problem.camera), &line_loss, blocks.pose(o.pose), line);
   }
   for (const BundleEdge& edge : problem.edges) {
-    ceres_problem.AddResidualBlock(new EdgeCost(edge), &edge_loss, blocks.poses[static_cast<std::size_t>(edge.a)].data(),
-                                   blocks.poses[static_cast<std::size_t>(edge.b)].data());
+    ceres_problem.AddResidualBlock(new EdgeCost(edge), &edge_loss, blocks.pose(edge.a), blocks.pose(edge.b));
   }
 
   ceres::Solver::Options solver;
@@ -97,19 +119,17 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
   return summary;
 }
 
-void mark_outliers(BundleProblem& problem, const Blocks& blocks, const BundleOptions& options) {
+void mark_outliers(BundleProblem& problem, Blocks& blocks, const BundleOptions& options) {
   for (BundlePointObservation& o : problem.point_observations) {
     PointTerm term = to_term(o);
-    term.world = problem.points[static_cast<std::size_t>(o.point)];
+    term.world = Eigen::Map<const Eigen::Vector3d>(blocks.point(o.point));
     Eigen::Vector3d r;
-    const int rows = point_residual(term, to_rigid(blocks.poses[static_cast<std::size_t>(o.pose)].data()),
-                                    problem.camera, r, nullptr);
+    const int rows = point_residual(term, to_rigid(blocks.pose(o.pose)), problem.camera, r, nullptr);
     o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= options.point_gate);
   }
   for (BundleLineObservation& o : problem.line_observations) {
     const LineCost cost(o, problem.camera);
-    const double* parameters[2] = {blocks.poses[static_cast<std::size_t>(o.pose)].data(),
-                                   blocks.lines[static_cast<std::size_t>(o.line)].data()};
+    const double* parameters[2] = {blocks.pose(o.pose), blocks.line(o.line)};
     Eigen::Vector4d r;
     cost.Evaluate(parameters, r.data(), nullptr);
     o.outlier = !(r.head<2>().squaredNorm() <= options.line_gate);
@@ -121,8 +141,10 @@ void mark_outliers(BundleProblem& problem, const Blocks& blocks, const BundleOpt
 void BundleOptions::declare(core::OptionTable& table) {
   table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "", "Iterations of each round at most");
   table.integer("bundle.rounds", rounds, {1, 10}, "", "Solves; between them outliers are put aside");
-  table.number("bundle.point_loss", point_loss, {0.1, 100.0}, "", "Huber threshold of points, standard deviations");
-  table.number("bundle.line_loss", line_loss, {0.1, 100.0}, "", "Huber threshold of lines, standard deviations");
+  table.number("bundle.point_loss", point_loss, {0.1, 100.0}, "",
+               "Huber threshold of points, standard deviations");
+  table.number("bundle.line_loss", line_loss, {0.1, 100.0}, "",
+               "Huber threshold of lines, standard deviations");
   table.number("bundle.edge_loss", edge_loss, {0.1, 1000.0}, "",
                "Huber threshold of relative poses, standard deviations");
 }
@@ -136,12 +158,10 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
     return summary;
   }
   Blocks blocks(problem);
-  const std::vector<Eigen::Vector3d> points_before = problem.points;
   for (int round = 0; round < options.rounds; ++round) {
     const ceres::Solver::Summary ceres_summary = solve_round(problem, blocks, options);
     if (round == 0) summary.initial_cost = ceres_summary.initial_cost;
     if (!ceres_summary.IsSolutionUsable()) {
-      problem.points = points_before;
       summary.message = ceres_summary.message;
       return summary;
     }
