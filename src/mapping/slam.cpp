@@ -41,7 +41,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const 
   FrameReport report;
   report.frame_index = frame.index;
   report.stamp = frame.stamp;
-  const tracking::TrackResult track = tracker_.track(map_, frame, *features);
+  last_track_ = tracker_.track(map_, frame, *features);
+  const tracking::TrackResult& track = last_track_;
   report.state = track.state;
   if (track.state == tracking::TrackState::kInitialising) {
     start_map(frame, features, report);

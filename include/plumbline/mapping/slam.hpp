@@ -54,6 +54,8 @@ class Slam {
   void finish();
 
   [[nodiscard]] const maps::Map& map() const { return map_; }
+  /// What the tracker said about the last frame; for pictures of it.
+  [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Poses after optimisation: tracked frames only, in order of time.
   [[nodiscard]] geometry::Trajectory trajectory() const;
   [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
@@ -77,6 +79,7 @@ class Slam {
   core::Log* log_;
   maps::Map map_;
   tracking::Tracker tracker_;
+  tracking::TrackResult last_track_;
   KeyframeRule rule_;
   LocalMapper mapper_;
   std::vector<FramePose> frames_;
