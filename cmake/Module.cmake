@@ -21,6 +21,8 @@ function(plumbline_module name)
     target_link_libraries(plumbline_${name} INTERFACE ${ARG_DEPENDS} ${ARG_LINK})
   endif()
   add_library(plumbline::${name} ALIAS plumbline_${name})
+  set_target_properties(plumbline_${name} PROPERTIES EXPORT_NAME ${name})
+  install(TARGETS plumbline_${name} EXPORT plumbline ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endfunction()
 
 # plumbline_test(NAME SOURCES... LINK library...): a GoogleTest program, each of its tests seen by ctest.

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# cmake -D BUILD=... -D WORK=... [-D FLAGS=...] -P run.cmake: installs BUILD below WORK, builds the project beside
+# this file against it and runs it; a pipeline of the installed program is checked, too.
+function(run)
+  execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK}/out)
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${WORK}/build -G Ninja
+    -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_BUILD_TYPE=Debug "-DCMAKE_CXX_FLAGS=${FLAGS}")
+run(${CMAKE_COMMAND} --build ${WORK}/build)
+run(${WORK}/build/consumer ${WORK}/out)
+run(${WORK}/prefix/bin/plumbline pipelines check rgbd)
+file(REMOVE_RECURSE ${WORK}/prefix)
