@@ -30,6 +30,19 @@ Robust huber(double squared, double threshold) {
   return {threshold * (error - 0.5 * threshold), threshold / error};
 }
 
+/// What a term costs that has no image at a pose, standard deviations: hiding it behind the camera must not pay.
+constexpr double kUnseen = 1e3;
+
+/// Levenberg-Marquardt damping, alike in all directions of a block. Marquardt's own scaling by each diagonal entry
+/// would be blind to weak directions: with one wall in view, moving along it by d / sin(tilt) does for the wall
+/// what moving towards it by d does, and would be damped no more.
+Vector6d damping(const Matrix6d& h, double lambda) {
+  Vector6d d;
+  d.head<3>().setConstant(lambda * h.diagonal().head<3>().maxCoeff() + 1e-9);
+  d.tail<3>().setConstant(lambda * h.diagonal().tail<3>().maxCoeff() + 1e-9);
+  return d;
+}
+
 void add_row(const Row6& j, double r, double w, NormalEquations& n) {
   for (int a = 0; a < 6; ++a) {
     const double wa = w * j(a);
@@ -47,7 +60,10 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
   for (const PointTerm& term : problem.points) {
     Eigen::Vector3d r;
     const int rows = point_residual(term, pose, problem.camera, r, kDerivatives ? &j3 : nullptr);
-    if (rows == 0) continue;
+    if (rows == 0) {
+      n.cost += options.point_weight * huber(kUnseen * kUnseen, options.point_loss).cost;
+      continue;
+    }
     const Robust pixel = huber(r.head<2>().squaredNorm(), options.point_loss);
     n.cost += options.point_weight * pixel.cost;
     double depth_weight = 0.0;
@@ -67,7 +83,10 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
       geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx, problem.camera.cy);
   for (const LineTerm& term : problem.lines) {
     Eigen::Vector2d r;
-    if (!line_residual(term, pose, projection, r, kDerivatives ? &j2 : nullptr)) continue;
+    if (!line_residual(term, pose, projection, r, kDerivatives ? &j2 : nullptr)) {
+      n.cost += options.line_weight * huber(kUnseen * kUnseen, options.line_loss).cost;
+      continue;
+    }
     const Robust robust = huber(r.squaredNorm(), options.line_loss);
     n.cost += options.line_weight * robust.cost;
     if constexpr (kDerivatives) {
@@ -130,7 +149,7 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   double lambda = 1e-5;
   for (; summary.iterations < options.max_iterations; ++summary.iterations) {
     Matrix6d damped = n.h.selfadjointView<Eigen::Lower>();
-    damped.diagonal() += lambda * n.h.diagonal() + Vector6d::Constant(1e-9);
+    damped.diagonal() += damping(n.h, lambda);
     const Vector6d step = -damped.ldlt().solve(n.g);
     if (!step.allFinite()) break;
     const Rigid3 trial = geometry::exp_se3(step) * pose;
