@@ -57,7 +57,8 @@ std::optional<Relocalisation> relocalise(const maps::Map& map, const std::vector
   const cv::Matx33d k(camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0);
   for (core::KeyframeId id : candidates) {
     const std::vector<Pair> pairs = match_all(map, id, features);
-    if (static_cast<int>(pairs.size()) < min_inliers) continue;
+    // P3P has up to four solutions; a fourth pair must be there to choose, whatever the threshold.
+    if (static_cast<int>(pairs.size()) < std::max(4, min_inliers)) continue;
     std::vector<cv::Point3d> world;
     std::vector<cv::Point2d> pixels;
     for (const Pair& pair : pairs) {
