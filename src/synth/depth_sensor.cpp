@@ -161,6 +161,8 @@ class Measurement {
     const float lean = 0.3F * fy / h;
     const int first = static_cast<int>(w * device_.left * (0.7F + lean));
     const int end = depth.cols - static_cast<int>(w * device_.right * (0.9F + 0.6F * lean));
+    int lit = -1;  // the face that `weak` was worked out for, anew every four pixels
+    float weak = 0.0F;
     for (int x = first; x < end; ++x) {
       float z = depth(y, x);
       if (!(z > 0.0F) || ids[x] < 0) continue;
@@ -172,7 +174,8 @@ class Measurement {
           if (other > 0.0F) z = 0.5F * (z + other);
         }
       }
-      const float weak = signal(ids[x], x, y, z);
+      if (ids[x] != lit || (x & 3) == 0) weak = signal(ids[x], x, y, z);
+      lit = ids[x];
       if (weak < 0.075F + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
       const auto zd = static_cast<double>(z);
       if (zd < range_.min || zd > range_.max + 0.15 * static_cast<double>(blobs.at(x, y))) continue;
