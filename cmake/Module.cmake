@@ -25,11 +25,16 @@ function(plumbline_module name)
   install(TARGETS plumbline_${name} EXPORT plumbline ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endfunction()
 
-# plumbline_test(NAME SOURCES... LINK library...): a GoogleTest program, each of its tests seen by ctest.
+# plumbline_test(NAME SOURCES... LINK library... [LABEL label]): a GoogleTest program, each of its tests seen by
+# ctest under the label (default: unit). A test that GTEST_SKIPs, for want of recordings say, is told as skipped.
 function(plumbline_test name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL" "SOURCES;LINK" ${ARGN})
+  if(NOT ARG_LABEL)
+    set(ARG_LABEL unit)
+  endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main plumbline_warnings)
   target_compile_definitions(${name} PRIVATE PLUMBLINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+                       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 300)
 endfunction()
