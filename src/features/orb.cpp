@@ -14,12 +14,13 @@ constexpr int kEdge = 16;        // ORB's patch (31 px) must lie inside the pict
 constexpr int kHalfPatch = 15;
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
 
-/// Half width of the circular patch in each row, as in the ORB paper's intensity centroid.
+/// Half width of the circular patch in each row, as in the ORB paper's intensity centroid. u^2 + v^2 <= r (r + 1)
+/// is the same seen along x and along y; rounding each row is not, and bends orientations by several degrees.
 std::array<int, kHalfPatch + 1> patch_rows() {
   std::array<int, kHalfPatch + 1> rows{};
   for (int v = 0; v <= kHalfPatch; ++v) {
     rows[static_cast<std::size_t>(v)] =
-        static_cast<int>(std::lround(std::sqrt(static_cast<double>(kHalfPatch * kHalfPatch - v * v))));
+        static_cast<int>(std::sqrt(static_cast<double>(kHalfPatch * (kHalfPatch + 1) - v * v)));
   }
   return rows;
 }
@@ -174,7 +175,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
 
   cv::Mat descriptors;
   const auto orb = cv::ORB::create(static_cast<int>(keypoints.size()), static_cast<float>(options_.scale_factor),
-                                   options_.levels, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
+                                   options_.levels, kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
   orb->compute(gray, keypoints, descriptors);
   result.points.resize(keypoints.size());
   result.descriptors.resize(keypoints.size());
