@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/mapping/slam.hpp"
 
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "plumbline/mapping/local_bundle.hpp"
@@ -13,6 +14,14 @@ void SlamOptions::declare(core::OptionTable& table) {
   tracker.declare(table);
   keyframe.declare(table);
   mapper.declare(table);
+}
+
+/// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all that
+/// follows would be lost.
+static bool can_start_map(const sensor::RgbdFrame& frame) {
+  constexpr double kMinMeasured = 0.05;  // share of the pixels
+  return !frame.depth.empty() &&
+         cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
 }
 
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
@@ -45,6 +54,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const 
   const tracking::TrackResult& track = last_track_;
   report.state = track.state;
   if (track.state == tracking::TrackState::kInitialising) {
+    if (!can_start_map(frame)) return report;
     start_map(frame, features, report);
     remember_pose(frame.stamp, Rigid3{}, true);
     return report;
