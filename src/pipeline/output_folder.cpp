@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/pipeline/output_folder.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
-#include <fstream>
 #include <system_error>
 #include <utility>
 
@@ -14,7 +16,8 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMegabyte = 1'000'000;
 constexpr std::uintmax_t kLeastFreeMb = 64;
-/// In every OUT.partial, so that what an interrupted run left behind can be told from anything else.
+/// In every OUT.partial and locked by its run, so that what an interrupted run left behind can be told from
+/// anything else, and from a run that is still going on.
 const char* const kMarker = ".plumbline-unfinished";
 
 fs::path with_ending(const fs::path& folder, const char* ending) {
@@ -53,6 +56,15 @@ core::Result<void> check_target(const fs::path& target, bool replace) {
   return {};
 }
 
+/// Descriptor of the locked marker, -1 when it cannot be had.
+int lock_marker(const fs::path& partial, int flags) {
+  const int descriptor = open((partial / kMarker).c_str(), flags | O_CLOEXEC, 0644);
+  if (descriptor < 0) return -1;
+  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  close(descriptor);
+  return -1;
+}
+
 /// Removes what an interrupted run left, and nothing else.
 core::Result<void> clear_leftover(const fs::path& partial) {
   std::error_code ec;
@@ -63,7 +75,13 @@ core::Result<void> clear_leftover(const fs::path& partial) {
                     "another output folder",
                     partial.string()));
   }
+  const int lock = lock_marker(partial, O_RDONLY);
+  if (lock < 0 && !fs::is_empty(partial, ec)) {
+    return core::usage_error(fmt::format(
+        "{}: another run is writing there; wait or name another output folder", partial.string()));
+  }
   fs::remove_all(partial, ec);
+  if (lock >= 0) close(lock);
   if (ec)
     return core::output_error(fmt::format("{}: cannot be removed ({})", partial.string(), ec.message()));
   return {};
@@ -76,16 +94,20 @@ bool is_result_folder(const fs::path& folder) {
   return fs::is_regular_file(folder / "summary.json", ec) && fs::is_regular_file(folder / "config.yaml", ec);
 }
 
-OutputFolder::OutputFolder(fs::path target, fs::path partial)
-    : target_(std::move(target)), partial_(std::move(partial)) {}
+OutputFolder::OutputFolder(fs::path target, fs::path partial, int lock)
+    : target_(std::move(target)), partial_(std::move(partial)), lock_(lock) {}
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
-    : target_(std::move(other.target_)), partial_(std::exchange(other.partial_, {})) {}
+    : target_(std::move(other.target_)),
+      partial_(std::exchange(other.partial_, {})),
+      lock_(std::exchange(other.lock_, -1)) {}
 
 OutputFolder::~OutputFolder() {
-  if (partial_.empty()) return;
-  std::error_code ignored;
-  fs::remove_all(partial_, ignored);
+  if (!partial_.empty()) {
+    std::error_code ignored;
+    fs::remove_all(partial_, ignored);
+  }
+  if (lock_ >= 0) close(lock_);
 }
 
 core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace) {
@@ -101,11 +123,9 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
     return core::output_error(fmt::format("{}: cannot be created ({}); name a folder where you may write",
                                           out.string(), ec.message()));
   }
-  OutputFolder folder(target, partial);
-  std::ofstream marker(partial / kMarker);
-  if (!(marker << "An unfinished result of plumbline; may be removed.\n" << std::flush)) {
-    return core::output_error(fmt::format("{}: cannot be written", out.string()));
-  }
+  const int lock = lock_marker(partial, O_CREAT | O_WRONLY);
+  if (lock < 0) return core::output_error(fmt::format("{}: cannot be written", out.string()));
+  OutputFolder folder(target, partial, lock);
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",

@@ -43,11 +43,13 @@ class ReadStage : public Stage {
   }
 
   core::Result<void> finish(StageIo& io) override {
+    if (io.frame() == 0)
+      return core::input_error("stopped before the first frame was mapped; nothing is written");
     if (unreadable_ > kToldOneByOne) {
       log_->warning(
           fmt::format("{} of {} frames could not be read and were skipped", unreadable_.load(), io.frame()));
     }
-    if (read_ == 0 && io.frame() > 0) {
+    if (read_ == 0) {
       return core::input_error(fmt::format("{}: none of {} frames could be read; see the warnings above",
                                            source_->name(), io.frame()));
     }

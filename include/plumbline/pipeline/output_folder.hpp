@@ -13,8 +13,8 @@ namespace plumbline::pipeline {
 class OutputFolder {
  public:
   /// Checks and makes OUT.partial. kUsage: OUT exists and `replace` is false, or OUT is neither empty nor an
-  /// earlier result (then `replace` does not help: nothing else is ever deleted). kOutput: cannot be created
-  /// or written, or less than 64 MB are free.
+  /// earlier result (then `replace` does not help: nothing else is ever deleted), or another run is writing
+  /// there. kOutput: cannot be created or written, or less than 64 MB are free.
   static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace);
 
   OutputFolder(OutputFolder&& other) noexcept;
@@ -25,9 +25,10 @@ class OutputFolder {
   core::Result<void> commit();
 
  private:
-  OutputFolder(std::filesystem::path target, std::filesystem::path partial);
+  OutputFolder(std::filesystem::path target, std::filesystem::path partial, int lock);
   std::filesystem::path target_;
   std::filesystem::path partial_;  ///< empty: nothing to clean up
+  int lock_ = -1;                  ///< descriptor of the locked marker file
 };
 
 /// Whether a folder holds the result of an earlier run.
