@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks the pages: check_docs.py ROOT PROGRAM
+
+Links to files of the tree must lead somewhere, every page of docs/ is in its index, and every `plumbline` command in
+a page is one that the program has, with the flags it is shown with.
+"""
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
+BLOCK = re.compile(r"^```[a-z]*\n(.*?)^```", re.S | re.M)
+GROUPS = {"evaluate", "pipelines", "filters"}
+
+
+def pages(root):
+    return sorted(root.glob("*.md")) + sorted((root / "docs").rglob("*.md"))
+
+
+def check_links(root):
+    problems = []
+    for page in pages(root):
+        for number, line in enumerate(page.read_text().splitlines(), 1):
+            for target in LINK.findall(line):
+                if not re.match(r"[a-z]+:", target) and not (page.parent / target).exists():
+                    problems.append(f"{page.relative_to(root)}:{number}: {target} is not there")
+    return problems
+
+
+def check_index(root):
+    index = root / "docs" / "README.md"
+    listed = set(LINK.findall(index.read_text())) if index.is_file() else set()
+    return [f"docs/README.md:1: does not list {page.name}" for page in pages(root)
+            if page.parent == root / "docs" and page != index and page.name not in listed]
+
+
+def commands(text):
+    """(line, words) of every plumbline command in the code blocks of a page."""
+    for block in BLOCK.finditer(text):
+        first = text.count("\n", 0, block.start(1)) + 1
+        for number, line in enumerate(block.group(1).splitlines(), first):
+            words = line.split("#")[0].replace("build/release/bin/", "").split()
+            if words[:1] == ["plumbline"]:
+                yield number, words[1:]
+
+
+def check_commands(root, help_of):
+    """`help_of(words)` gives the help of a command, None when there is no such command."""
+    problems = []
+    for page in pages(root):
+        for number, words in commands(page.read_text()):
+            command = words[:2] if words[:1] and words[0] in GROUPS else words[:1]
+            where = f"{page.relative_to(root)}:{number}"
+            text = help_of(command)
+            if text is None:
+                problems.append(f"{where}: there is no command 'plumbline {' '.join(command)}'")
+                continue
+            for flag in [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]:
+                if not re.search(rf"(?<![\w-]){re.escape(flag)}(?![\w-])", text):
+                    problems.append(f"{where}: plumbline {' '.join(command)} has no {flag}")
+    return problems
+
+
+def check(root, help_of):
+    return check_links(root) + check_index(root) + check_commands(root, help_of)
+
+
+def main(root, program):
+    def help_of(command):
+        run = subprocess.run([program, *command, "--help"], capture_output=True, text=True)
+        return run.stdout if run.returncode == 0 else None
+
+    problems = check(root, help_of)
+    print("\n".join(problems + [f"{len(pages(root))} pages, {len(problems)} problems"]))
+    return 1 if problems or not pages(root) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).resolve(), sys.argv[2]))

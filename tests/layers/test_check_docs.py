@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The check of the pages, tried on made-up ones."""
+import tempfile
+import unittest
+from pathlib import Path
+
+import check_docs
+
+HELP = {("map",): "map INPUT -o,--output OUT --every N", ("evaluate", "cloud"): "--align none|se3"}
+
+
+class CheckDocs(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = Path(folder.name)
+        (self.root / "docs").mkdir()
+        self.write("docs/README.md", "[a](a.md) [up](../README.md#place) [web](https://example.org/x)\n")
+        self.write("docs/a.md", "words\n")
+        self.write("README.md", "[docs](docs/README.md)\n\n```\nplumbline map IN -o OUT --every 2  # --nonsense\n"
+                   "build/release/bin/plumbline evaluate cloud C --align se3\nplumb x\n```\n")
+
+    def write(self, path, text):
+        (self.root / path).write_text(text)
+
+    def problems(self):
+        return check_docs.check(self.root, lambda command: HELP.get(tuple(command)))
+
+    def test_good_pages_pass(self):
+        self.assertEqual(self.problems(), [])
+        self.assertEqual(len(list(check_docs.commands((self.root / "README.md").read_text()))), 2)
+
+    def test_dead_link(self):
+        self.write("docs/a.md", "words\n[b](b.png)\n")
+        self.assertEqual(self.problems(), ["docs/a.md:2: b.png is not there"])
+
+    def test_page_that_is_not_listed(self):
+        self.write("docs/b.md", "words\n")
+        self.assertEqual(self.problems(), ["docs/README.md:1: does not list b.md"])
+
+    def test_command_that_is_not_there(self):
+        self.write("docs/a.md", "```sh\nplumbline fly\nplumbline evaluate smell\n```\n")
+        self.assertEqual(self.problems(), ["docs/a.md:2: there is no command 'plumbline fly'",
+                                           "docs/a.md:3: there is no command 'plumbline evaluate smell'"])
+
+    def test_flag_that_is_not_there(self):
+        self.write("docs/a.md", "```\nplumbline map IN --ever 2\nplumbline evaluate cloud --every=3\n```\n")
+        self.assertEqual(self.problems(), ["docs/a.md:2: plumbline map has no --ever",
+                                           "docs/a.md:3: plumbline evaluate cloud has no --every"])
+
+
+if __name__ == "__main__":
+    unittest.main()
