@@ -201,6 +201,40 @@ bool Tracker::trustworthy(const TrackResult& result, const features::FrameFeatur
   return by_features || by_surface;
 }
 
+std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                              const features::FrameFeatures& features) const {
+  if (lost_frames_ >= 30) return std::nullopt;
+  for (const Rigid3& guess : guesses(features, frame.stamp)) {
+    TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
+    judge(features, attempt);
+    if (attempt.state == TrackState::kTracked) return attempt;
+  }
+  return std::nullopt;
+}
+
+std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                               const features::FrameFeatures& features) {
+  std::vector<core::KeyframeId> candidates = local_map_.keyframes;
+  const std::vector<core::KeyframeId> all = map.keyframe_ids();
+  for (auto id = all.rbegin(); id != all.rend() && candidates.size() < 40; ++id) {
+    if (std::find(candidates.begin(), candidates.end(), *id) == candidates.end()) candidates.push_back(*id);
+  }
+  const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers);
+  if (!seen) return std::nullopt;
+  LocalMap before = std::move(local_map_);
+  local_map_ = build_local_map(map, seen->keyframe, options_.local_map);
+  TrackResult attempt = estimate(map, frame, features, seen->camera_from_world, 10.0);
+  judge(features, attempt);
+  attempt.relocalised = true;
+  if (attempt.state != TrackState::kTracked) {
+    local_map_ = std::move(before);  // a mistake must not take the surroundings away
+    return std::nullopt;
+  }
+  velocity_.setZero();
+  last_.valid = false;
+  return attempt;
+}
+
 TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
                            const features::FrameFeatures& features) {
   TrackResult result;
@@ -209,36 +243,11 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     remember(frame, features, result);
     return result;
   }
-  bool found = false;
-  if (lost_frames_ < 30) {
-    for (const Rigid3& guess : guesses(features, frame.stamp)) {
-      TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
-      judge(features, attempt);
-      if (attempt.state != TrackState::kTracked) continue;
-      result = std::move(attempt);
-      found = true;
-      break;
-    }
-  }
-  if (!found) {
-    std::vector<core::KeyframeId> candidates = local_map_.keyframes;
-    const std::vector<core::KeyframeId> all = map.keyframe_ids();
-    for (auto id = all.rbegin(); id != all.rend() && candidates.size() < 40; ++id) {
-      if (std::find(candidates.begin(), candidates.end(), *id) == candidates.end()) candidates.push_back(*id);
-    }
-    if (const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers)) {
-      local_map_ = build_local_map(map, seen->keyframe, options_.local_map);
-      TrackResult attempt = estimate(map, frame, features, seen->camera_from_world, 10.0);
-      judge(features, attempt);
-      attempt.relocalised = true;
-      if (attempt.state == TrackState::kTracked) {
-        result = std::move(attempt);
-        velocity_.setZero();
-        last_.valid = false;
-        found = true;
-      }
-    }
-  }
+  // After a while without a pose the last one says little: surfaces near it fit by chance, so the picture goes first.
+  constexpr int kStaleFrames = 5;
+  const bool stale = lost_frames_ >= kStaleFrames;
+  std::optional<TrackResult> found = stale ? by_picture(map, frame, features) : by_motion(map, frame, features);
+  if (!found) found = stale ? by_motion(map, frame, features) : by_picture(map, frame, features);
   if (!found) {
     result.state = TrackState::kLost;
     result.camera_from_world = predict(frame.stamp);
@@ -246,8 +255,8 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     velocity_ *= 0.8;
     return result;
   }
-  remember(frame, features, result);
-  return result;
+  remember(frame, features, *found);
+  return *std::move(found);
 }
 
 void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,

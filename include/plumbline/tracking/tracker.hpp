@@ -84,6 +84,12 @@ class Tracker {
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
                                      const features::FrameFeatures& features, const geometry::Rigid3& guess,
                                      double radius) const;
+  /// From where the camera should be by now; none when nothing there can be trusted.
+  [[nodiscard]] std::optional<TrackResult> by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                                     const features::FrameFeatures& features) const;
+  /// From what the picture looks like; the local map moves there.
+  [[nodiscard]] std::optional<TrackResult> by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                                      const features::FrameFeatures& features);
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] bool trustworthy(const TrackResult& result, const features::FrameFeatures& features) const;
   void judge(const features::FrameFeatures& features, TrackResult& result) const;
