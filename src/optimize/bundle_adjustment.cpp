@@ -66,6 +66,23 @@ class Blocks {
   std::vector<double> numbers_;
 };
 
+/// Poses that edges hold are held to where they are by 1 m and 1 rad as well: far weaker than anything measured, but
+/// directions that an edge leaves free would otherwise run off (the solver scales each unknown by what is known of
+/// it, and so prefers to move along them).
+void hold_weakly(const BundleProblem& problem, Blocks& blocks, PoseBlock& origin, ceres::Problem& ceres_problem) {
+  std::vector<char> held(problem.poses.size(), 0);
+  for (const BundleEdge& edge : problem.edges) {
+    for (const int i : {edge.a, edge.b}) {
+      const auto k = static_cast<std::size_t>(i);
+      if (held[k] != 0 || problem.poses[k].fixed) continue;
+      held[k] = 1;
+      const BundleEdge stay{-1, i, to_rigid(blocks.pose(i)), geometry::Matrix6d::Identity()};
+      ceres_problem.AddResidualBlock(new EdgeCost(stay), nullptr, origin.data(), blocks.pose(i));
+      ceres_problem.SetParameterBlockConstant(origin.data());
+    }
+  }
+}
+
 /// Builds and solves one round; the Ceres problem does not outlive it.
 ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const BundleOptions& options) {
   ceres::Problem::Options problem_options;
@@ -76,6 +93,8 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
   ceres::HuberLoss line_loss(options.line_loss);
   ceres::HuberLoss edge_loss(options.edge_loss);
   PoseManifold pose_manifold;
+  PoseBlock origin;
+  from_rigid({}, origin.data());
   LineManifold line_manifold;
   ceres::Problem ceres_problem(problem_options);
   auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
@@ -106,6 +125,9 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
     ceres_problem.AddResidualBlock(new EdgeCost(edge), &edge_loss, blocks.pose(edge.a), blocks.pose(edge.b));
   }
 
+  hold_weakly(problem, blocks, origin, ceres_problem);
+  if (ceres_problem.HasParameterBlock(origin.data())) ordering->AddElementToGroup(origin.data(), 1);
+
   ceres::Solver::Options solver;
   solver.linear_solver_type = problem.poses.size() <= 60 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   solver.linear_solver_ordering.reset(ordering);
@@ -127,12 +149,18 @@ void mark_outliers(BundleProblem& problem, Blocks& blocks, const BundleOptions& 
     const int rows = point_residual(term, to_rigid(blocks.pose(o.pose)), problem.camera, r, nullptr);
     o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= options.point_gate);
   }
+  const Eigen::Matrix3d projection = geometry::line_projection(problem.camera.fx, problem.camera.fy,
+                                                               problem.camera.cx, problem.camera.cy);
   for (BundleLineObservation& o : problem.line_observations) {
-    const LineCost cost(o, problem.camera);
-    const double* parameters[2] = {blocks.pose(o.pose), blocks.line(o.line)};
-    Eigen::Vector4d r;
-    cost.Evaluate(parameters, r.data(), nullptr);
-    o.outlier = !(r.head<2>().squaredNorm() <= options.line_gate);
+    LineTerm term;
+    term.world = geometry::to_plucker(to_line(blocks.line(o.line)));
+    term.start = o.start;
+    term.end = o.end;
+    term.pixel_sigma = o.pixel_sigma;
+    Eigen::Vector2d r;
+    // A line through the camera's centre has no image: it cannot be what was seen there.
+    const bool has_image = line_residual(term, to_rigid(blocks.pose(o.pose)), projection, r, nullptr);
+    o.outlier = !has_image || !(r.squaredNorm() <= options.line_gate);
   }
 }
 
