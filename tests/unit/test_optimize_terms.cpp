@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Analytic Jacobians of every residual against central differences; for Ceres' cost functions through the
+// manifolds that the solver uses.
+#include <gtest/gtest.h>
+
+#include "cost_edge.hpp"
+#include "cost_line.hpp"
+#include "cost_point.hpp"
+#include "manifolds.hpp"
+#include "numeric_jacobian.hpp"
+#include "plumbline/optimize/pose_terms.hpp"
+#include "random_world.hpp"
+
+namespace plumbline::optimize {
+namespace {
+
+using geometry::Rigid3;
+using geometry::Vector6d;
+using tests::numeric_jacobian;
+using tests::Random;
+
+const sensor::Pinhole kCamera{640, 480, 520.0, 540.0, 318.0, 243.0};
+const Eigen::Matrix3d kProjection = geometry::line_projection(520.0, 540.0, 318.0, 243.0);
+
+/// Largest difference, as a share of the largest entry.
+template <typename A, typename B>
+double relative(const A& analytic, const B& numeric) {
+  return (analytic - numeric).cwiseAbs().maxCoeff() / (1.0 + numeric.cwiseAbs().maxCoeff());
+}
+
+Eigen::Vector3d in_front(Random& random) {
+  return {random.uniform(-1.5, 1.5), random.uniform(-1.0, 1.0), random.uniform(0.8, 5.0)};
+}
+
+TEST(PointResidual, IsTheReprojectionAndDepthError) {
+  PointTerm term;
+  term.world = {0.2, -0.1, 2.0};
+  term.pixel = kCamera.project(term.world) + Eigen::Vector2d(3.0, -1.0);
+  term.pixel_sigma = 2.0;
+  Eigen::Vector3d r;
+  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 2);
+  EXPECT_NEAR(r(0), 1.5, 1e-12);
+  EXPECT_NEAR(r(1), -0.5, 1e-12);
+  EXPECT_EQ(r(2), 0.0);
+  term.depth = 2.02;
+  term.depth_sigma = 0.01;
+  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 3);
+  EXPECT_NEAR(r(2), 2.0, 1e-9);
+  term.world.z() = -2.0;
+  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 0) << "behind the camera";
+  term.world.z() = 0.0;
+  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 0) << "in the camera";
+}
+
+TEST(PointResidual, Jacobian) {
+  Random random(1);
+  for (int i = 0; i < 30; ++i) {
+    const Rigid3 pose = random.pose(3.0, 2.0);
+    PointTerm term;
+    term.world = pose.inverse() * in_front(random);
+    term.pixel = {random.uniform(0, 640), random.uniform(0, 480)};
+    term.pixel_sigma = random.uniform(0.5, 3.0);
+    term.depth = i % 2 == 0 ? 2.0 : 0.0;
+    term.depth_sigma = 0.02;
+    Eigen::Vector3d r;
+    Eigen::Matrix<double, 3, 6> j;
+    ASSERT_EQ(point_residual(term, pose, kCamera, r, &j), i % 2 == 0 ? 3 : 2);
+    const auto numeric = numeric_jacobian<3, 6>([&](const Vector6d& xi) {
+      Eigen::Vector3d e;
+      point_residual(term, geometry::exp_se3(xi) * pose, kCamera, e, nullptr);
+      return e;
+    });
+    EXPECT_LT(relative(j, numeric), 1e-6);
+  }
+}
+
+TEST(LineResidual, IsTheDistanceOfTheEndpoints) {
+  LineTerm term;  // a horizontal line, in the image at v = 243 + 540 * 0.5 / 2
+  term.world = geometry::line_through({-1.0, 0.5, 2.0}, {1.0, 0.5, 2.0});
+  term.start = {100.0, 243.0 + 135.0 + 4.0};
+  term.end = {300.0, 243.0 + 135.0 - 2.0};
+  term.pixel_sigma = 2.0;
+  Eigen::Vector2d r;
+  ASSERT_TRUE(line_residual(term, {}, kProjection, r, nullptr));
+  EXPECT_NEAR(std::abs(r(0)), 2.0, 1e-9);
+  EXPECT_NEAR(std::abs(r(1)), 1.0, 1e-9);
+  EXPECT_LT(r(0) * r(1), 0.0) << "on both sides of the line";
+}
+
+TEST(LineResidual, ALineThroughTheCameraHasNoImage) {
+  LineTerm term;
+  term.world = geometry::line_through({0, 0, 0}, {0.1, 0.2, 1.0});
+  Eigen::Vector2d r;
+  EXPECT_FALSE(line_residual(term, {}, kProjection, r, nullptr));
+  EXPECT_TRUE(line_residual(term, {Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0}}, kProjection, r, nullptr));
+}
+
+TEST(LineResidual, Jacobian) {
+  Random random(2);
+  for (int i = 0; i < 30; ++i) {
+    const Rigid3 pose = random.pose(3.0, 2.0);
+    LineTerm term;
+    term.world =
+        geometry::transform(pose.inverse(), geometry::line_through(in_front(random), in_front(random)));
+    term.start = {random.uniform(0, 640), random.uniform(0, 480)};
+    term.end = {random.uniform(0, 640), random.uniform(0, 480)};
+    term.pixel_sigma = 1.3;
+    Eigen::Vector2d r;
+    Eigen::Matrix<double, 2, 6> j;
+    ASSERT_TRUE(line_residual(term, pose, kProjection, r, &j));
+    const auto numeric = numeric_jacobian<2, 6>([&](const Vector6d& xi) {
+      Eigen::Vector2d e;
+      line_residual(term, geometry::exp_se3(xi) * pose, kProjection, e, nullptr);
+      return e;
+    });
+    EXPECT_LT(relative(j, numeric), 1e-6);
+  }
+}
+
+TEST(PlaneResidual, ValueAndJacobian) {
+  PlaneTerm simple;
+  simple.camera = {0.3, 0.1, 2.05};
+  simple.world = {0.0, 0.0, 2.0};
+  simple.normal = {0.0, 0.0, -1.0};
+  simple.sigma = 0.01;
+  EXPECT_NEAR(plane_residual(simple, {}, nullptr), -5.0, 1e-9);
+
+  Random random(3);
+  for (int i = 0; i < 30; ++i) {
+    const Rigid3 pose = random.pose(3.0, 2.0);
+    PlaneTerm term;
+    term.camera = in_front(random);
+    term.world = pose.inverse() * in_front(random);
+    term.normal = random.direction();
+    term.sigma = 0.02;
+    Row6 j;
+    plane_residual(term, pose, &j);
+    const auto numeric = numeric_jacobian<1, 6>([&](const Vector6d& xi) {
+      return Eigen::Matrix<double, 1, 1>(plane_residual(term, geometry::exp_se3(xi) * pose, nullptr));
+    });
+    EXPECT_LT(relative(j, numeric), 1e-6);
+  }
+}
+
+/// Both local Jacobians of a cost over (pose, block): analytic ones (first columns of the lifted Jacobian)
+/// and numeric ones through Plus.
+template <int kRows, int kAmbient, int kTangent>
+void expect_local_jacobians(const ceres::CostFunction& cost, const double* pose, const double* block,
+                            const ceres::Manifold* manifold, double tolerance = 1e-6) {
+  const PoseManifold pose_manifold;
+  const double* parameters[2] = {pose, block};
+  Eigen::Matrix<double, kRows, 1> r;
+  Eigen::Matrix<double, kRows, 7, Eigen::RowMajor> by_pose;
+  Eigen::Matrix<double, kRows, kAmbient, Eigen::RowMajor> by_block;
+  double* jacobians[2] = {by_pose.data(), by_block.data()};
+  ASSERT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
+  Eigen::Matrix<double, 7, 6, Eigen::RowMajor> lift;
+  pose_manifold.PlusJacobian(pose, lift.data());
+  const auto numeric_pose = numeric_jacobian<kRows, 6>([&](const Vector6d& delta) {
+    PoseBlock moved;
+    pose_manifold.Plus(pose, delta.data(), moved.data());
+    const double* p[2] = {moved.data(), block};
+    Eigen::Matrix<double, kRows, 1> e;
+    cost.Evaluate(p, e.data(), nullptr);
+    return e;
+  });
+  EXPECT_LT(relative((by_pose * lift).eval(), numeric_pose), tolerance);
+
+  Eigen::Matrix<double, kAmbient, kTangent, Eigen::RowMajor> block_lift;
+  block_lift.setIdentity();
+  if (manifold != nullptr) manifold->PlusJacobian(block, block_lift.data());
+  const auto numeric_block =
+      numeric_jacobian<kRows, kTangent>([&](const Eigen::Matrix<double, kTangent, 1>& delta) {
+        std::array<double, kAmbient> moved;
+        if (manifold != nullptr) {
+          manifold->Plus(block, delta.data(), moved.data());
+        } else {
+          for (int i = 0; i < kTangent; ++i) moved[static_cast<std::size_t>(i)] = block[i] + delta(i);
+        }
+        const double* p[2] = {pose, moved.data()};
+        Eigen::Matrix<double, kRows, 1> e;
+        cost.Evaluate(p, e.data(), nullptr);
+        return e;
+      });
+  EXPECT_LT(relative((by_block * block_lift).eval(), numeric_block), tolerance);
+
+  // One Jacobian alone is the same one; none is allowed.
+  Eigen::Matrix<double, kRows, kAmbient, Eigen::RowMajor> alone;
+  double* second_only[2] = {nullptr, alone.data()};
+  ASSERT_TRUE(cost.Evaluate(parameters, r.data(), second_only));
+  EXPECT_EQ(alone, by_block);
+}
+
+TEST(Manifolds, PlusZeroIsTheSameAndBlocksRoundTrip) {
+  Random random(4);
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3 pose = random.pose(3.1, 2.0);
+    PoseBlock block;
+    from_rigid(pose, block.data());
+    PoseBlock same;
+    const Vector6d zero = Vector6d::Zero();
+    PoseManifold().Plus(block.data(), zero.data(), same.data());
+    EXPECT_LT(tests::angle(to_rigid(same.data()), pose), 1e-7);
+    EXPECT_LT((to_rigid(same.data()).translation - pose.translation).norm(), 1e-13);
+
+    const geometry::OrthonormalLine line =
+        geometry::to_orthonormal(geometry::line_through(random.vector(2.0), random.vector(2.0)));
+    LineBlock lines;
+    from_line(line, lines.data());
+    EXPECT_LT((to_line(lines.data()).u - line.u).norm(), 1e-12);
+    EXPECT_EQ(to_line(lines.data()).w1, line.w1);
+  }
+}
+
+TEST(PointCost, LocalJacobians) {
+  Random random(5);
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3 pose = random.pose(3.0, 2.0);
+    const Eigen::Vector3d point = pose.inverse() * in_front(random);
+    PointTerm term;
+    term.pixel = {random.uniform(0, 640), random.uniform(0, 480)};
+    term.pixel_sigma = 1.4;
+    term.depth = i % 2 == 0 ? 2.0 : 0.0;
+    term.depth_sigma = 0.02;
+    PoseBlock block;
+    from_rigid(pose, block.data());
+    expect_local_jacobians<3, 3, 3>(PointCost(term, kCamera), block.data(), point.data(), nullptr);
+  }
+}
+
+TEST(PointCost, BehindTheCameraIsALargeConstant) {
+  PoseBlock block;
+  from_rigid({}, block.data());
+  const Eigen::Vector3d point(0.1, 0.1, -1.0);
+  const PointCost cost(PointTerm{}, kCamera);
+  const double* parameters[2] = {block.data(), point.data()};
+  Eigen::Vector3d r;
+  Eigen::Matrix<double, 3, 7, Eigen::RowMajor> by_pose;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
+  double* jacobians[2] = {by_pose.data(), by_point.data()};
+  ASSERT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
+  EXPECT_GT(r.norm(), 100.0);
+  EXPECT_TRUE(by_pose.isZero());
+  EXPECT_TRUE(by_point.isZero());
+}
+
+BundleLineObservation line_observation(Random& random, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  BundleLineObservation seen;
+  seen.start = kCamera.project(a) + Eigen::Vector2d(random.normal(2.0), random.normal(2.0));
+  seen.end = kCamera.project(b) + Eigen::Vector2d(random.normal(2.0), random.normal(2.0));
+  seen.pixel_sigma = 1.2;
+  seen.has_depth = true;
+  seen.start_camera = a + random.vector(0.03);
+  seen.end_camera = b + random.vector(0.03);
+  seen.start_sigma = 0.02;
+  seen.end_sigma = 0.03;
+  return seen;
+}
+
+TEST(LineCost, LocalJacobiansWithAndWithoutDepth) {
+  Random random(6);
+  for (int i = 0; i < 30; ++i) {
+    const Rigid3 pose = random.pose(3.0, 2.0);
+    const Eigen::Vector3d a = in_front(random);
+    const Eigen::Vector3d b = in_front(random);
+    BundleLineObservation seen = line_observation(random, a, b);
+    seen.has_depth = i % 2 == 0;
+    PoseBlock block;
+    from_rigid(pose, block.data());
+    LineBlock line;
+    const Rigid3 world_from_camera = pose.inverse();
+    from_line(geometry::to_orthonormal(geometry::line_through(world_from_camera * a, world_from_camera * b)),
+              line.data());
+    const LineManifold manifold;
+    expect_local_jacobians<4, 6, 4>(LineCost(seen, kCamera), block.data(), line.data(), &manifold, 1e-5);
+  }
+}
+
+TEST(LineCost, LocalJacobiansWhereTheDirectionHasTurnedRound) {  // w2 < 0: the far side of infinity
+  Random random(7);
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Vector3d a = in_front(random);
+    const Eigen::Vector3d b = in_front(random);
+    geometry::OrthonormalLine orthonormal = geometry::to_orthonormal(geometry::line_through(a, b));
+    orthonormal.u.col(1) *= -1.0;
+    orthonormal.u.col(2) *= -1.0;
+    orthonormal.w2 *= -1.0;
+    PoseBlock block;
+    from_rigid(random.pose(0.05, 0.05), block.data());
+    LineBlock line;
+    from_line(orthonormal, line.data());
+    const LineManifold manifold;
+    expect_local_jacobians<4, 6, 4>(LineCost(line_observation(random, a, b), kCamera), block.data(),
+                                    line.data(), &manifold, 1e-5);
+  }
+}
+
+TEST(LineCost, DepthRowsMeasureAlongTheRayOnly) {
+  // A horizontal line at depth 2; measured endpoints 4 cm too far away, and off the line across it in the
+  // image.
+  const Eigen::Vector3d a(-0.5, 0.0, 2.0);
+  const Eigen::Vector3d b(0.5, 0.0, 2.0);
+  BundleLineObservation seen;
+  seen.start = kCamera.project(a);
+  seen.end = kCamera.project(b);
+  seen.has_depth = true;
+  seen.start_camera = a + Eigen::Vector3d(0.0, 0.01, 0.04);
+  seen.end_camera = b + Eigen::Vector3d(0.2, 0.0, 0.04);  // along the line costs nothing
+  seen.start_sigma = 0.02;
+  seen.end_sigma = 0.04;
+  PoseBlock pose;
+  from_rigid({}, pose.data());
+  LineBlock line;
+  from_line(geometry::to_orthonormal(geometry::line_through(a, b)), line.data());
+  const double* parameters[2] = {pose.data(), line.data()};
+  Eigen::Vector4d r;
+  ASSERT_TRUE(LineCost(seen, kCamera).Evaluate(parameters, r.data(), nullptr));
+  EXPECT_NEAR(r(0), 0.0, 1e-9);
+  EXPECT_NEAR(r(1), 0.0, 1e-9);
+  EXPECT_NEAR(std::abs(r(2)), 2.0, 1e-9);
+  EXPECT_NEAR(std::abs(r(3)), 1.0, 1e-9);
+}
+
+TEST(EdgeCost, LocalJacobians) {
+  Random random(8);
+  for (int i = 0; i < 20; ++i) {
+    const Rigid3 a = random.pose(3.0, 2.0);
+    const Rigid3 b = random.pose(3.0, 2.0);
+    BundleEdge edge;
+    edge.b_from_a = random.step(0.002, 0.001) * (b * a.inverse());
+    const geometry::Matrix6d half = geometry::Matrix6d::Random();
+    edge.information = half * half.transpose();
+    if (i % 2 == 0) edge.information.col(2).setZero(), edge.information.row(2).setZero();
+    PoseBlock block_a;
+    PoseBlock block_b;
+    from_rigid(a, block_a.data());
+    from_rigid(b, block_b.data());
+    const PoseManifold manifold;
+    // J_l^-1 is taken to first order: right up to the square of the residual.
+    expect_local_jacobians<6, 7, 6>(EdgeCost(edge), block_a.data(), block_b.data(), &manifold, 1e-5);
+  }
+}
+
+TEST(EdgeCost, CostIsTheInformationOfTheError) {
+  Random random(9);
+  const Rigid3 a = random.pose(3.0, 2.0);
+  const Rigid3 b = random.pose(3.0, 2.0);
+  Vector6d xi;
+  xi << 0.1, -0.2, 0.05, 0.02, 0.03, -0.01;
+  BundleEdge edge;
+  edge.b_from_a = geometry::exp_se3(-xi) * (b * a.inverse());  // estimate * measured^-1 = Exp(xi)
+  edge.information = geometry::Matrix6d::Identity();
+  edge.information(0, 0) = 100.0;
+  edge.information(4, 4) = 0.0;  // free
+  PoseBlock block_a;
+  PoseBlock block_b;
+  from_rigid(a, block_a.data());
+  from_rigid(b, block_b.data());
+  const double* parameters[2] = {block_a.data(), block_b.data()};
+  Vector6d r;
+  ASSERT_TRUE(EdgeCost(edge).Evaluate(parameters, r.data(), nullptr));
+  EXPECT_NEAR(r.squaredNorm(), xi.dot(edge.information * xi), 1e-9);
+}
+
+}  // namespace
+}  // namespace plumbline::optimize
