@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "plumbline/features/frame_features.hpp"
+
+namespace plumbline::features {
+namespace {
+
+const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+
+TEST(PointGrid, FindsWhatABruteForceSearchFinds) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> x(0.0F, 639.0F);
+  std::uniform_real_distribution<float> y(0.0F, 479.0F);
+  std::vector<PointFeature> points(500);
+  for (auto& p : points) p.pixel = {x(random), y(random)};
+  points[0].pixel = {0.0F, 0.0F};
+  points[1].pixel = {639.0F, 479.0F};
+  const PointGrid grid(points, 640, 480);
+  for (int i = 0; i < 300; ++i) {
+    const float u = 1.2F * x(random) - 60.0F;  // also from outside
+    const float v = 1.2F * y(random) - 50.0F;
+    const float radius = static_cast<float>(i % 80);
+    std::vector<int> found;
+    grid.within(points, u, v, radius, found);
+    std::sort(found.begin(), found.end());
+    std::vector<int> expected;
+    for (int k = 0; k < 500; ++k) {
+      if ((points[static_cast<std::size_t>(k)].pixel - Eigen::Vector2f(u, v)).squaredNorm() <=
+          radius * radius) {
+        expected.push_back(k);
+      }
+    }
+    ASSERT_EQ(found, expected);
+  }
+}
+
+TEST(PointGrid, EmptyOnesFindNothing) {
+  std::vector<int> found;
+  PointGrid().within({}, 10, 10, 100, found);
+  PointGrid({}, 640, 480).within({}, 10, 10, 100, found);
+  EXPECT_TRUE(found.empty());
+}
+
+TEST(CornerDepth, IsTheMeanOfOneSurfaceOnly) {
+  cv::Mat depth(100, 100, CV_32FC1, cv::Scalar(2.0F));
+  EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F), 2.0F);
+  EXPECT_FLOAT_EQ(corner_depth(depth, 0.0F, 0.0F), 2.0F) << "the corner of the picture still has nine pixels";
+  depth.at<float>(50, 50) = 0.0F;
+  EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F), 2.0F) << "a hole in the middle is bridged";
+  depth(cv::Rect(52, 0, 48, 100)).setTo(3.0F);
+  EXPECT_EQ(corner_depth(depth, 50.0F, 50.0F), 0.0F) << "over a border";
+  EXPECT_FLOAT_EQ(corner_depth(depth, 49.0F, 50.0F), 2.0F) << "just beside it";
+}
+
+TEST(CornerDepth, BadDepthIsNoDepth) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(corner_depth({}, 5.0F, 5.0F), 0.0F);
+  for (float bad : {0.0F, -1.0F, nan, infinity}) {
+    cv::Mat depth(20, 20, CV_32FC1, cv::Scalar(static_cast<double>(bad)));
+    EXPECT_EQ(corner_depth(depth, 10.0F, 10.0F), 0.0F) << bad;
+  }
+  cv::Mat depth(20, 20, CV_32FC1, cv::Scalar(static_cast<double>(nan)));
+  depth(cv::Rect(8, 8, 3, 2)).setTo(1.5F);
+  EXPECT_EQ(corner_depth(depth, 10.0F, 10.0F), 0.0F) << "too few";
+}
+
+sensor::RgbdFrame textured_frame() {
+  sensor::RgbdFrame frame;
+  frame.gray = cv::Mat(480, 640, CV_8UC1);
+  cv::RNG random(4);
+  random.fill(frame.gray, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(frame.gray, frame.gray, {9, 9}, 2.0);
+  cv::normalize(frame.gray, frame.gray, 0, 255, cv::NORM_MINMAX);
+  frame.depth = cv::Mat(480, 640, CV_32FC1, cv::Scalar(2.0F));
+  frame.depth(cv::Rect(320, 0, 320, 480)).setTo(3.0F);
+  return frame;
+}
+
+TEST(FeatureExtractor, PointsCarryDepthExceptOverBorders) {
+  const FrameFeatures found = FeatureExtractor({}, kCamera).extract(textured_frame());
+  ASSERT_GT(found.points.size(), 700U);
+  ASSERT_EQ(found.points.size(), found.descriptors.size());
+  int at_border = 0;
+  for (const PointFeature& p : found.points) {
+    if (p.pixel.x() < 317.0F || p.pixel.x() > 322.5F) {
+      EXPECT_FLOAT_EQ(p.depth, p.pixel.x() < 320.0F ? 2.0F : 3.0F);
+    }
+    if (p.pixel.x() > 318.6F && p.pixel.x() < 320.4F) {
+      ++at_border;
+      EXPECT_EQ(p.depth, 0.0F);
+    }
+  }
+  EXPECT_GT(at_border, 0);
+  std::vector<int> near;
+  found.grid.within(found.points, found.points[5].pixel.x(), found.points[5].pixel.y(), 0.1F, near);
+  EXPECT_NE(std::find(near.begin(), near.end(), 5), near.end());
+}
+
+TEST(FeatureExtractor, ThumbnailsAreSmallAndNeverMixDepth) {
+  const sensor::RgbdFrame frame = textured_frame();
+  const FrameFeatures found = FeatureExtractor({}, kCamera).extract(frame);
+  EXPECT_EQ(found.thumbnail.size(), cv::Size(80, 60));
+  EXPECT_EQ(found.thumbnail.type(), CV_32FC1);
+  EXPECT_EQ(found.thumbnail_depth.size(), found.thumbnail.size());
+  EXPECT_NEAR(cv::mean(found.thumbnail)[0], cv::mean(frame.gray)[0], 1.0);
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 80; ++x) {
+      const float z = found.thumbnail_depth.at<float>(y, x);
+      EXPECT_TRUE(z == (x < 40 ? 2.0F : 3.0F)) << x << " " << y << ": " << z;
+    }
+  }
+}
+
+TEST(FeatureExtractor, FamiliesCanBeSwitchedOff) {
+  FeatureOptions options;
+  options.points = false;
+  sensor::RgbdFrame frame = textured_frame();
+  cv::rectangle(frame.gray, {100, 100, 200, 200}, 255, cv::FILLED);
+  const FrameFeatures lines_only = FeatureExtractor(options, kCamera).extract(frame);
+  EXPECT_TRUE(lines_only.points.empty());
+  EXPECT_FALSE(lines_only.lines.empty());
+  options.points = true;
+  options.lines = false;
+  const FrameFeatures points_only = FeatureExtractor(options, kCamera).extract(frame);
+  EXPECT_FALSE(points_only.points.empty());
+  EXPECT_TRUE(points_only.lines.empty());
+}
+
+TEST(FeatureExtractor, BlankPicturesAndMissingDepthGiveEmptyFeatures) {
+  sensor::RgbdFrame frame;
+  EXPECT_TRUE(FeatureExtractor({}, kCamera).extract(frame).points.empty());
+  frame.gray = cv::Mat(480, 640, CV_8UC1, cv::Scalar(0));
+  const FrameFeatures blank = FeatureExtractor({}, kCamera).extract(frame);  // no depth picture at all
+  EXPECT_TRUE(blank.points.empty());
+  EXPECT_TRUE(blank.lines.empty());
+  EXPECT_EQ(blank.thumbnail.size(), cv::Size(80, 60));
+  EXPECT_EQ(cv::countNonZero(blank.thumbnail_depth), 0);
+  frame = textured_frame();
+  frame.depth.release();
+  for (const PointFeature& p : FeatureExtractor({}, kCamera).extract(frame).points) EXPECT_EQ(p.depth, 0.0F);
+}
+
+}  // namespace
+}  // namespace plumbline::features

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "plumbline/features/orb.hpp"
+
+namespace plumbline::features {
+namespace {
+
+/// Blurred noise: corners everywhere.
+cv::Mat texture(int width, int height, std::uint32_t seed = 1) {
+  cv::Mat image(height, width, CV_8UC1);
+  cv::RNG random(seed);
+  random.fill(image, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(image, image, {5, 5}, 1.0);
+  cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
+  return image;
+}
+
+OrbFeatures extract(const cv::Mat& image, const OrbOptions& options = {}) {
+  return OrbExtractor(options).extract(image, {0, 0, image.cols, image.rows});
+}
+
+TEST(Orb, EveryNinthOfATexturedPictureHasItsShare) {
+  const OrbFeatures found = extract(texture(640, 480));
+  EXPECT_EQ(found.points.size(), found.descriptors.size());
+  EXPECT_NEAR(static_cast<double>(found.points.size()), 1000.0, 30.0);
+  std::array<int, 9> count{};
+  for (const PointFeature& p : found.points) {
+    const int x = std::min(2, static_cast<int>(p.pixel.x() / 640.0F * 3.0F));
+    const int y = std::min(2, static_cast<int>(p.pixel.y() / 480.0F * 3.0F));
+    ++count[static_cast<std::size_t>(3 * y + x)];
+  }
+  for (int c : count) EXPECT_GT(c, 60);
+}
+
+TEST(Orb, WeakTextureGetsItsPointsBesideStrong) {
+  cv::Mat image = texture(640, 480);
+  cv::Mat left = image(cv::Rect(0, 0, 320, 480));
+  left.convertTo(left, CV_8U, 0.12, 110.0);  // a tenth of the contrast
+  const OrbFeatures found = extract(image);
+  int weak = 0;
+  for (const PointFeature& p : found.points) weak += p.pixel.x() < 310.0F ? 1 : 0;
+  EXPECT_GT(weak, 250);
+}
+
+TEST(Orb, AllOctavesAreUsedAndInRange) {
+  const OrbFeatures found = extract(texture(640, 480));
+  std::array<int, 8> count{};
+  for (const PointFeature& p : found.points) {
+    ASSERT_GE(p.octave, 0);
+    ASSERT_LT(p.octave, 8);
+    ++count[static_cast<std::size_t>(p.octave)];
+    EXPECT_GE(p.angle, 0.0F);
+    EXPECT_LT(p.angle, 360.01F);
+    EXPECT_EQ(p.depth, 0.0F);
+  }
+  for (int c : count) EXPECT_GT(c, 10);
+  EXPECT_GT(count[0], count[7]);
+  const OrbExtractor extractor({});
+  EXPECT_FLOAT_EQ(extractor.sigma(0), 1.0F);
+  EXPECT_NEAR(extractor.sigma(3), 1.728F, 1e-4F);
+}
+
+TEST(Orb, SameBytesTwice) {
+  const OrbFeatures a = extract(texture(320, 240));
+  const OrbFeatures b = extract(texture(320, 240));
+  ASSERT_EQ(a.points.size(), b.points.size());
+  EXPECT_EQ(a.descriptors, b.descriptors);
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    EXPECT_EQ(a.points[i].pixel, b.points[i].pixel);
+    EXPECT_EQ(a.points[i].angle, b.points[i].angle);
+  }
+}
+
+TEST(Orb, BlankAndTinyPicturesHaveNoPoints) {
+  for (int grey : {0, 128, 255})
+    EXPECT_TRUE(extract(cv::Mat(480, 640, CV_8UC1, cv::Scalar(grey))).points.empty());
+  EXPECT_TRUE(extract(texture(30, 30)).points.empty());
+  EXPECT_TRUE(extract(texture(640, 20)).points.empty());
+  EXPECT_TRUE(extract(cv::Mat(1, 1, CV_8UC1, cv::Scalar(0))).points.empty());
+  EXPECT_FALSE(extract(texture(100, 100)).points.empty());
+}
+
+TEST(Orb, StaysInTheRegion) {
+  const cv::Rect region(200, 120, 240, 200);
+  const OrbFeatures found = OrbExtractor({}).extract(texture(640, 480), region);
+  ASSERT_GT(found.points.size(), 200U);
+  for (const PointFeature& p : found.points) {
+    EXPECT_TRUE(region.contains(cv::Point2f(p.pixel.x(), p.pixel.y()))) << p.pixel.transpose();
+  }
+  EXPECT_TRUE(OrbExtractor({}).extract(texture(640, 480), {300, 300, 10, 10}).points.empty());
+  EXPECT_TRUE(OrbExtractor({}).extract(texture(640, 480), {}).points.empty());
+}
+
+TEST(Orb, CountIsHonoured) {
+  OrbOptions options;
+  options.count = 200;
+  EXPECT_NEAR(static_cast<double>(extract(texture(640, 480), options).points.size()), 200.0, 10.0);
+  options.levels = 1;
+  const OrbFeatures found = extract(texture(640, 480), options);
+  EXPECT_EQ(found.points.size(), 200U);
+  for (const PointFeature& p : found.points) EXPECT_EQ(p.octave, 0);
+}
+
+/// A quarter turn clockwise moves pixel (x, y) to (height - 1 - y, x).
+Eigen::Vector2f turned(const Eigen::Vector2f& p, int height) {
+  return {static_cast<float>(height - 1) - p.y(), p.x()};
+}
+
+TEST(Orb, AQuarterTurnTurnsOrientationsAndKeepsDescriptors) {
+  const cv::Mat image = texture(400, 400, 5);
+  cv::Mat quarter;
+  cv::rotate(image, quarter, cv::ROTATE_90_CLOCKWISE);
+  OrbOptions options;
+  options.levels = 1;  // resizing does not commute with turning
+  const OrbFeatures a = extract(image, options);
+  const OrbFeatures b = extract(quarter, options);
+  int same_place = 0;
+  int good_angle = 0;
+  int good_descriptor = 0;
+  int first = 0;
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    const Eigen::Vector2f expected = turned(a.points[i].pixel, image.rows);
+    for (std::size_t j = 0; j < b.points.size(); ++j) {
+      if ((b.points[j].pixel - expected).norm() > 0.5F) continue;
+      ++same_place;
+      float difference = std::fmod(b.points[j].angle - a.points[i].angle - 90.0F + 720.0F, 360.0F);
+      difference = std::min(difference, 360.0F - difference);
+      good_angle += difference < 2.0F ? 1 : 0;
+      good_descriptor += hamming_distance(a.descriptors[i], b.descriptors[j]) < 40 ? 1 : 0;
+      // And nothing else looks as much alike.
+      int nearest = 257;
+      for (std::size_t k = 0; k < b.points.size(); ++k) {
+        if (k != j) nearest = std::min(nearest, hamming_distance(a.descriptors[i], b.descriptors[k]));
+      }
+      first += hamming_distance(a.descriptors[i], b.descriptors[j]) < nearest ? 1 : 0;
+    }
+  }
+  EXPECT_GT(same_place, static_cast<int>(a.points.size()) * 6 / 10);
+  EXPECT_GT(good_angle, same_place * 97 / 100);
+  EXPECT_GT(good_descriptor, same_place * 95 / 100);
+  EXPECT_GT(first, same_place * 97 / 100);
+}
+
+TEST(Descriptor, HammingDistanceCountsBits) {
+  const Descriptor256 zero{};
+  Descriptor256 all;
+  all.fill(~0ULL);
+  EXPECT_EQ(hamming_distance(zero, zero), 0);
+  EXPECT_EQ(hamming_distance(zero, all), 256);
+  const Descriptor256 some{1ULL, 1ULL << 63, 0x0FULL, 0};
+  EXPECT_EQ(hamming_distance(zero, some), 6);
+  std::mt19937_64 random(3);
+  std::vector<Descriptor256> list(50);
+  for (auto& d : list) d = {random(), random(), random(), random()};
+  const std::vector<int> indices{3, 49, 0, 3};
+  std::vector<int> distances(4);
+  hamming_distances(list[7], list.data(), indices.data(), indices.size(), distances.data());
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    EXPECT_EQ(distances[i], hamming_distance(list[7], list[static_cast<std::size_t>(indices[i])]));
+  }
+}
+
+}  // namespace
+}  // namespace plumbline::features
