@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole of one robot's SLAM on short filmed recordings with known truth.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "plumbline/evaluate/trajectory.hpp"
+#include "plumbline/mapping/slam.hpp"
+#include "plumbline/synth/source.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using tracking::TrackState;
+
+struct Shot {
+  sensor::RgbdFrame frame;
+  std::shared_ptr<const features::FrameFeatures> features;
+};
+
+/// Filmed once for all tests: 36 frames of the furnished room, with the noise of a Kinect.
+class Recording {
+ public:
+  static const Recording& get() {
+    static const Recording kRecording;
+    return kRecording;
+  }
+  std::vector<Shot> shots;
+  sensor::Pinhole camera;
+  geometry::Trajectory truth;
+  features::FeatureExtractor extractor{{}, {}};
+
+  [[nodiscard]] Shot shot(sensor::RgbdFrame frame) const {
+    auto features = std::make_shared<features::FrameFeatures>(extractor.extract(frame));
+    return {std::move(frame), std::move(features)};
+  }
+
+ private:
+  Recording() {
+    const core::Executor executor(2);
+    const auto log = core::null_log();
+    const std::string scenes = std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes";
+    const auto source = synth::open_synth("synth:room?frames=36&fps=15&seed=2", scenes, executor, *log);
+    if (!source) throw std::runtime_error(source.error().message);
+    camera = (*source)->camera().color;
+    truth = (*source)->truth().value();
+    extractor = features::FeatureExtractor({}, camera);
+    shots.resize((*source)->size());
+    executor.parallel_for(shots.size(), [&](std::size_t i) { shots[i] = shot((*source)->read(i).value()); });
+  }
+};
+
+struct SlamRun {
+  std::vector<FrameReport> reports;
+  geometry::Trajectory trajectory;
+  geometry::Trajectory keyframes;
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> lines;
+  std::size_t points = 0;
+
+  [[nodiscard]] int count(TrackState state) const {
+    return static_cast<int>(
+        std::count_if(reports.begin(), reports.end(), [&](const auto& r) { return r.state == state; }));
+  }
+};
+
+SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& options = {}) {
+  const core::Executor executor(threads);
+  const auto log = core::null_log();
+  Slam slam(options, Recording::get().camera, 0, executor, *log);
+  SlamRun result;
+  for (const Shot& shot : shots) result.reports.push_back(slam.process(shot.frame, shot.features));
+  slam.finish();
+  result.trajectory = slam.trajectory();
+  result.keyframes = slam.keyframe_trajectory();
+  result.lines = slam.line_segments();
+  result.points = slam.map().point_count();
+  return result;
+}
+
+double ate(const geometry::Trajectory& trajectory, const geometry::Trajectory& truth) {
+  const auto report = evaluate::evaluate_trajectory(trajectory, truth);
+  return report ? report->ate_m.rmse : 1e9;
+}
+
+Shot blackened(const Shot& shot) {
+  sensor::RgbdFrame frame = shot.frame;
+  frame.color = cv::Mat(frame.color.size(), frame.color.type(), cv::Scalar::all(0));
+  frame.gray = cv::Mat(frame.gray.size(), CV_8UC1, cv::Scalar(0));
+  frame.depth = cv::Mat(frame.depth.size(), CV_32FC1, cv::Scalar(0));
+  return Recording::get().shot(frame);
+}
+
+Shot without_depth(const Shot& shot) {
+  sensor::RgbdFrame frame = shot.frame;
+  frame.depth = cv::Mat(frame.depth.size(), CV_32FC1, cv::Scalar(0));
+  return Recording::get().shot(frame);
+}
+
+bool same_bytes(const geometry::Trajectory& a, const geometry::Trajectory& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const auto& x = a[i].world_from_camera;
+    const auto& y = b[i].world_from_camera;
+    if (a[i].stamp != b[i].stamp) return false;
+    if (std::memcmp(x.rotation.data(), y.rotation.data(), 9 * sizeof(double)) != 0) return false;
+    if (std::memcmp(x.translation.data(), y.translation.data(), 3 * sizeof(double)) != 0) return false;
+  }
+  return true;
+}
+
+TEST(Slam, TracksEveryFrameWithinTwoCentimetres) {
+  const Recording& recording = Recording::get();
+  const SlamRun result = run(recording.shots);
+  ASSERT_EQ(result.reports.size(), 36U);
+  EXPECT_EQ(result.count(TrackState::kTracked), 36);
+  ASSERT_EQ(result.trajectory.size(), 36U);
+  EXPECT_LT(ate(result.trajectory, recording.truth), 0.02);
+  double way = 0.0;
+  for (std::size_t i = 1; i < recording.truth.size(); ++i) {
+    way += (recording.truth[i].world_from_camera.translation -
+            recording.truth[i - 1].world_from_camera.translation)
+               .norm();
+  }
+  EXPECT_GT(way, 0.4) << "a camera that stands still proves nothing";
+  EXPECT_GE(result.keyframes.size(), 3U);
+  EXPECT_LT(result.keyframes.size(), 25U);
+  EXPECT_GT(result.points, 500U);
+  EXPECT_GT(result.lines.size(), 5U);
+  for (std::size_t i = 0; i < 36; ++i) {
+    EXPECT_EQ(result.reports[i].frame_index, recording.shots[i].frame.index);
+    EXPECT_EQ(result.trajectory[i].stamp, recording.shots[i].frame.stamp);
+  }
+}
+
+TEST(Slam, SameBytesTwiceAndForAnyNumberOfThreads) {
+  const Recording& recording = Recording::get();
+  const SlamRun a = run(recording.shots, 1);
+  const SlamRun b = run(recording.shots, 2);
+  EXPECT_TRUE(same_bytes(a.trajectory, b.trajectory));
+  EXPECT_TRUE(same_bytes(a.keyframes, b.keyframes));
+  EXPECT_EQ(a.points, b.points);
+  ASSERT_EQ(a.lines.size(), b.lines.size());
+  for (std::size_t i = 0; i < a.lines.size(); ++i) {
+    EXPECT_EQ(a.lines[i].first, b.lines[i].first);
+    EXPECT_EQ(a.lines[i].second, b.lines[i].second);
+  }
+}
+
+TEST(Slam, BlackBlindAndRepeatedFramesAreSurvived) {
+  const Recording& recording = Recording::get();
+  std::vector<Shot> shots = recording.shots;
+  shots.resize(28);
+  shots[8] = blackened(shots[8]);
+  shots[14] = without_depth(shots[14]);
+  const Shot repeated = shots[20];
+  shots.insert(shots.begin() + 21, repeated);  // the same picture with the same stamp
+  const SlamRun result = run(shots);
+  EXPECT_EQ(result.reports[8].state, TrackState::kLost) << "nothing to be seen is nothing to be trusted";
+  EXPECT_EQ(result.reports[9].state, TrackState::kTracked);
+  EXPECT_EQ(result.reports[14].state, TrackState::kTracked) << "points and lines suffice for a frame";
+  EXPECT_EQ(result.reports[21].state, TrackState::kTracked);
+  EXPECT_EQ(result.count(TrackState::kTracked), 28);
+  EXPECT_EQ(result.trajectory.size(), 28U) << "only tracked frames have a pose";
+  EXPECT_LT(ate(result.trajectory, recording.truth), 0.02);
+}
+
+TEST(Slam, ABlackStartWaitsForTheFirstPicture) {
+  const Recording& recording = Recording::get();
+  std::vector<Shot> shots(recording.shots.begin(), recording.shots.begin() + 16);
+  for (std::size_t i = 0; i < 4; ++i) shots[i] = blackened(shots[i]);
+  const SlamRun result = run(shots);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NE(result.reports[i].state, TrackState::kTracked) << i;
+  for (std::size_t i = 4; i < 16; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
+  EXPECT_EQ(result.trajectory.size(), 12U);
+  EXPECT_LT(ate(result.trajectory, recording.truth), 0.02);
+}
+
+TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
+  const Recording& recording = Recording::get();
+  std::vector<Shot> shots(recording.shots.begin(), recording.shots.begin() + 30);
+  geometry::Trajectory truth(recording.truth.begin(), recording.truth.begin() + 30);
+  const double step = shots[1].frame.stamp - shots[0].frame.stamp;
+  const auto append = [&](Shot shot, const geometry::Rigid3& pose) {
+    shot.frame.stamp = shots.back().frame.stamp + step;
+    shot.frame.depth_stamp = shot.frame.stamp;
+    truth.push_back({shot.frame.stamp, pose});
+    shots.push_back(std::move(shot));
+  };
+  const Shot black = blackened(shots[0]);
+  for (int i = 0; i < 15; ++i) append(black, recording.truth[29].world_from_camera);
+  for (std::size_t i = 2; i < 8; ++i) append(recording.shots[i], recording.truth[i].world_from_camera);
+  const SlamRun result = run(shots);
+  for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
+  for (std::size_t i = 30; i < 45; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kLost) << i;
+  for (std::size_t i = 45; i < 51; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
+  EXPECT_TRUE(result.reports[45].relocalised) << "carried back while covered: only the picture can tell";
+  EXPECT_EQ(result.trajectory.size(), 36U);
+  EXPECT_LT(ate(result.trajectory, truth), 0.025);
+}
+
+TEST(Slam, NothingButBlackFramesGiveNoTrajectory) {
+  std::vector<Shot> shots(5, blackened(Recording::get().shots[0]));
+  for (std::size_t i = 0; i < shots.size(); ++i) shots[i].frame.stamp += 0.1 * static_cast<double>(i);
+  const SlamRun result = run(shots);
+  EXPECT_EQ(result.count(TrackState::kTracked), 0);
+  EXPECT_TRUE(result.trajectory.empty());
+  EXPECT_TRUE(result.keyframes.empty());
+}
+
+TEST(Slam, EachFamilyAloneTracksTheFurnishedRoom) {
+  const Recording& recording = Recording::get();
+  const std::vector<Shot> shots(recording.shots.begin(), recording.shots.begin() + 20);
+  for (const bool depth : {false, true}) {
+    SlamOptions options;
+    options.tracker.points = !depth;
+    options.tracker.lines = !depth;
+    options.tracker.depth = depth;
+    const SlamRun result = run(shots, 1, options);
+    EXPECT_EQ(result.count(TrackState::kTracked), 20) << (depth ? "depth" : "points and lines");
+    EXPECT_LT(ate(result.trajectory, recording.truth), depth ? 0.04 : 0.03)
+        << (depth ? "depth" : "points and lines");
+  }
+}
+
+}  // namespace
+}  // namespace plumbline::mapping
