@@ -213,7 +213,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   tiles.fine = white_tile(mix(seed, 1));
   correlate(tiles.fine, sensor == Sensor::kRealsense ? 1.8 : 1.1);
   tiles.medium = white_tile(mix(seed, 7));
-  correlate(tiles.medium, 2.2);
+  correlate(tiles.medium, 3.0);
   tiles.coarse = white_tile(mix(seed, 2));
   correlate(tiles.coarse, 6.0);
   tiles.color.create(kTile, kTile);
@@ -223,7 +223,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
     channel[k] = white_tile(mix(seed, 3 + k));
     correlate(channel[k], k == 3 ? 0.6 : 1.0);
   }
-  tiles.fine = 0.78 * tiles.fine + 0.62 * tiles.medium;  // a sharp core with a skirt, as measured
+  tiles.fine = 0.72 * tiles.fine + 0.58 * tiles.medium + 0.38 * tiles.coarse;  // a sharp core with a skirt, as measured
   for (int y = 0; y < kTile; ++y) {
     for (int x = 0; x < kTile; ++x) {
       for (int k = 0; k < 3; ++k) {

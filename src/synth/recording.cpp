@@ -5,10 +5,10 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "png_writer.hpp"
 #include "reference.hpp"
 
 namespace plumbline::synth {
@@ -34,8 +34,7 @@ Result<void> make_folder(const fs::path& folder) {
 }
 
 std::string write_png(const fs::path& file, const cv::Mat& image) {
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1})) return file.string() + ": cannot be coded";
+  const std::vector<std::uint8_t> bytes = encode_png(image);
   std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   out.flush();

@@ -171,9 +171,12 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   out.probes = major > 3.0F * minor ? 4 : major > 1.5F * minor ? 2 : 1;
   const float size = std::max(minor, major / static_cast<float>(out.probes));
   if (out.probes > 1) {
-    const float angle = 0.5F * std::atan2(2.0F * xy, xx - yy);
-    out.step_x = std::cos(angle) * major / static_cast<float>(out.probes);
-    out.step_y = std::sin(angle) * major / static_cast<float>(out.probes);
+    // The longer axis: eigenvector of the larger eigenvalue, from the row that is not nearly zero.
+    const float big = mean + spread;
+    const float ex = xx >= yy ? big - yy : xy, ey = xx >= yy ? xy : big - xx;
+    const float step = major / (static_cast<float>(out.probes) * std::sqrt(std::max(ex * ex + ey * ey, 1e-20F)));
+    out.step_x = ex * step;
+    out.step_y = ey * step;
   }
   const float last = static_cast<float>(texture.levels.size() - 1);
   const float level = std::clamp(std::log2(size), 0.0F, last);
@@ -246,6 +249,28 @@ class Shader {
     if (face < 0) return Vec4{24.0F, 24.0F, 24.0F, 0.0F};
     const auto id = static_cast<std::size_t>(face);
     return color(id, foot(id, x, y), x, y) * brightness(id, x, y);
+  }
+  /// Sum of four places about a pixel; light and level of detail are worked out once for each face.
+  [[nodiscard]] Vec4 mean(const std::array<int, 4>& faces, float x, float y, const float (&spots)[4][2]) const {
+    Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
+    for (std::size_t k = 0; k < 4; ++k) {
+      bool done = false;
+      for (std::size_t i = 0; i < k; ++i) done = done || faces[i] == faces[k];
+      if (done) continue;
+      if (faces[k] < 0) {
+        for (const int face : faces) sum += face < 0 ? at(face, x, y) : Vec4{0.0F, 0.0F, 0.0F, 0.0F};
+        continue;
+      }
+      const auto id = static_cast<std::size_t>(faces[k]);
+      const float sx = x + spots[k][0], sy = y + spots[k][1];
+      const Footprint here = foot(id, sx, sy);
+      Vec4 part = {0.0F, 0.0F, 0.0F, 0.0F};
+      for (std::size_t i = k; i < 4; ++i) {
+        if (faces[i] == faces[k]) part += color(id, here, x + spots[i][0], y + spots[i][1]);
+      }
+      sum += part * brightness(id, sx, sy);
+    }
+    return sum;
   }
   [[nodiscard]] PLUMBLINE_INLINE Vec4 color(std::size_t id, const Footprint& foot, float x, float y) const {
     const FaceView& f = view_.faces[id];
@@ -324,12 +349,8 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
   }
   rays.flush();
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
-    for (std::size_t k = 0; k < 4; ++k) {
-      sum += shader.at(seen[i][k], static_cast<float>(pixels[i].x) + kSpots[k][0],
-                       static_cast<float>(pixels[i].y) + kSpots[k][1]);
-    }
-    Shader::store(sum * 0.25F, image[pixels[i].y][pixels[i].x].val);
+    Shader::store(shader.mean(seen[i], static_cast<float>(pixels[i].x), static_cast<float>(pixels[i].y), kSpots) * 0.25F,
+                  image[pixels[i].y][pixels[i].x].val);
   }
 }
 

@@ -238,9 +238,9 @@ Canvas cloth(const Material& m, cv::Size size, std::uint64_t seed) {
     folds.push_back({static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform(0.004, 0.018)),
                      static_cast<float>(rng.uniform(0.015, 0.085) * (rng.uniform() < 0.6 ? 1.0 : -0.6))});
   }
-  for (int i = 0; i < 9; ++i) {  // narrow, nearly sharp ones
+  for (int i = 0; i < 17; ++i) {  // narrow, nearly sharp ones
     folds.push_back({static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform(0.0012, 0.0028)),
-                     static_cast<float>(rng.uniform(0.06, 0.15) * (rng.uniform() < 0.5 ? 1.0 : -1.0))});
+                     static_cast<float>(rng.uniform(0.08, 0.18) * (rng.uniform() < 0.6 ? 1.0 : -1.0))});
   }
   cv::Mat1f field(size, 0.0F);
   for (int y = 0; y < size.height; ++y) {
@@ -259,7 +259,7 @@ Canvas cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   add_creases(field, rng);
   modulate(canvas, field, 1.0F);
   modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.012F);
-  for (int i = 0; i < 24; ++i) {  // stains and pin holes
+  for (int i = 0; i < 18; ++i) {  // stains and pin holes
     const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
     cv::ellipse(canvas, c, {1 + static_cast<int>(rng.uniform(0, 2.0)), 1}, rng.uniform(0, 180), 0, 360,
                 scalar(tone(m) * rng.uniform(0.4, 0.75)), -1, cv::LINE_AA);
@@ -502,7 +502,7 @@ Canvas cardboard(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, fractal(size, 4, 4, 4, 0.6F, seed + 4), 0.05F);
   modulate(canvas, grain(size, seed + 5), 0.05F);
   Rng rng(seed, 17);
-  for (int i = 0; i < 26; ++i) {  // staples and scratches
+  for (int i = 0; i < 12; ++i) {  // staples and scratches
     const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
     cv::circle(canvas, c, 2, scalar(tone(m) * (rng.uniform() < 0.5 ? 0.3 : 1.7)), -1, cv::LINE_AA);
   }
