@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "builder.hpp"
 
-#include <cmath>
 #include <fmt/format.h>
+
+#include <cmath>
 
 namespace plumbline::synth {
 
@@ -55,21 +56,23 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   scene_.faces.push_back(std::move(face));
 }
 
-void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const Skin& skin, const Skin* front) {
+void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const Skin& skin,
+                  const Skin* front) {
   const auto p = [&](int x, int y, int z) {
     return f * Vector3d(x ? hi.x() : lo.x(), y ? hi.y() : lo.y(), z ? hi.z() : lo.z());
   };
   const Vector3d ux = f.rotation.col(0), uy = f.rotation.col(1);
-  polygon({p(0, 0, 0), p(1, 0, 0), p(1, 0, 1), p(0, 0, 1)}, ux, front != nullptr ? *front : skin);  // front, -y
-  polygon({p(1, 1, 0), p(0, 1, 0), p(0, 1, 1), p(1, 1, 1)}, -ux, skin);                             // back, +y
-  polygon({p(0, 1, 0), p(0, 0, 0), p(0, 0, 1), p(0, 1, 1)}, -uy, skin);                             // left, -x
-  polygon({p(1, 0, 0), p(1, 1, 0), p(1, 1, 1), p(1, 0, 1)}, uy, skin);                              // right, +x
-  polygon({p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)}, ux, skin);                              // top, +z
-  polygon({p(0, 1, 0), p(1, 1, 0), p(1, 0, 0), p(0, 0, 0)}, ux, skin);                              // bottom, -z
+  polygon({p(0, 0, 0), p(1, 0, 0), p(1, 0, 1), p(0, 0, 1)}, ux,
+          front != nullptr ? *front : skin);                             // front, -y
+  polygon({p(1, 1, 0), p(0, 1, 0), p(0, 1, 1), p(1, 1, 1)}, -ux, skin);  // back, +y
+  polygon({p(0, 1, 0), p(0, 0, 0), p(0, 0, 1), p(0, 1, 1)}, -uy, skin);  // left, -x
+  polygon({p(1, 0, 0), p(1, 1, 0), p(1, 1, 1), p(1, 0, 1)}, uy, skin);   // right, +x
+  polygon({p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)}, ux, skin);   // top, +z
+  polygon({p(0, 1, 0), p(1, 1, 0), p(1, 0, 0), p(0, 0, 0)}, ux, skin);   // bottom, -z
 }
 
-void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, double top_radius, double height,
-                       int segments, const Skin& skin) {
+void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, double top_radius,
+                       double height, int segments, const Skin& skin) {
   const auto ring = [&](int i, double r, double z) {
     const double angle = 2.0 * M_PI * i / segments;
     return Vector3d(f * (bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));

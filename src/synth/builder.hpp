@@ -47,14 +47,17 @@ class Builder {
 
 // ---- furniture.cpp: things made of boxes; the frame stands on the floor, its -y side is the front ----
 
-void add_desk(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material);
-void add_table(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material);
+void add_desk(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size,
+              const std::string& material);
+void add_table(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size,
+               const std::string& material);
 void add_chair(Builder& b, const geometry::Rigid3& frame, const std::string& material);
-void add_shelf(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material,
-               bool books);
+void add_shelf(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size,
+               const std::string& material, bool books);
 void add_cabinet(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size,
                  const std::string& material, int doors);
-void add_sofa(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size, const std::string& material);
+void add_sofa(Builder& b, const geometry::Rigid3& frame, const Eigen::Vector3d& size,
+              const std::string& material);
 void add_monitor(Builder& b, const geometry::Rigid3& frame, double width, bool stand);
 void add_plant(Builder& b, const geometry::Rigid3& frame, double height);
 void add_floor_lamp(Builder& b, const geometry::Rigid3& frame, double height, double power);
@@ -69,11 +72,11 @@ void add_panel(Builder& b, const geometry::Rigid3& frame, double width, double h
 // ---- walls.cpp ----
 
 struct Opening {
-  double at = 0.0;      ///< m along the wall to the opening's near edge
-  double width = 0.9;   ///< m
-  double bottom = 0.0;  ///< m above the wall's foot
-  double height = 2.1;  ///< m
-  bool window = false;  ///< glazed: bright glass and a frame; else a doorway
+  double at = 0.0;        ///< m along the wall to the opening's near edge
+  double width = 0.9;     ///< m
+  double bottom = 0.0;    ///< m above the wall's foot
+  double height = 2.1;    ///< m
+  bool window = false;    ///< glazed: bright glass and a frame; else a doorway
   double open_rad = 1.4;  ///< of the door leaf; < 0: no leaf
   std::string material = "door";
   core::ConfigMark mark;
@@ -86,14 +89,15 @@ struct Wall {
   double height = 2.6;
   double thickness = 0.12;
   std::string material = "plaster";
-  std::string skirting;  ///< material of a skirting board on both sides; "" = none
+  std::string skirting;           ///< material of a skirting board on both sides; "" = none
   std::vector<Opening> openings;  ///< sorted by `at`, not overlapping
 };
 
 void add_wall(Builder& b, const Wall& wall);
 
-/// Panel `index` of a zigzag through `points`: mitred with its neighbours, so that no seam shows at the corners.
-/// Thickness, heights and material are those of `wall`.
-void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vector2d>& points, std::size_t index);
+/// Panel `index` of a zigzag through `points`: mitred with its neighbours, so that no seam shows at the
+/// corners. Thickness, heights and material are those of `wall`.
+void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vector2d>& points,
+                      std::size_t index);
 
 }  // namespace plumbline::synth

@@ -21,8 +21,8 @@ struct Device {
   float wander;          ///< px that borders wander to and fro
   float flying;          ///< share of border pixels that float between front and back
   float fixed_share;     ///< share of the noise variance that stays while the picture does not change
-  /// The depth camera sees less than the colour camera it is registered to: shares of width (left, right) and height
-  /// (top, bottom) without depth.
+  /// The depth camera sees less than the colour camera it is registered to: shares of width (left, right) and
+  /// height (top, bottom) without depth.
   float left, right, top, bottom;
 };
 Device device(Sensor sensor) {
@@ -51,7 +51,8 @@ void correlate(cv::Mat1f& tile, double sigma) {
 /// A tile with a shift of its own.
 class Field {
  public:
-  Field(const cv::Mat1f& tile, std::uint64_t key) : tile_(tile), dx_(static_cast<int>(key & 511U)), dy_(static_cast<int>(key >> 9U & 511U)) {}
+  Field(const cv::Mat1f& tile, std::uint64_t key)
+      : tile_(tile), dx_(static_cast<int>(key & 511U)), dy_(static_cast<int>(key >> 9U & 511U)) {}
   [[nodiscard]] const float* row(int y) const { return tile_[(y + dy_) & (kTile - 1)]; }
   [[nodiscard]] int column(int x) const { return (x + dx_) & (kTile - 1); }
   [[nodiscard]] float at(int x, int y) const { return row(y)[column(x)]; }
@@ -66,9 +67,11 @@ std::uint64_t frame_bits(const FrameKey& key, std::uint64_t purpose, std::int64_
 }
 
 /// Exact depth looked up where the matching window of the device really sat: borders become ragged.
-cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tiles, const FrameKey& key, cv::Mat1b& from) {
+cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tiles, const FrameKey& key,
+                 cv::Mat1b& from) {
   const Field still_x(tiles.coarse, mix(key.seed, 11)), still_y(tiles.coarse, mix(key.seed, 12));
-  const Field now_x(tiles.medium, frame_bits(key, 13, key.index)), now_y(tiles.medium, frame_bits(key, 14, key.index));
+  const Field now_x(tiles.medium, frame_bits(key, 13, key.index)),
+      now_y(tiles.medium, frame_bits(key, 14, key.index));
   cv::Mat1f out(exact.size());
   from.create(exact.size());  // 1 where the neighbourhood is not smooth
   for (int y = 0; y < exact.rows; ++y) {
@@ -77,7 +80,8 @@ cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tile
     for (int x = 0; x < exact.cols; ++x) {
       const float z = row[x], tolerance = 0.02F + 0.02F * z;
       const float left = row[std::max(0, x - 2)], right = row[std::min(exact.cols - 1, x + 2)];
-      const bool border = std::abs(left + right - 2.0F * z) > tolerance || std::abs(up[x] + low[x] - 2.0F * z) > tolerance;
+      const bool border =
+          std::abs(left + right - 2.0F * z) > tolerance || std::abs(up[x] + low[x] - 2.0F * z) > tolerance;
       from(y, x) = border ? 1 : 0;
       if (!border) {
         out(y, x) = z;
@@ -117,8 +121,14 @@ struct Return {
 
 class Measurement {
  public:
-  Measurement(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles, const FrameKey& key)
-      : world_(world), view_(view), device_(device(sensor)), range_(depth_range(sensor)), tiles_(tiles), key_(key) {}
+  Measurement(const World& world, const View& view, Sensor sensor, const NoiseTiles& tiles,
+              const FrameKey& key)
+      : world_(world),
+        view_(view),
+        device_(device(sensor)),
+        range_(depth_range(sensor)),
+        tiles_(tiles),
+        key_(key) {}
 
   cv::Mat1w run() {
     cv::Mat1b border;
@@ -150,12 +160,14 @@ class Measurement {
 
   void row(int y, const cv::Mat1f& depth, const cv::Mat1b& border, std::uint16_t* out) const {
     const Field still(tiles_.fine, mix(key_.seed, 21)), now(tiles_.fine, frame_bits(key_, 22, key_.index));
-    const Field blobs(tiles_.coarse, mix(key_.seed, 23)), flicker(tiles_.medium, frame_bits(key_, 24, key_.index));
+    const Field blobs(tiles_.coarse, mix(key_.seed, 23)),
+        flicker(tiles_.medium, frame_bits(key_, 24, key_.index));
     const int* ids = view_.ids[y];
     const float fixed = std::sqrt(device_.fixed_share), fresh = std::sqrt(1.0F - device_.fixed_share);
     const float step2 = device_.step * device_.step / 12.0F;
     std::fill(out, out + depth.cols, std::uint16_t{0});
-    const auto w = static_cast<float>(depth.cols), h = static_cast<float>(depth.rows), fy = static_cast<float>(y);
+    const auto w = static_cast<float>(depth.cols), h = static_cast<float>(depth.rows),
+               fy = static_cast<float>(y);
     // The registered picture's edge is a little askew.
     if (fy < h * device_.top || fy > h * (1.0F - device_.bottom)) return;
     const float lean = 0.3F * fy / h;
@@ -184,7 +196,8 @@ class Measurement {
       const float own = std::sqrt(std::max(0.15F * sigma * sigma, sigma * sigma - step2));
       const float noise = fixed * still.at(x, y) + fresh * now.at(x, y);
       const float disparity = device_.focal_baseline / z + own * noise;
-      const float stepped = static_cast<float>(static_cast<int>(disparity / device_.step + 0.5F)) * device_.step;
+      const float stepped =
+          static_cast<float>(static_cast<int>(disparity / device_.step + 0.5F)) * device_.step;
       if (stepped <= device_.step) continue;
       const float raw = device_.focal_baseline / stepped * 5000.0F;
       if (raw < 65534.5F) out[x] = static_cast<std::uint16_t>(raw + 0.5F);
@@ -223,7 +236,8 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
     channel[k] = white_tile(mix(seed, 3 + k));
     correlate(channel[k], k == 3 ? 0.6 : 1.0);
   }
-  tiles.fine = 0.72 * tiles.fine + 0.58 * tiles.medium + 0.38 * tiles.coarse;  // a sharp core with a skirt, as measured
+  tiles.fine = 0.72 * tiles.fine + 0.58 * tiles.medium +
+               0.38 * tiles.coarse;  // a sharp core with a skirt, as measured
   for (int y = 0; y < kTile; ++y) {
     for (int x = 0; x < kTile; ++x) {
       for (int k = 0; k < 3; ++k) {
@@ -246,15 +260,18 @@ cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, con
     const float* z = exact[y];
     std::uint16_t* out = raw[y];
     for (int x = 0; x < raw.cols; ++x) {
-      out[x] = z[x] > min && z[x] < max ? static_cast<std::uint16_t>(z[x] * 5000.0F + 0.5F) : std::uint16_t{0};
+      out[x] =
+          z[x] > min && z[x] < max ? static_cast<std::uint16_t>(z[x] * 5000.0F + 0.5F) : std::uint16_t{0};
     }
   }
   return raw;
 }
 
-void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles, const FrameKey& key) {
+void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles,
+                     const FrameKey& key) {
   if (sensor == Sensor::kIdeal) return;
-  // Shot noise: after the square-root coding it is the same for all levels, but for the shadows; more gain, more noise.
+  // Shot noise: after the square-root coding it is the same for all levels, but for the shadows; more gain,
+  // more noise.
   const float sigma = std::clamp(1.0F * std::sqrt(std::max(gain, 0.3F)), 0.7F, 5.0F);
   const int scale = static_cast<int>(std::lround(256.0F * sigma / 16.0F));
   const std::uint64_t bits = frame_bits(key, 31, key.index);
@@ -299,7 +316,8 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
       }
     }
     auto* q = out.ptr<std::uint8_t>(y) + 3 * cell.x;
-    for (int i = 0; i < 3 * cell.width; ++i) q[i] = static_cast<std::uint8_t>(std::min(255, (sum[i] * divide + 32768) >> 16));
+    for (int i = 0; i < 3 * cell.width; ++i)
+      q[i] = static_cast<std::uint8_t>(std::min(255, (sum[i] * divide + 32768) >> 16));
   }
 }
 }  // namespace

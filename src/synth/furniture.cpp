@@ -45,7 +45,8 @@ void add_chair(Builder& b, const Rigid3& f, const std::string& material) {
   b.cylinder(f, {0.0, 0.0, 0.08}, 0.028, 0.028, 0.36, 10, {"metal"});
   for (int i = 0; i < 5; ++i) {
     Rigid3 arm = f;
-    arm.rotation = f.rotation * Eigen::AngleAxisd(2.0 * M_PI * i / 5.0 + 0.3, Vector3d::UnitZ()).toRotationMatrix();
+    arm.rotation =
+        f.rotation * Eigen::AngleAxisd(2.0 * M_PI * i / 5.0 + 0.3, Vector3d::UnitZ()).toRotationMatrix();
     b.box(arm, {0.02, -0.02, 0.06}, {0.30, 0.02, 0.09}, {"plastic_black"});
     b.box(arm, {0.26, -0.02, 0.0}, {0.30, 0.02, 0.06}, {"plastic_black"});
   }
@@ -75,8 +76,8 @@ void add_shelf(Builder& b, const Rigid3& f, const Vector3d& size, const std::str
         const double height = room * rng.uniform(0.62, 0.92), depth = rng.uniform(0.14, 0.9 * size.y());
         const Skin side{"paper"};
         Skin spines{"books", true, b.seed() * 64 + i * 8 + run};
-        b.box(f, {at, -y + 0.02, z + t}, {at + width, std::min(-y + 0.02 + depth, y - 0.02), z + t + height}, side,
-              &spines);
+        b.box(f, {at, -y + 0.02, z + t}, {at + width, std::min(-y + 0.02 + depth, y - 0.02), z + t + height},
+              side, &spines);
       }
       at += width + rng.uniform(0.0, 0.08);
       ++run;
@@ -137,7 +138,8 @@ void add_plant(Builder& b, const Rigid3& f, double height) {
   Rng rng(static_cast<std::uint64_t>(b.seed()), 0x91a7);
   for (int i = 0; i < 22; ++i) {
     const double z = rng.uniform(pot + 0.1 * height, 0.85 * height), yaw = rng.uniform(0.0, 2.0 * M_PI);
-    const double length = rng.uniform(0.16, 0.34), width = rng.uniform(0.05, 0.1), rise = rng.uniform(-0.2, 0.9);
+    const double length = rng.uniform(0.16, 0.34), width = rng.uniform(0.05, 0.1),
+                 rise = rng.uniform(-0.2, 0.9);
     Rigid3 leaf = f;
     leaf.translation = f * Vector3d(0.0, 0.0, z);
     leaf.rotation = f.rotation * Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix() *
@@ -189,8 +191,8 @@ void add_clutter(Builder& b, const Rigid3& f, double width, double depth, int co
     Rigid3 item = f;
     item.translation = f * Vector3d(-0.5 * width + cell * (i + rng.uniform(0.35, 0.65)),
                                     rng.uniform(-0.32, 0.32) * depth, 0.0);
-    item.rotation = f.rotation *
-                    Eigen::AngleAxisd(rng.uniform(-0.6, 0.6), Vector3d::UnitZ()).toRotationMatrix();
+    item.rotation =
+        f.rotation * Eigen::AngleAxisd(rng.uniform(-0.6, 0.6), Vector3d::UnitZ()).toRotationMatrix();
     const double kind = rng.uniform();
     if (kind < 0.25) {
       b.cylinder(item, Vector3d::Zero(), 0.038, 0.042, rng.uniform(0.09, 0.13), 14,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Soft light and shadows, computed once for a grid of nodes on every face: lamps as rectangles with 3 x 3 shadow
-// rays, and light without direction dimmed by what stands close (obscurance after Zhukov, Iones, Kronin 1998).
+// Soft light and shadows, computed once for a grid of nodes on every face: lamps as rectangles with 3 x 3
+// shadow rays, and light without direction dimmed by what stands close (obscurance after Zhukov, Iones,
+// Kronin 1998).
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -10,9 +10,34 @@
 
 namespace plumbline::synth {
 
-enum class Print { kPlain, kPlaster, kCeiling, kCarpet, kPlanks, kWood, kBrick, kCloth, kFabric, kRug, kMetal,
-                   kScreen, kPoster, kPicture, kWhiteboard, kSign, kBooks, kPaper, kCover, kDoor, kWindow, kTiles,
-                   kCardboard, kLino, kLeaf, kHall };
+enum class Print {
+  kPlain,
+  kPlaster,
+  kCeiling,
+  kCarpet,
+  kPlanks,
+  kWood,
+  kBrick,
+  kCloth,
+  kFabric,
+  kRug,
+  kMetal,
+  kScreen,
+  kPoster,
+  kPicture,
+  kWhiteboard,
+  kSign,
+  kBooks,
+  kPaper,
+  kCover,
+  kDoor,
+  kWindow,
+  kTiles,
+  kCardboard,
+  kLino,
+  kLeaf,
+  kHall
+};
 
 struct Material {
   const char* name;
@@ -29,11 +54,12 @@ struct Material {
 /// Null when there is no such material.
 const Material* find_material(const std::string& name);
 
-/// 8-bit texture with mip levels. Values are 255 sqrt(reflectance), so that light multiplies as its square root.
+/// 8-bit texture with mip levels. Values are 255 sqrt(reflectance), so that light multiplies as its square
+/// root.
 struct Texture2d {
   struct Level {
-    int width = 0;   ///< a power of two
-    int height = 0;  ///< a power of two
+    int width = 0;                      ///< a power of two
+    int height = 0;                     ///< a power of two
     std::vector<std::uint32_t> texels;  ///< B | G << 8 | R << 16, row by row, v = 0 at the top of the image
   };
   std::vector<Level> levels;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/synth/options.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdlib>
-#include <fmt/format.h>
 
 #include "plumbline/core/config.hpp"
 
@@ -28,9 +29,10 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.number("speed", speed, {0.05, 20.0}, "", "Times the scene's own speed");
   table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
                "Distance between samples of reference.ply; 0 = 5 mm, more for large scenes");
-  table.text("events", events,
-             "Hard moments, kind@start+duration[*value] in seconds, separated by commas; kinds: whiteout, lampoff, "
-             "blur (value px), drop, cover, spin (value turns), nodepth");
+  table.text(
+      "events", events,
+      "Hard moments, kind@start+duration[*value] in seconds, separated by commas; kinds: whiteout, lampoff, "
+      "blur (value px), drop, cover, spin (value turns), nodepth");
 }
 
 namespace {
@@ -41,8 +43,9 @@ struct KindName {
   double default_value;
 };
 constexpr KindName kKinds[] = {
-    {"whiteout", EventKind::kWhiteout, 1.0}, {"lampoff", EventKind::kLampOff, 1.0}, {"blur", EventKind::kBlur, 8.0},
-    {"drop", EventKind::kDrop, 1.0},         {"cover", EventKind::kCover, 1.0},     {"spin", EventKind::kSpin, 1.0},
+    {"whiteout", EventKind::kWhiteout, 1.0}, {"lampoff", EventKind::kLampOff, 1.0},
+    {"blur", EventKind::kBlur, 8.0},         {"drop", EventKind::kDrop, 1.0},
+    {"cover", EventKind::kCover, 1.0},       {"spin", EventKind::kSpin, 1.0},
     {"nodepth", EventKind::kNoDepth, 1.0},
 };
 
@@ -58,7 +61,8 @@ std::string trim(const std::string& s) {
 }
 
 core::Result<Event> parse_event(const std::string& text) {
-  const auto at = text.find('@'), plus = text.find('+', at == std::string::npos ? 0 : at), star = text.find('*');
+  const auto at = text.find('@'), plus = text.find('+', at == std::string::npos ? 0 : at),
+             star = text.find('*');
   const std::string name = trim(text.substr(0, at));
   std::vector<std::string> names;
   const KindName* kind = nullptr;
@@ -73,15 +77,15 @@ core::Result<Event> parse_event(const std::string& text) {
                                          near.empty() ? "" : fmt::format("; did you mean {}?", near)));
   }
   Event event{kind->kind, 0.0, 0.0, kind->default_value};
-  const bool formed = at != std::string::npos && plus != std::string::npos &&
-                      (star == std::string::npos || star > plus) &&
-                      read_number(trim(text.substr(at + 1, plus - at - 1)), event.start_s) &&
-                      read_number(trim(text.substr(plus + 1, star == std::string::npos ? star : star - plus - 1)),
-                                  event.duration_s) &&
-                      (star == std::string::npos || read_number(trim(text.substr(star + 1)), event.value));
+  const bool formed =
+      at != std::string::npos && plus != std::string::npos && (star == std::string::npos || star > plus) &&
+      read_number(trim(text.substr(at + 1, plus - at - 1)), event.start_s) &&
+      read_number(trim(text.substr(plus + 1, star == std::string::npos ? star : star - plus - 1)),
+                  event.duration_s) &&
+      (star == std::string::npos || read_number(trim(text.substr(star + 1)), event.value));
   if (!formed || event.start_s < 0.0 || event.duration_s <= 0.0 || std::abs(event.value) > 100.0) {
-    return core::usage_error(
-        fmt::format("events: '{}' is not kind@start+duration[*value] in seconds, such as blur@6+0.5*12", text));
+    return core::usage_error(fmt::format(
+        "events: '{}' is not kind@start+duration[*value] in seconds, such as blur@6+0.5*12", text));
   }
   return event;
 }
@@ -106,10 +110,13 @@ core::Result<std::vector<Event>> parse_events(const std::string& text) {
 }
 
 core::Result<void> check(const SynthOptions& options) {
-  if (options.frames == 0) return core::usage_error("frames: zero frames make no recording (-1 = the path once)");
+  if (options.frames == 0)
+    return core::usage_error("frames: zero frames make no recording (-1 = the path once)");
   if (options.robots < 1) return core::usage_error("robots: at least one");
-  if (options.width < 64 || options.height < 48) return core::usage_error("width, height: at least 64 x 48 pixels");
-  if (!(options.fps > 0.0) || !(options.speed > 0.0)) return core::usage_error("fps, speed: must be positive");
+  if (options.width < 64 || options.height < 48)
+    return core::usage_error("width, height: at least 64 x 48 pixels");
+  if (!(options.fps > 0.0) || !(options.speed > 0.0))
+    return core::usage_error("fps, speed: must be positive");
   if (auto events = parse_events(options.events); !events) return tl::unexpected<core::Error>(events.error());
   return {};
 }

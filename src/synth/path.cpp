@@ -30,7 +30,9 @@ double smoother_integral(double x) {
 
 /// Centripetal Catmull-Rom between b and c (Barry-Goldman pyramid).
 Vector3d catmull_rom(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d, double s) {
-  const auto knot = [](const Vector3d& p, const Vector3d& q) { return std::max(1e-4, std::sqrt((q - p).norm())); };
+  const auto knot = [](const Vector3d& p, const Vector3d& q) {
+    return std::max(1e-4, std::sqrt((q - p).norm()));
+  };
   const double t1 = knot(a, b), t2 = t1 + knot(b, c), t3 = t2 + knot(c, d), t = t1 + s * (t2 - t1);
   const Vector3d a1 = (t1 - t) / t1 * a + t / t1 * b;
   const Vector3d a2 = (t2 - t) / (t2 - t1) * b + (t - t1) / (t2 - t1) * c;
@@ -43,7 +45,9 @@ Vector3d catmull_rom(const Vector3d& a, const Vector3d& b, const Vector3d& c, co
 struct Direction {
   double yaw, pitch;
 };
-Direction direction(const Vector3d& d) { return {std::atan2(d.y(), d.x()), std::atan2(d.z(), d.head<2>().norm())}; }
+Direction direction(const Vector3d& d) {
+  return {std::atan2(d.y(), d.x()), std::atan2(d.z(), d.head<2>().norm())};
+}
 
 /// Where a waypoint wants the camera to look when it is at `position`, moving along `tangent`.
 Direction wish(const Waypoint& w, const Vector3d& position, const Vector3d& tangent) {
@@ -68,7 +72,8 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
   const auto at = [&](long i) -> Vector3d {
     if (robot.closed) return w[static_cast<std::size_t>((i % n + n) % n)].position;
     if (i < 0) return 2.0 * w[0].position - w[1].position;
-    if (i >= n) return 2.0 * w[static_cast<std::size_t>(n - 1)].position - w[static_cast<std::size_t>(n - 2)].position;
+    if (i >= n)
+      return 2.0 * w[static_cast<std::size_t>(n - 1)].position - w[static_cast<std::size_t>(n - 2)].position;
     return w[static_cast<std::size_t>(i)].position;
   };
   std::vector<Sample> out;

@@ -9,17 +9,17 @@
 
 namespace plumbline::synth {
 
-/// Camera motion along a robot's waypoints. Centripetal Catmull-Rom through the waypoints gives the shape, speed and
-/// turn rate give the time, and a uniform cubic B-spline over knots in time makes position, yaw and pitch C2.
-/// Hand-held sway or the tremble of wheels is added as a sum of sines.
+/// Camera motion along a robot's waypoints. Centripetal Catmull-Rom through the waypoints gives the shape,
+/// speed and turn rate give the time, and a uniform cubic B-spline over knots in time makes position, yaw and
+/// pitch C2. Hand-held sway or the tremble of wheels is added as a sum of sines.
 class CameraPath {
  public:
   struct Options {
     double speed = 1.0;  ///< times the path's own
     bool wheeled = false;
     std::uint64_t seed = 1;
-    double start_share = 0.0;    ///< of a round, where to begin
-    std::vector<Event> events;   ///< kSpin is motion; others are passed over
+    double start_share = 0.0;   ///< of a round, where to begin
+    std::vector<Event> events;  ///< kSpin is motion; others are passed over
   };
   CameraPath(const RobotPath& robot, const Options& options);
 

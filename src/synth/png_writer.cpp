@@ -52,12 +52,14 @@ std::vector<std::uint8_t> filtered_rows(const cv::Mat& image) {
 }  // namespace
 
 std::vector<std::uint8_t> encode_png(const cv::Mat& image) {
-  if (image.type() != CV_8UC3 && image.type() != CV_16UC1) throw std::invalid_argument("encode_png: type of picture");
+  if (image.type() != CV_8UC3 && image.type() != CV_16UC1)
+    throw std::invalid_argument("encode_png: type of picture");
   const std::vector<std::uint8_t> rows = filtered_rows(image);
-  const std::unique_ptr<libdeflate_compressor, void (*)(libdeflate_compressor*)> deflate(libdeflate_alloc_compressor(1),
-                                                                                         libdeflate_free_compressor);
+  const std::unique_ptr<libdeflate_compressor, void (*)(libdeflate_compressor*)> deflate(
+      libdeflate_alloc_compressor(1), libdeflate_free_compressor);
   std::vector<std::uint8_t> packed(libdeflate_zlib_compress_bound(deflate.get(), rows.size()));
-  packed.resize(libdeflate_zlib_compress(deflate.get(), rows.data(), rows.size(), packed.data(), packed.size()));
+  packed.resize(
+      libdeflate_zlib_compress(deflate.get(), rows.data(), rows.size(), packed.data(), packed.size()));
 
   std::vector<std::uint8_t> out = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   std::vector<std::uint8_t> header;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Counter-based random numbers: a value is a pure function of its seed and counter, so that frames come out the
-// same in any order and on any number of threads. Mixing: splitmix64 (Steele, Lea, Flood 2014), public domain.
+// Counter-based random numbers: a value is a pure function of its seed and counter, so that frames come out
+// the same in any order and on any number of threads. Mixing: splitmix64 (Steele, Lea, Flood 2014), public
+// domain.
 #include <cmath>
 #include <cstdint>
 
@@ -14,7 +15,9 @@ inline std::uint64_t mix(std::uint64_t x) {
   x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
   return x ^ (x >> 31U);
 }
-inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) { return mix(mix(a) ^ (b * 0xd1342543de82ef95ULL)); }
+inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) {
+  return mix(mix(a) ^ (b * 0xd1342543de82ef95ULL));
+}
 inline std::uint64_t mix(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return mix(mix(a, b), c); }
 
 /// Stream of numbers for one purpose.

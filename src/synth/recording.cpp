@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/synth/recording.hpp"
 
-#include <chrono>
 #include <fmt/format.h>
+
+#include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -22,14 +23,16 @@ Result<void> write_text(const fs::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary);
   out << text;
   out.flush();
-  if (!out) return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
+  if (!out)
+    return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
   return {};
 }
 
 Result<void> make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) return core::output_error(fmt::format("{}: cannot be made ({})", folder.string(), error.message()));
+  if (error)
+    return core::output_error(fmt::format("{}: cannot be made ({})", folder.string(), error.message()));
   return {};
 }
 
@@ -42,7 +45,9 @@ std::string write_png(const fs::path& file, const cv::Mat& image) {
 }
 
 std::string color_name(const dataset::PairInfo& info) { return fmt::format("rgb/{:.6f}.png", info.stamp); }
-std::string depth_name(const dataset::PairInfo& info) { return fmt::format("depth/{:.6f}.png", info.depth_stamp); }
+std::string depth_name(const dataset::PairInfo& info) {
+  return fmt::format("depth/{:.6f}.png", info.depth_stamp);
+}
 
 /// Writes one pair; "" or what went wrong.
 std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
@@ -63,9 +68,11 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
     const dataset::PairInfo info = source.info(i);
     color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
     depth += fmt::format("{:.6f} {}\n", info.depth_stamp, depth_name(info));
-    pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp, depth_name(info));
+    pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
+                         depth_name(info));
     truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
-    if (info.depth_stamp != info.stamp) truth.push_back({info.depth_stamp, source.world_from_camera(info.depth_stamp)});
+    if (info.depth_stamp != info.stamp)
+      truth.push_back({info.depth_stamp, source.world_from_camera(info.depth_stamp)});
   }
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
@@ -95,30 +102,33 @@ Result<std::size_t> write_frames(const Job& job, const core::Executor& executor,
   while (done < job.source.size() && !stop.stop_requested()) {
     const std::size_t count = std::min(batch, job.source.size() - done);
     std::vector<std::string> problems(count);
-    executor.parallel_for(count, [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
+    executor.parallel_for(count,
+                          [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
     for (const std::string& problem : problems) {
       if (!problem.empty()) return core::output_error(problem);
     }
     done += count;
     if (progress) progress(job.done_before + done, job.all_frames);
   }
-  if (auto ok = write_lists(job.source, done, job.folder); !ok) return tl::unexpected<core::Error>(ok.error());
+  if (auto ok = write_lists(job.source, done, job.folder); !ok)
+    return tl::unexpected<core::Error>(ok.error());
   return done;
 }
 
-nlohmann::json describe_robot(const SynthSource& source, const std::string& folder, const std::string& path_name,
-                              std::size_t frames) {
+nlohmann::json describe_robot(const SynthSource& source, const std::string& folder,
+                              const std::string& path_name, std::size_t frames) {
   const auto first = source.info(0), last = source.info(source.size() - 1);
   const geometry::Rigid3 start = source.world_from_camera(first.stamp);
   const Eigen::Quaterniond q = start.quaternion();
   const Eigen::Vector3d& t = start.translation;
-  return {{"folder", folder},
-          {"path", path_name},
-          {"frames", frames},
-          {"path_m", source.path_length()},
-          {"first_stamp", first.stamp},
-          {"last_stamp", last.stamp},
-          {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
+  return {
+      {"folder", folder},
+      {"path", path_name},
+      {"frames", frames},
+      {"path_m", source.path_length()},
+      {"first_stamp", first.stamp},
+      {"last_stamp", last.stamp},
+      {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
 }
 
 nlohmann::json describe_options(const SynthOptions& o) {
@@ -140,7 +150,8 @@ std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
 Result<void> check_free(const fs::path& output) {
   for (const fs::path& file : {output / "scene.json", output / folder_name(0)}) {
     if (fs::exists(file)) {
-      return core::output_error(fmt::format("{}: exists already; choose another folder or remove it", file.string()));
+      return core::output_error(
+          fmt::format("{}: exists already; choose another folder or remove it", file.string()));
     }
   }
   return {};
@@ -159,8 +170,8 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
 }  // namespace
 
 Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options, const fs::path& output,
-                                      const core::Executor& executor, const core::StopToken& stop, core::Log& log,
-                                      const Progress& progress) {
+                                      const core::Executor& executor, const core::StopToken& stop,
+                                      core::Log& log, const Progress& progress) {
   const auto fail = [](const core::Error& e) { return tl::unexpected<core::Error>(e); };
   if (auto ok = check_free(output); !ok) return fail(ok.error());
   auto world = build_world(scene, options, executor);
@@ -177,19 +188,24 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   nlohmann::json robots = nlohmann::json::array();
   for (int i = 0; i < options.robots && !stop.stop_requested(); ++i) {
     const SynthSource& source = *(*sources)[static_cast<std::size_t>(i)];
-    const auto written = write_frames({source, output / folder_name(i), summary.frames, all_frames}, executor, stop, progress);
+    const auto written =
+        write_frames({source, output / folder_name(i), summary.frames, all_frames}, executor, stop, progress);
     if (!written) return fail(written.error());
     summary.frames += *written;
     summary.path_m += source.path_length();
-    robots.push_back(describe_robot(source, folder_name(i), scene.robots[static_cast<std::size_t>(i) % scene.robots.size()].name, *written));
+    robots.push_back(describe_robot(source, folder_name(i),
+                                    scene.robots[static_cast<std::size_t>(i) % scene.robots.size()].name,
+                                    *written));
   }
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-  summary.reference_spacing_m = options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
+  summary.reference_spacing_m =
+      options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
   if (!stop.stop_requested()) {
     Visibility visibility(*world, summary.reference_spacing_m);
     for (const auto& source : *sources) visibility.add(*source, executor, stop);
-    const auto counts = write_reference(output / "reference.ply", **world, visibility, summary.reference_spacing_m, executor);
+    const auto counts =
+        write_reference(output / "reference.ply", **world, visibility, summary.reference_spacing_m, executor);
     if (!counts) return fail(counts.error());
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;
@@ -208,8 +224,8 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
                                  {"visible", summary.reference_visible}}},
                                {"complete", !summary.stopped}};
   if (auto ok = write_text(output / "scene.json", json.dump(2) + "\n"); !ok) return fail(ok.error());
-  log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)", scene.name,
-                       summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
+  log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
+                       scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));
   return summary;
 }

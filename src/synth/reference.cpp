@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "reference.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
 #include <fstream>
 
 #include "depth_sensor.hpp"
@@ -57,7 +58,8 @@ struct PlySample {
 };
 #pragma pack(pop)
 
-PlySample make_sample(const World& world, std::size_t index, double u, double v, const Vector3d& p, bool visible) {
+PlySample make_sample(const World& world, std::size_t index, double u, double v, const Vector3d& p,
+                      bool visible) {
   const Face& face = world.scene.faces[index];
   PlySample s{};
   s.x = static_cast<float>(p.x());
@@ -74,7 +76,8 @@ PlySample make_sample(const World& world, std::size_t index, double u, double v,
   return s;
 }
 
-std::vector<PlySample> sample_face(const World& world, const Visibility& visibility, std::size_t index, double spacing) {
+std::vector<PlySample> sample_face(const World& world, const Visibility& visibility, std::size_t index,
+                                   double spacing) {
   const Face& face = world.scene.faces[index];
   const Bounds b = bounds(face);
   std::vector<PlySample> out;
@@ -119,7 +122,8 @@ bool Visibility::seen(std::size_t face, double u, double v) const {
   const Grid& g = grids_[face];
   const int i = std::clamp(static_cast<int>((u - g.u0) / block_), 0, g.columns - 1);
   const int j = std::clamp(static_cast<int>((v - g.v0) / block_), 0, g.rows - 1);
-  return flags_[g.first + static_cast<std::size_t>(j) * static_cast<std::size_t>(g.columns) + static_cast<std::size_t>(i)] != 0;
+  return flags_[g.first + static_cast<std::size_t>(j) * static_cast<std::size_t>(g.columns) +
+                static_cast<std::size_t>(i)] != 0;
 }
 
 void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::Pinhole& camera) {
@@ -135,7 +139,8 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     if (c.z() < range.min || c.z() > std::min(range.max, 6.0)) return false;
     const Vector2d pixel = camera.project(c);
     if (!camera.contains(pixel, 1.0)) return false;
-    return view.ids(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) == static_cast<int>(index);
+    return view.ids(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) ==
+           static_cast<int>(index);
   };
   for (std::size_t index = 0; index < present.size(); ++index) {
     if (present[index] == 0) continue;
@@ -144,7 +149,9 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     const Bounds b = bounds(face);
     for (int j = 0; j < g.rows; ++j) {
       for (int i = 0; i < g.columns; ++i) {
-        std::atomic<std::uint8_t>& flag = flags_[g.first + static_cast<std::size_t>(j) * static_cast<std::size_t>(g.columns) + static_cast<std::size_t>(i)];
+        std::atomic<std::uint8_t>& flag =
+            flags_[g.first + static_cast<std::size_t>(j) * static_cast<std::size_t>(g.columns) +
+                   static_cast<std::size_t>(i)];
         if (flag.load(std::memory_order_relaxed) != 0) continue;
         const double ua = g.u0 + i * block_, va = g.v0 + j * block_;
         const double ub = std::min(ua + block_, b.hi.x()), vb = std::min(va + block_, b.hi.y());
@@ -186,7 +193,8 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
                                               const Visibility& visibility, double spacing,
                                               const core::Executor& executor) {
   std::vector<std::vector<PlySample>> parts(world.scene.faces.size());
-  executor.parallel_for(parts.size(), [&](std::size_t i) { parts[i] = sample_face(world, visibility, i, spacing); });
+  executor.parallel_for(parts.size(),
+                        [&](std::size_t i) { parts[i] = sample_face(world, visibility, i, spacing); });
   ReferenceCounts counts;
   for (const auto& part : parts) {
     counts.samples += part.size();
@@ -194,17 +202,20 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
   }
   std::ofstream out(file, std::ios::binary);
   out << fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment samples of the true surfaces, {:.4f} m apart; visible = 1 where "
+      "ply\nformat binary_little_endian 1.0\ncomment samples of the true surfaces, {:.4f} m apart; visible = "
+      "1 where "
       "a camera saw the spot within range\nelement vertex {}\n",
       spacing, counts.samples);
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
   for (const char* name : {"red", "green", "blue", "visible"}) out << "property uchar " << name << "\n";
   out << "end_header\n";
   for (const auto& part : parts) {
-    out.write(reinterpret_cast<const char*>(part.data()), static_cast<std::streamsize>(part.size() * sizeof(PlySample)));
+    out.write(reinterpret_cast<const char*>(part.data()),
+              static_cast<std::streamsize>(part.size() * sizeof(PlySample)));
   }
   out.flush();
-  if (!out) return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
+  if (!out)
+    return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
   return counts;
 }
 

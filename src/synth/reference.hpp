@@ -14,8 +14,8 @@
 
 namespace plumbline::synth {
 
-/// Marks blocks (about 2 cm) of every face that were seen whole from some camera pose, within the sensor's range and
-/// not at a grazing angle.
+/// Marks blocks (about 2 cm) of every face that were seen whole from some camera pose, within the sensor's
+/// range and not at a grazing angle.
 class Visibility {
  public:
   Visibility(std::shared_ptr<const World> world, double spacing);

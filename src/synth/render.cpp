@@ -14,8 +14,8 @@ namespace {
 using Vec4 = float __attribute__((vector_size(16)));
 using Byte4 = std::uint8_t __attribute__((vector_size(4)));
 
-// The inner loop is compiled twice, for any x86-64 and for AVX2, and chosen when it runs. No fused operations in
-// either, so the bytes are the same.
+// The inner loop is compiled twice, for any x86-64 and for AVX2, and chosen when it runs. No fused operations
+// in either, so the bytes are the same.
 #if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define PLUMBLINE_FAST __attribute__((target_clones("avx2", "default")))
 #else
@@ -52,7 +52,8 @@ FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole&
   const TexelScale scale = texel_scale(world, index);
   const double shift_u = static_cast<double>(world.offset_u[index]) - ua.dot(origin);
   const double shift_v = static_cast<double>(world.offset_v[index]) - va.dot(origin);
-  const Vector3d a = scale.u * (through_pixels(ua) + shift_u * c), b = -scale.v * (through_pixels(va) + shift_v * c);
+  const Vector3d a = scale.u * (through_pixels(ua) + shift_u * c),
+                 b = -scale.v * (through_pixels(va) + shift_v * c);
   FaceView out;
   for (int i = 0; i < 3; ++i) {
     out.a[i] = static_cast<float>(a[i]);
@@ -139,8 +140,10 @@ PLUMBLINE_INLINE Vec4 bilinear(const Texture2d::Level& level, float x, float y) 
   y -= 0.5F;
   const int ix = static_cast<int>(x) - (x < 0.0F ? 1 : 0), iy = static_cast<int>(y) - (y < 0.0F ? 1 : 0);
   const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
-  const auto x0 = static_cast<std::size_t>(ix & (level.width - 1)), x1 = static_cast<std::size_t>((ix + 1) & (level.width - 1));
-  const std::uint32_t* top = level.texels.data() + static_cast<std::size_t>((iy & (level.height - 1)) * level.width);
+  const auto x0 = static_cast<std::size_t>(ix & (level.width - 1)),
+             x1 = static_cast<std::size_t>((ix + 1) & (level.width - 1));
+  const std::uint32_t* top =
+      level.texels.data() + static_cast<std::size_t>((iy & (level.height - 1)) * level.width);
   const std::uint32_t* low =
       level.texels.data() + static_cast<std::size_t>(((iy + 1) & (level.height - 1)) * level.width);
   const Vec4 t0 = unpack(top[x0]), t1 = unpack(top[x1]), l0 = unpack(low[x0]), l1 = unpack(low[x1]);
@@ -166,7 +169,8 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   // Axes of the footprint: eigenvalues of J J^T.
   const float xx = ux * ux + uy * uy, yy = vx * vx + vy * vy, xy = ux * vx + uy * vy;
   const float mean = 0.5F * (xx + yy), spread = std::sqrt(0.25F * (xx - yy) * (xx - yy) + xy * xy);
-  const float major = std::sqrt(std::max(mean + spread, 1e-12F)), minor = std::sqrt(std::max(mean - spread, 1e-12F));
+  const float major = std::sqrt(std::max(mean + spread, 1e-12F)),
+              minor = std::sqrt(std::max(mean - spread, 1e-12F));
   Footprint out{};
   out.probes = major > 3.0F * minor ? 4 : major > 1.5F * minor ? 2 : 1;
   const float size = std::max(minor, major / static_cast<float>(out.probes));
@@ -174,7 +178,8 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
     // The longer axis: eigenvector of the larger eigenvalue, from the row that is not nearly zero.
     const float big = mean + spread;
     const float ex = xx >= yy ? big - yy : xy, ey = xx >= yy ? xy : big - xx;
-    const float step = major / (static_cast<float>(out.probes) * std::sqrt(std::max(ex * ex + ey * ey, 1e-20F)));
+    const float step =
+        major / (static_cast<float>(out.probes) * std::sqrt(std::max(ex * ex + ey * ey, 1e-20F)));
     out.step_x = ex * step;
     out.step_y = ey * step;
   }
@@ -186,7 +191,8 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   out.fine = &texture.levels[fine];
   out.coarse = &texture.levels[coarse];
   out.blend = out.probes > 1 ? 0.0F : level - static_cast<float>(fine);
-  const auto width = static_cast<float>(texture.levels[0].width), height = static_cast<float>(texture.levels[0].height);
+  const auto width = static_cast<float>(texture.levels[0].width),
+             height = static_cast<float>(texture.levels[0].height);
   out.fine_x = static_cast<float>(out.fine->width) / width;
   out.fine_y = static_cast<float>(out.fine->height) / height;
   out.coarse_x = static_cast<float>(out.coarse->width) / width;
@@ -251,7 +257,8 @@ class Shader {
     return color(id, foot(id, x, y), x, y) * brightness(id, x, y);
   }
   /// Sum of four places about a pixel; light and level of detail are worked out once for each face.
-  [[nodiscard]] Vec4 mean(const std::array<int, 4>& faces, float x, float y, const float (&spots)[4][2]) const {
+  [[nodiscard]] Vec4 mean(const std::array<int, 4>& faces, float x, float y,
+                          const float (&spots)[4][2]) const {
     Vec4 sum = {0.0F, 0.0F, 0.0F, 0.0F};
     for (std::size_t k = 0; k < 4; ++k) {
       bool done = false;
@@ -334,7 +341,8 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
     const int *row = ids[y], *up = ids[std::max(0, y - 1)], *low = ids[std::min(ids.rows - 1, y + 1)];
     for (int x = 0; x < ids.cols; ++x) {
       const int id = row[x];
-      if (up[x] != id || low[x] != id || row[std::max(0, x - 1)] != id || row[std::min(ids.cols - 1, x + 1)] != id) {
+      if (up[x] != id || low[x] != id || row[std::max(0, x - 1)] != id ||
+          row[std::min(ids.cols - 1, x + 1)] != id) {
         pixels.emplace_back(x, y);
       }
     }
@@ -349,8 +357,10 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
   }
   rays.flush();
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    Shader::store(shader.mean(seen[i], static_cast<float>(pixels[i].x), static_cast<float>(pixels[i].y), kSpots) * 0.25F,
-                  image[pixels[i].y][pixels[i].x].val);
+    Shader::store(
+        shader.mean(seen[i], static_cast<float>(pixels[i].x), static_cast<float>(pixels[i].y), kSpots) *
+            0.25F,
+        image[pixels[i].y][pixels[i].x].val);
   }
 }
 
@@ -404,8 +414,9 @@ cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure) 
 cv::Vec3b surface_color(const World& world, std::size_t face, double u, double v) {
   const TexelScale scale = texel_scale(world, face);
   const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
-  const Vec4 texel = bilinear(top, static_cast<float>((u + static_cast<double>(world.offset_u[face])) * scale.u),
-                              static_cast<float>(-(v + static_cast<double>(world.offset_v[face])) * scale.v));
+  const Vec4 texel =
+      bilinear(top, static_cast<float>((u + static_cast<double>(world.offset_u[face])) * scale.u),
+               static_cast<float>(-(v + static_cast<double>(world.offset_v[face])) * scale.v));
   cv::Vec3b bgr;
   Shader::store(texel * world.light[face].at(static_cast<float>(u), static_cast<float>(v)), bgr.val);
   return bgr;

@@ -10,8 +10,8 @@
 
 namespace plumbline::synth {
 
-/// How one face appears in one picture. With p = (x, y, 1) in pixels: 1/z = c.p, and texture coordinates (level 0
-/// texels) are (a.p) z and (b.p) z: flat faces need no rays but for who is in front.
+/// How one face appears in one picture. With p = (x, y, 1) in pixels: 1/z = c.p, and texture coordinates
+/// (level 0 texels) are (a.p) z and (b.p) z: flat faces need no rays but for who is in front.
 struct FaceView {
   float a[3], b[3], c[3];
 };
@@ -24,7 +24,8 @@ struct View {
   cv::Mat1i ids;  ///< face per pixel, -1 = nothing
 };
 
-/// Casts rays at every second pixel of every second row, and at the pixels between where their neighbours differ.
+/// Casts rays at every second pixel of every second row, and at the pixels between where their neighbours
+/// differ.
 View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera);
 
 /// Metres along z of what `ids` names; 0 = nothing.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -27,7 +28,8 @@ class ObjectReader {
     table_.text("name", name, "What messages call it");
   }
 
-  ObjectReader& point(const std::string& key, std::vector<double>& value, std::size_t length, bool required = true) {
+  ObjectReader& point(const std::string& key, std::vector<double>& value, std::size_t length,
+                      bool required = true) {
     table_.numbers(key, value, length, {-1000.0, 1000.0}, "m", "Place");
     if (required) required_.push_back(key);
     return *this;
@@ -128,7 +130,8 @@ void read_openings(const Context& c, const char* key, bool window, Wall& wall) {
   const ConfigNode* list = c.node.find(key);
   if (list == nullptr) return;
   if (list->kind != ConfigNode::Kind::kSequence) {
-    c.problems.push_back({list->mark, c.path + "." + key, "is a list of openings, each with at, width, height"});
+    c.problems.push_back(
+        {list->mark, c.path + "." + key, "is a list of openings, each with at, width, height"});
     return;
   }
   for (std::size_t i = 0; i < list->items.size(); ++i) {
@@ -148,9 +151,10 @@ void check_openings(const Context& c, Wall& wall) {
     if (o.at < end) {
       c.problems.push_back({o.mark, c.path, fmt::format("openings overlap at {:.2f} m", o.at)});
     } else if (o.at + o.width > length + 1e-9 || o.bottom + o.height > wall.height + 1e-9) {
-      c.problems.push_back({o.mark, c.path,
-                            fmt::format("the opening at {:.2f} m does not fit in a wall {:.2f} m long and {:.2f} m high",
-                                        o.at, length, wall.height)});
+      c.problems.push_back(
+          {o.mark, c.path,
+           fmt::format("the opening at {:.2f} m does not fit in a wall {:.2f} m long and {:.2f} m high", o.at,
+                       length, wall.height)});
     }
     end = o.at + o.width;
   }
@@ -167,7 +171,8 @@ void read_wall(const Context& c) {
   wall.from = {from[0], from[1]};
   wall.to = {to[0], to[1]};
   if ((wall.to - wall.from).norm() < 0.01) {
-    r.problem(c.node.mark, fmt::format("degenerate wall: from and to are the same place ({}, {})", from[0], from[1]));
+    r.problem(c.node.mark,
+              fmt::format("degenerate wall: from and to are the same place ({}, {})", from[0], from[1]));
     return;
   }
   const std::size_t before = c.problems.size();
@@ -246,8 +251,8 @@ void read_box(const Context& c) {
   }
   if (!begin(c, r)) return;
   const Skin skin{material, stretched};
-  c.builder.box(upright(to3(at), yaw), {-0.5 * size[0], -0.5 * size[1], 0.0}, {0.5 * size[0], 0.5 * size[1], size[2]},
-                skin, &skin);
+  c.builder.box(upright(to3(at), yaw), {-0.5 * size[0], -0.5 * size[1], 0.0},
+                {0.5 * size[0], 0.5 * size[1], size[2]}, skin, &skin);
 }
 
 void read_cylinder(const Context& c) {
@@ -259,14 +264,14 @@ void read_cylinder(const Context& c) {
   r.point("at", at, 3).length("radius", radius, 0.001, 50.0).length("top_radius", top_radius, 0.001, 50.0);
   r.length("height", height, 0.001, 50.0).count("segments", segments, 3, 256).material("material", material);
   if (!begin(c, r)) return;
-  c.builder.cylinder(upright(to3(at), 0.0), Vector3d::Zero(), radius, top_radius > 0.0 ? top_radius : radius, height,
-                     segments, {material});
+  c.builder.cylinder(upright(to3(at), 0.0), Vector3d::Zero(), radius, top_radius > 0.0 ? top_radius : radius,
+                     height, segments, {material});
 }
 
 /// Posters, whiteboards, signs and pictures: flat things that hang; yaw 0 looks to -y.
 void read_panel(const Context& c) {
   std::vector<double> at, size = c.type == "whiteboard" ? std::vector<double>{1.8, 1.1}
-                              : c.type == "sign"        ? std::vector<double>{0.3, 0.15}
+                                 : c.type == "sign"     ? std::vector<double>{0.3, 0.15}
                                                         : std::vector<double>{0.6, 0.85};
   double yaw = 0.0, thickness = 0.008;
   int seed = -1;
@@ -279,7 +284,10 @@ void read_panel(const Context& c) {
   const std::size_t first = c.builder.scene().faces.size();
   const bool framed = c.type == "whiteboard" || c.type == "picture";
   add_panel(c.builder, upright(to3(at), yaw), size[0], size[1], thickness, material,
-            c.type == "picture" ? "wood_dark" : framed ? "metal" : "paint_white", framed);
+            c.type == "picture" ? "wood_dark"
+            : framed            ? "metal"
+                                : "paint_white",
+            framed);
   if (seed >= 0) c.builder.scene().faces[first].seed = seed;
 }
 
@@ -358,13 +366,13 @@ void read_thing(const Context& c) {
 using ReadObject = std::function<void(const Context&)>;
 const std::map<std::string, ReadObject>& object_readers() {
   static const std::map<std::string, ReadObject> kReaders = {
-      {"wall", read_wall},         {"panels", read_panels},     {"floor", read_slab},
-      {"ceiling", read_slab},      {"box", read_box},           {"cylinder", read_cylinder},
-      {"poster", read_panel},      {"whiteboard", read_panel},  {"sign", read_panel},
-      {"picture", read_panel},     {"desk", read_furniture},    {"table", read_furniture},
-      {"shelf", read_furniture},   {"sofa", read_furniture},    {"cabinet", read_furniture},
-      {"chair", read_furniture},   {"monitor", read_thing},     {"plant", read_thing},
-      {"lamp", read_thing},        {"floor_lamp", read_thing},  {"clutter", read_thing},
+      {"wall", read_wall},       {"panels", read_panels},    {"floor", read_slab},
+      {"ceiling", read_slab},    {"box", read_box},          {"cylinder", read_cylinder},
+      {"poster", read_panel},    {"whiteboard", read_panel}, {"sign", read_panel},
+      {"picture", read_panel},   {"desk", read_furniture},   {"table", read_furniture},
+      {"shelf", read_furniture}, {"sofa", read_furniture},   {"cabinet", read_furniture},
+      {"chair", read_furniture}, {"monitor", read_thing},    {"plant", read_thing},
+      {"lamp", read_thing},      {"floor_lamp", read_thing}, {"clutter", read_thing},
       {"curtain", read_thing},
   };
   return kReaders;
@@ -372,7 +380,8 @@ const std::map<std::string, ReadObject>& object_readers() {
 
 void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& problems) {
   if (list.kind != ConfigNode::Kind::kSequence) {
-    problems.push_back({list.mark, "objects", "is a list of things such as '- box: {at: [0, 0, 0], size: [1, 1, 1]}'"});
+    problems.push_back(
+        {list.mark, "objects", "is a list of things such as '- box: {at: [0, 0, 0], size: [1, 1, 1]}'"});
     return;
   }
   std::vector<std::string> types;
@@ -431,7 +440,8 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
   table.text("name", robot.name, "Name");
   table.boolean("closed", robot.closed, "The path goes on from its last waypoint to the first");
   table.number("speed", robot.speed, {0.02, 5.0}, "m/s", "Speed along the path");
-  table.number("turn_rate", robot.turn_rate, {0.05, 5.0}, "rad/s", "Slower where the camera would turn faster");
+  table.number("turn_rate", robot.turn_rate, {0.05, 5.0}, "rad/s",
+               "Slower where the camera would turn faster");
   table.number("height", height, {-100.0, 100.0}, "m", "Height of waypoints given as [x, y]");
   table.number("pitch", pitch, {-1.5, 1.5}, "rad", "Looks up by");
   if (node.kind != ConfigNode::Kind::kMap) {
@@ -446,7 +456,8 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
   }
   for (std::size_t i = 0; i < list->items.size(); ++i) {
     Waypoint w;
-    if (!read_waypoint(list->items[i], fmt::format("{}.path[{}]", path, i), height, pitch, w, problems)) continue;
+    if (!read_waypoint(list->items[i], fmt::format("{}.path[{}]", path, i), height, pitch, w, problems))
+      continue;
     if (w.look && (*w.look - w.position).norm() < 0.05) {
       problems.push_back({w.mark, path, "the point looked at is the waypoint itself"});
     }
@@ -498,7 +509,8 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
     problems.push_back({root.mark, "objects", "a scene needs a list of objects"});
   }
   read_robots(root, scene, problems);
-  if (problems.empty() && scene.faces.empty()) problems.push_back({root.mark, "objects", "the world is empty"});
+  if (problems.empty() && scene.faces.empty())
+    problems.push_back({root.mark, "objects", "the world is empty"});
 }
 
 core::Result<Scene> build(const ConfigNode& root, const std::string& file) {
@@ -542,8 +554,8 @@ core::Result<Scene> load_scene(const std::string& name_or_file, const std::files
     if (!std::filesystem::exists(file)) {
       const std::vector<std::string> names = scene_names(scenes_folder);
       const std::string near = core::did_you_mean(name_or_file, names);
-      return core::usage_error(fmt::format("unknown scene '{}' (there are: {}{}; or give a YAML file)", name_or_file,
-                                           fmt::join(names, ", "),
+      return core::usage_error(fmt::format("unknown scene '{}' (there are: {}{}; or give a YAML file)",
+                                           name_or_file, fmt::join(names, ", "),
                                            near.empty() ? "" : fmt::format("; did you mean {}?", near)));
     }
   }

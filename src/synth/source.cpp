@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/synth/source.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "depth_sensor.hpp"
@@ -21,7 +22,11 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   camera.name = fmt::format("synth_{}", to_string(sensor));
   const double s = std::min(width / 640.0, height / 480.0);
   const bool wide = sensor == Sensor::kRealsense;  // its colour camera is wider in focus: 69 degrees across
-  camera.color = {width, height, (wide ? 462.0 : 535.4) * s, (wide ? 462.0 : 539.2) * s, 0.5 * width + 0.1 * s,
+  camera.color = {width,
+                  height,
+                  (wide ? 462.0 : 535.4) * s,
+                  (wide ? 462.0 : 539.2) * s,
+                  0.5 * width + 0.1 * s,
                   0.5 * height + 7.6 * s};
   if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
   if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
@@ -51,7 +56,8 @@ std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>&
   std::vector<Stamps> out;
   for (std::size_t i = 0; i < frames; ++i) {
     const double t = static_cast<double>(i) / o.fps;
-    const double jitter = ideal ? 0.0 : rng.uniform(-0.0012, 0.0012), other = ideal ? 0.0 : rng.uniform(-0.0006, 0.0006);
+    const double jitter = ideal ? 0.0 : rng.uniform(-0.0012, 0.0012),
+                 other = ideal ? 0.0 : rng.uniform(-0.0006, 0.0006);
     bool dropped = false;
     for (const Event& e : events) dropped = dropped || (e.kind == EventKind::kDrop && e.active(t));
     const double stamp = whole_us(kFirstStamp + t + jitter);
@@ -91,15 +97,20 @@ struct SynthSource::Impl {
 
 /// Every step from frame to frame must be free, and must not start inside something.
 core::Result<void> SynthSource::Impl::check_way() const {
-  const RobotPath& robot_path = world->scene.robots[static_cast<std::size_t>(robot) % world->scene.robots.size()];
+  const RobotPath& robot_path =
+      world->scene.robots[static_cast<std::size_t>(robot) % world->scene.robots.size()];
   const auto complain = [&](const Vector3d& p, double t, const Hit& hit, const char* how) {
     const std::size_t k = path->waypoint_at(t), n = robot_path.waypoints.size();
-    const Object& thing = world->scene.objects[static_cast<std::size_t>(world->scene.faces[static_cast<std::size_t>(hit.face)].object)];
+    const Object& thing =
+        world->scene
+            .objects[static_cast<std::size_t>(world->scene.faces[static_cast<std::size_t>(hit.face)].object)];
     const core::ConfigMark& mark = robot_path.waypoints[k].mark;
-    return core::usage_error(fmt::format(
-        "{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, {:.2f}); move a waypoint "
-        "or the thing",
-        mark.file, mark.line, robot_path.name, how, thing.name, thing.mark.line, k, (k + 1) % n, p.x(), p.y(), p.z()));
+    return core::usage_error(
+        fmt::format("{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, "
+                    "{:.2f}); move a waypoint "
+                    "or the thing",
+                    mark.file, mark.line, robot_path.name, how, thing.name, thing.mark.line, k, (k + 1) % n,
+                    p.x(), p.y(), p.z()));
   };
   const double end = frames.back().color - kFirstStamp;
   const Vector3d first = path->world_from_camera(0.0).translation;
@@ -129,7 +140,8 @@ void SynthSource::Impl::set_exposure() {
   float level = 0.0F;
   for (std::size_t i = 0; i < last; ++i) {
     const double t = static_cast<double>(i * kGainStep) / world->options.fps;
-    const float now = std::max(0.02F, mean_level(*world, look(*world, small.color, path->world_from_camera(t))));
+    const float now =
+        std::max(0.02F, mean_level(*world, look(*world, small.color, path->world_from_camera(t))));
     level = i == 0 ? now : level + 0.25F * (now - level);
     gains.push_back(std::clamp(0.68F / level, 0.35F, 3.0F));
   }
@@ -144,7 +156,8 @@ float SynthSource::Impl::gain(std::int64_t number) const {
 /// Pixels that things move during the exposure, on a grid 8 times coarser than the picture.
 cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double extra_px) const {
   constexpr double kExposure = 0.010;
-  const Rigid3 later = pose(at.color + 0.5 * kExposure).inverse(), sooner = pose(at.color - 0.5 * kExposure).inverse();
+  const Rigid3 later = pose(at.color + 0.5 * kExposure).inverse(),
+               sooner = pose(at.color - 0.5 * kExposure).inverse();
   const int w = (view.ids.cols + 7) / 8, h = (view.ids.rows + 7) / 8;
   cv::Mat2f out(h, w);
   const double angle = Rng(seed, 0xb1 + static_cast<std::uint64_t>(at.number / 15)).uniform(0.0, 2.0 * M_PI);
@@ -154,11 +167,13 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
       double z = 3.0;
       if (const int id = view.ids(y, x); id >= 0) {
         const FaceView& f = view.faces[static_cast<std::size_t>(id)];
-        z = 1.0 / static_cast<double>(f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
+        z = 1.0 /
+            static_cast<double>(f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
       }
       const Vector3d p = view.world_from_camera * view.camera.unproject(x, y, z);
       const Eigen::Vector2d d = view.camera.project(later * p) - view.camera.project(sooner * p);
-      out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)), static_cast<float>(d.y() + extra_px * std::sin(angle))};
+      out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)),
+                   static_cast<float>(d.y() + extra_px * std::sin(angle))};
     }
   }
   return out;
@@ -189,11 +204,13 @@ SynthSource::SynthSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 SynthSource::~SynthSource() = default;
 
 /// Everything that needs no picture: motion, stamps, and the check of the way.
-core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_ptr<const World> world, int robot) {
+core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_ptr<const World> world,
+                                                                   int robot) {
   const SynthOptions& o = world->options;
   if (auto ok = check(o); !ok) return tl::unexpected<core::Error>(ok.error());
   if (robot < 0 || robot >= o.robots) {
-    return core::usage_error(fmt::format("robot {} of {}: robots count from 0 to {}", robot, o.robots, o.robots - 1));
+    return core::usage_error(
+        fmt::format("robot {} of {}: robots count from 0 to {}", robot, o.robots, o.robots - 1));
   }
   const auto paths = world->scene.robots.size();
   const RobotPath& way = world->scene.robots[static_cast<std::size_t>(robot) % paths];
@@ -215,12 +232,14 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
                                           : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
   impl->frames = make_stamps(o, world->events, frames, impl->seed);
-  if (impl->frames.empty()) return core::usage_error("events: every frame is dropped, nothing is left to film");
+  if (impl->frames.empty())
+    return core::usage_error("events: every frame is dropped, nothing is left to film");
   if (auto free = impl->check_way(); !free) return tl::unexpected<core::Error>(free.error());
   return impl;
 }
 
-core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<const World> world, int robot) {
+core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<const World> world,
+                                                               int robot) {
   auto planned = plan(std::move(world), robot);
   if (!planned) return tl::unexpected<core::Error>(planned.error());
   std::unique_ptr<Impl> impl = std::move(*planned);
@@ -231,10 +250,12 @@ core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<c
 
 core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) {
   if (auto ok = check(options); !ok) return ok;
-  if (scene.faces.empty() || scene.robots.empty()) return core::usage_error(fmt::format("scene '{}' is empty", scene.name));
+  if (scene.faces.empty() || scene.robots.empty())
+    return core::usage_error(fmt::format("scene '{}' is empty", scene.name));
   const auto world = std::make_shared<const World>(scene, options);
   for (int robot = 0; robot < options.robots; ++robot) {
-    if (auto planned = SynthSource::plan(world, robot); !planned) return tl::unexpected<core::Error>(planned.error());
+    if (auto planned = SynthSource::plan(world, robot); !planned)
+      return tl::unexpected<core::Error>(planned.error());
   }
   return {};
 }
@@ -266,7 +287,8 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
     raw = cv::Mat1w::zeros(color.size());
   } else {
     const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth));
-    raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles, {impl_->seed, at.number});
+    raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
+                        {impl_->seed, at.number});
   }
   raw.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
   return frame;
@@ -280,7 +302,8 @@ std::optional<geometry::Trajectory> SynthSource::truth() const {
 
 Rigid3 SynthSource::world_from_camera(double stamp) const {
   const auto& f = impl_->frames;
-  return impl_->pose(std::clamp(stamp, std::min(f.front().color, f.front().depth), std::max(f.back().color, f.back().depth)));
+  return impl_->pose(std::clamp(stamp, std::min(f.front().color, f.front().depth),
+                                std::max(f.back().color, f.back().depth)));
 }
 
 ExactFrame SynthSource::exact(std::size_t index) const {
@@ -302,7 +325,9 @@ bool SynthSource::blind(std::size_t index) const {
 double SynthSource::path_length() const {
   double length = 0.0;
   for (std::size_t i = 1; i < impl_->frames.size(); ++i) {
-    length += (impl_->pose(impl_->frames[i].color).translation - impl_->pose(impl_->frames[i - 1].color).translation).norm();
+    length += (impl_->pose(impl_->frames[i].color).translation -
+               impl_->pose(impl_->frames[i - 1].color).translation)
+                  .norm();
   }
   return length;
 }

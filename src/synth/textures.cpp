@@ -14,7 +14,8 @@ namespace {
 
 using Canvas = cv::Mat_<cv::Vec3f>;  // reflectance, B G R
 
-/// Sum of octaves of smooth noise on lattices that wrap round; `cx`, `cy` cells over the whole image at the lowest one.
+/// Sum of octaves of smooth noise on lattices that wrap round; `cx`, `cy` cells over the whole image at the
+/// lowest one.
 cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std::uint64_t seed) {
   cv::Mat1f out(size, 0.0F);
   float gain = 1.0F, sum = 0.0F;
@@ -40,7 +41,8 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
       const int iy = std::min(py - 1, static_cast<int>(v));
       const float sy = smooth(v - std::floor(v));
       const float* top = lattice.data() + static_cast<std::size_t>(iy) * static_cast<std::size_t>(px);
-      const float* low = lattice.data() + static_cast<std::size_t>((iy + 1) % py) * static_cast<std::size_t>(px);
+      const float* low =
+          lattice.data() + static_cast<std::size_t>((iy + 1) % py) * static_cast<std::size_t>(px);
       float* row = out[y];
       for (int x = 0; x < size.width; ++x) {
         const int i = cell[static_cast<std::size_t>(x)], k = i + 1 == px ? 0 : i + 1;
@@ -86,7 +88,8 @@ Canvas plaster(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, fractal(size, 64, 64, 3, 0.8F, seed + 50), 0.05F);  // roller marks
   Rng rng(seed, 1);
   for (int i = 0; i < 40; ++i) {  // scuffs and specks
-    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)),
+                      static_cast<int>(rng.uniform(0, size.height)));
     const double gain = rng.uniform(0.72, 1.06);
     cv::ellipse(canvas, c, {1 + static_cast<int>(rng.uniform(0, 2.5)), 1}, rng.uniform(0, 180), 0, 360,
                 scalar(tone(m) * gain), -1, cv::LINE_AA);
@@ -98,7 +101,8 @@ Canvas ceiling(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas = plaster(m, size, seed);
   Rng rng(seed, 2);
   for (int i = 0; i < 900; ++i) {  // perforated acoustic boards
-    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)),
+                      static_cast<int>(rng.uniform(0, size.height)));
     cv::circle(canvas, c, rng.uniform() < 0.3 ? 1 : 0, scalar(tone(m) * rng.uniform(0.45, 0.8)), -1);
   }
   for (int i = 0; i < 2; ++i) {
@@ -116,7 +120,8 @@ Canvas carpet(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, fractal(size, 24, 24, 4, 0.8F, seed + 7), 0.22F);
   Rng rng(seed, 3);
   for (int i = 0; i < 1400; ++i) {  // flecks of other yarn
-    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)),
+                      static_cast<int>(rng.uniform(0, size.height)));
     const cv::Point d(static_cast<int>(rng.uniform(-5, 5)), static_cast<int>(rng.uniform(-5, 5)));
     cv::line(canvas, c, c + d, scalar(tone(m) * rng.uniform(0.35, 2.2)), 1, cv::LINE_AA);
   }
@@ -149,7 +154,8 @@ Canvas wood(const Material& m, cv::Size size, std::uint64_t seed) {
     const cv::Point c(static_cast<int>(rng.uniform(30, size.width - 30)),
                       static_cast<int>(rng.uniform(30, size.height - 30)));
     for (int r = 9; r >= 1; r -= 2) {
-      cv::ellipse(canvas, c, {2 * r, r}, 0, 0, 360, scalar(tone(m) * (r % 4 == 1 ? 0.45 : 0.75)), -1, cv::LINE_AA);
+      cv::ellipse(canvas, c, {2 * r, r}, 0, 0, 360, scalar(tone(m) * (r % 4 == 1 ? 0.45 : 0.75)), -1,
+                  cv::LINE_AA);
     }
   }
   modulate(canvas, grain(size, seed + 3), 0.05F);
@@ -185,8 +191,8 @@ Canvas brick(const Material& m, cv::Size size, std::uint64_t seed) {
       const double x = (k + (i % 2) * 0.5) * w;
       const cv::Scalar color = scalar(tone(m) * rng.uniform(0.65, 1.3));
       for (const double shift : {0.0, -static_cast<double>(size.width)}) {
-        cv::rectangle(canvas, cv::Point2d(x + 3 + shift, i * h + 3), cv::Point2d(x + w - 3 + shift, (i + 1) * h - 3),
-                      color, -1);
+        cv::rectangle(canvas, cv::Point2d(x + 3 + shift, i * h + 3),
+                      cv::Point2d(x + w - 3 + shift, (i + 1) * h - 3), color, -1);
       }
     }
   }
@@ -202,7 +208,8 @@ void add_creases(cv::Mat1f& field, Rng& rng) {
     double angle = rng.uniform(0.0, M_PI);
     const double depth = rng.uniform(0.05, 0.16) * (rng.uniform() < 0.5 ? 1.0 : -1.0);
     for (int k = 0; k < 5; ++k) {
-      const cv::Point q = p + cv::Point(static_cast<int>(7 * std::cos(angle)), static_cast<int>(7 * std::sin(angle)));
+      const cv::Point q =
+          p + cv::Point(static_cast<int>(7 * std::cos(angle)), static_cast<int>(7 * std::sin(angle)));
       cv::line(creases, p, q, depth * (1.0 - 0.15 * k), 2, cv::LINE_8);
       p = q;
       angle += rng.uniform(-0.5, 0.5);
@@ -260,7 +267,8 @@ Canvas cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, field, 1.0F);
   modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.012F);
   for (int i = 0; i < 18; ++i) {  // stains and pin holes
-    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)),
+                      static_cast<int>(rng.uniform(0, size.height)));
     cv::ellipse(canvas, c, {1 + static_cast<int>(rng.uniform(0, 2.0)), 1}, rng.uniform(0, 180), 0, 360,
                 scalar(tone(m) * rng.uniform(0.4, 0.75)), -1, cv::LINE_AA);
   }
@@ -294,7 +302,8 @@ Canvas rug(const Material& m, cv::Size size, std::uint64_t seed) {
         const int r = step * (ring + 1) / 9;
         const std::vector<cv::Point> diamond = {c + cv::Point(r, 0), c + cv::Point(0, r), c - cv::Point(r, 0),
                                                 c - cv::Point(0, r)};
-        cv::fillConvexPoly(canvas, diamond, colors[static_cast<std::size_t>(ring + i + 2 * k) % 4], cv::LINE_AA);
+        cv::fillConvexPoly(canvas, diamond, colors[static_cast<std::size_t>(ring + i + 2 * k) % 4],
+                           cv::LINE_AA);
       }
     }
   }
@@ -302,11 +311,13 @@ Canvas rug(const Material& m, cv::Size size, std::uint64_t seed) {
   return canvas;
 }
 
-const std::array<const char*, 24> kWords = {"ROBOT", "mapping", "the",   "visual", "point", "line",  "of",     "depth",
-                                            "ICP",   "world",   "and",   "plane",  "loop",  "2024",  "sensor", "a",
-                                            "light", "camera",  "frame", "in",     "model", "error", "scale",  "GRAPH"};
+const std::array<const char*, 24> kWords = {"ROBOT", "mapping", "the",    "visual", "point", "line",
+                                            "of",    "depth",   "ICP",    "world",  "and",   "plane",
+                                            "loop",  "2024",    "sensor", "a",      "light", "camera",
+                                            "frame", "in",      "model",  "error",  "scale", "GRAPH"};
 
-void text_line(Canvas& canvas, cv::Point at, int width, double scale, const cv::Scalar& color, int thick, Rng& rng) {
+void text_line(Canvas& canvas, cv::Point at, int width, double scale, const cv::Scalar& color, int thick,
+               Rng& rng) {
   int x = at.x;
   while (true) {
     const std::string word = kWords[static_cast<std::size_t>(rng.uniform(0.0, 23.999))];
@@ -336,8 +347,10 @@ void photograph(Canvas part, std::uint64_t seed) {
     }
   }
   for (int i = 0; i < 7; ++i) {
-    const int w = static_cast<int>(rng.uniform(0.06, 0.2) * size.width), h = static_cast<int>(rng.uniform(0.1, 0.4) * size.height);
-    const cv::Point at(static_cast<int>(rng.uniform(0, size.width - w)), static_cast<int>(0.75 * size.height) - h);
+    const int w = static_cast<int>(rng.uniform(0.06, 0.2) * size.width),
+              h = static_cast<int>(rng.uniform(0.1, 0.4) * size.height);
+    const cv::Point at(static_cast<int>(rng.uniform(0, size.width - w)),
+                       static_cast<int>(0.75 * size.height) - h);
     cv::rectangle(part, at, at + cv::Point(w, h), random_color(rng, 0.1, 0.8), -1);
     for (int k = 0; k < 6; ++k) {
       const cv::Point p = at + cv::Point(w * (1 + k % 2 * 3) / 6, h * (1 + k / 2 * 2) / 7);
@@ -366,7 +379,8 @@ Canvas poster(const Material&, cv::Size size, std::uint64_t seed) {
       if (rng.uniform() < 0.12 && y + h / 7 < h - margin) {
         const cv::Scalar color = random_color(rng, 0.05, 0.9);
         cv::rectangle(canvas, {x, y - h / 40}, {x + width / 2, y + h / 12}, color, -1);
-        cv::circle(canvas, {x + 3 * width / 4, y + h / 30}, h / 26, random_color(rng, 0.05, 0.9), -1, cv::LINE_AA);
+        cv::circle(canvas, {x + 3 * width / 4, y + h / 30}, h / 26, random_color(rng, 0.05, 0.9), -1,
+                   cv::LINE_AA);
         y += h / 7;
       } else {
         text_line(canvas, {x, y}, width, 0.62 * unit, ink, std::max(1, static_cast<int>(1.6 * unit)), rng);
@@ -403,7 +417,8 @@ Canvas whiteboard(const Material& m, cv::Size size, std::uint64_t seed) {
     } else {
       std::vector<cv::Point> curve;
       const double f = rng.uniform(0.02, 0.07), a = rng.uniform(10, 40);
-      for (int x = 0; x < 2 * s; x += 4) curve.emplace_back(at.x + x, at.y + static_cast<int>(a * std::sin(f * x)));
+      for (int x = 0; x < 2 * s; x += 4)
+        curve.emplace_back(at.x + x, at.y + static_cast<int>(a * std::sin(f * x)));
       cv::polylines(canvas, curve, false, pen, 3, cv::LINE_AA);
     }
   }
@@ -415,10 +430,11 @@ Canvas sign(const Material&, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, cv::Vec3f(0, 0, 0));
   canvas.setTo(random_color(rng, 0.04, 0.6));
   const int h = size.height, w = size.width;
-  cv::rectangle(canvas, {h / 16, h / 16}, {w - h / 16, h - h / 16}, cv::Scalar::all(0.85), std::max(1, h / 40));
+  cv::rectangle(canvas, {h / 16, h / 16}, {w - h / 16, h - h / 16}, cv::Scalar::all(0.85),
+                std::max(1, h / 40));
   const std::string number = std::to_string(static_cast<int>(rng.uniform(100, 999)));
-  cv::putText(canvas, number, {w / 8, 6 * h / 10}, cv::FONT_HERSHEY_DUPLEX, h / 62.0, cv::Scalar::all(0.88), h / 30 + 1,
-              cv::LINE_AA);
+  cv::putText(canvas, number, {w / 8, 6 * h / 10}, cv::FONT_HERSHEY_DUPLEX, h / 62.0, cv::Scalar::all(0.88),
+              h / 30 + 1, cv::LINE_AA);
   text_line(canvas, {w / 8, 17 * h / 20}, 3 * w / 4, h / 220.0, cv::Scalar::all(0.85), h / 110 + 1, rng);
   return canvas;
 }
@@ -503,7 +519,8 @@ Canvas cardboard(const Material& m, cv::Size size, std::uint64_t seed) {
   modulate(canvas, grain(size, seed + 5), 0.05F);
   Rng rng(seed, 17);
   for (int i = 0; i < 12; ++i) {  // staples and scratches
-    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)), static_cast<int>(rng.uniform(0, size.height)));
+    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)),
+                      static_cast<int>(rng.uniform(0, size.height)));
     cv::circle(canvas, c, 2, scalar(tone(m) * (rng.uniform() < 0.5 ? 0.3 : 1.7)), -1, cv::LINE_AA);
   }
   return canvas;
@@ -520,30 +537,54 @@ Canvas draw(const Material& m, cv::Size size, std::uint64_t seed) {
   switch (m.print) {
     case Print::kPlain:
     case Print::kPaper:
-    case Print::kHall: return plain(m, size, seed);
-    case Print::kPlaster: return plaster(m, size, seed);
-    case Print::kCeiling: return ceiling(m, size, seed);
-    case Print::kCarpet: return carpet(m, size, seed);
-    case Print::kPlanks: return planks(m, size, seed);
-    case Print::kWood: return wood(m, size, seed);
-    case Print::kBrick: return brick(m, size, seed);
-    case Print::kCloth: return cloth(m, size, seed);
-    case Print::kFabric: return fabric(m, size, seed);
-    case Print::kRug: return rug(m, size, seed);
-    case Print::kMetal: return cardboard(m, size, seed);
-    case Print::kScreen: return screen(m, size, seed);
-    case Print::kPoster: return poster(m, size, seed);
-    case Print::kPicture: return picture(m, size, seed);
-    case Print::kWhiteboard: return whiteboard(m, size, seed);
-    case Print::kSign: return sign(m, size, seed);
-    case Print::kBooks: return books(m, size, seed);
-    case Print::kCover: return poster(m, size, seed);
-    case Print::kDoor: return door(m, size, seed);
-    case Print::kWindow: return window(m, size, seed);
-    case Print::kTiles: return tiles(m, size, seed);
-    case Print::kCardboard: return cardboard(m, size, seed);
-    case Print::kLino: return lino(m, size, seed);
-    case Print::kLeaf: return fabric(m, size, seed);
+    case Print::kHall:
+      return plain(m, size, seed);
+    case Print::kPlaster:
+      return plaster(m, size, seed);
+    case Print::kCeiling:
+      return ceiling(m, size, seed);
+    case Print::kCarpet:
+      return carpet(m, size, seed);
+    case Print::kPlanks:
+      return planks(m, size, seed);
+    case Print::kWood:
+      return wood(m, size, seed);
+    case Print::kBrick:
+      return brick(m, size, seed);
+    case Print::kCloth:
+      return cloth(m, size, seed);
+    case Print::kFabric:
+      return fabric(m, size, seed);
+    case Print::kRug:
+      return rug(m, size, seed);
+    case Print::kMetal:
+      return cardboard(m, size, seed);
+    case Print::kScreen:
+      return screen(m, size, seed);
+    case Print::kPoster:
+      return poster(m, size, seed);
+    case Print::kPicture:
+      return picture(m, size, seed);
+    case Print::kWhiteboard:
+      return whiteboard(m, size, seed);
+    case Print::kSign:
+      return sign(m, size, seed);
+    case Print::kBooks:
+      return books(m, size, seed);
+    case Print::kCover:
+      return poster(m, size, seed);
+    case Print::kDoor:
+      return door(m, size, seed);
+    case Print::kWindow:
+      return window(m, size, seed);
+    case Print::kTiles:
+      return tiles(m, size, seed);
+    case Print::kCardboard:
+      return cardboard(m, size, seed);
+    case Print::kLino:
+      return lino(m, size, seed);
+    case Print::kLeaf:
+      return fabric(m, size, seed);
   }
   return plain(m, size, seed);
 }
@@ -593,11 +634,13 @@ Material worn(const Material& material, Texture texture) {
 Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t seed, double aspect) {
   const Material m = worn(material, texture);
   cv::Size size(m.pixels, m.pixels);
-  if (aspect > 0.0) size = {power_of_two(m.pixels * std::min(1.0, aspect)), power_of_two(m.pixels / std::max(1.0, aspect))};
+  if (aspect > 0.0)
+    size = {power_of_two(m.pixels * std::min(1.0, aspect)), power_of_two(m.pixels / std::max(1.0, aspect))};
   Canvas canvas;
   if (aspect > 0.0) {
     // Drawn with square pixels, then stored at powers of two.
-    const int w = static_cast<int>(m.pixels * std::min(1.0, aspect)), h = static_cast<int>(m.pixels / std::max(1.0, aspect));
+    const int w = static_cast<int>(m.pixels * std::min(1.0, aspect)),
+              h = static_cast<int>(m.pixels / std::max(1.0, aspect));
     Canvas drawn = draw(m, {std::max(24, w), std::max(24, h)}, seed);
     cv::resize(drawn, canvas, size, 0, 0, cv::INTER_AREA);
   } else {
@@ -609,7 +652,8 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
     out.levels.push_back(encode(canvas));
     if (canvas.cols == 1 && canvas.rows == 1) break;
     Canvas half;
-    cv::resize(canvas, half, {std::max(1, canvas.cols / 2), std::max(1, canvas.rows / 2)}, 0, 0, cv::INTER_AREA);
+    cv::resize(canvas, half, {std::max(1, canvas.cols / 2), std::max(1, canvas.rows / 2)}, 0, 0,
+               cv::INTER_AREA);
     canvas = half;
   }
   return out;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cstdlib>
 #include <fmt/format.h>
+
+#include <cstdlib>
 
 #include "plumbline/synth/source.hpp"
 
@@ -22,7 +23,8 @@ core::Result<Parsed> parse_url(const std::string& url) {
   const std::string body = url.substr(std::string(kPrefix).size());
   const auto question = body.find('?');
   parsed.scene = body.substr(0, question);
-  if (parsed.scene.empty()) return core::usage_error(fmt::format("'{}' names no scene (synth:SCENE?key=value&...)", url));
+  if (parsed.scene.empty())
+    return core::usage_error(fmt::format("'{}' names no scene (synth:SCENE?key=value&...)", url));
   core::ConfigNode map;
   map.kind = core::ConfigNode::Kind::kMap;
   map.mark.file = url;
@@ -32,7 +34,8 @@ core::Result<Parsed> parse_url(const std::string& url) {
     const std::string piece = rest.substr(0, amp);
     rest = amp == std::string::npos ? "" : rest.substr(amp + 1);
     const auto equals = piece.find('=');
-    if (equals == std::string::npos) return core::usage_error(fmt::format("{}: '{}' is not key=value", url, piece));
+    if (equals == std::string::npos)
+      return core::usage_error(fmt::format("{}: '{}' is not key=value", url, piece));
     core::ConfigNode value;
     value.kind = core::ConfigNode::Kind::kScalar;
     value.scalar = piece.substr(equals + 1);
@@ -65,7 +68,8 @@ core::Result<std::vector<std::string>> split_robots(const std::string& url) {
 
 core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string& url,
                                                                const std::filesystem::path& scenes_folder,
-                                                               const core::Executor& executor, core::Log& log) {
+                                                               const core::Executor& executor,
+                                                               core::Log& log) {
   auto parsed = parse_url(url);
   if (!parsed) return tl::unexpected<core::Error>(parsed.error());
   auto scene = load_scene(parsed->scene, scenes_folder);
@@ -74,8 +78,9 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string
   if (!world) return tl::unexpected<core::Error>(world.error());
   auto source = SynthSource::create(*world, parsed->robot < 0 ? 0 : parsed->robot);
   if (!source) return tl::unexpected<core::Error>(source.error());
-  log.debug(fmt::format("{}: {} frames, {} faces, {} lamps, {:.1f} m of path", (*source)->name(), (*source)->size(),
-                        scene->faces.size(), scene->lamps.size(), (*source)->path_length()));
+  log.debug(fmt::format("{}: {} frames, {} faces, {} lamps, {:.1f} m of path", (*source)->name(),
+                        (*source)->size(), scene->faces.size(), scene->lamps.size(),
+                        (*source)->path_length()));
   return std::unique_ptr<dataset::FrameSource>(std::move(*source));
 }
 

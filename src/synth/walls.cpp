@@ -11,7 +11,8 @@ using geometry::Rigid3;
 namespace {
 
 /// One solid piece of a wall; texture coordinates count from the wall's foot, so pieces continue each other.
-void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, double x1, double z0, double z1) {
+void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, double x1, double z0,
+               double z1) {
   if (x1 - x0 < 1e-6 || z1 - z0 < 1e-6) return;
   const double half = 0.5 * wall.thickness;
   const std::size_t first = b.scene().faces.size();
@@ -19,7 +20,8 @@ void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, dou
   const double length = (wall.to - wall.from).norm();
   for (std::size_t i = first; i < b.scene().faces.size(); ++i) {
     Face& face = b.scene().faces[i];
-    const Vector3d foot = i == first + 1 ? frame * Vector3d(length, half, 0.0) : frame * Vector3d(0.0, -half, 0.0);
+    const Vector3d foot =
+        i == first + 1 ? frame * Vector3d(length, half, 0.0) : frame * Vector3d(0.0, -half, 0.0);
     const Vector3d d = foot - face.origin;
     const Eigen::Vector2d shift(d.dot(face.u_axis), d.dot(face.v_axis));
     face.origin = face.at(shift.x(), shift.y());
@@ -31,13 +33,15 @@ void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, dou
   }
 }
 
-void add_frame(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& o, const std::string& material) {
+void add_frame(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& o,
+               const std::string& material) {
   const double half = 0.5 * wall.thickness + 0.015, bar = 0.05;
   const double x0 = o.at, x1 = o.at + o.width, z0 = o.bottom, z1 = o.bottom + o.height;
   b.box(frame, {x0 - bar, -half, z0}, {x0 + 0.01, half, z1 + bar}, {material});
   b.box(frame, {x1 - 0.01, -half, z0}, {x1 + bar, half, z1 + bar}, {material});
   b.box(frame, {x0, -half, z1 - 0.01}, {x1, half, z1 + bar}, {material});
-  if (o.window) b.box(frame, {x0 - bar, -half - 0.08, z0 - 0.04}, {x1 + bar, half + 0.02, z0 + 0.01}, {material});
+  if (o.window)
+    b.box(frame, {x0 - bar, -half - 0.08, z0 - 0.04}, {x1 + bar, half + 0.02, z0 + 0.01}, {material});
 }
 
 void add_glass(Builder& b, const Rigid3& frame, const Opening& o) {
@@ -63,15 +67,15 @@ void add_leaf(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& 
   const double w = o.width - 0.02, h = o.height - 0.02;
   const Skin leaf{o.material, true};
   b.box(hinge, {0.0, 0.0, 0.01}, {w, 0.04, h}, leaf, &leaf);
-  for (const double y : {-0.05, 0.04}) b.box(hinge, {w - 0.14, y, 1.02}, {w - 0.03, y + 0.05, 1.05}, {"metal"});
+  for (const double y : {-0.05, 0.04})
+    b.box(hinge, {w - 0.14, y, 1.02}, {w - 0.03, y + 0.05, 1.05}, {"metal"});
 }
 
 }  // namespace
 
 void add_wall(Builder& b, const Wall& wall) {
   const Eigen::Vector2d along = wall.to - wall.from;
-  const Rigid3 frame =
-      upright({wall.from.x(), wall.from.y(), wall.bottom}, std::atan2(along.y(), along.x()));
+  const Rigid3 frame = upright({wall.from.x(), wall.from.y(), wall.bottom}, std::atan2(along.y(), along.x()));
   double x = 0.0;
   for (const Opening& o : wall.openings) {
     add_piece(b, frame, wall, x, o.at, 0.0, wall.height);
@@ -102,7 +106,8 @@ Eigen::Vector2d mitre(const std::vector<Eigen::Vector2d>& points, std::size_t i,
 }
 }  // namespace
 
-void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vector2d>& points, std::size_t index) {
+void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vector2d>& points,
+                      std::size_t index) {
   const double half = 0.5 * wall.thickness;
   const Eigen::Vector2d a = points[index], c = points[index + 1];
   const Eigen::Vector2d ma = mitre(points, index, half), mc = mitre(points, index + 1, half);
@@ -114,7 +119,8 @@ void add_zigzag_panel(Builder& b, const Wall& wall, const std::vector<Eigen::Vec
   b.polygon({lift(c + mc, z0), lift(a + ma, z0), lift(a + ma, z1), lift(c + mc, z1)}, -u, skin);
   b.polygon({lift(a - ma, z1), lift(c - mc, z1), lift(c + mc, z1), lift(a + ma, z1)}, u, skin);
   b.polygon({lift(a + ma, z0), lift(c + mc, z0), lift(c - mc, z0), lift(a - ma, z0)}, u, skin);
-  if (index == 0) b.polygon({lift(a + ma, z0), lift(a - ma, z0), lift(a - ma, z1), lift(a + ma, z1)}, lift(-ma, 0.0), skin);
+  if (index == 0)
+    b.polygon({lift(a + ma, z0), lift(a - ma, z0), lift(a - ma, z1), lift(a + ma, z1)}, lift(-ma, 0.0), skin);
   if (index + 2 == points.size()) {
     b.polygon({lift(c - mc, z0), lift(c + mc, z0), lift(c + mc, z1), lift(c - mc, z1)}, lift(mc, 0.0), skin);
   }

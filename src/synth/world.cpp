@@ -2,9 +2,9 @@
 #include "world.hpp"
 
 #include <embree3/rtcore.h>
+#include <fmt/format.h>
 
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -40,10 +40,10 @@ void World::build_bvh() {
     triangles += face.polygon.size() - 2;
   }
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* v = static_cast<float*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
-  auto* t = static_cast<unsigned*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
+  auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                        RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
+  auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
   unsigned base = 0;
   for (std::size_t i = 0; i < scene.faces.size(); ++i) {
     const Face& face = scene.faces[i];
@@ -98,7 +98,8 @@ bool World::inside_solid(const Vector3d& point) const {
   return hit.face >= 0 && !hit.front;
 }
 
-void World::cast8(const float origin[3], const float* dx, const float* dy, const float* dz, int* faces) const {
+void World::cast8(const float origin[3], const float* dx, const float* dy, const float* dz,
+                  int* faces) const {
   alignas(32) static constexpr int kAll[8] = {-1, -1, -1, -1, -1, -1, -1, -1};
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -127,7 +128,8 @@ void World::cast8(const float origin[3], const float* dx, const float* dy, const
 }
 
 void World::build_textures(const core::Executor& executor) {
-  // Faces of one material share a texture when it tiles; a print that is stretched is drawn for its seed and shape.
+  // Faces of one material share a texture when it tiles; a print that is stretched is drawn for its seed and
+  // shape.
   struct Job {
     const Material* material;
     std::uint64_t seed;
@@ -144,7 +146,8 @@ void World::build_textures(const core::Executor& executor) {
     const bool tiled = face.stretch_u <= 0.0 || (options.texture == Texture::kNone && materials[i]->large);
     const double aspect = tiled ? 0.0 : face.stretch_u / face.stretch_v;
     const int variant = tiled ? 0 : 1 + face.seed % 4096;
-    const auto key = std::make_tuple(face.material, variant, static_cast<int>(std::lround(16.0 * std::log2(std::max(aspect, 1e-3)))));
+    const auto key = std::make_tuple(face.material, variant,
+                                     static_cast<int>(std::lround(16.0 * std::log2(std::max(aspect, 1e-3)))));
     const auto [entry, fresh] = known.emplace(key, static_cast<int>(jobs.size()));
     if (fresh) {
       std::uint64_t name_hash = 0;
@@ -168,7 +171,8 @@ void World::build_textures(const core::Executor& executor) {
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
                                                        const core::Executor& executor) {
   if (auto ok = check(options); !ok) return tl::unexpected<core::Error>(ok.error());
-  if (scene.faces.empty()) return core::usage_error(fmt::format("scene '{}': the world is empty", scene.name));
+  if (scene.faces.empty())
+    return core::usage_error(fmt::format("scene '{}': the world is empty", scene.name));
   if (scene.robots.empty()) return core::usage_error(fmt::format("scene '{}': it has no robots", scene.name));
   for (const Face& face : scene.faces) {
     if (find_material(face.material) == nullptr) {

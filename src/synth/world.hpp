@@ -56,7 +56,7 @@ class World {
 
   Scene scene;
   SynthOptions options;
-  std::vector<Event> events;  ///< of scene and options
+  std::vector<Event> events;               ///< of scene and options
   std::vector<const Material*> materials;  ///< per face
   std::vector<LightMap> light;             ///< per face
   std::vector<Texture2d> textures;
@@ -71,7 +71,8 @@ class World {
   /// First thing along a ray; direction need not be unit (distance is in its lengths).
   [[nodiscard]] Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double far) const;
   /// Distance to the nearest thing or `far`.
-  [[nodiscard]] double free_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double far) const;
+  [[nodiscard]] double free_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                     double far) const;
   /// Eight rays from one origin; faces[k] = -1 for nothing. dx, dy, dz: directions.
   void cast8(const float origin[3], const float* dx, const float* dy, const float* dz, int* faces) const;
   /// Whether a point lies inside a solid.

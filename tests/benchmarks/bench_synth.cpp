@@ -46,10 +46,18 @@ void build(benchmark::State& state, const char* name) {
   }
 }
 
-BENCHMARK_CAPTURE(render, room_kinect, "room", synth::Sensor::kKinect)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(render, room_ideal, "room", synth::Sensor::kIdeal)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(render, structure_kinect, "structure", synth::Sensor::kKinect)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(render, office_kinect, "office", synth::Sensor::kKinect)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(render, room_kinect, "room", synth::Sensor::kKinect)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(render, room_ideal, "room", synth::Sensor::kIdeal)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(render, structure_kinect, "structure", synth::Sensor::kKinect)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(render, office_kinect, "office", synth::Sensor::kKinect)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 BENCHMARK_CAPTURE(build, room, "room")->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
 BENCHMARK_CAPTURE(build, office, "office")->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
 

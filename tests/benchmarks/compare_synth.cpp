@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Measures what makes a recording hard or easy, the same way for a made-up and a real one:
 //   compare_synth SCENES_FOLDER INPUT...      INPUT: synth:SCENE?... or a TUM folder with camera.yaml
-// Prints a Markdown table: ORB points and LSD lines a picture, missing depth, depth noise on planes by range, and the
-// correlation of that noise between neighbouring pixels and between frames.
+// Prints a Markdown table: ORB points and LSD lines a picture, missing depth, depth noise on planes by range,
+// and the correlation of that noise between neighbouring pixels and between frames.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -20,8 +20,8 @@ namespace {
 
 using namespace plumbline;
 
-constexpr int kPatch = 20;   // px; residuals are from planes fitted to such squares
-constexpr int kBorder = 4;   // px left out all round: some recordings have a black frame
+constexpr int kPatch = 20;  // px; residuals are from planes fitted to such squares
+constexpr int kBorder = 4;  // px left out all round: some recordings have a black frame
 constexpr std::array<double, 8> kBins = {0.8, 1.2, 1.6, 2.0, 2.5, 3.0, 3.5, 4.5};
 
 struct Correlation {
@@ -31,7 +31,9 @@ struct Correlation {
     left += a * a;
     right += b * b;
   }
-  [[nodiscard]] double value() const { return left > 0.0 && right > 0.0 ? product / std::sqrt(left * right) : 0.0; }
+  [[nodiscard]] double value() const {
+    return left > 0.0 && right > 0.0 ? product / std::sqrt(left * right) : 0.0;
+  }
 };
 
 struct Measures {
@@ -112,7 +114,8 @@ void correlate(const cv::Mat1f& a, const cv::Mat1f& b, int dx, int dy, Correlati
   }
 }
 
-/// Median absolute second difference of the picture: sharpness of what is smooth, that is noise (grey levels).
+/// Median absolute second difference of the picture: sharpness of what is smooth, that is noise (grey
+/// levels).
 double gray_noise(const cv::Mat& gray) {
   std::vector<int> d;
   for (int y = 10; y + 10 < gray.rows; y += 3) {
@@ -173,7 +176,8 @@ Measures measure(const dataset::FrameSource& source) {
   return m;
 }
 
-void print_row(const char* name, const std::vector<Measures>& all, double (*value)(const Measures&), const char* format) {
+void print_row(const char* name, const std::vector<Measures>& all, double (*value)(const Measures&),
+               const char* format) {
   std::printf("| %s |", name);
   for (const Measures& m : all) {
     std::printf(" ");
@@ -189,10 +193,14 @@ void print(const std::vector<std::string>& names, const std::vector<Measures>& a
   std::printf("\n|---|");
   for (std::size_t i = 0; i < names.size(); ++i) std::printf("---|");
   std::printf("\n");
-  print_row("ORB points a picture", all, [](const Measures& m) { return m.orb / m.frames; }, "%.0f");
-  print_row("LSD lines >= 25 px a picture", all, [](const Measures& m) { return m.lines / m.frames; }, "%.1f");
-  print_row("grey noise (levels)", all, [](const Measures& m) { return m.gray_noise / m.frames; }, "%.2f");
-  print_row("missing depth (%)", all, [](const Measures& m) { return 100.0 * m.missing / m.frames; }, "%.1f");
+  print_row(
+      "ORB points a picture", all, [](const Measures& m) { return m.orb / m.frames; }, "%.0f");
+  print_row(
+      "LSD lines >= 25 px a picture", all, [](const Measures& m) { return m.lines / m.frames; }, "%.1f");
+  print_row(
+      "grey noise (levels)", all, [](const Measures& m) { return m.gray_noise / m.frames; }, "%.2f");
+  print_row(
+      "missing depth (%)", all, [](const Measures& m) { return 100.0 * m.missing / m.frames; }, "%.1f");
   for (std::size_t b = 0; b + 1 < kBins.size(); ++b) {
     std::printf("| depth noise, %.1f-%.1f m (mm) |", kBins[b], kBins[b + 1]);
     for (const Measures& m : all) {
@@ -204,13 +212,21 @@ void print(const std::vector<std::string>& names, const std::vector<Measures>& a
     }
     std::printf("\n");
   }
-  print_row("correlation, 1 px across", all, [](const Measures& m) { return m.lag_x1.value(); }, "%.2f");
-  print_row("correlation, 2 px across", all, [](const Measures& m) { return m.lag_x2.value(); }, "%.2f");
-  print_row("correlation, 4 px across", all, [](const Measures& m) { return m.lag_x4.value(); }, "%.2f");
-  print_row("correlation, 1 px down", all, [](const Measures& m) { return m.lag_y1.value(); }, "%.2f");
-  print_row("correlation, next frame", all, [](const Measures& m) { return m.frame1.value(); }, "%.2f");
-  print_row("correlation, 5 frames on", all, [](const Measures& m) { return m.frame5.value(); }, "%.2f");
-  print_row("squares that are flat (%)", all, [](const Measures& m) { return 100.0 * m.patches / m.tried; }, "%.0f");
+  print_row(
+      "correlation, 1 px across", all, [](const Measures& m) { return m.lag_x1.value(); }, "%.2f");
+  print_row(
+      "correlation, 2 px across", all, [](const Measures& m) { return m.lag_x2.value(); }, "%.2f");
+  print_row(
+      "correlation, 4 px across", all, [](const Measures& m) { return m.lag_x4.value(); }, "%.2f");
+  print_row(
+      "correlation, 1 px down", all, [](const Measures& m) { return m.lag_y1.value(); }, "%.2f");
+  print_row(
+      "correlation, next frame", all, [](const Measures& m) { return m.frame1.value(); }, "%.2f");
+  print_row(
+      "correlation, 5 frames on", all, [](const Measures& m) { return m.frame5.value(); }, "%.2f");
+  print_row(
+      "squares that are flat (%)", all, [](const Measures& m) { return 100.0 * m.patches / m.tried; },
+      "%.0f");
 }
 
 }  // namespace

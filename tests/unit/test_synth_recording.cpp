@@ -35,7 +35,8 @@ class SynthRecording : public ::testing::Test {
     if (!scene) throw std::runtime_error(scene.error().message);
     const core::Executor executor(threads);
     const auto log = core::null_log();
-    return write_recordings(*scene, options_, to, executor, stop, *log, [this](std::size_t done, std::size_t) { told_ = done; });
+    return write_recordings(*scene, options_, to, executor, stop, *log,
+                            [this](std::size_t done, std::size_t) { told_ = done; });
   }
   static std::string bytes(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
@@ -60,8 +61,9 @@ TEST_F(SynthRecording, WhatIsWrittenIsWhatIsRendered) {
   for (int robot = 0; robot < 2; ++robot) {
     const auto written = dataset::open_recording(folder_ / ("robot" + std::to_string(robot)), {}, *log);
     ASSERT_TRUE(written) << written.error().message;
-    const auto rendered = open_synth("synth:structure?frames=6&robots=2&width=160&height=120&robot=" + std::to_string(robot),
-                                     kScenes, executor, *log);
+    const auto rendered =
+        open_synth("synth:structure?frames=6&robots=2&width=160&height=120&robot=" + std::to_string(robot),
+                   kScenes, executor, *log);
     ASSERT_TRUE(rendered) << rendered.error().message;
     ASSERT_EQ((*written)->size(), 6U);
     EXPECT_EQ((*written)->camera().color.fx, (*rendered)->camera().color.fx);
@@ -73,7 +75,8 @@ TEST_F(SynthRecording, WhatIsWrittenIsWhatIsRendered) {
       EXPECT_EQ(cv::norm(a->color, b->color, cv::NORM_INF), 0.0);
       EXPECT_LT(cv::norm(a->depth, b->depth, cv::NORM_INF), 1e-5);
     }
-    const auto truth = dataset::read_trajectory(folder_ / ("robot" + std::to_string(robot)) / "groundtruth.txt");
+    const auto truth =
+        dataset::read_trajectory(folder_ / ("robot" + std::to_string(robot)) / "groundtruth.txt");
     ASSERT_TRUE(truth) << truth.error().message;
     EXPECT_EQ(truth->size(), 12U);
     const auto pose = geometry::pose_at(*truth, (*rendered)->info(2).stamp);
@@ -89,7 +92,8 @@ TEST_F(SynthRecording, SameBytesOnAnyNumberOfThreads) {
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "one")) {
     if (!entry.is_regular_file()) continue;
     ++files;
-    EXPECT_EQ(bytes(entry.path()), bytes(folder_ / "two" / fs::relative(entry.path(), folder_ / "one"))) << entry.path();
+    EXPECT_EQ(bytes(entry.path()), bytes(folder_ / "two" / fs::relative(entry.path(), folder_ / "one")))
+        << entry.path();
   }
   EXPECT_EQ(files, 2U * (12U + 5U) + 2U);
 }

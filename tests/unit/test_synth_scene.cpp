@@ -36,7 +36,8 @@ TEST(SynthScene, UnknownSceneSuggestsOne) {
 }
 
 TEST(SynthScene, BoxHasSixFacesThatLookOutwards) {
-  const auto scene = parse_scene("objects:\n  - box: {at: [1, 2, 3], size: [2, 4, 6], yaw: 30 deg}\n" + kRobots, "t");
+  const auto scene =
+      parse_scene("objects:\n  - box: {at: [1, 2, 3], size: [2, 4, 6], yaw: 30 deg}\n" + kRobots, "t");
   ASSERT_TRUE(scene) << scene.error().message;
   ASSERT_EQ(scene->faces.size(), 6U);
   const Eigen::Vector3d center(1.0, 2.0, 6.0);
@@ -44,7 +45,8 @@ TEST(SynthScene, BoxHasSixFacesThatLookOutwards) {
   for (const Face& f : scene->faces) {
     ASSERT_EQ(f.polygon.size(), 4U);
     const Eigen::Vector2d size = f.polygon[2] - f.polygon[0];
-    const Eigen::Vector3d middle = f.at(0.5 * (f.polygon[0] + f.polygon[2]).x(), 0.5 * (f.polygon[0] + f.polygon[2]).y());
+    const Eigen::Vector3d middle =
+        f.at(0.5 * (f.polygon[0] + f.polygon[2]).x(), 0.5 * (f.polygon[0] + f.polygon[2]).y());
     EXPECT_GT((middle - center).dot(f.normal), 0.9);
     EXPECT_NEAR((f.u_axis.cross(f.v_axis) - f.normal).norm(), 0.0, 1e-12);
     area += std::abs(size.x() * size.y());
@@ -55,7 +57,9 @@ TEST(SynthScene, BoxHasSixFacesThatLookOutwards) {
 TEST(SynthScene, WallWithADoorLeavesTheOpeningFree) {
   const auto scene = parse_scene(
       "objects:\n  - wall: {from: [0, 0], to: [4, 0], height: 2.5, thickness: 0.1,\n"
-      "           doors: [{at: 1, width: 1, height: 2, leaf: false}]}\n" + kRobots, "t");
+      "           doors: [{at: 1, width: 1, height: 2, leaf: false}]}\n" +
+          kRobots,
+      "t");
   ASSERT_TRUE(scene) << scene.error().message;
   for (const Face& f : scene->faces) {
     if (f.material != "plaster" || std::abs(f.normal.y()) < 0.5) continue;
@@ -69,7 +73,8 @@ TEST(SynthScene, WallWithADoorLeavesTheOpeningFree) {
 TEST(SynthScene, ProblemsNamePlaceAndRemedyAllAtOnce) {
   const std::string what = problem(
       "objects:\n  - wall: {from: [1, 1], to: [1, 1]}\n  - boxx: {at: [0, 0, 0]}\n"
-      "  - desk: {at: [0, 0], colour: red}\n  - box: {at: [0, 0, 0], size: [0, 1, 1]}\n" + kRobots);
+      "  - desk: {at: [0, 0], colour: red}\n  - box: {at: [0, 0, 0], size: [0, 1, 1]}\n" +
+      kRobots);
   EXPECT_NE(what.find("test.yaml:2"), std::string::npos) << what;
   EXPECT_NE(what.find("degenerate wall"), std::string::npos) << what;
   EXPECT_NE(what.find("test.yaml:3"), std::string::npos) << what;
@@ -85,15 +90,21 @@ TEST(SynthScene, RefusesWhatIsNoScene) {
   EXPECT_NE(problem("objects: 3\n" + kRobots).find("list"), std::string::npos);
   EXPECT_NE(problem(kRobots).find("objects"), std::string::npos);
   EXPECT_NE(problem("objects:\n  - floor: {from: [0, 0], to: [1, 1]}\n").find("robot"), std::string::npos);
-  EXPECT_NE(problem("objects:\n  - floor: {from: [0, 0], to: [0, 1]}\n" + kRobots).find("degenerate"), std::string::npos);
+  EXPECT_NE(problem("objects:\n  - floor: {from: [0, 0], to: [0, 1]}\n" + kRobots).find("degenerate"),
+            std::string::npos);
   EXPECT_NE(problem("objects:\n  - box: {at: [0, 0], size: [1, 1, 1]}\n" + kRobots), "");
-  EXPECT_NE(problem("objects:\n  - panels: {points: [[0, 0], [0, 0]]}\n" + kRobots).find("degenerate"), std::string::npos);
-  EXPECT_NE(problem("objects:\n  - wall: {from: [0, 0], to: [2, 0], doors: [{at: 1.5, width: 1}]}\n" + kRobots).find("does not fit"),
+  EXPECT_NE(problem("objects:\n  - panels: {points: [[0, 0], [0, 0]]}\n" + kRobots).find("degenerate"),
             std::string::npos);
-  EXPECT_NE(problem("objects:\n  - floor: {from: [0, 0], to: [1, 1]}\nrobots:\n  - path: [[0, 0], [0, 0]]\n").find("same place"),
+  EXPECT_NE(
+      problem("objects:\n  - wall: {from: [0, 0], to: [2, 0], doors: [{at: 1.5, width: 1}]}\n" + kRobots)
+          .find("does not fit"),
+      std::string::npos);
+  EXPECT_NE(problem("objects:\n  - floor: {from: [0, 0], to: [1, 1]}\nrobots:\n  - path: [[0, 0], [0, 0]]\n")
+                .find("same place"),
             std::string::npos);
-  EXPECT_NE(problem("motoin: wheeled\nobjects:\n  - floor: {from: [0, 0], to: [1, 1]}\n" + kRobots).find("motion"),
-            std::string::npos);
+  EXPECT_NE(
+      problem("motoin: wheeled\nobjects:\n  - floor: {from: [0, 0], to: [1, 1]}\n" + kRobots).find("motion"),
+      std::string::npos);
 }
 
 TEST(SynthOptionsTest, EventsAreReadAndRefused) {
@@ -107,7 +118,8 @@ TEST(SynthOptionsTest, EventsAreReadAndRefused) {
   EXPECT_TRUE((*events)[0].active(3.0));
   EXPECT_FALSE((*events)[0].active(4.0));
   EXPECT_TRUE(parse_events("")->empty());
-  for (const char* bad : {"blur", "blur@", "blur@1", "blur@1+0", "blur@-1+1", "blur@1+1*x", "blurr@1+1", "@1+1", "blur@nan+1"}) {
+  for (const char* bad : {"blur", "blur@", "blur@1", "blur@1+0", "blur@-1+1", "blur@1+1*x", "blurr@1+1",
+                          "@1+1", "blur@nan+1"}) {
     EXPECT_FALSE(parse_events(bad)) << bad;
   }
   EXPECT_NE(parse_events("blurr@1+1").error().message.find("did you mean blur"), std::string::npos);

@@ -34,7 +34,8 @@ std::shared_ptr<const World> world_of(const std::string& yaml, const SynthOption
   return *world;
 }
 
-std::unique_ptr<SynthSource> source_of(const std::string& yaml, const SynthOptions& options, int threads = 1) {
+std::unique_ptr<SynthSource> source_of(const std::string& yaml, const SynthOptions& options,
+                                       int threads = 1) {
   auto source = SynthSource::create(world_of(yaml, options, threads), 0);
   if (!source) throw std::runtime_error(source.error().message);
   return std::move(*source);
@@ -75,8 +76,9 @@ TEST(SynthSource, IdealDepthIsTheTrueSurface) {
         ASSERT_GT(z, 0.0F);
         const Eigen::Vector3d p = pose * source->camera().color.unproject(x, y, static_cast<double>(z));
         // Every point lies on the front wall, the floor, the ceiling or a side wall.
-        const double off = std::min({std::abs(p.y() - 2.0), std::abs(p.z()), std::abs(p.z() - 2.5),
-                                     std::abs(std::abs(p.x()) - 1.94), std::abs(p.z() - 2.45), std::abs(p.z() - 2.44)});
+        const double off =
+            std::min({std::abs(p.y() - 2.0), std::abs(p.z()), std::abs(p.z() - 2.5),
+                      std::abs(std::abs(p.x()) - 1.94), std::abs(p.z() - 2.45), std::abs(p.z() - 2.44)});
         EXPECT_LT(off, 2e-4) << p.transpose();
         wall += std::abs(p.y() - 2.0) < 2e-4 ? 1 : 0;
       }
@@ -92,12 +94,14 @@ TEST(SynthSource, ColourFollowsTheTruePoses) {
   const auto source = source_of(kCell, options);
   const auto a = source->read(0), b = source->read(11);
   ASSERT_TRUE(a && b);
-  const auto pa = source->world_from_camera(a->stamp), b_from_world = source->world_from_camera(b->stamp).inverse();
+  const auto pa = source->world_from_camera(a->stamp),
+             b_from_world = source->world_from_camera(b->stamp).inverse();
   ASSERT_GT((pa.translation - b_from_world.inverse().translation).norm(), 0.03);
   cv::Mat map_x(240, 320, CV_32F), map_y(240, 320, CV_32F);
   for (int y = 0; y < 240; ++y) {
     for (int x = 0; x < 320; ++x) {
-      const Eigen::Vector3d p = pa * source->camera().color.unproject(x, y, static_cast<double>(a->depth.at<float>(y, x)));
+      const Eigen::Vector3d p =
+          pa * source->camera().color.unproject(x, y, static_cast<double>(a->depth.at<float>(y, x)));
       const Eigen::Vector2d q = source->camera().color.project(b_from_world * p);
       map_x.at<float>(y, x) = static_cast<float>(q.x());
       map_y.at<float>(y, x) = static_cast<float>(q.y());
@@ -187,11 +191,13 @@ TEST(SynthSource, MotionIsSmooth) {
     const auto source = source_of(kCell, options);
     const double t0 = source->info(0).stamp, h = 0.002;
     for (double t = t0 + 0.1; t < t0 + 4.0; t += 0.011) {
-      const Eigen::Vector3d a = source->world_from_camera(t).translation, b = source->world_from_camera(t + h).translation,
+      const Eigen::Vector3d a = source->world_from_camera(t).translation,
+                            b = source->world_from_camera(t + h).translation,
                             c = source->world_from_camera(t + 2 * h).translation,
                             d = source->world_from_camera(t + 3 * h).translation;
       EXPECT_LT((d - 3.0 * c + 3.0 * b - a).norm(), 200.0 * h * h * h);
-      const auto ra = source->world_from_camera(t), rb = source->world_from_camera(t + h), rc = source->world_from_camera(t + 2 * h);
+      const auto ra = source->world_from_camera(t), rb = source->world_from_camera(t + h),
+                 rc = source->world_from_camera(t + 2 * h);
       const Eigen::Vector3d w1 = geometry::log_so3(ra.rotation.transpose() * rb.rotation);
       const Eigen::Vector3d w2 = geometry::log_so3(rb.rotation.transpose() * rc.rotation);
       EXPECT_LT((w2 - w1).norm(), 20.0 * h * h);
@@ -203,7 +209,8 @@ TEST(SynthSource, MotionIsSmooth) {
 
 TEST(SynthSource, HardMomentsHappen) {
   auto options = small(Sensor::kKinect, 150);
-  options.events = "whiteout@0.5+0.2,lampoff@1+0.2,cover@1.5+0.2,nodepth@2+0.2,drop@2.5+0.5,blur@3.5+0.2*12,spin@4+0.8";
+  options.events =
+      "whiteout@0.5+0.2,lampoff@1+0.2,cover@1.5+0.2,nodepth@2+0.2,drop@2.5+0.5,blur@3.5+0.2*12,spin@4+0.8";
   const auto source = source_of(kCell, options);
   EXPECT_EQ(source->size(), 135U);
   const auto at = [&](double t) {
@@ -245,7 +252,8 @@ TEST(SynthSource, PathThroughAWallIsRefused) {
   EXPECT_NE(what.find("test.yaml:11"), std::string::npos) << what;
   yaml += "  - path: [[0, 0, 1], [1, 0, 1]]\n";
   const std::string solid = "robots:";
-  yaml.replace(yaml.find(solid), solid.size(), "  - box: {name: block, at: [0, 0, 0.5], size: [1, 1, 1.5]}\nrobots:");
+  yaml.replace(yaml.find(solid), solid.size(),
+               "  - box: {name: block, at: [0, 0, 0.5], size: [1, 1, 1.5]}\nrobots:");
   EXPECT_NE(why_not(yaml, small(Sensor::kIdeal, 5)).find("inside block"), std::string::npos);
 }
 
@@ -281,8 +289,9 @@ TEST(SynthSource, WithoutTextureNothingButShadingIsLeft) {
 TEST(SynthUrl, OpensAndRefuses) {
   const core::Executor executor(2);
   const auto log = core::null_log();
-  const auto source = open_synth("synth:structure?frames=4&texture=none&seed=3&robots=2&robot=1&width=160&height=120", kScenes,
-                                 executor, *log);
+  const auto source =
+      open_synth("synth:structure?frames=4&texture=none&seed=3&robots=2&robot=1&width=160&height=120",
+                 kScenes, executor, *log);
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->size(), 4U);
   EXPECT_EQ((*source)->format(), "synth");
@@ -301,7 +310,8 @@ TEST(SynthUrl, OpensAndRefuses) {
   EXPECT_NE(why("synth:structure?sensor=lidar").find("kinect"), std::string::npos);
   EXPECT_NE(why("synth:"), "");
   EXPECT_NE(why("tum:room"), "");
-  EXPECT_EQ(*split_robots("synth:room?robots=2"), (std::vector<std::string>{"synth:room?robots=2&robot=0", "synth:room?robots=2&robot=1"}));
+  EXPECT_EQ(*split_robots("synth:room?robots=2"),
+            (std::vector<std::string>{"synth:room?robots=2&robot=0", "synth:room?robots=2&robot=1"}));
   EXPECT_EQ(split_robots("synth:room")->size(), 1U);
 }
 

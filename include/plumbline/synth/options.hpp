@@ -15,8 +15,8 @@ enum class Sensor { kIdeal, kKinect, kRealsense };
 enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene file says
 
 struct SynthOptions {
-  int frames = -1;                   ///< of each robot; -1 = the path once; more than the path: it goes on round it
-  int robots = 1;                    ///< how many recordings
+  int frames = -1;  ///< of each robot; -1 = the path once; more than the path: it goes on round it
+  int robots = 1;   ///< how many recordings
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur
   Motion motion = Motion::kScene;
@@ -24,11 +24,11 @@ struct SynthOptions {
   int width = 640;
   int height = 480;
   double fps = 30.0;
-  double speed = 1.0;             ///< times the scene's own speed
+  double speed = 1.0;              ///< times the scene's own speed
   double reference_spacing = 0.0;  ///< m between samples of reference.ply; 0 = 5 mm, more for large scenes
-  /// Hard moments, "kind@start+duration[*value]" in seconds from the first frame, separated by commas; added to
-  /// those of the scene. Kinds: whiteout, lampoff, blur (value px, default 8), drop, cover, spin (value turns,
-  /// default 1: pure rotation on the spot), nodepth. Example: "whiteout@3+1,blur@6+0.5*12".
+  /// Hard moments, "kind@start+duration[*value]" in seconds from the first frame, separated by commas; added
+  /// to those of the scene. Kinds: whiteout, lampoff, blur (value px, default 8), drop, cover, spin (value
+  /// turns, default 1: pure rotation on the spot), nodepth. Example: "whiteout@3+1,blur@6+0.5*12".
   std::string events;
 
   void declare(core::OptionTable& table);

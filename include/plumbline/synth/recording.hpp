@@ -29,18 +29,21 @@ struct WriteSummary {
 using Progress = std::function<void(std::size_t, std::size_t)>;
 
 /// Makes
-///   OUT/robot0/ ...       TUM layout: rgb/ (8-bit PNG), depth/ (16-bit PNG, 5000 per metre), rgb.txt, depth.txt,
-///                         associations.txt, groundtruth.txt (exact world_from_camera at colour and depth stamps),
-///                         camera.yaml
+///   OUT/robot0/ ...       TUM layout: rgb/ (8-bit PNG), depth/ (16-bit PNG, 5000 per metre), rgb.txt,
+///   depth.txt,
+///                         associations.txt, groundtruth.txt (exact world_from_camera at colour and depth
+///                         stamps), camera.yaml
 ///   OUT/reference.ply     binary PLY, samples of the true surfaces in the frame of groundtruth.txt:
 ///                         float x y z, float nx ny nz, uchar red green blue, uchar visible.
-///                         visible = 1 when some camera saw that spot within the sensor's range and at no grazing
-///                         angle, else 0. Insides of solids and the world's outer skin are left out.
-///   OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path lengths, counts
-/// Errors: kUsage (options, scene), kOutput (cannot write; names the file). `progress` may be empty; it is called
-/// from one thread at a time.
+///                         visible = 1 when some camera saw that spot within the sensor's range and at no
+///                         grazing angle, else 0. Insides of solids and the world's outer skin are left out.
+///   OUT/scene.json        what was made: scene, options, seeds, cameras, robot starts and path lengths,
+///   counts
+/// Errors: kUsage (options, scene), kOutput (cannot write; names the file). `progress` may be empty; it is
+/// called from one thread at a time.
 core::Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options,
-                                            const std::filesystem::path& output, const core::Executor& executor,
-                                            const core::StopToken& stop, core::Log& log, const Progress& progress);
+                                            const std::filesystem::path& output,
+                                            const core::Executor& executor, const core::StopToken& stop,
+                                            core::Log& log, const Progress& progress);
 
 }  // namespace plumbline::synth

@@ -70,14 +70,14 @@ struct Scene {
   std::vector<Object> objects;
   std::vector<Face> faces;
   std::vector<Lamp> lamps;
-  double ambient = 0.35;                ///< share of light without direction
-  Motion motion = Motion::kHandheld;    ///< when the options do not choose
-  std::vector<RobotPath> robots;        ///< at least one
+  double ambient = 0.35;              ///< share of light without direction
+  Motion motion = Motion::kHandheld;  ///< when the options do not choose
+  std::vector<RobotPath> robots;      ///< at least one
   std::vector<Event> events;
 };
 
-/// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the file are
-/// told together as file:line:column: key: what is wrong; an unknown name comes with a suggestion.
+/// `name_or_file`: a shipped scene (a file of `scenes_folder` without .yaml) or a path. All problems of the
+/// file are told together as file:line:column: key: what is wrong; an unknown name comes with a suggestion.
 core::Result<Scene> load_scene(const std::string& name_or_file, const std::filesystem::path& scenes_folder);
 
 /// The same from YAML text; `file_name` is for messages.

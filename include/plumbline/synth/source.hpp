@@ -23,13 +23,14 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
 struct ExactFrame {
   geometry::Rigid3 world_from_color;  ///< pose at the colour stamp
   geometry::Rigid3 world_from_depth;  ///< pose at the depth stamp
-  cv::Mat depth;                      ///< CV_32FC1 metres, of the true surfaces at the depth stamp, 0 = nothing hit
-  cv::Mat face;                       ///< CV_32SC1, index into Scene::faces, -1 = nothing hit
+  cv::Mat depth;  ///< CV_32FC1 metres, of the true surfaces at the depth stamp, 0 = nothing hit
+  cv::Mat face;   ///< CV_32SC1, index into Scene::faces, -1 = nothing hit
 };
 
 class SynthSource final : public dataset::FrameSource {
  public:
-  /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the thing).
+  /// Robot `robot` (from 0) of the scene. Errors: no frames, path through a solid (names the segment and the
+  /// thing).
   static core::Result<std::unique_ptr<SynthSource>> create(std::shared_ptr<const World> world, int robot);
   ~SynthSource() override;
 
@@ -58,20 +59,22 @@ class SynthSource final : public dataset::FrameSource {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether every robot's path is free, without building textures and light. The error names the segment and the thing.
+/// Whether every robot's path is free, without building textures and light. The error names the segment and
+/// the thing.
 core::Result<void> check_paths(const Scene& scene, const SynthOptions& options);
 
 /// Opens "synth:SCENE?key=value&..."; keys are those of SynthOptions and `robot` (0 .. robots-1).
 /// Unknown scenes and keys are errors with a suggestion.
 core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string& url,
                                                                const std::filesystem::path& scenes_folder,
-                                                               const core::Executor& executor, core::Log& log);
+                                                               const core::Executor& executor,
+                                                               core::Log& log);
 
 /// Whether an input is such a URL ("synth:...").
 bool is_synth_url(const std::string& input);
 
-/// One URL per robot: "synth:room?robots=2" -> "synth:room?robots=2&robot=0", "...&robot=1"; unchanged when it
-/// already names its robot.
+/// One URL per robot: "synth:room?robots=2" -> "synth:room?robots=2&robot=0", "...&robot=1"; unchanged when
+/// it already names its robot.
 core::Result<std::vector<std::string>> split_robots(const std::string& url);
 
 /// The camera of a sensor at a picture size. kinect: TUM fr3's intrinsics; depth_scale 5000; no distortion.
