@@ -110,13 +110,13 @@ bool same_bytes(const geometry::Trajectory& a, const geometry::Trajectory& b) {
   return true;
 }
 
-TEST(Slam, TracksEveryFrameWithinTwoCentimetres) {
+TEST(Slam, TracksEveryFrameWithinFiveMillimetres) {
   const Recording& recording = Recording::get();
   const SlamRun result = run(recording.shots);
   ASSERT_EQ(result.reports.size(), 36U);
   EXPECT_EQ(result.count(TrackState::kTracked), 36);
   ASSERT_EQ(result.trajectory.size(), 36U);
-  EXPECT_LT(ate(result.trajectory, recording.truth), 0.02);
+  EXPECT_LT(ate(result.trajectory, recording.truth), 0.005);
   double way = 0.0;
   for (std::size_t i = 1; i < recording.truth.size(); ++i) {
     way += (recording.truth[i].world_from_camera.translation -
@@ -163,7 +163,7 @@ TEST(Slam, BlackBlindAndRepeatedFramesAreSurvived) {
   EXPECT_EQ(result.reports[21].state, TrackState::kTracked);
   EXPECT_EQ(result.count(TrackState::kTracked), 28);
   EXPECT_EQ(result.trajectory.size(), 28U) << "only tracked frames have a pose";
-  EXPECT_LT(ate(result.trajectory, recording.truth), 0.02);
+  EXPECT_LT(ate(result.trajectory, recording.truth), 0.005);
 }
 
 TEST(Slam, ABlackStartWaitsForTheFirstPicture) {
@@ -174,7 +174,7 @@ TEST(Slam, ABlackStartWaitsForTheFirstPicture) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NE(result.reports[i].state, TrackState::kTracked) << i;
   for (std::size_t i = 4; i < 16; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
   EXPECT_EQ(result.trajectory.size(), 12U);
-  EXPECT_LT(ate(result.trajectory, recording.truth), 0.02);
+  EXPECT_LT(ate(result.trajectory, recording.truth), 0.005);
 }
 
 TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
@@ -197,7 +197,7 @@ TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
   for (std::size_t i = 45; i < 51; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
   EXPECT_TRUE(result.reports[45].relocalised) << "carried back while covered: only the picture can tell";
   EXPECT_EQ(result.trajectory.size(), 36U);
-  EXPECT_LT(ate(result.trajectory, truth), 0.025);
+  EXPECT_LT(ate(result.trajectory, truth), 0.005);
 }
 
 TEST(Slam, NothingButBlackFramesGiveNoTrajectory) {
@@ -219,7 +219,7 @@ TEST(Slam, EachFamilyAloneTracksTheFurnishedRoom) {
     options.tracker.depth = depth;
     const SlamRun result = run(shots, 1, options);
     EXPECT_EQ(result.count(TrackState::kTracked), 20) << (depth ? "depth" : "points and lines");
-    EXPECT_LT(ate(result.trajectory, recording.truth), depth ? 0.04 : 0.03)
+    EXPECT_LT(ate(result.trajectory, recording.truth), depth ? 0.01 : 0.005)
         << (depth ? "depth" : "points and lines");
   }
 }
