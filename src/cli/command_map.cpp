@@ -59,7 +59,11 @@ void add_map(CLI::App& app, Session& session) {
   command->add_option("--every", request->open.every, "Use every N-th frame")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
-  command->add_flag("--force", request->replace, "Replace an earlier result in OUT");
+  command
+      ->add_option("--debug-video", request->debug_video,
+                   "Also write a picture of every frame with what the tracker sees")
+      ->type_name("DIR");
+  command->add_flag("--force", request->replace, "Replace an earlier result in OUT, and in DIR");
 }
 
 }  // namespace plumbline::cli

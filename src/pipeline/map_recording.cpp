@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <optional>
 #include <utility>
 
+#include "debug_video.hpp"
 #include "plumbline/cloud/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/pipeline/graph.hpp"
@@ -57,6 +60,12 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   register_stages(registry);
   auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
   if (!graph) return fail(graph.error());
+  const bool tracks = std::any_of(graph->nodes.begin(), graph->nodes.end(),
+                                  [](const Node& node) { return node.type->name == "track"; });
+  if (!request.debug_video.empty() && !tracks) {
+    return core::usage_error(fmt::format("{}: has no track stage whose work could be drawn; leave out --debug-video",
+                                         pipeline_file->string()));
+  }
   const auto source =
       open_input(request.input, request.open, request.pipelines_folder / "scenes", executor, log);
   if (!source) return fail(source.error());
@@ -67,12 +76,20 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
     return fail(written.error());
   }
 
+  std::optional<DebugFolder> debug;
+  if (!request.debug_video.empty()) {
+    auto prepared = DebugFolder::prepare(request.debug_video, request.output, output->path(), request.replace);
+    if (!prepared) return fail(prepared.error());
+    debug.emplace(std::move(*prepared));
+  }
+
   RunContext context;
   context.source = source->get();
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
   context.output_folder = output->path();
+  if (debug) context.debug_folder = debug->path();
   const auto report = run_graph(*graph, context, progress);
   if (!report) return fail(report.error());
 
@@ -91,6 +108,9 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   if (auto written = write_summary(output->path() / "summary.json", summary); !written)
     return fail(written.error());
   if (auto committed = output->commit(); !committed) return fail(committed.error());
+  if (debug) {
+    if (auto committed = debug->commit(); !committed) return fail(committed.error());
+  }
   return summary;
 }
 

@@ -34,7 +34,7 @@ fs::path normal(const fs::path& out) {
   return path.has_filename() ? path : path.parent_path();
 }
 
-core::Result<void> check_target(const fs::path& target, bool replace) {
+core::Result<void> check_target(const fs::path& target, bool replace, OutputFolder::IsEarlier is_earlier) {
   std::error_code ec;
   if (!fs::exists(target, ec)) return {};
   if (!fs::is_directory(target, ec)) {
@@ -42,7 +42,7 @@ core::Result<void> check_target(const fs::path& target, bool replace) {
         fmt::format("{}: is a file; name a folder that does not exist yet", target.string()));
   }
   if (fs::is_empty(target, ec)) return {};
-  if (!is_result_folder(target)) {
+  if (!is_earlier(target)) {
     return core::usage_error(
         fmt::format("{}: exists, is not empty and is no earlier result; name a folder that does not exist "
                     "yet (only earlier "
@@ -94,13 +94,14 @@ bool is_result_folder(const fs::path& folder) {
   return fs::is_regular_file(folder / "summary.json", ec) && fs::is_regular_file(folder / "config.yaml", ec);
 }
 
-OutputFolder::OutputFolder(fs::path target, fs::path partial, int lock)
-    : target_(std::move(target)), partial_(std::move(partial)), lock_(lock) {}
+OutputFolder::OutputFolder(fs::path target, fs::path partial, int lock, IsEarlier is_earlier)
+    : target_(std::move(target)), partial_(std::move(partial)), lock_(lock), is_earlier_(is_earlier) {}
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : target_(std::move(other.target_)),
       partial_(std::exchange(other.partial_, {})),
-      lock_(std::exchange(other.lock_, -1)) {}
+      lock_(std::exchange(other.lock_, -1)),
+      is_earlier_(other.is_earlier_) {}
 
 OutputFolder::~OutputFolder() {
   if (!partial_.empty()) {
@@ -110,10 +111,10 @@ OutputFolder::~OutputFolder() {
   if (lock_ >= 0) close(lock_);
 }
 
-core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace) {
+core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, IsEarlier is_earlier) {
   if (out.empty()) return core::usage_error("the output folder has no name");
   const fs::path target = normal(out);
-  if (auto checked = check_target(target, replace); !checked)
+  if (auto checked = check_target(target, replace, is_earlier); !checked)
     return tl::unexpected<core::Error>(checked.error());
   const fs::path partial = with_ending(target, ".partial");
   if (auto cleared = clear_leftover(partial); !cleared) return tl::unexpected<core::Error>(cleared.error());
@@ -125,7 +126,7 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
   }
   const int lock = lock_marker(partial, O_CREAT | O_WRONLY);
   if (lock < 0) return core::output_error(fmt::format("{}: cannot be written", out.string()));
-  OutputFolder folder(target, partial, lock);
+  OutputFolder folder(target, partial, lock, is_earlier);
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
@@ -140,7 +141,7 @@ core::Result<void> OutputFolder::commit() {
   const fs::path old = with_ending(target_, ".replaced");
   const bool replaces = fs::exists(target_, ec) && !fs::is_empty(target_, ec);
   if (replaces) {
-    if (is_result_folder(old)) fs::remove_all(old, ec);
+    if (is_earlier_(old)) fs::remove_all(old, ec);
     fs::rename(target_, old, ec);
     if (ec)
       return core::output_error(fmt::format("{}: cannot be replaced ({})", target_.string(), ec.message()));

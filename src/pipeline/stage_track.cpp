@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "debug_video.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -33,20 +34,23 @@ class TrackStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     constexpr std::int32_t kRobot = 0;
-    slam_ = std::make_unique<mapping::Slam>(options_, context.source->camera().color, kRobot,
-                                            *context.executor, *context.log);
+    camera_ = context.source->camera().color;
+    debug_folder_ = context.debug_folder;
+    slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
     return {};
   }
 
   core::Result<void> process(StageIo& io) override {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
-    const mapping::FrameReport report = slam_->process(*frame, io.input<features::FrameFeatures>("features"));
+    const auto features = io.input<features::FrameFeatures>("features");
+    const mapping::FrameReport report = slam_->process(*frame, features);
     rows_.push_back({io.frame(), tracking::to_string(report.state), columns(report)});
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->keyframe = report.keyframe;
     tracked->stamp = report.stamp;
     io.output<TrackedFrame>("track", tracked);
-    return {};
+    if (debug_folder_.empty()) return {};
+    return write_debug_picture(debug_folder_, io.frame(), *frame, *features, *slam_, report, camera_);
   }
 
   core::Result<void> finish(StageIo& io) override {
@@ -74,6 +78,8 @@ class TrackStage : public Stage {
 
  private:
   mapping::SlamOptions options_;
+  sensor::Pinhole camera_;
+  std::filesystem::path debug_folder_;
   std::unique_ptr<mapping::Slam> slam_;
   std::vector<FrameRow> rows_;
   std::size_t lines_ = 0;

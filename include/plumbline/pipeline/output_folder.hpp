@@ -8,14 +8,20 @@
 
 namespace plumbline::pipeline {
 
+/// Whether a folder holds the result of an earlier run.
+bool is_result_folder(const std::filesystem::path& folder);
+
 /// Results are written to OUT.partial, which commit() renames to OUT; an earlier result is replaced only
 /// then. A run that fails leaves OUT as it was, and no OUT.partial.
 class OutputFolder {
  public:
   /// Checks and makes OUT.partial. kUsage: OUT exists and `replace` is false, or OUT is neither empty nor an
   /// earlier result (then `replace` does not help: nothing else is ever deleted), or another run is writing
-  /// there. kOutput: cannot be created or written, or less than 64 MB are free.
-  static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace);
+  /// there. kOutput: cannot be created or written, or less than 64 MB are free. `is_earlier` tells what an
+  /// earlier result is: what alone may be deleted.
+  using IsEarlier = bool (*)(const std::filesystem::path&);
+  static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace,
+                                            IsEarlier is_earlier = is_result_folder);
 
   OutputFolder(OutputFolder&& other) noexcept;
   OutputFolder& operator=(OutputFolder&&) = delete;
@@ -25,13 +31,11 @@ class OutputFolder {
   core::Result<void> commit();
 
  private:
-  OutputFolder(std::filesystem::path target, std::filesystem::path partial, int lock);
+  OutputFolder(std::filesystem::path target, std::filesystem::path partial, int lock, IsEarlier is_earlier);
   std::filesystem::path target_;
   std::filesystem::path partial_;  ///< empty: nothing to clean up
   int lock_ = -1;                  ///< descriptor of the locked marker file
+  IsEarlier is_earlier_;
 };
-
-/// Whether a folder holds the result of an earlier run.
-bool is_result_folder(const std::filesystem::path& folder);
 
 }  // namespace plumbline::pipeline

@@ -108,6 +108,7 @@ struct RunContext {
   core::Log* log = nullptr;
   core::StopToken stop;
   std::filesystem::path output_folder;  ///< where sinks write
+  std::filesystem::path debug_folder;   ///< where the tracker's pictures go; empty: nowhere
 };
 
 /// What a stage may look at while the graph is checked.
