@@ -56,6 +56,8 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     const Eigen::Vector3d in_camera = camera_.unproject(static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), static_cast<double>(f.depth));
     point.position = world_from_camera * in_camera;
     point.descriptor = features.descriptors[i];
+    point.angle = f.angle;
+    point.angle_keyframe = id;
     point.view_direction = (point.position - world_from_camera.translation).normalized();
     point.reference_distance = in_camera.norm();
     point.reference_octave = f.octave;

@@ -29,8 +29,9 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
                                                    const sensor::Pinhole& camera,
                                                    const geometry::Rigid3& camera_from_world,
                                                    const geometry::Rigid3& depth_from_camera,
-                                                   const SurfaceAssociationOptions& options) {
+                                                   const SurfaceAssociationOptions& options, int* in_view) {
   std::vector<optimize::PlaneTerm> terms;
+  if (in_view != nullptr) *in_view = 0;
   if (depth.empty() || surface.empty()) return terms;
   const geometry::Rigid3 depth_from_world = depth_from_camera * camera_from_world;
   const geometry::Rigid3 camera_from_depth = depth_from_camera.inverse();
@@ -48,6 +49,7 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
     const Eigen::Vector2d pixel = camera.project(p);
     const double z = depth_at(depth, pixel.x(), pixel.y());
     if (!(z > 0.25) || z > options.max_depth_m) continue;
+    if (in_view != nullptr) ++*in_view;
     const Eigen::Vector3d measured = camera.unproject(pixel.x(), pixel.y(), z);
     const double distance = s.normal.dot(world_from_depth * measured - s.point);
     if (std::abs(distance) > options.max_distance_m) continue;

@@ -2,7 +2,10 @@
 #include "plumbline/tracking/local_map.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <unordered_map>
 
 namespace plumbline::tracking {
 namespace {
@@ -19,8 +22,60 @@ void append_unique(std::vector<KeyframeId>& list, KeyframeId id) {
   if (std::find(list.begin(), list.end(), id) == list.end()) list.push_back(id);
 }
 
-std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vector<KeyframeId>& keyframes) {
-  std::vector<WorldSurface> result;
+/// Which voxel and which way a sample faces: what is fused must lie close together and face the same way.
+struct VoxelKey {
+  std::array<std::int32_t, 4> v{};
+  bool operator==(const VoxelKey& o) const { return v == o.v; }
+};
+struct VoxelHash {
+  std::size_t operator()(const VoxelKey& k) const {
+    std::size_t h = 0;
+    for (std::int32_t i : k.v) h = (h ^ static_cast<std::uint32_t>(i)) * 0x9e3779b97f4a7c15ULL;
+    return h ^ (h >> 29);
+  }
+};
+
+VoxelKey voxel_of(const WorldSurface& s, double voxel_m) {
+  const auto cell = [voxel_m](double x) { return static_cast<std::int32_t>(std::floor(x / voxel_m)); };
+  Eigen::Index axis = 0;
+  s.normal.cwiseAbs().maxCoeff(&axis);
+  const auto facing = static_cast<std::int32_t>(2 * axis + (s.normal(axis) > 0.0 ? 1 : 0));
+  return {{cell(s.point.x()), cell(s.point.y()), cell(s.point.z()), facing}};
+}
+
+/// Weighted means of position and normal per voxel; sigma falls with the weight, down to what noise common to
+/// neighbouring pixels leaves. In order of first appearance.
+std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, double voxel_m) {
+  std::unordered_map<VoxelKey, std::size_t, VoxelHash> index;
+  index.reserve(samples.size());
+  std::vector<WorldSurface> fused;
+  std::vector<double> weights;
+  for (const WorldSurface& s : samples) {
+    const double w = 1.0 / (s.sigma * s.sigma);
+    const auto [found, inserted] = index.try_emplace(voxel_of(s, voxel_m), fused.size());
+    if (inserted) {
+      fused.push_back({w * s.point, w * s.normal, s.sigma});
+      weights.push_back(w);
+      continue;
+    }
+    WorldSurface& f = fused[found->second];
+    f.point += w * s.point;
+    f.normal += w * s.normal;
+    f.sigma = std::min(f.sigma, s.sigma);
+    weights[found->second] += w;
+  }
+  for (std::size_t i = 0; i < fused.size(); ++i) {
+    fused[i].point /= weights[i];
+    fused[i].normal.normalize();
+    fused[i].sigma = std::max(0.6 * fused[i].sigma, 1.0 / std::sqrt(weights[i]));
+  }
+  return fused;
+}
+
+/// Surfaces of the keyframes as one voxel-filtered cloud.
+std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vector<KeyframeId>& keyframes,
+                                          double voxel_m) {
+  std::vector<WorldSurface> samples;
   std::size_t longest = 0;
   std::vector<geometry::Rigid3> world_from_keyframe;
   for (KeyframeId id : keyframes) {
@@ -32,11 +87,11 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
       const auto& surface = map.keyframe(keyframes[k]).surface;
       if (i >= surface.size()) continue;
       const maps::SurfaceSample& s = surface[i];
-      result.push_back({world_from_keyframe[k] * s.point.cast<double>(),
-                        world_from_keyframe[k].rotation * s.normal.cast<double>(), static_cast<double>(s.sigma)});
+      samples.push_back({world_from_keyframe[k] * s.point.cast<double>(),
+                         world_from_keyframe[k].rotation * s.normal.cast<double>(), static_cast<double>(s.sigma)});
     }
   }
-  return result;
+  return fuse_voxels(samples, voxel_m);
 }
 
 }  // namespace
@@ -44,6 +99,7 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
 void LocalMapOptions::declare(core::OptionTable& table) {
   table.integer("local.keyframes", keyframes, {1, 200}, "", "Keyframes whose landmarks are tracked");
   table.integer("local.surface_keyframes", surface_keyframes, {1, 50}, "", "Keyframes whose surfaces are aligned to");
+  table.number("local.voxel", voxel_m, {0.001, 1.0}, "m", "Surface samples closer than this are fused");
   table.number("local.overlap_angle", overlap_angle_rad, {0.05, 3.0}, "rad",
                "Keyframes whose optical axes differ less may overlap");
 }
@@ -85,7 +141,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
     if (static_cast<int>(dense.size()) >= options.surface_keyframes) break;
     if (overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad)) dense.push_back(id);
   }
-  local.surface = collect_surface(map, dense);
+  local.surface = collect_surface(map, dense, options.voxel_m);
   return local;
 }
 

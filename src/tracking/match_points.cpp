@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "plumbline/tracking/association.hpp"
 
@@ -30,11 +31,38 @@ bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_wo
   return true;
 }
 
+/// How far the picture has turned about its own axis since a keyframe, degrees; asked for many points in turn.
+class Roll {
+ public:
+  Roll(const maps::Map& map, const geometry::Rigid3& camera_from_world) : map_(map), camera_(camera_from_world) {}
+  float since(core::KeyframeId keyframe) {
+    if (!keyframe.valid() || !map_.has_keyframe(keyframe)) return 0.0F;
+    const auto [found, inserted] = degrees_.try_emplace(keyframe, 0.0F);
+    if (inserted) {
+      const Eigen::Matrix3d r = camera_.rotation * map_.camera_from_world(keyframe).rotation.transpose();
+      found->second = static_cast<float>(std::atan2(r(1, 0), r(0, 0)) * 180.0 / 3.14159265358979);
+    }
+    return found->second;
+  }
+
+ private:
+  const maps::Map& map_;
+  const geometry::Rigid3& camera_;
+  std::unordered_map<core::KeyframeId, float> degrees_;
+};
+
+float angle_between(float a, float b) {
+  const float d = std::fmod(std::abs(a - b), 360.0F);
+  return std::min(d, 360.0F - d);
+}
+
 }  // namespace
 
 void AssociationOptions::declare(core::OptionTable& table) {
   table.integer("match.max_hamming", max_hamming, {1, 256}, "bit", "Point descriptors may differ by so many bits");
   table.number("match.ratio", ratio, {0.1, 1.0}, "", "Best distance over second best, at most");
+  table.number("match.max_point_angle", max_point_angle_rad, {0.05, 3.2}, "rad",
+               "Angle between a predicted and a measured corner's orientation, at most");
   table.integer("match.max_line_hamming", max_line_hamming, {1, 256}, "bit",
                 "Line descriptors may differ by so many bits");
   table.number("match.max_line_angle", max_line_angle_rad, {0.01, 1.6}, "rad",
@@ -47,6 +75,8 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
                                      const AssociationOptions& options, std::vector<core::PointId>* visible) {
   const Eigen::Vector3d centre = camera_from_world.inverse().translation;
   const double log_scale = std::log(options.scale_factor);
+  Roll roll(map, camera_from_world);
+  const auto max_turn = static_cast<float>(options.max_point_angle_rad * 180.0 / 3.14159265358979);
   std::vector<PointMatch> by_feature(frame.points.size());
   std::vector<int> near;
   std::vector<int> distances;
@@ -58,12 +88,12 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     near.clear();
     const double grown = radius * std::pow(options.scale_factor, std::clamp(prediction.octave, 0, 4));
     frame.grid.within(frame.points, prediction.u, prediction.v, static_cast<float>(grown), near);
-    near.erase(std::remove_if(near.begin(), near.end(),
-                              [&](int i) {
-                                return std::abs(frame.points[static_cast<std::size_t>(i)].octave -
-                                                prediction.octave) > 1;
-                              }),
-               near.end());
+    const float angle = point->angle + roll.since(point->angle_keyframe);
+    const auto unlike = [&](int i) {
+      const features::PointFeature& f = frame.points[static_cast<std::size_t>(i)];
+      return std::abs(f.octave - prediction.octave) > 1 || angle_between(f.angle, angle) > max_turn;
+    };
+    near.erase(std::remove_if(near.begin(), near.end(), unlike), near.end());
     if (near.empty()) continue;
     distances.resize(near.size());
     features::hamming_distances(point->descriptor, frame.descriptors.data(), near.data(), near.size(),

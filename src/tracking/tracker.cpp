@@ -163,7 +163,8 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
       surface.max_distance_m = round.surface_distance;
       surface.max_samples = round.surface_samples;
       problem.planes =
-          associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour, surface);
+          associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour, surface,
+                            &result.surface_in_view);
     }
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
@@ -186,8 +187,9 @@ void Tracker::judge(const features::FrameFeatures& features, TrackResult& result
   result.min_eigenvalue = eigen.eigenvalues()(0);
   constexpr double kWeak = 2500.0;  // a standard deviation of 2 cm
   result.weak_directions = static_cast<int>((eigen.eigenvalues().array() < kWeak).count());
-  const int surface_used = result.estimate.planes.terms;
-  result.surface_share = surface_used > 0 ? static_cast<double>(result.estimate.planes.inliers) / surface_used : 0.0;
+  result.surface_share = result.surface_in_view > 0
+                             ? static_cast<double>(result.estimate.planes.inliers) / result.surface_in_view
+                             : 0.0;
   result.state = trustworthy(result, features) ? TrackState::kTracked : TrackState::kLost;
 }
 

@@ -49,6 +49,8 @@ struct MapPoint {
   PointId id;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, metres
   features::Descriptor256 descriptor{};                ///< the most typical of its observations
+  float angle = 0.0F;                                  ///< of that observation, degrees in its picture
+  KeyframeId angle_keyframe;                           ///< whose picture
   Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
   double reference_distance = 1.0;  ///< metres from the camera of its first observation
   int reference_octave = 0;         ///< in which octave it was seen there

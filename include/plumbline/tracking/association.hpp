@@ -28,6 +28,7 @@ struct AssociationOptions {
   int max_hamming = 64;
   double ratio = 0.9;
   double scale_factor = 1.2;  ///< of the ORB pyramid
+  double max_point_angle_rad = 0.6;
   int max_line_hamming = 90;
   double max_line_angle_rad = 0.2;
   void declare(core::OptionTable& table);
@@ -56,11 +57,13 @@ struct SurfaceAssociationOptions {
 /// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, the depth
 /// measured there is the point that should lie on its tangent plane. `depth_from_camera` carries the camera of the
 /// colour picture to that of the depth picture (they are stamped apart); the measured points come back in the
-/// colour camera's frame.
+/// colour camera's frame. `in_view` receives how many samples face the camera and have a measured depth where they
+/// should be seen, whether it fits or not.
 std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface, const cv::Mat& depth,
                                                    const sensor::Pinhole& camera,
                                                    const geometry::Rigid3& camera_from_world,
                                                    const geometry::Rigid3& depth_from_camera,
-                                                   const SurfaceAssociationOptions& options);
+                                                   const SurfaceAssociationOptions& options,
+                                                   int* in_view = nullptr);
 
 }  // namespace plumbline::tracking

@@ -46,6 +46,7 @@ struct TrackResult {
   std::vector<core::PointId> visible_points;  ///< landmarks that should have been seen
   std::vector<core::LineId> visible_lines;
   optimize::PoseSummary estimate;
+  int surface_in_view = 0;      ///< samples of the local surface where the depth image has a measurement
   double surface_share = 0.0;   ///< share of the local surface in view that the depth image confirms
   double min_eigenvalue = 0.0;  ///< of the information matrix, 1/m^2 after scaling rotations by the scene's depth
   int weak_directions = 0;      ///< of six, that nothing but the motion model holds
