@@ -182,8 +182,11 @@ core::Result<void> ablate(const std::string& input, const std::string& pipelines
       for (const PreparedFrame& prepared : chunk) runs[r]->process(prepared);
     });
   }
+  // A scene's name alone would not tell its variants apart.
+  const std::string sequence =
+      synth::is_synth_url(input) ? input.substr(input.find(':') + 1) : (*source)->name();
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    print_row(csv, (*source)->name(), kSets[r], *runs[r], frames, *truth);
+    print_row(csv, sequence, kSets[r], *runs[r], frames, *truth);
   }
   return {};
 }
