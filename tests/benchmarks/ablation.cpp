@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What each residual family is worth: every recording is tracked with all of them, without each, and with
 // each alone.
-//   ablation [--csv] [--threads N] [--set key=value]... INPUT...
+//   ablation [--csv] [--only "no depth"]... [--threads N] [--set key=value]... INPUT...
 // INPUT: a recording's folder with truth, or synth:SCENE?... A set also goes without the features it does not
 // track, as `plumbline map --set track.points=off --set features.points=off` does. Milliseconds are processor
 // time of one thread, median over the frames; everything else is the same on every run.
@@ -157,7 +157,8 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open(const std::string& inpu
 }
 
 core::Result<void> ablate(const std::string& input, const std::string& pipelines,
-                          const mapping::SlamOptions& options, const core::Executor& executor, bool csv) {
+                          const mapping::SlamOptions& options, const std::vector<FamilySet>& sets,
+                          const core::Executor& executor, bool csv) {
   const auto log = core::stderr_log(core::LogLevel::kWarning);
   const auto source = open(input, pipelines, executor, *log);
   if (!source) return tl::unexpected<core::Error>(source.error());
@@ -172,7 +173,7 @@ core::Result<void> ablate(const std::string& input, const std::string& pipelines
     extractors.emplace_back(o, camera);
   }
   std::vector<std::unique_ptr<Run>> runs;
-  for (const FamilySet& set : kSets) runs.push_back(std::make_unique<Run>(set, options, camera));
+  for (const FamilySet& set : sets) runs.push_back(std::make_unique<Run>(set, options, camera));
   const std::size_t frames = (*source)->size();
   for (std::size_t begin = 0; begin < frames; begin += kChunk) {
     std::vector<PreparedFrame> chunk(std::min(kChunk, frames - begin));
@@ -186,9 +187,15 @@ core::Result<void> ablate(const std::string& input, const std::string& pipelines
   const std::string sequence =
       synth::is_synth_url(input) ? input.substr(input.find(':') + 1) : (*source)->name();
   for (std::size_t r = 0; r < runs.size(); ++r) {
-    print_row(csv, sequence, kSets[r], *runs[r], frames, *truth);
+    print_row(csv, sequence, sets[r], *runs[r], frames, *truth);
   }
   return {};
+}
+
+std::vector<std::string> names_of(const std::array<FamilySet, 7>& sets) {
+  std::vector<std::string> names;
+  for (const FamilySet& set : sets) names.emplace_back(set.name);
+  return names;
 }
 
 /// "key=value" for the options that the pipeline's track stage has.
@@ -210,11 +217,15 @@ int main(int argc, char** argv) {
   CLI::App app("Tracks recordings with every set of residual families and prints how well each does");
   std::vector<std::string> inputs;
   std::vector<std::string> overrides;
+  std::vector<std::string> only;
   std::string pipelines = PLUMBLINE_SOURCE_DIR "/pipelines";
   bool csv = false;
   int threads = 1;
   app.add_option("INPUT", inputs, "Recordings with truth, or synth:SCENE?...")->required();
   app.add_flag("--csv", csv, "Comma-separated values instead of a Markdown table");
+  app.add_option("--only", only, "Only this family set; may be repeated")
+      ->check(CLI::IsMember(names_of(kSets)))
+      ->allow_extra_args(false);
   app.add_option("--threads", threads, "Frames and sets side by side; times are of one thread all the same")
       ->check(CLI::Range(1, 256));
   app.add_option("--set", overrides, "Set an option of the track stage; may be repeated")
@@ -232,10 +243,14 @@ int main(int argc, char** argv) {
   core::OptionTable table;
   options.declare(table);
   if (auto set = override_options(overrides, table); !set) return fail(set.error());
+  std::vector<FamilySet> sets;
+  for (const FamilySet& set : kSets) {
+    if (only.empty() || std::find(only.begin(), only.end(), set.name) != only.end()) sets.push_back(set);
+  }
   const core::Executor executor(threads);
   print_header(csv);
   for (const std::string& input : inputs) {
-    if (auto done = ablate(input, pipelines, options, executor, csv); !done) return fail(done.error());
+    if (auto done = ablate(input, pipelines, options, sets, executor, csv); !done) return fail(done.error());
   }
   return 0;
 }
