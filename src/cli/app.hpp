@@ -47,6 +47,7 @@ void add_info(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);
 void add_evaluate(CLI::App& app, Session& session);
+void add_evaluate_cloud(CLI::App& group, Session& session);  ///< the one below `evaluate`
 void add_synth(CLI::App& app, Session& session);
 void add_filter(CLI::App& app, Session& session);
 void add_pipelines(CLI::App& app, Session& session);

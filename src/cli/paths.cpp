@@ -31,4 +31,9 @@ std::string display_name(const fs::path& path) {
   return (normal.has_filename() ? normal : normal.parent_path()).filename().string();
 }
 
+fs::path file_in(const fs::path& path, const char* name) {
+  std::error_code ec;
+  return fs::is_directory(path, ec) ? path / name : path;
+}
+
 }  // namespace plumbline::cli

@@ -226,6 +226,7 @@ void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions&
   }
   for (std::size_t i = 0; i < cloud.source.size(); ++i) report.error_m[cloud.source[i]] = accuracy.error_m[i];
   report.reference_samples = truth.counted.points;
+  report.reference_normals = truth.counted.normals;
   report.reference_error_m = completeness.error_m;
 }
 

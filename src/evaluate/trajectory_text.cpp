@@ -85,7 +85,9 @@ Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& r) {
   return Eigen::Vector3d(std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))) * kDegrees;
 }
 
-std::string to_json(const TrajectoryReport& r) {
+namespace {
+
+Json json_of(const TrajectoryReport& r) {
   Json per_axis = Json::object();
   const std::array<const char*, 3> names = {"x", "y", "z"};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -111,7 +113,39 @@ std::string to_json(const TrajectoryReport& r) {
   out["alignment"] = json_of(r.truth_from_estimate);
   out["alignment"]["type"] = name_of(r.align);
   out["warnings"] = r.warnings;
-  return out.dump(2) + "\n";
+  return out;
+}
+
+}  // namespace
+
+std::string to_json(const TrajectoryReport& r) { return json_of(r).dump(2) + "\n"; }
+
+std::string to_json(const std::vector<NamedReport>& reports) {
+  Json estimates = Json::array();
+  for (const NamedReport& named : reports) {
+    Json one = {{"name", named.name}};
+    one.update(json_of(named.report));
+    estimates.push_back(std::move(one));
+  }
+  return Json{{"estimates", std::move(estimates)}}.dump(2) + "\n";
+}
+
+std::string to_text(const std::vector<NamedReport>& reports) {
+  std::size_t width = 8;
+  for (const NamedReport& named : reports) width = std::max(width, named.name.size());
+  std::string out = fmt::format("{:<{}} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9}\n", "estimate", width,
+                                "ATE rmse", "median", "max", "RPE/s m", "RPE/s deg", "matched", "tracked");
+  for (const NamedReport& named : reports) {
+    const TrajectoryReport& r = named.report;
+    const auto relative = [&](const Statistics& s) {
+      return r.rpe_second.pairs > 0 ? fmt::format("{:.6f}", s.rmse) : std::string("-");
+    };
+    out += fmt::format("{:<{}} {:>10.6f} {:>10.6f} {:>10.6f} {:>10} {:>10} {:>9} {:>9}\n", named.name, width,
+                       r.ate_m.rmse, r.ate_m.median, r.ate_m.max, relative(r.rpe_second.translation_m),
+                       relative(r.rpe_second.rotation_deg), r.matched,
+                       r.tracked_percent ? fmt::format("{:.2f} %", *r.tracked_percent) : "-");
+  }
+  return out;
 }
 
 std::string to_text(const TrajectoryReport& r) {

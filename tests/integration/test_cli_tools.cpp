@@ -100,7 +100,7 @@ TEST_F(Tools, EvaluateTellsWhatIsThere) {
   EXPECT_EQ(report["tracked_percent"], 100.0);
   EXPECT_EQ(run("evaluate trajectory out nothing.txt").code, 3);
   EXPECT_EQ(run("evaluate trajectory out wall --align so3").code, 2);
-  const Outcome plots = run("evaluate trajectory out wall --plots charts");
+  const Outcome plots = run("evaluate trajectory out wall --plot charts");
   EXPECT_EQ(plots.code, 0) << plots;
   EXPECT_FALSE(fs::is_empty(path("charts")));
 

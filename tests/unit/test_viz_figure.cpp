@@ -198,32 +198,34 @@ TEST_F(FigureTest, TrajectoryPlotsAreAllWritten) {
   comparison.name = "test";
   comparison.truth = circle(2.0, 80);
   comparison.estimate = circle(2.01, 80);
-  const auto done = write_trajectory_plots(comparison, folder_ / "plots" / "deep");
+  const auto done = write_trajectory_plots({comparison}, folder_ / "plots" / "deep");
   ASSERT_TRUE(done.has_value()) << done.error().message;
   for (const std::string name : {"path", "error", "poses", "error_distribution"}) {
     EXPECT_TRUE(well_formed(bytes("plots/deep/" + name + ".svg"))) << name;
     EXPECT_FALSE(cv::imread((folder_ / "plots" / "deep" / (name + ".png")).string()).empty()) << name;
   }
   comparison.truth.pop_back();
-  EXPECT_EQ(write_trajectory_plots(comparison, folder_).error().kind, core::ErrorKind::kUsage);
-  EXPECT_TRUE(write_trajectory_plots({"empty", {}, {}, {}}, folder_ / "empty").has_value());
+  EXPECT_EQ(write_trajectory_plots({comparison}, folder_).error().kind, core::ErrorKind::kUsage);
+  EXPECT_EQ(write_trajectory_plots({}, folder_).error().kind, core::ErrorKind::kUsage);
+  EXPECT_TRUE(
+      write_trajectory_plots({TrajectoryComparison{"empty", {}, {}, {}, {}}}, folder_ / "empty").has_value());
 }
 
 TEST(TrajectoryFigures, HoldTheNumbersTheyAreGiven) {
   TrajectoryComparison comparison;
   comparison.truth = circle(2.0, 80);
   comparison.estimate = circle(2.01, 80);
-  const Figure path = path_figure(comparison);
+  const Figure path = path_figure({comparison});
   ASSERT_EQ(path.panels.size(), 1U);
   EXPECT_TRUE(path.panels[0].equal_aspect);
   EXPECT_EQ(path.panels[0].x_label, "x (m)");
   EXPECT_EQ(path.panels[0].y_label, "y (m)");
   ASSERT_EQ(path.panels[0].colored_paths.size(), 1U);
   EXPECT_NEAR(path.panels[0].colored_paths[0].value[7], 10.0, 1e-6);  // millimetres
-  const Figure error = error_figure(comparison);
+  const Figure error = error_figure({comparison});
   EXPECT_NEAR(error.panels[0].lines[0].x.back(), 7.9, 1e-6);  // seconds from the start
   EXPECT_EQ(error.panels[0].lines[1].label, "RMS 10.0 mm");
-  const Figure poses = pose_figure(comparison);
+  const Figure poses = pose_figure({comparison});
   ASSERT_EQ(poses.panels.size(), 6U);
   const auto& yaw = poses.panels[5].lines[0].y;
   EXPECT_EQ(poses.panels[5].y_label, "yaw (deg)");
@@ -232,6 +234,41 @@ TEST(TrajectoryFigures, HoldTheNumbersTheyAreGiven) {
   ASSERT_EQ(resources.panels.size(), 2U);
   EXPECT_EQ(resources.panels[0].lines[1].label, "median 25.0");
   EXPECT_EQ(resources_figure({}, {}).panels.size(), 1U);
+}
+
+TEST(TrajectoryFigures, SeveralEstimatesStandSideBySide) {
+  TrajectoryComparison near;
+  near.name = "near";
+  near.truth = circle(2.0, 80);
+  near.estimate = circle(2.01, 80);
+  TrajectoryComparison far = near;
+  far.name = "far";
+  far.estimate = circle(2.05, 80);
+  const Figure path = path_figure({near, far});
+  ASSERT_EQ(path.panels.size(), 2U);
+  EXPECT_EQ(path.panels[1].title, "far");
+  ASSERT_TRUE(path.panels[0].colored_paths[0].range.has_value());
+  EXPECT_NEAR(path.panels[0].colored_paths[0].range->second, 50.0, 1e-6);  // one scale for both
+  const Figure error = error_figure({near, far});
+  ASSERT_EQ(error.panels[0].lines.size(), 2U);
+  EXPECT_EQ(error.panels[0].lines[1].label, "far: RMS 50.0 mm");
+  EXPECT_EQ(pose_figure({near, far}).panels[0].lines.size(), 3U);  // and the truth
+  EXPECT_EQ(error_distribution_figure({near, far}).panels[0].boxes.size(), 2U);
+}
+
+TEST(TrajectoryFigures, CurvesBreakWhereTrackingWasLost) {
+  TrajectoryComparison comparison;
+  comparison.whole_truth = circle(2.0, 80);
+  comparison.truth = comparison.whole_truth;
+  comparison.estimate = circle(2.01, 80);
+  comparison.truth.erase(comparison.truth.begin() + 20, comparison.truth.begin() + 40);
+  comparison.estimate.erase(comparison.estimate.begin() + 20, comparison.estimate.begin() + 40);
+  const Figure error = error_figure({comparison});
+  ASSERT_EQ(error.panels[0].lines[0].y.size(), 61U);
+  EXPECT_TRUE(std::isnan(error.panels[0].lines[0].y[20]));
+  const Figure path = path_figure({comparison});
+  EXPECT_TRUE(std::isnan(path.panels[0].colored_paths[0].x[20]));
+  EXPECT_EQ(path.panels[0].lines[0].x.size(), 80U);  // the truth is drawn whole
 }
 
 TEST(FigureLayout, BoxSummaryFollowsTukey) {

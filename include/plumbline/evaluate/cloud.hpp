@@ -89,6 +89,7 @@ struct CloudReport {
   std::vector<float>
       error_m;  ///< per point of the cloud as given, NaN where dropped; empty without reference
   std::vector<Eigen::Vector3f> reference_samples;  ///< what completeness was measured at
+  std::vector<Eigen::Vector3f> reference_normals;  ///< of each of them, zero = unknown; may be empty
   std::vector<float> reference_error_m;            ///< of each of them
   std::vector<std::string> warnings;
 };

@@ -92,4 +92,14 @@ std::string to_json(const TrajectoryReport& report);
 /// A table for people, several lines.
 std::string to_text(const TrajectoryReport& report);
 
+/// One of several estimates of the same truth.
+struct NamedReport {
+  std::string name;
+  TrajectoryReport report;
+};
+/// {"estimates": [{"name": ..., then as above}, ...]}, in the order given.
+std::string to_json(const std::vector<NamedReport>& reports);
+/// One line per estimate: ATE, RPE, share tracked.
+std::string to_text(const std::vector<NamedReport>& reports);
+
 }  // namespace plumbline::evaluate

@@ -19,14 +19,19 @@ struct TrajectoryComparison {
   geometry::Trajectory estimate;  ///< in the truth's frame
   geometry::Trajectory truth;     ///< same length and stamps; empty = no truth, only the estimate is drawn
   std::vector<double> error_m;    ///< absolute position error per pose; empty = taken from the positions
+  geometry::Trajectory whole_truth{};  ///< drawn instead of `truth`, also where nothing was estimated
 };
 
-/// The path from above (the two axes along which the truth moves most), coloured by error, truth dashed.
-Figure path_figure(const TrajectoryComparison& comparison);
+// Each figure shows one estimate or several side by side. Curves are broken where poses are missing for more
+// than five usual steps and 0.25 s: tracking was lost there.
+
+/// The path from above (the two axes along which the truth moves most), coloured by error, truth dashed; one
+/// panel per estimate with the same colours.
+Figure path_figure(const std::vector<TrajectoryComparison>& comparisons);
 /// Error over time, with its median and RMS.
-Figure error_figure(const TrajectoryComparison& comparison);
-/// x, y, z over time (left) and roll, pitch, yaw over time (right), estimate and truth.
-Figure pose_figure(const TrajectoryComparison& comparison);
+Figure error_figure(const std::vector<TrajectoryComparison>& comparisons);
+/// x, y, z over time (left) and roll, pitch, yaw over time (right), estimates and truth.
+Figure pose_figure(const std::vector<TrajectoryComparison>& comparisons);
 /// Box plot and histogram of the errors of several estimates.
 Figure error_distribution_figure(const std::vector<TrajectoryComparison>& comparisons);
 /// Milliseconds per frame and, if given, resident memory (MB) over frame number.
@@ -36,8 +41,9 @@ Figure resources_figure(const std::vector<double>& frame_ms, const std::vector<d
 core::Result<void> write_figure(const Figure& figure, const std::filesystem::path& folder,
                                 const std::string& name);
 
-/// Writes path, error, poses and error_distribution. Errors: kUsage when lengths differ, kOutput.
-core::Result<void> write_trajectory_plots(const TrajectoryComparison& comparison,
+/// Writes path, error, poses and error_distribution. Errors: kUsage when lengths differ or there is no
+/// estimate, kOutput.
+core::Result<void> write_trajectory_plots(const std::vector<TrajectoryComparison>& comparisons,
                                           const std::filesystem::path& folder);
 
 }  // namespace plumbline::viz

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline evaluate cloud CLOUD [REFERENCE]
+#include <fmt/format.h>
+
+#include <memory>
+#include <vector>
+
+#include "app.hpp"
+#include "error_cloud.hpp"
+#include "option_flags.hpp"
+#include "paths.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/evaluate/cloud.hpp"
+#include "plumbline/evaluate/companions.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CloudRequest {
+  fs::path cloud;
+  fs::path reference;
+  std::vector<fs::path> trajectories;
+  std::vector<fs::path> truths;
+  fs::path output;
+  bool json = false;
+  evaluate::CloudOptions options;
+  core::OptionTable table;
+  std::unique_ptr<OptionFlags> flags;
+};
+
+/// What the user named, else what lies beside cloud and reference.
+core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudRequest& request,
+                                                               const fs::path& cloud) {
+  std::vector<evaluate::TrajectoryFiles> files;
+  if (request.trajectories.size() != request.truths.size()) {
+    return core::usage_error("--trajectory and --truth belong together: give as many of one as of the other");
+  }
+  for (std::size_t i = 0; i < request.trajectories.size(); ++i) {
+    files.push_back({"", request.trajectories[i], request.truths[i]});
+  }
+  if (files.empty()) files = evaluate::find_trajectories(cloud, request.reference);
+  std::vector<evaluate::TrajectoryPair> pairs;
+  for (const evaluate::TrajectoryFiles& pair : files) {
+    auto estimate = dataset::read_trajectory(file_in(pair.estimate, "trajectory.txt"));
+    if (!estimate) return tl::unexpected<core::Error>(estimate.error());
+    auto truth = dataset::read_trajectory(file_in(pair.truth, "groundtruth.txt"));
+    if (!truth) return tl::unexpected<core::Error>(truth.error());
+    pairs.push_back({std::move(*estimate), std::move(*truth)});
+  }
+  return pairs;
+}
+
+/// The cloud by its distance to the truth and, if that was sampled, the truth by its distance to the cloud.
+core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
+                                      const evaluate::CloudReport& report,
+                                      const std::vector<evaluate::TrajectoryPair>& pairs,
+                                      const fs::path& folder) {
+  ErrorCloud accuracy;
+  accuracy.title = "Distance of the cloud to the true surface";
+  accuracy.points = cloud.points;
+  accuracy.normals = cloud.normals;
+  const geometry::Rigid3& moved = report.alignment.reference_from_cloud;
+  for (Eigen::Vector3f& p : accuracy.points) p = (moved * p.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& n : accuracy.normals) n = (moved.rotation * n.cast<double>()).cast<float>();
+  accuracy.error_m = report.error_m;
+  for (const evaluate::TrajectoryPair& pair : pairs) accuracy.cameras.push_back(pair.truth);
+  if (auto done = write_error_cloud(accuracy, folder, "accuracy"); !done) return done;
+  ErrorCloud completeness;
+  completeness.title = "Distance of the true surface to the cloud";
+  completeness.points = report.reference_samples;
+  completeness.normals = report.reference_normals;
+  completeness.error_m = report.reference_error_m;
+  completeness.cameras = accuracy.cameras;
+  return write_error_cloud(completeness, folder, "completeness");
+}
+
+core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
+  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (!request.output.empty() && request.reference.empty()) {
+    return core::usage_error("-o: colours by error need a REFERENCE to measure against");
+  }
+  const fs::path cloud_file = file_in(request.cloud, "map.ply");
+  const auto cloud = evaluate::load_cloud(cloud_file);
+  if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+  core::Result<evaluate::Reference> reference;
+  if (!request.reference.empty()) {
+    reference = evaluate::load_reference(file_in(request.reference, "reference.ply"));
+    if (!reference) return tl::unexpected<core::Error>(reference.error());
+  }
+  std::vector<evaluate::TrajectoryPair> pairs;
+  const bool aligns = request.options.align != evaluate::CloudAlignment::kNone;
+  if (!request.reference.empty() &&
+      (aligns || !request.output.empty() || !request.trajectories.empty() || !request.truths.empty())) {
+    auto read = read_pairs(request, cloud_file);
+    if (!read) return tl::unexpected<core::Error>(read.error());
+    pairs = std::move(*read);
+  }
+  const auto report = evaluate::evaluate_cloud(*cloud, request.reference.empty() ? nullptr : &*reference,
+                                               request.options, pairs, session.executor());
+  if (!report) return tl::unexpected<core::Error>(report.error());
+  for (const std::string& warning : report->warnings) session.console().warning(warning);
+  fmt::print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
+  if (request.output.empty()) return {};
+  return write_error_clouds(*cloud, *report, pairs, request.output);
+}
+
+}  // namespace
+
+void add_evaluate_cloud(CLI::App& group, Session& session) {
+  const auto request = std::make_shared<CloudRequest>();
+  request->options.declare(request->table);
+  CLI::App* command = add_command(group, session, "cloud",
+                                  "Accuracy, completeness, wall thickness of a cloud", [&session, request] {
+                                    const auto done = evaluate_surfaces(*request, session);
+                                    return done ? 0 : session.fail(done.error());
+                                  });
+  command->add_option("CLOUD", request->cloud, "A PLY file, or a result folder")->required();
+  command->add_option(
+      "REFERENCE", request->reference,
+      "The true surface (PLY, mesh or samples); without it only what the cloud tells of itself");
+  command->add_option("--trajectory", request->trajectories, "Estimated path to start the alignment from")
+      ->type_name("EST")
+      ->allow_extra_args(false);
+  command->add_option("--truth", request->truths, "Its truth, in the reference's frame")
+      ->type_name("GT")
+      ->allow_extra_args(false);
+  command
+      ->add_option("-o,--output", request->output,
+                   "Write clouds coloured by error and pictures of them into this folder: "
+                   "accuracy.{ply,png}, completeness.{ply,png}")
+      ->type_name("DIR");
+  command->add_flag("--json", request->json, "Print JSON");
+  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+}
+
+}  // namespace plumbline::cli

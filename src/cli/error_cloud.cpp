@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "error_cloud.hpp"
+
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <memory>
+#include <system_error>
+
+#include "plumbline/cloud/ply.hpp"
+#include "plumbline/viz/color.hpp"
+#include "plumbline/viz/snapshot.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+/// Upper end of the colours: the 98th percentile, rounded up to 1, 2 or 5 times a power of ten.
+double color_end_m(const std::vector<float>& errors) {
+  std::vector<float> known;
+  std::copy_if(errors.begin(), errors.end(), std::back_inserter(known),
+               [](float e) { return std::isfinite(e); });
+  if (known.empty()) return 0.001;
+  const auto at = known.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(known.size() - 1));
+  std::nth_element(known.begin(), at, known.end());
+  const double wanted = std::max(1e-6, static_cast<double>(*at));
+  const double decade = std::pow(10.0, std::floor(std::log10(wanted)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * decade >= wanted * (1.0 - 1e-9)) return factor * decade;
+  }
+  return 10.0 * decade;
+}
+
+cloud::PlyData as_ply(const ErrorCloud& cloud, double end_m) {
+  cloud::PlyData ply;
+  const auto add_vectors = [&ply](const std::vector<Eigen::Vector3f>& vectors,
+                                  const std::array<const char*, 3>& names) {
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<float> column(vectors.size());
+      std::transform(vectors.begin(), vectors.end(), column.begin(),
+                     [axis](const Eigen::Vector3f& v) { return v[axis]; });
+      ply.add(names[static_cast<std::size_t>(axis)], std::move(column));
+    }
+  };
+  add_vectors(cloud.points, {"x", "y", "z"});
+  if (!cloud.normals.empty()) add_vectors(cloud.normals, {"nx", "ny", "nz"});
+  std::array<std::vector<std::uint8_t>, 3> rgb;
+  for (const float e : cloud.error_m) {
+    const viz::Rgb c = viz::sequential_color(static_cast<double>(e) / end_m);
+    rgb[0].push_back(c.r);
+    rgb[1].push_back(c.g);
+    rgb[2].push_back(c.b);
+  }
+  ply.add("red", std::move(rgb[0]));
+  ply.add("green", std::move(rgb[1]));
+  ply.add("blue", std::move(rgb[2]));
+  ply.add("error", cloud.error_m);
+  ply.comments = {"error: distance in metres",
+                  fmt::format("colours: 0 (dark blue) to {:g} mm and more (yellow)", 1000.0 * end_m)};
+  return ply;
+}
+
+viz::Scene as_scene(const ErrorCloud& cloud) {
+  viz::Scene scene;
+  scene.title = cloud.title;
+  auto points = std::make_shared<pcl::PointCloud<pcl::PointXYZRGBNormal>>();
+  points->resize(cloud.points.size());
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    pcl::PointXYZRGBNormal& p = (*points)[i];
+    p.getVector3fMap() = cloud.points[i];
+    p.getNormalVector3fMap() = cloud.normals.empty() ? Eigen::Vector3f::Zero() : cloud.normals[i];
+  }
+  scene.cloud = points;
+  scene.scalar_label = "error (mm)";
+  scene.scalars.reserve(cloud.error_m.size());
+  for (const float e : cloud.error_m) scene.scalars.push_back(1000.0F * e);
+  for (const geometry::Trajectory& camera : cloud.cameras) {
+    viz::CameraPath path;
+    path.trajectory = camera;
+    path.color = {90, 94, 102};
+    scene.paths.push_back(std::move(path));
+  }
+  return scene;
+}
+
+}  // namespace
+
+core::Result<void> write_error_cloud(const ErrorCloud& cloud, const std::filesystem::path& folder,
+                                     const std::string& name) {
+  std::error_code problem;
+  std::filesystem::create_directories(folder, problem);
+  if (problem) {
+    return core::output_error(fmt::format("cannot make folder {}: {}", folder.string(), problem.message()));
+  }
+  const double end_m = color_end_m(cloud.error_m);
+  if (auto done = cloud::write_ply(folder / (name + ".ply"), as_ply(cloud, end_m)); !done) return done;
+  viz::SnapshotOptions options;
+  options.color = viz::ColorMode::kError;
+  options.scalar_range = {0.0, 1000.0 * end_m};
+  return viz::render_snapshot(as_scene(cloud), options, folder / (name + ".png"));
+}
+
+}  // namespace plumbline::cli
