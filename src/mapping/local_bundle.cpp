@@ -149,7 +149,7 @@ class Builder {
       seen.line = index;
       seen.start = f.segment.start.cast<double>();
       seen.end = f.segment.end.cast<double>();
-      seen.pixel_sigma = 1.2;
+      seen.pixel_sigma = 0.6;
       if (f.line3) {
         seen.has_depth = true;
         seen.start_camera = f.line3->start;

@@ -50,7 +50,7 @@ std::vector<optimize::LineTerm> line_terms(const maps::Map& map, const std::vect
     term.world = geometry::line_through(line.start, line.end);
     term.start = s.start.cast<double>();
     term.end = s.end.cast<double>();
-    term.pixel_sigma = 1.2;
+    term.pixel_sigma = 0.6;
     terms.push_back(term);
   }
   return terms;
