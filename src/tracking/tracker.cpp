@@ -71,6 +71,34 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
   terms.resize(kept);
 }
 
+constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
+
+/// Principal directions of the information, rotations counted in units that move the scene as much as a metre of
+/// translation does, at 2 m.
+struct Directions {
+  Vector6d eigenvalues;  ///< ascending
+  geometry::Matrix6d eigenvectors;
+};
+const Vector6d kDirectionScale = (Vector6d() << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5).finished();
+
+Directions weigh_directions(const geometry::Matrix6d& information) {
+  const geometry::Matrix6d h = kDirectionScale.asDiagonal() * information * kDirectionScale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(h);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+/// What no measurement holds is held by the motion model: information of 2 cm in the weak directions only.
+std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information, const Rigid3& predicted) {
+  const Directions directions = weigh_directions(information);
+  if (directions.eigenvalues(0) >= kWeak) return std::nullopt;
+  geometry::Matrix6d weak = geometry::Matrix6d::Zero();
+  for (int i = 0; i < 6 && directions.eigenvalues(i) < kWeak; ++i) {
+    weak += kWeak * directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();
+  }
+  const Vector6d inverse = kDirectionScale.cwiseInverse();
+  return optimize::PosePrior{predicted, inverse.asDiagonal() * weak * inverse.asDiagonal()};
+}
+
 }  // namespace
 
 const char* to_string(TrackState state) {
@@ -126,6 +154,8 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
   Rigid3 pose = guess;
   const Rigid3 depth_from_colour = depth_from_camera(frame);
   result.depth_from_camera = depth_from_colour;
+  // After a relocalisation the past says nothing.
+  const Rigid3 predicted = last_.valid && lost_frames_ == 0 ? predict(frame.stamp) : guess;
   optimize::PoseProblem problem;
   problem.camera = camera_;
   SurfaceAssociationOptions surface;
@@ -169,6 +199,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
     pose = result.estimate.camera_from_world;
+    problem.prior = motion_prior(result.estimate.information, predicted);
     if (round.gate) {
       drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
       drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);
@@ -179,14 +210,9 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
 }
 
 void Tracker::judge(const features::FrameFeatures& features, TrackResult& result) const {
-  // Rotations in units that move the scene as much as a metre of translation does, at 2 m.
-  Vector6d scale;
-  scale << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5;
-  const geometry::Matrix6d h = scale.asDiagonal() * result.estimate.information * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(h, Eigen::EigenvaluesOnly);
-  result.min_eigenvalue = eigen.eigenvalues()(0);
-  constexpr double kWeak = 2500.0;  // a standard deviation of 2 cm
-  result.weak_directions = static_cast<int>((eigen.eigenvalues().array() < kWeak).count());
+  const Directions directions = weigh_directions(result.estimate.information);
+  result.min_eigenvalue = directions.eigenvalues(0);
+  result.weak_directions = static_cast<int>((directions.eigenvalues.array() < kWeak).count());
   result.surface_share = result.surface_in_view > 0
                              ? static_cast<double>(result.estimate.planes.inliers) / result.surface_in_view
                              : 0.0;
