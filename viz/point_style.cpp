@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <unordered_map>
 
 namespace plumbline::viz {
 namespace {
@@ -15,6 +17,7 @@ using Point = pcl::PointXYZRGBNormal;
 
 // A wall seen edge-on has normals that scatter about 90 degrees to the view; it must not fall to pieces.
 constexpr double kFacesAway = -0.2;
+constexpr double kSurroundedAway = -0.4;
 
 Eigen::Vector3d position(const Point& p) { return {p.x, p.y, p.z}; }
 Eigen::Vector3d normal(const Point& p) { return {p.normal_x, p.normal_y, p.normal_z}; }
@@ -111,6 +114,34 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
   return result;
 }
 
+/// Normals summed over cubes: which way the surface round a point faces, whatever its own noisy normal says.
+class Surroundings {
+ public:
+  explicit Surroundings(const Scene& scene, std::size_t step) {
+    const auto& cloud = *scene.cloud;
+    for (std::size_t i = 0; i < cloud.size(); i += step) {
+      const Eigen::Vector3d n = normal(cloud[i]);
+      if (finite(cloud[i]) && n.allFinite())
+        sums_.try_emplace(cell(cloud[i]), Eigen::Vector3d::Zero()).first->second += n;
+    }
+  }
+  [[nodiscard]] Eigen::Vector3d direction(const Point& p) const {
+    const auto found = sums_.find(cell(p));
+    return found == sums_.end() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(found->second.normalized());
+  }
+
+ private:
+  static std::uint64_t cell(const Point& p) {
+    constexpr double kSide_m = 0.15;
+    const auto part = [](float v) {
+      return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / kSide_m)) + (1 << 20)) &
+             0x1fffffU;
+    };
+    return part(p.x) << 42U | part(p.y) << 21U | part(p.z);
+  }
+  std::unordered_map<std::uint64_t, Eigen::Vector3d> sums_;
+};
+
 }  // namespace
 
 std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& projection, bool cull,
@@ -120,14 +151,19 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   if (scene.cloud == nullptr) return all;
   const auto& cloud = *scene.cloud;
   all.reserve(cloud.size() / step + 1);
+  std::optional<Surroundings> surroundings;
+  if (cull) surroundings.emplace(scene, step);
   for (std::size_t i = 0; i < cloud.size(); i += step) {
     const Point& p = cloud[i];
     if (!finite(p)) continue;
     all.push_back(static_cast<std::uint32_t>(i));
     if (!cull) continue;
-    const double facing_cos = normal(p).dot(projection.to_viewer(position(p)));
-    const bool away = facing_cos < kFacesAway;  // false for NaN normals
-    if (!away) facing.push_back(static_cast<std::uint32_t>(i));
+    const Eigen::Vector3d to_viewer = projection.to_viewer(position(p));
+    const bool away = normal(p).dot(to_viewer) < kFacesAway;  // false for NaN normals
+    // Of a ceiling that is left out no dust must stay: points whose normals are noise go with their
+    // surroundings.
+    if (away || surroundings->direction(p).dot(to_viewer) < kSurroundedAway) continue;
+    facing.push_back(static_cast<std::uint32_t>(i));
   }
   const bool enough = facing.size() * 50 > all.size();
   return cull && enough ? facing : all;

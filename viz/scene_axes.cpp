@@ -39,6 +39,22 @@ Eigen::Vector3d mean_camera_up(const Scene& scene) {
   return sum.norm() > 1e-6 ? sum.normalized() : Eigen::Vector3d(0.0, -1.0, 0.0);
 }
 
+/// Mean horizontal direction of the optical axes; `otherwise` when they cancel out.
+Eigen::Vector3d mean_heading(const Scene& scene, const Eigen::Vector3d& up,
+                             const Eigen::Vector3d& otherwise) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (const CameraPath& path : scene.paths) {
+    for (const auto& pose : path.trajectory) {
+      if (!pose.world_from_camera.rotation.allFinite()) continue;
+      sum += pose.world_from_camera.rotation.col(2);
+      count += 1.0;
+    }
+  }
+  const Eigen::Vector3d flat = sum - sum.dot(up) * up;
+  return flat.norm() > 0.3 * std::max(1.0, count) ? flat.normalized() : otherwise;
+}
+
 /// Any unit vector perpendicular to v, preferring `wish`.
 Eigen::Vector3d perpendicular(const Eigen::Vector3d& v, const Eigen::Vector3d& wish) {
   for (const Eigen::Vector3d& candidate :
@@ -172,6 +188,7 @@ SceneAxes scene_axes(const Scene& scene, const SnapshotOptions& options) {
   }
   axes.forward = along_walls(sample_normals(scene), axes.up, perpendicular(axes.up, looks));
   axes.right = axes.forward.cross(axes.up);
+  axes.heading = mean_heading(scene, axes.up, axes.forward);
   return axes;
 }
 

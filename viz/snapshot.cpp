@@ -102,7 +102,7 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   const std::size_t step = std::max<std::size_t>(1, size / kFramingSample);
   const auto sample = positions(scene, visible_points(scene, for_culling, options.cull_back_faces, step));
   if (!fixed) {
-    fit(directions, sample, must_see(scene, sample.empty()));
+    fit(directions, evened(sample), must_see(scene, sample.empty()));
     return directions;
   }
   std::vector<double> depths;

@@ -2,7 +2,9 @@
 #include "view_frame.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 
 namespace plumbline::viz {
 namespace {
@@ -10,6 +12,7 @@ namespace {
 constexpr double kDegree = M_PI / 180.0;
 constexpr double kIsoPitch = 35.0 * kDegree;
 constexpr double kIsoAzimuth = 35.0 * kDegree;  // not 45: one wall direction stays the longer one
+constexpr double kHeadsRight = 0.2;             // sine of the heading from `forward`
 constexpr double kIsoFieldOfView = 28.0 * kDegree;
 constexpr double kMargin = 0.07;  // of the picture, free on each side
 
@@ -74,6 +77,26 @@ double quantile(std::vector<double> values, double q) {
   return values[at];
 }
 
+std::vector<Eigen::Vector3d> evened(const std::vector<Eigen::Vector3d>& points) {
+  constexpr double kCells = 60.0;
+  Eigen::Vector3d low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Interval along = extent(points, {}, Eigen::Vector3d::Unit(axis));
+    low[axis] = along.low;
+    high[axis] = along.high;
+  }
+  const double side = std::max((high - low).maxCoeff() / kCells, 1e-3);
+  std::set<std::array<long, 3>> taken;
+  std::vector<Eigen::Vector3d> result;
+  for (const auto& p : points) {
+    // What lies far outside of 99 % of the points shares the border cubes.
+    const Eigen::Array3d cell = ((p - low).array() / side).floor().max(-kCells).min(2.0 * kCells);
+    const auto index = [&cell](int axis) { return std::lround(cell[axis]); };
+    if (taken.insert({index(0), index(1), index(2)}).second) result.push_back(p);
+  }
+  return result;
+}
+
 Eigen::Vector3d Projection::project(const Eigen::Vector3d& p) const {
   const Eigen::Vector3d v = p - eye;
   const double depth = v.dot(forward);
@@ -95,11 +118,14 @@ Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes
   view.orthographic = options.view != View::kIso && options.view != View::kExplicit;
   double field_of_view = kIsoFieldOfView;
   switch (options.view) {
-    case View::kIso:
-      view.forward =
-          std::cos(kIsoPitch) * (std::cos(kIsoAzimuth) * axes.forward - std::sin(kIsoAzimuth) * axes.right) -
-          std::sin(kIsoPitch) * axes.up;
+    case View::kIso: {
+      // To the left, unless that shows the backs of what the cameras saw.
+      const double side = axes.heading.dot(axes.right) > kHeadsRight ? 1.0 : -1.0;
+      view.forward = std::cos(kIsoPitch) *
+                         (std::cos(kIsoAzimuth) * axes.forward + side * std::sin(kIsoAzimuth) * axes.right) -
+                     std::sin(kIsoPitch) * axes.up;
       break;
+    }
     case View::kTop:
       view.forward = -axes.up;
       view.up = axes.forward;

@@ -13,6 +13,8 @@ namespace plumbline::viz {
 /// direction (if walls meet at right angles) nearest to where the first camera looks.
 struct SceneAxes {
   Eigen::Vector3d right, forward, up;
+  Eigen::Vector3d
+      heading;  ///< where the cameras look on average, horizontal; = forward when they turned round
 };
 SceneAxes scene_axes(const Scene& scene, const SnapshotOptions& options);
 
@@ -40,6 +42,10 @@ Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes
 /// Places the camera so that 99 % of `points` and all of `must_see` lie in the picture; sets the depth range.
 void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
          const std::vector<Eigen::Vector3d>& must_see);
+
+/// One point (the first) per cube of about 1/60 of the extent: dense surfaces near a camera then count no
+/// more than sparse ones far away, which would be cut off otherwise.
+std::vector<Eigen::Vector3d> evened(const std::vector<Eigen::Vector3d>& points);
 
 /// The q-quantile; 0 for no values.
 double quantile(std::vector<double> values, double q);

@@ -143,6 +143,66 @@ Found find(const cv::Mat& picture, Hue hue) {
   return found;
 }
 
+/// Pixels on the outermost `border` of the picture that are not background.
+int drawn_on_border(const cv::Mat& picture, int border) {
+  int drawn = 0;
+  for (int v = 0; v < picture.rows; ++v) {
+    for (int u = 0; u < picture.cols; ++u) {
+      const bool inside =
+          u >= border && v >= border && u < picture.cols - border && v < picture.rows - border;
+      if (!inside && !is(picture.at<cv::Vec3b>(v, u), Hue::kBackground)) ++drawn;
+    }
+  }
+  return drawn;
+}
+
+TEST_F(Snapshot, SparseSurfacesFarAwayAreInThePictureToo) {
+  // Near the camera a thousand times as many points per square metre as on the floor behind.
+  Scene scene;
+  auto cloud = std::make_shared<Cloud>();
+  const auto ground = [&](double x0, double x1, double step, const Rgb& color) {
+    for (double x = x0; x < x1; x += step) {
+      for (double z = -0.5; z < 0.5; z += step) {
+        cloud->push_back(point({x, 0.0, z}, Eigen::Vector3d(0, -1, 0), color));
+      }
+    }
+  };
+  ground(0.0, 1.0, 0.003, {128, 128, 128});
+  ground(1.0, 5.0, 0.1, {220, 30, 30});
+  scene.cloud = cloud;
+  const cv::Mat picture = render(scene, small(View::kTop));
+  EXPECT_GT(find(picture, Hue::kRed).count, 100);
+  EXPECT_EQ(drawn_on_border(picture, 8), 0);
+}
+
+TEST_F(Snapshot, NoDustStaysOfACeilingThatIsLeftOut) {
+  Scene scene = make_room();
+  auto cloud = std::make_shared<Cloud>(*scene.cloud);
+  for (std::size_t i = 0; i < cloud->size();
+       i += 7) {  // every seventh normal is noise, here: the other way round
+    auto& p = (*cloud)[i];
+    if (p.r > 200 && p.b > 200) p.getNormalVector3fMap() *= -1.0F;
+  }
+  scene.cloud = cloud;
+  const cv::Mat picture = render(scene, small(View::kTop));
+  const cv::Rect inside(picture.cols / 4, picture.rows / 5, picture.cols / 2,
+                        picture.rows * 3 / 5);  // no walls
+  EXPECT_EQ(find(picture(inside), Hue::kMagenta).count, 0);
+}
+
+TEST_F(Snapshot, IsoViewLooksWhereTheCamerasLooked) {
+  // Walls at 45 degrees: their direction next to the heading is a matter of chance, the side shown is not.
+  for (const double turn : {-0.6, 0.6}) {
+    Scene scene = make_room();
+    const Eigen::Matrix3d heading = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    for (auto& pose : scene.paths[0].trajectory) pose.world_from_camera.rotation = heading;
+    const cv::Mat picture = render(scene, small(View::kIso), "iso.png");
+    // Turned to the right (clockwise from above) the cameras saw the right wall; to the left, the left one.
+    EXPECT_EQ(find(picture, Hue::kGreen).count > 100, turn > 0.0) << turn;
+    EXPECT_EQ(find(picture, Hue::kRed).count > 100, turn < 0.0) << turn;
+  }
+}
+
 TEST_F(Snapshot, TopViewIsAPlanWithoutCeiling) {
   for (const double tilt : {0.0, 0.5}) {  // a camera that looked 29 degrees up or down at the start
     const cv::Mat picture = render(make_room(tilt), small(View::kTop));
