@@ -6,13 +6,17 @@
 
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <system_error>
+#include <vector>
 
 #include "app.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/dataset/summary.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/synth/source.hpp"
@@ -68,6 +72,27 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
   return {};
 }
 
+/// Whether a text's first line of numbers is a pose: eight of them, the last four a unit quaternion.
+bool holds_poses(const std::filesystem::path& file) {
+  if (file.extension() != ".txt") return false;
+  std::ifstream stream(file);
+  std::string line;
+  while (std::getline(stream, line) && (line.empty() || line[0] == '#')) line.clear();
+  std::istringstream words(line);
+  const std::vector<double> n{std::istream_iterator<double>(words), {}};
+  return words.eof() && n.size() == 8 &&
+         std::abs(std::hypot(std::hypot(n[4], n[5], n[6]), n[7]) - 1.0) < 1e-3;
+}
+
+void describe_path(const geometry::Trajectory& path) {
+  double length_m = 0.0;
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    length_m += (path[i].world_from_camera.translation - path[i - 1].world_from_camera.translation).norm();
+  }
+  fmt::print("poses: {}\nfrom: {:.6f} s\nto: {:.6f} s\nlength: {:.3f} m\n", path.size(), path.front().stamp,
+             path.back().stamp, length_m);
+}
+
 core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -86,7 +111,13 @@ core::Result<void> info(Session& session, InfoRequest& request) {
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
-  if (!std::filesystem::is_directory(path, ec)) return describe_cloud(path);
+  if (!std::filesystem::is_directory(path, ec)) {
+    if (!holds_poses(path)) return describe_cloud(path);
+    const auto poses = dataset::read_trajectory(path);
+    if (!poses) return tl::unexpected<core::Error>(poses.error());
+    describe_path(*poses);
+    return {};
+  }
   if (pipeline::is_result_folder(path)) return describe_result(path);
   return describe_recording(session, request);
 }

@@ -301,6 +301,7 @@ Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_n
     while (parser.HandleNextDocument(builder)) {
     }
     root = builder.take_root();
+    if (root.mark.file.empty()) root.mark.file = file_name;  // an empty document has no place of its own
   } catch (const Refused& refused) {
     problems.push_back(refused.problem);
   } catch (const YAML::Exception& e) {

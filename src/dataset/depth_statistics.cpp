@@ -31,6 +31,13 @@ std::optional<double> DepthStatistics::median() const {
   return static_cast<double>(*middle);
 }
 
+double DepthStatistics::share_beyond(double depth_m) const {
+  if (measured_.empty()) return 0.0;
+  const auto beyond = std::count_if(measured_.begin(), measured_.end(),
+                                    [depth_m](float z) { return static_cast<double>(z) > depth_m; });
+  return static_cast<double>(beyond) / static_cast<double>(measured_.size());
+}
+
 double DepthStatistics::missing_share() const {
   if (pixels_ == 0) return 1.0;
   return 1.0 - static_cast<double>(measured_.size()) / static_cast<double>(pixels_);

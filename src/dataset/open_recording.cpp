@@ -17,6 +17,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kDepthSamples = 5;
+// Structured light and time of flight measure hardly anything beyond; with millimetres taken for TUM's unit
+// the median of a desk is still that of a room (1.3 m for 6.3 m), but its background lies far outside.
+constexpr double kSensorReach_m = 10.0;
+constexpr double kMaxShareBeyondReach = 0.1;
 
 template <typename T>
 tl::unexpected<core::Error> pass_on(const core::Result<T>& result) {
@@ -102,8 +106,9 @@ core::Result<void> select(const OpenOptions& options, const std::string& folder,
   return {};
 }
 
-/// Depth of a few frames; of the first readable frame with depth when none of those can be used.
-core::Result<double> median_depth(const FrameSource& source, const std::string& folder) {
+/// Depth of a few frames; of the first readable frame with depth when none of those can be used. Never
+/// without a measurement.
+core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std::string& folder) {
   DepthStatistics statistics;
   bool readable = false;
   std::string first_error;
@@ -117,7 +122,7 @@ core::Result<double> median_depth(const FrameSource& source, const std::string& 
   };
   for (const std::size_t i : spread(source.size(), kDepthSamples)) add(i);
   for (std::size_t i = 0; i < source.size() && !statistics.median(); ++i) add(i);
-  if (const auto median = statistics.median()) return *median;
+  if (statistics.median()) return statistics;
   if (!readable) {
     return core::input_error(fmt::format("{}: none of the {} pairs can be read; the first: {}", folder,
                                          source.size(), first_error));
@@ -127,11 +132,14 @@ core::Result<double> median_depth(const FrameSource& source, const std::string& 
 }
 
 core::Result<void> check_depth_scale(const FrameSource& source, const std::string& folder, core::Log& log) {
-  const auto median = median_depth(source, folder);
-  if (!median) return pass_on(median);
-  if (*median >= 0.7 && *median <= 7.0) return {};
+  const auto depth = sample_depth(source, folder);
+  if (!depth) return pass_on(depth);
+  const auto median = depth->median();
   const double scale = source.camera().depth_scale;
   const double fit = fitting_depth_scale(*median * scale);
+  const double beyond = depth->share_beyond(kSensorReach_m);
+  const bool too_far = beyond > kMaxShareBeyondReach && fit > scale;
+  if (*median >= 0.7 && *median <= 7.0 && !too_far) return {};
   const std::string what = fmt::format(
       "{}: with depth_scale {} the median depth is {:.4g} m; depth_scale {} would "
       "fit (median {:.2g} m)",

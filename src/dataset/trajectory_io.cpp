@@ -39,8 +39,10 @@ core::Result<geometry::StampedPose> read_pose(const std::string& file, const Tex
 std::string to_text(const geometry::Trajectory& trajectory) {
   std::string text = "# timestamp tx ty tz qx qy qz qw\n";
   for (const geometry::StampedPose& pose : trajectory) {
-    const Eigen::Vector3d& t = pose.world_from_camera.translation;
-    const Eigen::Quaterniond q = pose.world_from_camera.quaternion();
+    const auto digit = [](double v) { return std::abs(v) < 0.5e-9 ? 0.0 : v; };  // no "-0.000000000"
+    const Eigen::Vector3d t = pose.world_from_camera.translation.unaryExpr(digit);
+    Eigen::Quaterniond q = pose.world_from_camera.quaternion();
+    q.coeffs() = q.coeffs().unaryExpr(digit).eval();
     fmt::format_to(std::back_inserter(text), "{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
                    pose.stamp, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }

@@ -65,6 +65,11 @@ int lock_marker(const fs::path& partial, int flags) {
   return -1;
 }
 
+tl::unexpected<core::Error> another_run(const fs::path& partial) {
+  return core::usage_error(
+      fmt::format("{}: another run is writing there; wait or name another output folder", partial.string()));
+}
+
 /// Removes what an interrupted run left, and nothing else.
 core::Result<void> clear_leftover(const fs::path& partial) {
   std::error_code ec;
@@ -77,8 +82,7 @@ core::Result<void> clear_leftover(const fs::path& partial) {
   }
   const int lock = lock_marker(partial, O_RDONLY);
   if (lock < 0 && !fs::is_empty(partial, ec)) {
-    return core::usage_error(fmt::format(
-        "{}: another run is writing there; wait or name another output folder", partial.string()));
+    return another_run(partial);
   }
   fs::remove_all(partial, ec);
   if (lock >= 0) close(lock);
@@ -125,7 +129,13 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
                                           out.string(), ec.message()));
   }
   const int lock = lock_marker(partial, O_CREAT | O_WRONLY);
-  if (lock < 0) return core::output_error(fmt::format("{}: cannot be written", out.string()));
+  if (lock < 0) {
+    std::error_code gone;
+    if (fs::exists(partial / kMarker, gone))
+      return another_run(partial);  // it began a moment before this one
+    return core::output_error(
+        fmt::format("{}: cannot be written; name a folder where you may write", out.string()));
+  }
   OutputFolder folder(target, partial, lock, is_earlier);
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {

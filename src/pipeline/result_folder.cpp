@@ -13,6 +13,10 @@ namespace plumbline::pipeline {
 
 core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
   std::error_code ec;
+  if (std::filesystem::is_regular_file(folder, ec)) {
+    return core::input_error(
+        fmt::format("{}: is a file; give the result folder of plumbline map", folder.string()));
+  }
   if (!std::filesystem::is_directory(folder, ec)) {
     return core::input_error(fmt::format("{}: no such folder", folder.string()));
   }

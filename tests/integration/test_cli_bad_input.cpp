@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Broken recordings and broken configuration: one line that names place and remedy, the right exit code.
+#include <sstream>
+
 #include "program.hpp"
 #include "wall_recording.hpp"
 
@@ -98,6 +100,71 @@ TEST_F(BadInput, ImpossibleDepthScales) {
     write_wall(path("wall"), wall);
     expect_refused(run(kMap), 3, {"depth_scale"});
   }
+}
+
+TEST_F(BadInput, ColourOfAnotherSize) {
+  write_wall(path("wall"));
+  cv::imwrite(path("wall/rgb/004.png").string(), painting(100, 100, 3));
+  const Outcome o = run(kMap);
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("004.png")) << o;
+  EXPECT_EQ(read_json(path("out/summary.json"))["frames"]["unreadable"], 1);
+}
+
+TEST_F(BadInput, DepthWithoutAnyMeasurement) {
+  write_wall(path("wall"));
+  for (int f = 0; f < 12; ++f) {
+    cv::imwrite((path("wall/depth") / frame_name(f)).string(), cv::Mat::zeros(kHeight, kWidth, CV_16UC1));
+  }
+  expect_refused(run(kMap), 3, {"wall", "no measurement"});
+}
+
+TEST_F(BadInput, OneFrameOrTwoAreARecording) {
+  for (const int frames : {1, 2}) {
+    WallRecording wall;
+    wall.frames = frames;
+    fs::remove_all(path("wall"));
+    write_wall(path("wall"), wall);
+    const Outcome o = run("map wall -o out --force --set output.views=");
+    EXPECT_EQ(o.code, 0) << o;
+    EXPECT_EQ(read_json(path("out/summary.json"))["frames"]["tracked"], frames);
+  }
+}
+
+TEST_F(BadInput, StampsThatRunBackwardsAreSortedAndTold) {
+  write_wall(path("wall"));
+  std::istringstream lines(slurp(path("wall/rgb.txt")));
+  std::string backwards;
+  for (std::string line; std::getline(lines, line);) backwards = line + "\n" + backwards;
+  write("wall/rgb.txt", backwards);
+  const Outcome o = run(kMap);
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("rgb.txt: the stamps are not in order")) << o;
+  EXPECT_EQ(read_json(path("out/summary.json"))["frames"]["read"], 12);
+}
+
+TEST_F(BadInput, TruthThatIsNoNumberIsNamed) {
+  write_wall(path("wall"));
+  std::ofstream(path("wall/groundtruth.txt"), std::ios::app) << "11 nan 0 0 0 0 0 1\n";
+  const Outcome o = run("map wall -o out --set output.views=");
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("groundtruth.txt:13: 'nan'")) << o;
+  const Outcome e = run("evaluate trajectory out wall");
+  EXPECT_EQ(e.code, 3) << e;
+  EXPECT_TRUE(e.told("groundtruth.txt:13: 'nan'")) << e;
+}
+
+TEST_F(BadInput, NamesWithSpacesAndForeignLettersAreNames) {
+  write_wall(path("eine Küche"));
+  const Outcome o = run("map './eine Küche/' -o 'mein Ergebnis/' -p known_poses --set output.views=");
+  EXPECT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(fs::exists(path("mein Ergebnis/map.ply")));
+}
+
+TEST_F(BadInput, AnEmptyPipelineFileIsNamed) {
+  write_wall(path("wall"));
+  write("empty.yaml", "");
+  expect_refused(run("map wall -o out -p empty.yaml"), 2, {"empty.yaml: a pipeline is a map"});
 }
 
 TEST_F(BadInput, DoubtfulDepthScaleIsAWarningThatNamesTheLikelyOne) {

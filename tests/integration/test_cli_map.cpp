@@ -42,6 +42,7 @@ TEST_F(MapCommand, WritesTheWholeResultFolder) {
 TEST_F(MapCommand, TracksTheWall) {
   const Outcome o = run(std::string("map wall -o out -q") + kNoPictures);
   ASSERT_EQ(o.code, 0) << o;
+  EXPECT_EQ(slurp(path("out/trajectory.txt")).find("-0.000000000"), std::string::npos);
   EXPECT_EQ(o.out, "");
   EXPECT_EQ(o.err, "");
   const nlohmann::json summary = read_json(path("out/summary.json"));

@@ -53,6 +53,9 @@ TEST_F(Tools, InfoOfRecordingMapAndCloud) {
   const Outcome cloud = run("info out/map.pcd");
   EXPECT_EQ(cloud.code, 0) << cloud;
   EXPECT_NE(cloud.out.find("points: " + std::to_string(points("out/map.ply"))), std::string::npos) << cloud;
+  const Outcome path_info = run("info out/trajectory.txt");
+  EXPECT_EQ(path_info.code, 0) << path_info;
+  EXPECT_EQ(path_info.out.rfind("poses: 12\nfrom: 10.000000 s\n", 0), 0U) << path_info;
   EXPECT_EQ(run("info nothing").code, 3);
 }
 
@@ -86,6 +89,9 @@ TEST_F(Tools, ExportsCloudPathAndLines) {
   EXPECT_EQ(run("export out --what lines -o l.ply").code, 0);
   EXPECT_EQ(run("export out -o c.obj").code, 2);
   EXPECT_EQ(run("export wall -o c.ply").code, 3);
+  const Outcome file = run("export out/map.ply -o c.ply");
+  EXPECT_EQ(file.code, 3);
+  EXPECT_TRUE(file.told("out/map.ply: is a file; give the result folder")) << file;
 }
 
 TEST_F(Tools, EvaluateTellsWhatIsThere) {

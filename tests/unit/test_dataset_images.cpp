@@ -256,6 +256,26 @@ TEST_F(DepthScale, WarningNamesTheScaleThatFits) {
   EXPECT_THAT(log_.warnings, AllOf(HasSubstr("0.5 m"), HasSubstr("depth_scale 1000 would fit")));
 }
 
+TEST_F(DepthScale, BackgroundBeyondEveryDepthCamerasReachIsDoubted) {
+  // A desk at 1.3 m before a wall at 2.5 m, in TUM's unit read as millimetres: the median is that of a room.
+  const auto desk_before_wall = [&](const std::string& scale) {
+    write(6500, scale);
+    for (int i = 0; i < 3; ++i) {
+      const std::string file = (folder_ / "depth" / (std::to_string(i) + ".png")).string();
+      cv::Mat raw = cv::imread(file, cv::IMREAD_UNCHANGED);
+      raw.colRange(0, raw.cols / 4).setTo(12500);
+      cv::imwrite(file, raw);
+    }
+  };
+  desk_before_wall("1000");
+  EXPECT_TRUE(open());
+  EXPECT_THAT(log_.warnings, AllOf(HasSubstr("6.5 m"), HasSubstr("depth_scale 5000 would fit")));
+  log_.warnings.clear();
+  desk_before_wall("5000");
+  EXPECT_TRUE(open());
+  EXPECT_EQ(log_.warnings, "");
+}
+
 TEST_F(DepthScale, UsualDepthIsSilent) {
   write(9500, "5000");
   EXPECT_TRUE(open());
