@@ -25,7 +25,7 @@ struct Interval {
   }
 };
 
-/// Along one camera axis: the middle 99 % of the points, and all of must_see.
+/// Along one camera axis: all but a few specks of the points, and all of must_see.
 Interval extent(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& must_see,
                 const Eigen::Vector3d& axis) {
   std::vector<double> values;
@@ -33,7 +33,7 @@ Interval extent(const std::vector<Eigen::Vector3d>& points, const std::vector<Ei
   for (const auto& p : points) values.push_back(p.dot(axis));
   Interval interval;
   if (!values.empty()) {
-    interval = {quantile(values, 0.005), quantile(values, 0.995)};
+    interval = {quantile(values, 0.002), quantile(values, 0.998)};
   } else if (!must_see.empty()) {
     interval = {must_see.front().dot(axis), must_see.front().dot(axis)};
   }
@@ -63,7 +63,7 @@ double fit_distance(const Projection& projection, const Eigen::Vector3d& centre,
   std::vector<double> distances;
   distances.reserve(points.size());
   for (const auto& p : points) distances.push_back(needed(p));
-  double distance = quantile(std::move(distances), 0.99);
+  double distance = quantile(std::move(distances), 0.996);
   for (const auto& p : must_see) distance = std::max(distance, needed(p));
   return std::max(distance, 0.3);
 }
@@ -177,7 +177,7 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
     distance = fit_distance(projection, centre, points, must_see);
   }
   projection.eye = centre - distance * projection.forward;
-  // Points beyond the 99 % may stick out; half the depth again holds them without wasting depth precision.
+  // Points left out by that may stick out; half the depth again holds them without wasting depth precision.
   projection.near_m = std::max(distance - 1.0 * depth, 0.05 * distance);
   projection.far_m = distance + 1.5 * depth;
 }

@@ -39,7 +39,8 @@ struct Projection {
 /// Directions of a view only (eye and scale unset), so that the points it can see may be chosen.
 Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes);
 
-/// Places the camera so that 99 % of `points` and all of `must_see` lie in the picture; sets the depth range.
+/// Places the camera so that all but a few in a thousand of `points` and all of `must_see` lie in the
+/// picture; sets the depth range.
 void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
          const std::vector<Eigen::Vector3d>& must_see);
 
