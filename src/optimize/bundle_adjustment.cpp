@@ -83,6 +83,16 @@ void hold_weakly(const BundleProblem& problem, Blocks& blocks, PoseBlock& origin
   }
 }
 
+/// How many inliers see each landmark. What one pose alone sees without depth would leave its block singular.
+template <typename Seen>
+std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmark, std::size_t landmarks) {
+  std::vector<int> count(landmarks, 0);
+  for (const Seen& o : observations) {
+    if (!o.outlier) ++count[static_cast<std::size_t>(o.*landmark)];
+  }
+  return count;
+}
+
 /// Builds and solves one round; the Ceres problem does not outlive it.
 ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const BundleOptions& options) {
   ceres::Problem::Options problem_options;
@@ -105,15 +115,17 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
     if (problem.poses[i].fixed) ceres_problem.SetParameterBlockConstant(pose);
     ordering->AddElementToGroup(pose, 1);
   }
+  const std::vector<int> point_views = views(problem.point_observations, &BundlePointObservation::point, problem.points.size());
   for (const BundlePointObservation& o : problem.point_observations) {
-    if (o.outlier) continue;
+    if (o.outlier || (point_views[static_cast<std::size_t>(o.point)] < 2 && !(o.depth > 0.0))) continue;
     double* point = blocks.point(o.point);
     ceres_problem.AddResidualBlock(new PointCost(to_term(o), problem.camera), &point_loss,
                                    blocks.pose(o.pose), point);
     ordering->AddElementToGroup(point, 0);
   }
+  const std::vector<int> line_views = views(problem.line_observations, &BundleLineObservation::line, problem.lines.size());
   for (const BundleLineObservation& o : problem.line_observations) {
-    if (o.outlier) continue;
+    if (o.outlier || (line_views[static_cast<std::size_t>(o.line)] < 2 && !o.has_depth)) continue;
     double* line = blocks.line(o.line);
     if (!ceres_problem.HasParameterBlock(line)) {
       ceres_problem.AddParameterBlock(line, 6, &line_manifold);
