@@ -7,20 +7,11 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <string>
 
+#include "plumbline/core/output_file.hpp"
+
 namespace plumbline::viz {
-namespace {
-
-core::Error cannot_write(const std::filesystem::path& file, const std::string& reason) {
-  return {core::ErrorKind::kOutput, "cannot write " + file.string() + ": " + reason};
-}
-
-}  // namespace
-
 Image downsample(const Image& image, int factor) {
   if (factor == 1) return image;
   Image small;
@@ -47,24 +38,9 @@ Image downsample(const Image& image, int factor) {
 }
 
 core::Result<void> write_bytes(std::string_view bytes, const std::filesystem::path& file) {
-  const std::filesystem::path partial = file.string() + ".partial";
-  std::ofstream out(partial, std::ios::binary | std::ios::trunc);
-  if (!out) return tl::unexpected(cannot_write(file, std::strerror(errno)));
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  std::error_code problem;
-  if (!out) {
-    const std::string reason = errno != 0 ? std::strerror(errno) : "write failed";
-    std::filesystem::remove(partial, problem);
-    return tl::unexpected(cannot_write(file, reason));
-  }
-  std::filesystem::rename(partial, file, problem);
-  if (problem) {
-    const std::string reason = problem.message();
-    std::filesystem::remove(partial, problem);
-    return tl::unexpected(cannot_write(file, reason));
-  }
-  return {};
+  core::OutputFile out(file);
+  out.write(bytes);
+  return out.commit();
 }
 
 core::Result<void> write_png(const Image& image, const std::filesystem::path& file) {
@@ -79,7 +55,7 @@ core::Result<void> write_png(const Image& image, const std::filesystem::path& fi
   writer->Write();
   const vtkUnsignedCharArray* result = writer->GetResult();
   if (result == nullptr || result->GetNumberOfValues() == 0) {
-    return tl::unexpected(cannot_write(file, "the picture cannot be encoded as PNG"));
+    return core::output_error(file.string() + ": the picture cannot be encoded as PNG");
   }
   auto* bytes = writer->GetResult();
   return write_bytes({reinterpret_cast<const char*>(bytes->GetPointer(0)),

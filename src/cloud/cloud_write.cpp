@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -32,7 +32,7 @@ std::size_t count_finite(const Cloud& cloud) {
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns) {
   check_columns(cloud, columns);
-  OutputFile out(file);
+  core::OutputFile out(file);
   out.write(
       fmt::format("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\nelement vertex {}\n",
                   count_finite(cloud)));
@@ -79,7 +79,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   field(!columns.observations.empty(), "observations", "4", "U");
   field(!columns.robot.empty(), "robot", "1", "U");
 
-  OutputFile out(file);
+  core::OutputFile out(file);
   const auto& t = cloud.sensor_origin_;
   const auto& q = cloud.sensor_orientation_;
   out.write(

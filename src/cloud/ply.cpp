@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "ply_header.hpp"
 
 namespace plumbline::cloud {
@@ -298,7 +298,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
   if (colored && data.edge_colors.size() != data.edges.size())
     throw std::invalid_argument("PLY edge colours");
 
-  OutputFile out(file);
+  core::OutputFile out(file);
   out.write("ply\nformat binary_little_endian 1.0\n");
   for (const auto& comment : data.comments) out.write("comment " + comment + "\n");
   out.write(fmt::format("element vertex {}\n", data.vertex_count));

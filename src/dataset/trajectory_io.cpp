@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <iterator>
-#include <system_error>
 
+#include "plumbline/core/output_file.hpp"
 #include "text_lines.hpp"
 
 namespace plumbline::dataset {
@@ -69,25 +68,9 @@ core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& 
 
 core::Result<void> write_trajectory(const std::filesystem::path& file,
                                     const geometry::Trajectory& trajectory) {
-  const std::filesystem::path temporary = file.string() + ".part";
-  std::error_code ignored;
-  {
-    std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-    stream << to_text(trajectory);
-    stream.flush();
-    if (!stream) {
-      std::filesystem::remove(temporary, ignored);
-      return core::output_error(
-          fmt::format("{}: cannot be written: no right, no such folder or disk full", file.string()));
-    }
-  }
-  std::error_code error;
-  std::filesystem::rename(temporary, file, error);
-  if (error) {
-    std::filesystem::remove(temporary, ignored);
-    return core::output_error(fmt::format("{}: cannot be written: {}", file.string(), error.message()));
-  }
-  return {};
+  core::OutputFile out(file);
+  out.write(to_text(trajectory));
+  return out.commit();
 }
 
 }  // namespace plumbline::dataset

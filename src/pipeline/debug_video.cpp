@@ -10,7 +10,7 @@
 #include <system_error>
 #include <vector>
 
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/tracking/overlay.hpp"
 
 namespace plumbline::pipeline {
@@ -86,7 +86,7 @@ core::Result<void> write_debug_picture(const fs::path& folder, std::size_t numbe
   const cv::Mat picture = tracking::draw_overlay(shown, features, track, slam.map(), camera);
   std::vector<unsigned char> png;
   cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  cloud::OutputFile file(folder / picture_name(number));
+  core::OutputFile file(folder / picture_name(number));
   file.write(png.data(), png.size());
   return file.commit();
 }

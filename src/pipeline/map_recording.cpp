@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "debug_video.hpp"
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
@@ -30,7 +30,7 @@ std::string quoted(const std::string& text) {
 /// The effective configuration: a pipeline file that gives the same result again, and how it was run.
 core::Result<void> write_config(const std::filesystem::path& file, const MapRequest& request,
                                 const Graph& graph, int threads) {
-  cloud::OutputFile out(file);
+  core::OutputFile out(file);
   out.write(fmt::format(
       "# What plumbline {} ran with. A pipeline file itself: plumbline map INPUT -p config.yaml\n",
       core::version()));
@@ -63,8 +63,9 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   const bool tracks = std::any_of(graph->nodes.begin(), graph->nodes.end(),
                                   [](const Node& node) { return node.type->name == "track"; });
   if (!request.debug_video.empty() && !tracks) {
-    return core::usage_error(fmt::format("{}: has no track stage whose work could be drawn; leave out --debug-video",
-                                         pipeline_file->string()));
+    return core::usage_error(
+        fmt::format("{}: has no track stage whose work could be drawn; leave out --debug-video",
+                    pipeline_file->string()));
   }
   const auto source =
       open_input(request.input, request.open, request.pipelines_folder / "scenes", executor, log);
@@ -78,7 +79,8 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
 
   std::optional<DebugFolder> debug;
   if (!request.debug_video.empty()) {
-    auto prepared = DebugFolder::prepare(request.debug_video, request.output, output->path(), request.replace);
+    auto prepared =
+        DebugFolder::prepare(request.debug_video, request.output, output->path(), request.replace);
     if (!prepared) return fail(prepared.error());
     debug.emplace(std::move(*prepared));
   }

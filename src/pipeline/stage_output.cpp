@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/line_export.hpp"
@@ -94,7 +94,7 @@ class OutputStage : public Stage {
                                          std::size_t frames) {
     const auto commas = std::count(map.frame_columns.begin(), map.frame_columns.end(), ',');
     const std::string nothing(static_cast<std::size_t>(commas), ',');
-    cloud::OutputFile out(file);
+    core::OutputFile out(file);
     out.write("frame,state," + map.frame_columns + "\n");
     auto row = map.frames.begin();
     for (std::size_t f = 0; f < frames; ++f) {

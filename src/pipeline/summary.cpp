@@ -7,7 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 
 namespace plumbline::pipeline {
@@ -19,7 +19,7 @@ constexpr double kMostLostPercent = 10.0;
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 core::Result<void> write_text(const std::filesystem::path& file, const std::string& text) {
-  cloud::OutputFile out(file);
+  core::OutputFile out(file);
   out.write(text);
   return out.commit();
 }

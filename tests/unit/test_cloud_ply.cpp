@@ -5,8 +5,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "plumbline/cloud/output_file.hpp"
 #include "plumbline/cloud/ply.hpp"
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -144,11 +144,11 @@ TEST(Ply, BrokenFilesSayWhatIsWrong) {
 TEST(OutputFile, LeavesTheOldFileWhenNotCommitted) {
   const auto file = spill("kept.txt", "old");
   {
-    OutputFile out(file);
+    core::OutputFile out(file);
     out.write("new");
   }
   EXPECT_EQ(slurp(file), "old");
-  OutputFile out(file);
+  core::OutputFile out(file);
   out.write("new");
   ASSERT_TRUE(out.commit());
   EXPECT_EQ(slurp(file), "new");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/output_file.hpp"
+#include "plumbline/core/output_file.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include <cstring>
 #include <system_error>
 
-namespace plumbline::cloud {
+namespace plumbline::core {
 namespace {
 
 constexpr std::size_t kBuffer = std::size_t{1} << 20;
@@ -84,7 +84,7 @@ void OutputFile::discard() {
   if (written_ != target_) ::unlink(written_.c_str());
 }
 
-core::Result<void> OutputFile::commit() {
+Result<void> OutputFile::commit() {
   if (problem_.empty()) flush();
   if (problem_.empty()) {
     const int descriptor = descriptor_;
@@ -100,7 +100,7 @@ core::Result<void> OutputFile::commit() {
   }
   discard();
   if (problem_.empty()) return {};
-  return core::output_error(problem_ + "; free space or choose another folder");
+  return output_error(problem_ + "; free space or choose another folder");
 }
 
-}  // namespace plumbline::cloud
+}  // namespace plumbline::core

@@ -10,7 +10,7 @@
 
 #include "plumbline/core/error.hpp"
 
-namespace plumbline::cloud {
+namespace plumbline::core {
 
 /// Buffered writer to a hidden file in the target's folder that commit() renames to the target. A target that
 /// is a device or pipe (/dev/stdout) is written in place. Without commit() the target stays as it was.
@@ -31,7 +31,7 @@ class OutputFile {
 
   /// Flushes, closes, renames. The first thing that went wrong since opening, as a kOutput error naming the
   /// target.
-  core::Result<void> commit();
+  Result<void> commit();
 
  private:
   void flush();
@@ -45,4 +45,4 @@ class OutputFile {
   std::string problem_;
 };
 
-}  // namespace plumbline::cloud
+}  // namespace plumbline::core
