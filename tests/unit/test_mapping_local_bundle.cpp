@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Local bundles taken from a map of known truth, adjusted and put back.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "plumbline/mapping/local_bundle.hpp"
+#include "random_world.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+
+const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+
+/// Keyframes side by side that all see the same exact points; keyframe 2 and the points are put askew.
+struct SmallMap {
+  maps::Map map;
+  std::vector<Rigid3> truth;
+  std::vector<Eigen::Vector3d> points;
+  core::PointId single;  ///< seen by keyframe 2 only
+
+  explicit SmallMap(double turn_rate_of_last = 0.0) {
+    tests::Random random(3);
+    for (int i = 0; i < 60; ++i) {
+      points.emplace_back(random.uniform(-0.8, 0.8), random.uniform(-0.6, 0.6), random.uniform(1.5, 3.0));
+    }
+    for (int k = 0; k < 3; ++k) {
+      truth.emplace_back(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-0.1 * k, 0.02 * k, 0.0));
+      add_keyframe(k, k == 2 ? turn_rate_of_last : 0.0);
+    }
+    for (const Eigen::Vector3d& p : points) {
+      maps::MapPoint point;
+      point.position = p + random.vector(0.01);
+      const core::PointId id = map.add_point(0, point);
+      for (int k = 0; k < 3; ++k) map.observe(id, {0, k}, id.index);
+    }
+    maps::MapPoint alone;
+    alone.position = truth[2].inverse() * Eigen::Vector3d(0.1, 0.1, 2.0);
+    single = map.add_point(0, alone);
+    map.observe(single, {0, 2}, static_cast<int>(points.size()));
+    Rigid3 askew = random.step(0.02, 0.01) * truth[2];
+    map.point(single).position = askew.inverse() * Eigen::Vector3d(0.1, 0.1, 2.0);
+    map.set_pose({0, 2}, askew);
+  }
+
+  void add_keyframe(int k, double turn_rate) {
+    auto features = std::make_shared<features::FrameFeatures>();
+    for (const Eigen::Vector3d& p : points) {
+      const Eigen::Vector3d c = truth.back() * p;
+      features::PointFeature f;
+      f.pixel = kCamera.project(c).cast<float>();
+      f.depth = static_cast<float>(c.z());
+      features->points.push_back(f);
+    }
+    features->points.push_back({kCamera.project({0.1, 0.1, 2.0}).cast<float>(), 2.0F, 0.0F, 0.0F, 0});
+    features->descriptors.resize(features->points.size());
+    auto keyframe = std::make_shared<maps::Keyframe>();
+    keyframe->id = {0, k};
+    keyframe->turn_rate = turn_rate;
+    keyframe->features = features;
+    map.add_keyframe(keyframe, truth.back());
+  }
+};
+
+TEST(LocalBundle, PutsAKeyframeAndItsLandmarksBackInPlace) {
+  SmallMap world;
+  ASSERT_GT(tests::distance(world.map.camera_from_world({0, 2}), world.truth[2]), 0.01);
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  put_back(bundle, world.map);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_LT(tests::distance(world.map.camera_from_world({0, k}), world.truth[static_cast<std::size_t>(k)]), 1e-3)
+        << k;
+  }
+  for (core::PointId id : world.map.point_ids()) {
+    if (id == world.single) continue;
+    EXPECT_LT((world.map.point(id).position - world.points[static_cast<std::size_t>(id.index)]).norm(), 2e-3);
+  }
+}
+
+TEST(LocalBundle, WhatOnlyOneKeyframeSeesMovesWithIt) {
+  SmallMap world;
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  put_back(bundle, world.map);
+  const Eigen::Vector3d in_camera = world.map.camera_from_world({0, 2}) * world.map.point(world.single).position;
+  EXPECT_LT((in_camera - Eigen::Vector3d(0.1, 0.1, 2.0)).norm(), 1e-9);
+}
+
+TEST(LocalBundle, AKeyframeTakenWhileTurningFastIsHeldAndSilent) {
+  SmallMap world(5.0);
+  const Rigid3 before = world.map.camera_from_world({0, 2});
+  LocalBundle bundle = take_local_bundle(world.map, {0, 1}, kCamera, {});
+  for (const auto& seen : bundle.point_seen) EXPECT_NE(seen.keyframe, (KeyframeId{0, 2}));
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  put_back(bundle, world.map);
+  EXPECT_EQ(tests::distance(world.map.camera_from_world({0, 2}), before), 0.0);
+}
+
+TEST(LocalBundle, AWrongObservationIsTakenOutOfTheMap) {
+  SmallMap world;
+  // Point 0 is said to be seen where another one is.
+  world.map.unobserve(core::PointId{0, 0}, {0, 1});
+  world.map.unobserve(core::PointId{0, 1}, {0, 1});
+  ASSERT_TRUE(world.map.observe(core::PointId{0, 0}, {0, 1}, 1));
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  put_back(bundle, world.map);
+  EXPECT_FALSE(world.map.point_of({0, 1}, 1).valid());
+  EXPECT_TRUE(world.map.point_of({0, 1}, 5).valid());
+}
+
+TEST(LocalBundle, ASingleKeyframeIsHeld) {
+  SmallMap world;
+  LocalBundleOptions options;
+  options.keyframes = 1;
+  const LocalBundle bundle = take_local_bundle(world.map, {0, 0}, kCamera, options);
+  EXPECT_TRUE(bundle.problem.poses.front().fixed);
+}
+
+}  // namespace
+}  // namespace plumbline::mapping
