@@ -97,10 +97,12 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
   if (!reports) return tl::unexpected<core::Error>(reports.error());
   const bool single = reports->size() == 1;
   for (const evaluate::NamedReport& named : *reports) {
-    for (const std::string& warning : named.report.warnings) {
-      console.warning(single ? warning : named.name + ": " + warning);
+    if (request.json) {  // the table for people tells them itself
+      for (const std::string& warning : named.report.warnings) {
+        console.warning(single ? warning : named.name + ": " + warning);
+      }
+      continue;
     }
-    if (request.json) continue;
     fmt::print("{}{}\n", single ? "" : "== " + named.name + "\n", evaluate::to_text(named.report));
   }
   if (request.json) {

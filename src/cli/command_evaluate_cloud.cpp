@@ -40,7 +40,7 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
   for (std::size_t i = 0; i < request.trajectories.size(); ++i) {
     files.push_back({"", request.trajectories[i], request.truths[i]});
   }
-  if (files.empty()) files = evaluate::find_trajectories(cloud, request.reference);
+  if (files.empty()) files = evaluate::find_trajectories(cloud, file_in(request.reference, "reference.ply"));
   std::vector<evaluate::TrajectoryPair> pairs;
   for (const evaluate::TrajectoryFiles& pair : files) {
     auto estimate = dataset::read_trajectory(file_in(pair.estimate, "trajectory.txt"));
@@ -99,8 +99,14 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   }
   const auto report = evaluate::evaluate_cloud(*cloud, request.reference.empty() ? nullptr : &*reference,
                                                request.options, pairs, session.executor());
-  if (!report) return tl::unexpected<core::Error>(report.error());
-  for (const std::string& warning : report->warnings) session.console().warning(warning);
+  if (!report) {  // not about the reference, which has been read
+    core::Error error = report.error();
+    error.message = fmt::format("{}: {}", cloud_file.string(), error.message);
+    return tl::unexpected<core::Error>(std::move(error));
+  }
+  if (request.json) {  // the table for people tells them itself
+    for (const std::string& warning : report->warnings) session.console().warning(warning);
+  }
   fmt::print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
   if (request.output.empty()) return {};
   return write_error_clouds(*cloud, *report, pairs, request.output);

@@ -272,7 +272,7 @@ void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTil
   if (sensor == Sensor::kIdeal) return;
   // Shot noise: after the square-root coding it is the same for all levels, but for the shadows; more gain,
   // more noise.
-  const float sigma = std::clamp(1.0F * std::sqrt(std::max(gain, 0.3F)), 0.7F, 5.0F);
+  const float sigma = std::clamp(0.72F * std::sqrt(std::max(gain, 0.3F)), 0.5F, 3.6F);
   const int scale = static_cast<int>(std::lround(256.0F * sigma / 16.0F));
   const std::uint64_t bits = frame_bits(key, 31, key.index);
   const int dx = static_cast<int>(bits & 511U), dy = static_cast<int>(bits >> 9U & 511U);

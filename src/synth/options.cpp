@@ -29,6 +29,8 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.number("speed", speed, {0.05, 20.0}, "", "Times the scene's own speed");
   table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
                "Distance between samples of reference.ply; 0 = 5 mm, more for large scenes");
+  table.number("visible_range", visible_range, {0.5, 20.0}, "m",
+               "What no camera saw from nearer than this does not count as visible in reference.ply");
   table.text(
       "events", events,
       "Hard moments, kind@start+duration[*value] in seconds, separated by commas; kinds: whiteout, lampoff, "

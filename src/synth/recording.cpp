@@ -142,6 +142,7 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"height", o.height},
           {"fps", o.fps},
           {"speed", o.speed},
+          {"visible_range", o.visible_range},
           {"events", o.events}};
 }
 

@@ -137,10 +137,12 @@ Canvas draw_brick(const Material& m, cv::Size size, std::uint64_t seed) {
 /// Short creases where the cloth was folded or pulled.
 static void add_creases(cv::Mat1f& field, Rng& rng) {
   cv::Mat1f creases(field.size(), 0.0F);
-  for (int i = 0; i < 70; ++i) {
-    cv::Point p(static_cast<int>(rng.uniform(0, field.cols)), static_cast<int>(rng.uniform(0, field.rows)));
+  constexpr int kAcross = 7, kDown = 8;  // one in each cell: no seed has many more in view than another
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    cv::Point p(static_cast<int>((i % kAcross + rng.uniform()) * field.cols / kAcross),
+                static_cast<int>((i / kAcross + rng.uniform()) * field.rows / kDown));
     double angle = rng.uniform(0.0, M_PI);
-    const double depth = rng.uniform(0.05, 0.16) * (rng.uniform() < 0.5 ? 1.0 : -1.0);
+    const double depth = rng.uniform(0.05, 0.13) * (rng.uniform() < 0.5 ? 1.0 : -1.0);
     for (int k = 0; k < 5; ++k) {
       const cv::Point q =
           p + cv::Point(static_cast<int>(7 * std::cos(angle)), static_cast<int>(7 * std::sin(angle)));
@@ -158,7 +160,7 @@ static void add_hem(Canvas& canvas, double pixels_per_m, Rng& rng) {
   const int bottom = canvas.rows, seam = bottom - static_cast<int>(0.055 * pixels_per_m);
   canvas.rowRange(seam - 1, seam + 1) *= 0.86;
   canvas.rowRange(seam + 1, bottom) *= 1.04;
-  for (double x = 0.0; x + 0.1 < canvas.cols / pixels_per_m; x += rng.uniform(0.3, 0.6)) {
+  for (double x = 0.0; x + 0.1 < canvas.cols / pixels_per_m; x += rng.uniform(0.5, 0.65)) {
     const int size = static_cast<int>(0.05 * pixels_per_m), left = static_cast<int>(x * pixels_per_m);
     canvas(cv::Rect(left, bottom - size, size, size)).setTo(cv::Scalar(0.72, 0.55, 0.50));
   }
@@ -175,13 +177,15 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
     float at, width, depth;
   };
   std::vector<Fold> folds;
-  for (int i = 0; i < 16; ++i) {
-    folds.push_back({static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform(0.004, 0.018)),
+  for (int i = 0; i < 16; ++i) {  // spread evenly, as above
+    folds.push_back({static_cast<float>((i + rng.uniform()) / 16.0),
+                     static_cast<float>(rng.uniform(0.004, 0.018)),
                      static_cast<float>(rng.uniform(0.015, 0.085) * (rng.uniform() < 0.6 ? 1.0 : -0.6))});
   }
-  for (int i = 0; i < 17; ++i) {  // narrow, nearly sharp ones
-    folds.push_back({static_cast<float>(rng.uniform()), static_cast<float>(rng.uniform(0.0012, 0.0028)),
-                     static_cast<float>(rng.uniform(0.08, 0.18) * (rng.uniform() < 0.6 ? 1.0 : -1.0))});
+  for (int i = 0; i < 18; ++i) {  // narrow, nearly sharp ones
+    folds.push_back({static_cast<float>((i + rng.uniform()) / 18.0),
+                     static_cast<float>(rng.uniform(0.0012, 0.0028)),
+                     static_cast<float>(rng.uniform(0.095, 0.16) * (rng.uniform() < 0.6 ? 1.0 : -1.0))});
   }
   cv::Mat1f field(size, 0.0F);
   for (int y = 0; y < size.height; ++y) {
@@ -200,11 +204,11 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   add_creases(field, rng);
   modulate(canvas, field, 1.0F);
   modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.012F);
-  for (int i = 0; i < 18; ++i) {  // stains and pin holes
-    const cv::Point c(static_cast<int>(rng.uniform(0, size.width)),
-                      static_cast<int>(rng.uniform(0, size.height)));
+  for (int i = 0; i < 8; ++i) {  // stains and pin holes
+    const cv::Point c(static_cast<int>((i % 4 + rng.uniform()) * size.width / 4),
+                      static_cast<int>((i / 4 + rng.uniform()) * size.height / 2));
     cv::ellipse(canvas, c, {1 + static_cast<int>(rng.uniform(0, 2.0)), 1}, rng.uniform(0, 180), 0, 360,
-                scalar(tone(m) * rng.uniform(0.4, 0.75)), -1, cv::LINE_AA);
+                scalar(tone(m) * rng.uniform(0.5, 0.8)), -1, cv::LINE_AA);
   }
   add_hem(canvas, size.height / m.tile_m, rng);
   return canvas;

@@ -204,7 +204,8 @@ void print(const std::vector<std::string>& names, const std::vector<Measures>& a
   for (std::size_t b = 0; b + 1 < kBins.size(); ++b) {
     std::printf("| depth noise, %.1f-%.1f m (mm) |", kBins[b], kBins[b + 1]);
     for (const Measures& m : all) {
-      if (m.counts[b] > 4000) {
+      // Fewer squares than one a picture are chance: the few that a fold just passes through.
+      if (m.counts[b] >= kPatch * kPatch * m.frames) {
         std::printf(" %.2f |", 1000.0 * std::sqrt(m.squares[b] / m.counts[b]));
       } else {
         std::printf(" - |");

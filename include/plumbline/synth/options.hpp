@@ -26,6 +26,7 @@ struct SynthOptions {
   double fps = 30.0;
   double speed = 1.0;              ///< times the scene's own speed
   double reference_spacing = 0.0;  ///< m between samples of reference.ply; 0 = 5 mm, more for large scenes
+  double visible_range = 4.0;      ///< m; as far as the shipped pipelines use depth, and the sensor's range
   /// Hard moments, "kind@start+duration[*value]" in seconds from the first frame, separated by commas; added
   /// to those of the scene. Kinds: whiteout, lampoff, blur (value px, default 8), drop, cover, spin (value
   /// turns, default 1: pure rotation on the spot), nodepth. Example: "whiteout@3+1,blur@6+0.5*12".
