@@ -25,7 +25,8 @@ int take(std::vector<Observation>& observations, KeyframeId keyframe) {
 
 KeyframeId Map::next_keyframe_id(std::int32_t robot) const { return keyframes_.next_id(robot); }
 
-KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe, const geometry::Rigid3& camera_from_world) {
+KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe,
+                             const geometry::Rigid3& camera_from_world) {
   if (keyframe == nullptr || !keyframe->id.valid()) throw std::invalid_argument("add_keyframe: no id");
   const KeyframeId id = keyframe->id;
   KeyframeEntry entry;
@@ -129,13 +130,16 @@ PointId Map::point_of(KeyframeId keyframe, int feature) const {
 LineId Map::line_of(KeyframeId keyframe, int feature) const {
   return keyframes_.at(keyframe).lines.at(static_cast<std::size_t>(feature));
 }
-const std::vector<PointId>& Map::points_of(KeyframeId keyframe) const { return keyframes_.at(keyframe).points; }
+const std::vector<PointId>& Map::points_of(KeyframeId keyframe) const {
+  return keyframes_.at(keyframe).points;
+}
 const std::vector<LineId>& Map::lines_of(KeyframeId keyframe) const { return keyframes_.at(keyframe).lines; }
 
 std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int min_shared) const {
   const auto& shared = keyframes_.at(keyframe).shared;
   std::vector<std::pair<KeyframeId, int>> result(shared.begin(), shared.end());
-  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::stable_sort(result.begin(), result.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
   if (result.empty()) return result;
   const int threshold = std::min(min_shared, result.front().second);
   while (result.back().second < threshold) result.pop_back();

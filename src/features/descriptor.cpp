@@ -13,7 +13,8 @@ __attribute__((target_clones("popcnt", "default"))) int hamming_distance(const D
 
 __attribute__((target_clones("popcnt", "default"))) void hamming_distances(const Descriptor256& query,
                                                                            const Descriptor256* candidates,
-                                                                           const int* indices, std::size_t count,
+                                                                           const int* indices,
+                                                                           std::size_t count,
                                                                            int* distances) {
   for (std::size_t i = 0; i < count; ++i) {
     const Descriptor256& c = candidates[indices[i]];

@@ -32,7 +32,8 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
     for (int x = 0; x < size.width; ++x) {
       std::array<float, 5> found{};
       std::size_t count = 0;
-      for (const auto& [dx, dy] : {std::pair{0.5F, 0.5F}, {0.25F, 0.5F}, {0.75F, 0.5F}, {0.5F, 0.25F}, {0.5F, 0.75F}}) {
+      for (const auto& [dx, dy] :
+           {std::pair{0.5F, 0.5F}, {0.25F, 0.5F}, {0.75F, 0.5F}, {0.5F, 0.25F}, {0.5F, 0.75F}}) {
         const int px = std::min(depth.cols - 1, static_cast<int>((static_cast<float>(x) + dx) * step_x));
         const int py = std::min(depth.rows - 1, static_cast<int>((static_cast<float>(y) + dy) * step_y));
         const float z = depth.at<float>(py, px);

@@ -10,12 +10,13 @@
 namespace plumbline::features {
 namespace {
 
-constexpr int kEdge = 16;        // ORB's patch (31 px) must lie inside the picture
+constexpr int kEdge = 16;  // ORB's patch (31 px) must lie inside the picture
 constexpr int kHalfPatch = 15;
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
 
-/// Half width of the circular patch in each row, as in the ORB paper's intensity centroid. u^2 + v^2 <= r (r + 1)
-/// is the same seen along x and along y; rounding each row is not, and bends orientations by several degrees.
+/// Half width of the circular patch in each row, as in the ORB paper's intensity centroid. u^2 + v^2 <= r (r
+/// + 1) is the same seen along x and along y; rounding each row is not, and bends orientations by several
+/// degrees.
 std::array<int, kHalfPatch + 1> patch_rows() {
   std::array<int, kHalfPatch + 1> rows{};
   for (int v = 0; v <= kHalfPatch; ++v) {
@@ -117,7 +118,8 @@ std::vector<cv::KeyPoint> detect(const cv::Mat& level, const cv::Rect& region, i
 
 void OrbOptions::declare(core::OptionTable& table) {
   table.integer("orb.count", count, {50, 20000}, "", "ORB points per picture");
-  table.number("orb.scale_factor", scale_factor, {1.05, 2.0}, "", "Size ratio of neighbouring pyramid levels");
+  table.number("orb.scale_factor", scale_factor, {1.05, 2.0}, "",
+               "Size ratio of neighbouring pyramid levels");
   table.integer("orb.levels", levels, {1, 12}, "", "Pyramid levels");
   table.integer("orb.fast_threshold", fast_threshold, {1, 200}, "", "FAST threshold, grey values");
   table.integer("orb.fast_threshold_min", fast_threshold_min, {1, 200}, "",
@@ -174,8 +176,9 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
   if (keypoints.empty()) return result;
 
   cv::Mat descriptors;
-  const auto orb = cv::ORB::create(static_cast<int>(keypoints.size()), static_cast<float>(options_.scale_factor),
-                                   options_.levels, kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
+  const auto orb =
+      cv::ORB::create(static_cast<int>(keypoints.size()), static_cast<float>(options_.scale_factor),
+                      options_.levels, kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
   orb->compute(gray, keypoints, descriptors);
   result.points.resize(keypoints.size());
   result.descriptors.resize(keypoints.size());

@@ -11,7 +11,8 @@ std::optional<Rigid3> pose_at(const Trajectory& trajectory, double stamp, double
   // Seconds since 1970 as a double are good to 2e-7: such a difference is none, before and after.
   constexpr double kSame = 1e-6;
   if (after != trajectory.end() && after->stamp - stamp < kSame) return after->world_from_camera;
-  if (after != trajectory.begin() && stamp - (after - 1)->stamp < kSame) return (after - 1)->world_from_camera;
+  if (after != trajectory.begin() && stamp - (after - 1)->stamp < kSame)
+    return (after - 1)->world_from_camera;
   if (after == trajectory.begin() || after == trajectory.end()) return std::nullopt;
   const StampedPose& a = *(after - 1);
   const StampedPose& b = *after;

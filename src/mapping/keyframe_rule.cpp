@@ -26,7 +26,8 @@ View view_of(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from
   }
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
-  return {static_cast<double>(inside) / static_cast<double>(keyframe.surface.size()), static_cast<double>(*middle)};
+  return {static_cast<double>(inside) / static_cast<double>(keyframe.surface.size()),
+          static_cast<double>(*middle)};
 }
 
 }  // namespace
@@ -41,7 +42,8 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                "A smaller share of the last keyframe's surface in view makes a keyframe");
   table.number("keyframe.max_parallax", max_parallax, {0.005, 2.0}, "",
                "More movement over depth makes a keyframe");
-  table.number("keyframe.max_rotation", max_rotation_rad, {0.01, 3.0}, "rad", "More rotation makes a keyframe");
+  table.number("keyframe.max_rotation", max_rotation_rad, {0.01, 3.0}, "rad",
+               "More rotation makes a keyframe");
   table.integer("keyframe.min_features", min_features, {0, 10000}, "",
                 "With fewer features tracked a keyframe is urgent, if the scene has more to offer");
 }
@@ -52,7 +54,8 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   d.frames_since = ++frames_since_;
   const int tracked = static_cast<int>(track.points.size() + track.lines.size());
   if (frames_since_ == 1) features_after_keyframe_ = tracked;
-  const geometry::Rigid3 camera_from_keyframe = track.camera_from_world * map.camera_from_world(reference).inverse();
+  const geometry::Rigid3 camera_from_keyframe =
+      track.camera_from_world * map.camera_from_world(reference).inverse();
   const View view = view_of(map.keyframe(reference), camera_from_keyframe, camera);
   d.overlap = view.overlap;
   d.shared = features_after_keyframe_ > 0 ? static_cast<double>(tracked) / features_after_keyframe_ : 1.0;
@@ -62,8 +65,9 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
              (tracked < options_.min_features && d.shared < 0.8);
   const bool moved = d.parallax > options_.max_parallax || d.rotation_rad > options_.max_rotation_rad;
   const bool left = d.shared < options_.min_shared || d.overlap < options_.min_surface_overlap;
-  const bool starving = d.frames_since >= options_.max_frames &&
-                        (d.parallax > 0.25 * options_.max_parallax || d.rotation_rad > 0.25 * options_.max_rotation_rad);
+  const bool starving =
+      d.frames_since >= options_.max_frames &&
+      (d.parallax > 0.25 * options_.max_parallax || d.rotation_rad > 0.25 * options_.max_rotation_rad);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || moved || left || starving);
   return d;
 }

@@ -19,7 +19,8 @@ constexpr int kMaxHeld = 20;
 std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe, int wanted) {
   std::vector<KeyframeId> window{keyframe};
   const auto append = [&](KeyframeId id) {
-    if (static_cast<int>(window.size()) < wanted && std::find(window.begin(), window.end(), id) == window.end()) {
+    if (static_cast<int>(window.size()) < wanted &&
+        std::find(window.begin(), window.end(), id) == window.end()) {
       window.push_back(id);
     }
   };
@@ -43,7 +44,9 @@ class Builder {
     }
     return found->second;
   }
-  [[nodiscard]] bool calm(KeyframeId id) const { return map_.keyframe(id).turn_rate <= options_.max_turn_rate; }
+  [[nodiscard]] bool calm(KeyframeId id) const {
+    return map_.keyframe(id).turn_rate <= options_.max_turn_rate;
+  }
   [[nodiscard]] bool has(KeyframeId id) const { return index_.count(id) != 0; }
 
   /// The landmarks of the window; keyframes outside that see them are held.
@@ -93,7 +96,9 @@ class Builder {
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   }
-  [[nodiscard]] bool pose_fixed(int i) const { return bundle_.problem.poses[static_cast<std::size_t>(i)].fixed; }
+  [[nodiscard]] bool pose_fixed(int i) const {
+    return bundle_.problem.poses[static_cast<std::size_t>(i)].fixed;
+  }
 
   void hold_others(const std::vector<core::PointId>& points, const std::vector<core::LineId>& lines) {
     std::map<KeyframeId, int> count;
@@ -111,7 +116,8 @@ class Builder {
       }
     }
     std::vector<std::pair<KeyframeId, int>> others(count.begin(), count.end());
-    std::stable_sort(others.begin(), others.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+    std::stable_sort(others.begin(), others.end(),
+                     [](const auto& a, const auto& b) { return a.second > b.second; });
     for (std::size_t i = 0; i < others.size() && i < kMaxHeld; ++i) add_pose(others[i].first, true);
   }
 
@@ -143,7 +149,8 @@ class Builder {
     bundle_.problem.lines.push_back(geometry::line_through(line.start, line.end));
     for (const maps::Observation& o : line.observations) {
       if (!has(o.keyframe) || !calm(o.keyframe)) continue;
-      const features::LineFeature& f = map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
+      const features::LineFeature& f =
+          map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
       optimize::BundleLineObservation seen;
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
@@ -203,7 +210,8 @@ void put_back(const LocalBundle& bundle, maps::Map& map) {
     map.set_pose(id, adjusted);
   }
   for (std::size_t i = 0; i < bundle.points.size(); ++i) {
-    if (map.find_point(bundle.points[i]) != nullptr) map.point(bundle.points[i]).position = bundle.problem.points[i];
+    if (map.find_point(bundle.points[i]) != nullptr)
+      map.point(bundle.points[i]).position = bundle.problem.points[i];
   }
   for (std::size_t i = 0; i < bundle.lines.size(); ++i) {
     if (map.find_line(bundle.lines[i]) == nullptr) continue;

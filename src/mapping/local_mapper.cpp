@@ -14,11 +14,14 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                 "Frames that should have seen a landmark before it is judged");
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
-  table.number("bundle.max_turn_rate", bundle_max_turn_rate, {0.0, 100.0}, "rad/s",
-               "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: they keep "
-               "the pose of the tracker and move no landmark");
-  table.boolean("edges", edges, "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
-  table.integer("edges.keyframes", edge_keyframes, {1, 100}, "", "Neighbours that a new keyframe is aligned with");
+  table.number(
+      "bundle.max_turn_rate", bundle_max_turn_rate, {0.0, 100.0}, "rad/s",
+      "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: they keep "
+      "the pose of the tracker and move no landmark");
+  table.boolean("edges", edges,
+                "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
+  table.integer("edges.keyframes", edge_keyframes, {1, 100}, "",
+                "Neighbours that a new keyframe is aligned with");
   table.number("edges.min_overlap", edge_min_overlap, {0.0, 1.0}, "",
                "Share of a neighbour's surface in view that must be confirmed");
   bundle_options.declare(table);
@@ -53,7 +56,8 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     if (!(f.depth > 0.0F) || static_cast<double>(f.depth) > options_.max_landmark_depth_m) continue;
     if (map.point_of(id, static_cast<int>(i)).valid()) continue;
     maps::MapPoint point;
-    const Eigen::Vector3d in_camera = camera_.unproject(static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), static_cast<double>(f.depth));
+    const Eigen::Vector3d in_camera = camera_.unproject(
+        static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), static_cast<double>(f.depth));
     point.position = world_from_camera * in_camera;
     point.descriptor = features.descriptors[i];
     point.angle = f.angle;

@@ -16,8 +16,8 @@ void SlamOptions::declare(core::OptionTable& table) {
   mapper.declare(table);
 }
 
-/// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all that
-/// follows would be lost.
+/// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all
+/// that follows would be lost.
 static bool can_start_map(const sensor::RgbdFrame& frame) {
   constexpr double kMinMeasured = 0.05;  // share of the pixels
   return !frame.depth.empty() &&
@@ -36,8 +36,8 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
 
 Slam::~Slam() = default;
 
-void Slam::start_map(const sensor::RgbdFrame& frame, const std::shared_ptr<const features::FrameFeatures>& features,
-                     FrameReport& report) {
+void Slam::start_map(const sensor::RgbdFrame& frame,
+                     const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {
   tracking::TrackResult origin;
   report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, 0.0);
   report.reference = report.keyframe;
@@ -46,7 +46,8 @@ void Slam::start_map(const sensor::RgbdFrame& frame, const std::shared_ptr<const
   tracker_.map_changed(map_, report.keyframe, origin.camera_from_world);
 }
 
-FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features) {
+FrameReport Slam::process(const sensor::RgbdFrame& frame,
+                          std::shared_ptr<const features::FrameFeatures> features) {
   FrameReport report;
   report.frame_index = frame.index;
   report.stamp = frame.stamp;
@@ -79,10 +80,12 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const 
       }
       mapper_.cull(map_);
       if (options_.mapper.bundle && tracker_.turn_rate() <= options_.mapper.bundle_max_turn_rate) {
-        const LocalBundleOptions window{options_.mapper.bundle_keyframes, options_.mapper.bundle_max_turn_rate,
+        const LocalBundleOptions window{options_.mapper.bundle_keyframes,
+                                        options_.mapper.bundle_max_turn_rate,
                                         options_.tracker.association.scale_factor};
         LocalBundle bundle = take_local_bundle(map_, report.keyframe, camera_, window);
-        if (optimize::adjust_bundle(bundle.problem, options_.mapper.bundle_options).usable) put_back(bundle, map_);
+        if (optimize::adjust_bundle(bundle.problem, options_.mapper.bundle_options).usable)
+          put_back(bundle, map_);
       }
       rule_.keyframe_made();
       tracker_.map_changed(map_, report.keyframe, map_.camera_from_world(report.keyframe));
@@ -96,7 +99,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, std::shared_ptr<const 
 
 void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
   const core::KeyframeId reference = tracker_.reference();
-  frames_.push_back({stamp, reference, camera_from_world * map_.camera_from_world(reference).inverse(), tracked});
+  frames_.push_back(
+      {stamp, reference, camera_from_world * map_.camera_from_world(reference).inverse(), tracked});
 }
 
 void Slam::finish() {}

@@ -66,10 +66,11 @@ class Blocks {
   std::vector<double> numbers_;
 };
 
-/// Poses that edges hold are held to where they are by 1 m and 1 rad as well: far weaker than anything measured, but
-/// directions that an edge leaves free would otherwise run off (the solver scales each unknown by what is known of
-/// it, and so prefers to move along them).
-void hold_weakly(const BundleProblem& problem, Blocks& blocks, PoseBlock& origin, ceres::Problem& ceres_problem) {
+/// Poses that edges hold are held to where they are by 1 m and 1 rad as well: far weaker than anything
+/// measured, but directions that an edge leaves free would otherwise run off (the solver scales each unknown
+/// by what is known of it, and so prefers to move along them).
+void hold_weakly(const BundleProblem& problem, Blocks& blocks, PoseBlock& origin,
+                 ceres::Problem& ceres_problem) {
   std::vector<char> held(problem.poses.size(), 0);
   for (const BundleEdge& edge : problem.edges) {
     for (const int i : {edge.a, edge.b}) {
@@ -115,7 +116,8 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
     if (problem.poses[i].fixed) ceres_problem.SetParameterBlockConstant(pose);
     ordering->AddElementToGroup(pose, 1);
   }
-  const std::vector<int> point_views = views(problem.point_observations, &BundlePointObservation::point, problem.points.size());
+  const std::vector<int> point_views =
+      views(problem.point_observations, &BundlePointObservation::point, problem.points.size());
   for (const BundlePointObservation& o : problem.point_observations) {
     if (o.outlier || (point_views[static_cast<std::size_t>(o.point)] < 2 && !(o.depth > 0.0))) continue;
     double* point = blocks.point(o.point);
@@ -123,7 +125,8 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
                                    blocks.pose(o.pose), point);
     ordering->AddElementToGroup(point, 0);
   }
-  const std::vector<int> line_views = views(problem.line_observations, &BundleLineObservation::line, problem.lines.size());
+  const std::vector<int> line_views =
+      views(problem.line_observations, &BundleLineObservation::line, problem.lines.size());
   for (const BundleLineObservation& o : problem.line_observations) {
     if (o.outlier || (line_views[static_cast<std::size_t>(o.line)] < 2 && !o.has_depth)) continue;
     double* line = blocks.line(o.line);
@@ -161,8 +164,8 @@ void mark_outliers(BundleProblem& problem, Blocks& blocks, const BundleOptions& 
     const int rows = point_residual(term, to_rigid(blocks.pose(o.pose)), problem.camera, r, nullptr);
     o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= options.point_gate);
   }
-  const Eigen::Matrix3d projection = geometry::line_projection(problem.camera.fx, problem.camera.fy,
-                                                               problem.camera.cx, problem.camera.cy);
+  const Eigen::Matrix3d projection =
+      geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx, problem.camera.cy);
   for (BundleLineObservation& o : problem.line_observations) {
     LineTerm term;
     term.world = geometry::to_plucker(to_line(blocks.line(o.line)));

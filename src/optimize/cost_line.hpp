@@ -51,7 +51,8 @@ class LineCost : public ceres::SizedCostFunction<4, 7, 6> {
       j.col(6).setZero();
     }
     if (jacobians[1] != nullptr) {
-      Eigen::Matrix<double, 6, 6> by_world = Eigen::Matrix<double, 6, 6>::Zero();  // d (n_c, v_c) / d (n_w, v_w)
+      Eigen::Matrix<double, 6, 6> by_world =
+          Eigen::Matrix<double, 6, 6>::Zero();  // d (n_c, v_c) / d (n_w, v_w)
       by_world.topLeftCorner<3, 3>() = pose.rotation;
       by_world.topRightCorner<3, 3>() = geometry::skew(pose.translation) * pose.rotation;
       by_world.bottomRightCorner<3, 3>() = pose.rotation;
@@ -85,7 +86,8 @@ class LineCost : public ceres::SizedCostFunction<4, 7, 6> {
   }
 
   /// d (n, v)/d(theta, phi) for n = (w1 / w2) u1, v = u2; phi turns W: d(w1/w2)/dphi = -(1 + (w1/w2)^2).
-  static Eigen::Matrix<double, 6, 4> unit_direction_jacobian(const geometry::OrthonormalLine& line, double w2) {
+  static Eigen::Matrix<double, 6, 4> unit_direction_jacobian(const geometry::OrthonormalLine& line,
+                                                             double w2) {
     const double d = line.w1 / w2;
     Eigen::Matrix<double, 6, 4> j = Eigen::Matrix<double, 6, 4>::Zero();
     j.block<3, 1>(0, 1) = -d * line.u.col(2);

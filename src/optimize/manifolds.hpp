@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Parameter blocks of bundle adjustment and how they are updated. The cost functions give their derivatives by the
-// local coordinates directly, in the first columns of the ambient Jacobian; PlusJacobian = [I; 0] hands them on.
+// Parameter blocks of bundle adjustment and how they are updated. The cost functions give their derivatives
+// by the local coordinates directly, in the first columns of the ambient Jacobian; PlusJacobian = [I; 0]
+// hands them on.
 #include <ceres/manifold.h>
 
 #include <array>

@@ -30,12 +30,13 @@ Robust huber(double squared, double threshold) {
   return {threshold * (error - 0.5 * threshold), threshold / error};
 }
 
-/// What a term costs that has no image at a pose, standard deviations: hiding it behind the camera must not pay.
+/// What a term costs that has no image at a pose, standard deviations: hiding it behind the camera must not
+/// pay.
 constexpr double kUnseen = 1e3;
 
-/// Levenberg-Marquardt damping, alike in all directions of a block. Marquardt's own scaling by each diagonal entry
-/// would be blind to weak directions: with one wall in view, moving along it by d / sin(tilt) does for the wall
-/// what moving towards it by d does, and would be damped no more.
+/// Levenberg-Marquardt damping, alike in all directions of a block. Marquardt's own scaling by each diagonal
+/// entry would be blind to weak directions: with one wall in view, moving along it by d / sin(tilt) does for
+/// the wall what moving towards it by d does, and would be damped no more.
 Vector6d damping(const Matrix6d& h, double lambda) {
   Vector6d d;
   d.head<3>().setConstant(lambda * h.diagonal().head<3>().maxCoeff() + 1e-9);
@@ -129,16 +130,21 @@ FamilySummary summarise(const std::vector<double>& squared, double gate_sq) {
 }  // namespace
 
 void PoseSolverOptions::declare(core::OptionTable& table) {
-  table.integer("solver.max_iterations", max_iterations, {1, 100}, "", "Levenberg-Marquardt iterations at most");
-  table.number("solver.point_loss", point_loss, {0.1, 100.0}, "", "Huber threshold of points, standard deviations");
-  table.number("solver.line_loss", line_loss, {0.1, 100.0}, "", "Huber threshold of lines, standard deviations");
-  table.number("solver.plane_loss", plane_loss, {0.1, 100.0}, "", "Huber threshold of depth, standard deviations");
+  table.integer("solver.max_iterations", max_iterations, {1, 100}, "",
+                "Levenberg-Marquardt iterations at most");
+  table.number("solver.point_loss", point_loss, {0.1, 100.0}, "",
+               "Huber threshold of points, standard deviations");
+  table.number("solver.line_loss", line_loss, {0.1, 100.0}, "",
+               "Huber threshold of lines, standard deviations");
+  table.number("solver.plane_loss", plane_loss, {0.1, 100.0}, "",
+               "Huber threshold of depth, standard deviations");
   table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
   table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
   table.number("solver.plane_weight", plane_weight, {0.0, 100.0}, "", "Weight of all depth samples together");
 }
 
-PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_world, const PoseSolverOptions& options) {
+PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_world,
+                       const PoseSolverOptions& options) {
   PoseSummary summary;
   Rigid3 pose = camera_from_world;
   NormalEquations n = evaluate<true>(problem, pose, options);

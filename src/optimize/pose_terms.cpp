@@ -10,8 +10,9 @@ constexpr double kMinDepth = 0.05;  // metres; nearer points are behind or insid
 
 }  // namespace
 
-int point_residual(const PointTerm& term, const geometry::Rigid3& camera_from_world, const sensor::Pinhole& camera,
-                   Eigen::Vector3d& residual, Eigen::Matrix<double, 3, 6>* jacobian) {
+int point_residual(const PointTerm& term, const geometry::Rigid3& camera_from_world,
+                   const sensor::Pinhole& camera, Eigen::Vector3d& residual,
+                   Eigen::Matrix<double, 3, 6>* jacobian) {
   const Eigen::Vector3d p = camera_from_world * term.world;
   if (p.z() < kMinDepth) return 0;
   const double iz = 1.0 / p.z();
@@ -60,7 +61,8 @@ bool line_residual(const LineTerm& term, const geometry::Rigid3& camera_from_wor
 double plane_residual(const PlaneTerm& term, const geometry::Rigid3& camera_from_world, Row6* jacobian) {
   const double w = 1.0 / term.sigma;
   // World point R^T (p_c - t); its derivative under the left perturbation is [-R^T, R^T [p_c]x].
-  const Eigen::Vector3d world = camera_from_world.rotation.transpose() * (term.camera - camera_from_world.translation);
+  const Eigen::Vector3d world =
+      camera_from_world.rotation.transpose() * (term.camera - camera_from_world.translation);
   const double residual = w * term.normal.dot(world - term.world);
   if (jacobian != nullptr) {
     const Eigen::Vector3d m = w * (camera_from_world.rotation * term.normal);  // n^T R^T as a column

@@ -82,8 +82,8 @@ class PosesStage : public Stage {
 
   std::string file_;
   double max_gap_s_ = 0.02;
-  double keyframe_distance_m_ = 0.15;
-  double keyframe_angle_rad_ = 0.2;
+  double keyframe_distance_m_ = 0.05;
+  double keyframe_angle_rad_ = 0.05;
   geometry::Trajectory poses_;
   MapResult map_;
 };

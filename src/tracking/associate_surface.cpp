@@ -17,7 +17,8 @@ float depth_at(const cv::Mat& depth, double u, double v) {
   const float* r1 = depth.ptr<float>(y + 1) + x;
   const float low = std::min(std::min(r0[0], r0[1]), std::min(r1[0], r1[1]));
   const float high = std::max(std::max(r0[0], r0[1]), std::max(r1[0], r1[1]));
-  if (!(low > 0.0F) || high - low > 0.01F * low + 4.0F * static_cast<float>(sensor::depth_sigma(low))) return 0.0F;
+  if (!(low > 0.0F) || high - low > 0.01F * low + 4.0F * static_cast<float>(sensor::depth_sigma(low)))
+    return 0.0F;
   const auto fx = static_cast<float>(u - x);
   const auto fy = static_cast<float>(v - y);
   return (1.0F - fy) * ((1.0F - fx) * r0[0] + fx * r0[1]) + fy * ((1.0F - fx) * r1[0] + fx * r1[1]);
@@ -25,8 +26,8 @@ float depth_at(const cv::Mat& depth, double u, double v) {
 
 }  // namespace
 
-std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface, const cv::Mat& depth,
-                                                   const sensor::Pinhole& camera,
+std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,
+                                                   const cv::Mat& depth, const sensor::Pinhole& camera,
                                                    const geometry::Rigid3& camera_from_world,
                                                    const geometry::Rigid3& depth_from_camera,
                                                    const SurfaceAssociationOptions& options, int* in_view) {

@@ -88,7 +88,8 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
       if (i >= surface.size()) continue;
       const maps::SurfaceSample& s = surface[i];
       samples.push_back({world_from_keyframe[k] * s.point.cast<double>(),
-                         world_from_keyframe[k].rotation * s.normal.cast<double>(), static_cast<double>(s.sigma)});
+                         world_from_keyframe[k].rotation * s.normal.cast<double>(),
+                         static_cast<double>(s.sigma)});
     }
   }
   return fuse_voxels(samples, voxel_m);
@@ -98,7 +99,8 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
 
 void LocalMapOptions::declare(core::OptionTable& table) {
   table.integer("local.keyframes", keyframes, {1, 200}, "", "Keyframes whose landmarks are tracked");
-  table.integer("local.surface_keyframes", surface_keyframes, {1, 50}, "", "Keyframes whose surfaces are aligned to");
+  table.integer("local.surface_keyframes", surface_keyframes, {1, 50}, "",
+                "Keyframes whose surfaces are aligned to");
   table.number("local.voxel", voxel_m, {0.001, 1.0}, "m", "Surface samples closer than this are fused");
   table.number("local.overlap_angle", overlap_angle_rad, {0.05, 3.0}, "rad",
                "Keyframes whose optical axes differ less may overlap");
@@ -117,7 +119,8 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   for (std::int32_t index = reference.index - 1; index >= 0 && index > reference.index - 40; --index) {
     if (local.keyframes.size() >= wanted) break;
     const KeyframeId id{reference.robot, index};
-    if (map.has_keyframe(id) && overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad)) {
+    if (map.has_keyframe(id) &&
+        overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad)) {
       append_unique(local.keyframes, id);
     }
   }
@@ -139,7 +142,8 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   std::vector<KeyframeId> dense;
   for (KeyframeId id : local.keyframes) {
     if (static_cast<int>(dense.size()) >= options.surface_keyframes) break;
-    if (overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad)) dense.push_back(id);
+    if (overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad))
+      dense.push_back(id);
   }
   local.surface = collect_surface(map, dense, options.voxel_m);
   return local;

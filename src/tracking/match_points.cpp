@@ -15,8 +15,9 @@ struct Prediction {
   int octave = 0;
 };
 
-bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_world, const Eigen::Vector3d& centre,
-             const sensor::Pinhole& camera, double log_scale, Prediction& prediction) {
+bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_world,
+             const Eigen::Vector3d& centre, const sensor::Pinhole& camera, double log_scale,
+             Prediction& prediction) {
   const Eigen::Vector3d p = camera_from_world * point.position;
   if (p.z() < 0.1) return false;
   const Eigen::Vector2d pixel = camera.project(p);
@@ -31,10 +32,12 @@ bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_wo
   return true;
 }
 
-/// How far the picture has turned about its own axis since a keyframe, degrees; asked for many points in turn.
+/// How far the picture has turned about its own axis since a keyframe, degrees; asked for many points in
+/// turn.
 class Roll {
  public:
-  Roll(const maps::Map& map, const geometry::Rigid3& camera_from_world) : map_(map), camera_(camera_from_world) {}
+  Roll(const maps::Map& map, const geometry::Rigid3& camera_from_world)
+      : map_(map), camera_(camera_from_world) {}
   float since(core::KeyframeId keyframe) {
     if (!keyframe.valid() || !map_.has_keyframe(keyframe)) return 0.0F;
     const auto [found, inserted] = degrees_.try_emplace(keyframe, 0.0F);
@@ -59,7 +62,8 @@ float angle_between(float a, float b) {
 }  // namespace
 
 void AssociationOptions::declare(core::OptionTable& table) {
-  table.integer("match.max_hamming", max_hamming, {1, 256}, "bit", "Point descriptors may differ by so many bits");
+  table.integer("match.max_hamming", max_hamming, {1, 256}, "bit",
+                "Point descriptors may differ by so many bits");
   table.number("match.ratio", ratio, {0.1, 1.0}, "", "Best distance over second best, at most");
   table.number("match.max_point_angle", max_point_angle_rad, {0.05, 3.2}, "rad",
                "Angle between a predicted and a measured corner's orientation, at most");
@@ -83,7 +87,8 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
   for (core::PointId id : points) {
     const maps::MapPoint* point = map.find_point(id);
     Prediction prediction;
-    if (point == nullptr || !predict(*point, camera_from_world, centre, camera, log_scale, prediction)) continue;
+    if (point == nullptr || !predict(*point, camera_from_world, centre, camera, log_scale, prediction))
+      continue;
     if (visible != nullptr) visible->push_back(id);
     near.clear();
     const double grown = radius * std::pow(options.scale_factor, std::clamp(prediction.octave, 0, 4));
@@ -106,13 +111,14 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
         // Two corners of neighbouring octaves at one place are the same corner, not a rival.
         const bool same_place =
             best_feature >= 0 && (frame.points[static_cast<std::size_t>(best_feature)].pixel -
-                                  frame.points[static_cast<std::size_t>(near[i])].pixel).norm() < 3.0F;
+                                  frame.points[static_cast<std::size_t>(near[i])].pixel)
+                                         .norm() < 3.0F;
         if (!same_place) second = best;
         best = distances[i];
         best_feature = near[i];
-      } else if (distances[i] < second &&
-                 (frame.points[static_cast<std::size_t>(best_feature)].pixel -
-                  frame.points[static_cast<std::size_t>(near[i])].pixel).norm() >= 3.0F) {
+      } else if (distances[i] < second && (frame.points[static_cast<std::size_t>(best_feature)].pixel -
+                                           frame.points[static_cast<std::size_t>(near[i])].pixel)
+                                                  .norm() >= 3.0F) {
         second = distances[i];
       }
     }

@@ -16,7 +16,8 @@ struct Pair {
 };
 
 /// Landmarks of a keyframe against all features of the frame: clearly best, and each other's best.
-std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe, const features::FrameFeatures& frame) {
+std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
+                            const features::FrameFeatures& frame) {
   constexpr int kMaxHamming = 60;
   constexpr double kRatio = 0.8;
   std::vector<int> all(frame.descriptors.size());
@@ -50,9 +51,10 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe, con
 
 }  // namespace
 
-std::optional<Relocalisation> relocalise(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
-                                         const features::FrameFeatures& features, const sensor::Pinhole& camera,
-                                         int min_inliers) {
+std::optional<Relocalisation> relocalise(const maps::Map& map,
+                                         const std::vector<core::KeyframeId>& candidates,
+                                         const features::FrameFeatures& features,
+                                         const sensor::Pinhole& camera, int min_inliers) {
   std::optional<Relocalisation> best;
   const cv::Matx33d k(camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0);
   for (core::KeyframeId id : candidates) {
@@ -71,8 +73,8 @@ std::optional<Relocalisation> relocalise(const maps::Map& map, const std::vector
     cv::Vec3d translation;
     std::vector<int> inliers;
     // OpenCV's RANSAC seeds its own generator the same way each time.
-    const bool solved = cv::solvePnPRansac(world, pixels, k, cv::noArray(), rotation, translation, false, 200, 4.0F,
-                                           0.99, inliers, cv::SOLVEPNP_P3P);
+    const bool solved = cv::solvePnPRansac(world, pixels, k, cv::noArray(), rotation, translation, false, 200,
+                                           4.0F, 0.99, inliers, cv::SOLVEPNP_P3P);
     const int count = static_cast<int>(inliers.size());
     if (!solved || count < min_inliers || (best && best->inliers >= count)) continue;
     const Eigen::Vector3d r(rotation[0], rotation[1], rotation[2]);

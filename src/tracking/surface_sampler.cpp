@@ -71,7 +71,8 @@ HalfDepth half_depth(const cv::Mat& depth) {
   const auto read = [&raw](int x, int y) { return raw.at(x, y); };
   for (int y = 0; y < raw.height; ++y) {
     for (int x = 0; x < raw.width; ++x) {
-      smooth.z[static_cast<std::size_t>(y * raw.width + x)] = surface_mean(read, x, y, raw.width, raw.height, 1);
+      smooth.z[static_cast<std::size_t>(y * raw.width + x)] =
+          surface_mean(read, x, y, raw.width, raw.height, 1);
     }
   }
   return smooth;
@@ -125,7 +126,8 @@ std::vector<Candidate> candidates(const HalfDepth& depth, const sensor::Pinhole&
   for (int y = 3; y < depth.height - 3; y += 2) {
     for (int x = 3 + (y / 2) % 2; x < depth.width - 3; x += 2) {
       const float z = depth.at(x, y);
-      if (z < static_cast<float>(options.min_depth_m) || z > static_cast<float>(options.max_depth_m)) continue;
+      if (z < static_cast<float>(options.min_depth_m) || z > static_cast<float>(options.max_depth_m))
+        continue;
       const int bx = straight_base(depth, x, y, 1, 0);
       const int by = straight_base(depth, x, y, 0, 1);
       if (bx == 0 || by == 0) continue;
@@ -137,7 +139,8 @@ std::vector<Candidate> candidates(const HalfDepth& depth, const sensor::Pinhole&
       const float cosine = -c.sample.normal.dot(c.sample.point.normalized());
       if (!(cosine > min_cosine)) continue;
       // Smoothing leaves part of the noise; what is left acts along the ray.
-      c.sample.sigma = 0.5F * static_cast<float>(sensor::depth_sigma(z)) * std::max(0.3F, -c.sample.normal.z());
+      c.sample.sigma =
+          0.5F * static_cast<float>(sensor::depth_sigma(z)) * std::max(0.3F, -c.sample.normal.z());
       c.cell = (y * kCellsY / depth.height) * kCellsX + x * kCellsX / depth.width;
       c.bin = direction_bin(c.sample.normal);
       result.push_back(c);
@@ -169,7 +172,8 @@ void take_evenly(const std::vector<Candidate>& all, const std::vector<std::uint3
 }  // namespace
 
 void SurfaceSamplerOptions::declare(core::OptionTable& table) {
-  table.integer("surface.samples", samples, {100, 20000}, "", "Surface samples kept of a keyframe's depth image");
+  table.integer("surface.samples", samples, {100, 20000}, "",
+                "Surface samples kept of a keyframe's depth image");
   table.number("surface.min_depth", min_depth_m, {0.0, 10.0}, "m", "Nearest depth that is aligned to");
   table.number("surface.max_depth", max_depth_m, {0.1, 50.0}, "m", "Farthest depth that is aligned to");
   table.number("surface.max_incidence", max_incidence_rad, {0.1, 1.57}, "rad",
@@ -190,11 +194,14 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
     i *= 0x846ca68bU;
     return i ^ (i >> 16);
   };
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
   std::vector<char> taken(all.size(), 0);
-  take_evenly(all, order, [](const Candidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2, taken);
-  take_evenly(all, order, [](const Candidate& c) { return c.bin; }, kAzimuths * kElevations,
-              options.samples - options.samples / 2, taken);
+  take_evenly(
+      all, order, [](const Candidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2, taken);
+  take_evenly(
+      all, order, [](const Candidate& c) { return c.bin; }, kAzimuths * kElevations,
+      options.samples - options.samples / 2, taken);
   std::vector<maps::SurfaceSample> result;
   result.reserve(static_cast<std::size_t>(options.samples));
   for (std::uint32_t i : order) {

@@ -75,8 +75,9 @@ Step linearise(const std::vector<Pixel>& pixels, const cv::Mat& current, const s
 
 }  // namespace
 
-ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& previous_depth, const cv::Mat& current,
-                                    const sensor::Pinhole& camera, const Rigid3& guess) {
+ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& previous_depth,
+                                    const cv::Mat& current, const sensor::Pinhole& camera,
+                                    const Rigid3& guess) {
   ThumbnailAlignment result;
   result.current_from_previous = guess;
   if (previous.empty() || current.empty() || previous_depth.empty() || previous.size() != current.size()) {
@@ -97,7 +98,8 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
   for (int y = 1; y + 1 < previous.rows; ++y) {
     for (int x = 1; x + 1 < previous.cols; ++x) {
       const float z = previous_depth.at<float>(y, x);
-      if (z > 0.0F) pixels.push_back({small.unproject(x, y, static_cast<double>(z)), previous.at<float>(y, x)});
+      if (z > 0.0F)
+        pixels.push_back({small.unproject(x, y, static_cast<double>(z)), previous.at<float>(y, x)});
     }
   }
   if (pixels.size() < 200) return result;

@@ -73,8 +73,8 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
 
 constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
 
-/// Principal directions of the information, rotations counted in units that move the scene as much as a metre of
-/// translation does, at 2 m.
+/// Principal directions of the information, rotations counted in units that move the scene as much as a metre
+/// of translation does, at 2 m.
 struct Directions {
   Vector6d eigenvalues;  ///< ascending
   geometry::Matrix6d eigenvectors;
@@ -88,7 +88,8 @@ Directions weigh_directions(const geometry::Matrix6d& information) {
 }
 
 /// What no measurement holds is held by the motion model: information of 2 cm in the weak directions only.
-std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information, const Rigid3& predicted) {
+std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
+                                                const Rigid3& predicted) {
   const Directions directions = weigh_directions(information);
   if (directions.eigenvalues(0) >= kWeak) return std::nullopt;
   geometry::Matrix6d weak = geometry::Matrix6d::Zero();
@@ -103,9 +104,12 @@ std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& inform
 
 const char* to_string(TrackState state) {
   switch (state) {
-    case TrackState::kInitialising: return "initialising";
-    case TrackState::kTracked: return "tracked";
-    case TrackState::kLost: return "lost";
+    case TrackState::kInitialising:
+      return "initialising";
+    case TrackState::kTracked:
+      return "tracked";
+    case TrackState::kLost:
+      return "lost";
   }
   return "";
 }
@@ -114,7 +118,8 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("points", points, "Track ORB points");
   table.boolean("lines", lines, "Track lines");
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
-  table.boolean("align_stamps", align_stamps, "Bring colour and depth stamped apart together with the motion model");
+  table.boolean("align_stamps", align_stamps,
+                "Bring colour and depth stamped apart together with the motion model");
   table.integer("min_inliers", min_inliers, {3, 1000}, "", "Features that a pose must explain to be trusted");
   table.integer("min_surface", min_surface, {10, 100000}, "",
                 "Depth samples that a pose without enough features must explain");
@@ -123,7 +128,8 @@ void TrackerOptions::declare(core::OptionTable& table) {
   solver.declare(table);
 }
 
-Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera) : options_(options), camera_(camera) {}
+Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
+    : options_(options), camera_(camera) {}
 
 Rigid3 Tracker::predict(double stamp) const {
   const double dt = std::clamp(stamp - last_.stamp, 0.0, 0.2);
@@ -149,7 +155,8 @@ std::vector<Rigid3> Tracker::guesses(const features::FrameFeatures& features, do
 }
 
 TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
-                              const features::FrameFeatures& features, const Rigid3& guess, double radius) const {
+                              const features::FrameFeatures& features, const Rigid3& guess,
+                              double radius) const {
   TrackResult result;
   Rigid3 pose = guess;
   const Rigid3 depth_from_colour = depth_from_camera(frame);
@@ -192,9 +199,8 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     if (options_.depth) {
       surface.max_distance_m = round.surface_distance;
       surface.max_samples = round.surface_samples;
-      problem.planes =
-          associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour, surface,
-                            &result.surface_in_view);
+      problem.planes = associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour,
+                                         surface, &result.surface_in_view);
     }
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
@@ -271,10 +277,12 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     remember(frame, features, result);
     return result;
   }
-  // After a while without a pose the last one says little: surfaces near it fit by chance, so the picture goes first.
+  // After a while without a pose the last one says little: surfaces near it fit by chance, so the picture
+  // goes first.
   constexpr int kStaleFrames = 5;
   const bool stale = lost_frames_ >= kStaleFrames;
-  std::optional<TrackResult> found = stale ? by_picture(map, frame, features) : by_motion(map, frame, features);
+  std::optional<TrackResult> found =
+      stale ? by_picture(map, frame, features) : by_motion(map, frame, features);
   if (!found) found = stale ? by_motion(map, frame, features) : by_picture(map, frame, features);
   if (!found) {
     result.state = TrackState::kLost;
@@ -303,7 +311,8 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
   last_.valid = true;
 }
 
-void Tracker::map_changed(const maps::Map& map, core::KeyframeId reference, const Rigid3& last_camera_from_world) {
+void Tracker::map_changed(const maps::Map& map, core::KeyframeId reference,
+                          const Rigid3& last_camera_from_world) {
   local_map_ = build_local_map(map, reference, options_.local_map);
   last_.camera_from_world = last_camera_from_world;
 }

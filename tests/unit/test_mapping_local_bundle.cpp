@@ -72,7 +72,8 @@ TEST(LocalBundle, PutsAKeyframeAndItsLandmarksBackInPlace) {
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
   put_back(bundle, world.map);
   for (int k = 0; k < 3; ++k) {
-    EXPECT_LT(tests::distance(world.map.camera_from_world({0, k}), world.truth[static_cast<std::size_t>(k)]), 1e-3)
+    EXPECT_LT(tests::distance(world.map.camera_from_world({0, k}), world.truth[static_cast<std::size_t>(k)]),
+              1e-3)
         << k;
   }
   for (core::PointId id : world.map.point_ids()) {
@@ -86,7 +87,8 @@ TEST(LocalBundle, WhatOnlyOneKeyframeSeesMovesWithIt) {
   LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
   put_back(bundle, world.map);
-  const Eigen::Vector3d in_camera = world.map.camera_from_world({0, 2}) * world.map.point(world.single).position;
+  const Eigen::Vector3d in_camera =
+      world.map.camera_from_world({0, 2}) * world.map.point(world.single).position;
   EXPECT_LT((in_camera - Eigen::Vector3d(0.1, 0.1, 2.0)).norm(), 1e-9);
 }
 

@@ -24,8 +24,8 @@ struct ConfigNode {
   Kind kind = Kind::kNull;
   ConfigMark mark;
   std::string scalar;
-  bool quoted = false;  ///< the scalar was written in quotes: never a number or boolean
-  std::vector<ConfigNode> items;                            ///< of a sequence
+  bool quoted = false;            ///< the scalar was written in quotes: never a number or boolean
+  std::vector<ConfigNode> items;  ///< of a sequence
   std::vector<std::pair<std::string, ConfigNode>> entries;  ///< of a map, in file order
   std::vector<ConfigMark> key_marks;                        ///< where each entry's key stands
 
@@ -46,8 +46,8 @@ std::string to_string(const ConfigProblems& problems);
 /// kUsage error holding all problems.
 Error to_error(const ConfigProblems& problems);
 
-/// Reads YAML. Refuses: unreadable files, files over 1 MB, duplicate keys, several documents, non-scalar keys,
-/// trees over 20 levels or 100 000 nodes after alias expansion. Messages name file, line and column.
+/// Reads YAML. Refuses: unreadable files, files over 1 MB, duplicate keys, several documents, non-scalar
+/// keys, trees over 20 levels or 100 000 nodes after alias expansion. Messages name file, line and column.
 Result<ConfigNode> read_yaml(const std::filesystem::path& file);
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name);
 

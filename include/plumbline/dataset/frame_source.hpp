@@ -50,8 +50,8 @@ struct OpenOptions {
 };
 
 /// Opens a folder. Checks camera, lists and the depth scale (median depth of some frames outside
-/// 0.35-20 m: error; outside 0.7-7 m, or a tenth of the depths beyond the 10 m that depth cameras reach: warning;
-/// both name the depth_scale that would fit).
+/// 0.35-20 m: error; outside 0.7-7 m, or a tenth of the depths beyond the 10 m that depth cameras reach:
+/// warning; both name the depth_scale that would fit).
 core::Result<std::unique_ptr<FrameSource>> open_recording(const std::filesystem::path& folder,
                                                           const OpenOptions& options, core::Log& log);
 

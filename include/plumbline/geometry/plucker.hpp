@@ -26,7 +26,8 @@ Eigen::Vector3d nearest_point(const PluckerLine& line, const Eigen::Vector3d& p)
 /// K_L: image line l = K_L n_c, with l.(u, v, 1) = 0 for pixels on it.
 Eigen::Matrix3d line_projection(double fx, double fy, double cx, double cy);
 
-/// Orthonormal form: U = [n/|n|, v/|v|, nxv/|nxv|], W the rotation of angle atan2(|v|, |n|). 4 degrees of freedom.
+/// Orthonormal form: U = [n/|n|, v/|v|, nxv/|nxv|], W the rotation of angle atan2(|v|, |n|). 4 degrees of
+/// freedom.
 struct OrthonormalLine {
   Eigen::Matrix3d u = Eigen::Matrix3d::Identity();
   double w1 = 0.0;  ///< W11 = |n| / sqrt(|n|^2 + |v|^2)

@@ -32,13 +32,13 @@ struct KeyframeDecision {
   bool urgent = false;  ///< tracking is about to be lost
 };
 
-/// The plain rule: enough parallax, rotation or loss of common features and surface; at once when tracking gets
-/// thin; never so rarely that the map starves.
+/// The plain rule: enough parallax, rotation or loss of common features and surface; at once when tracking
+/// gets thin; never so rarely that the map starves.
 class KeyframeRule {
  public:
   explicit KeyframeRule(const KeyframeRuleOptions& options) : options_(options) {}
-  KeyframeDecision decide(const maps::Map& map, core::KeyframeId reference, const tracking::TrackResult& track,
-                          const sensor::Pinhole& camera);
+  KeyframeDecision decide(const maps::Map& map, core::KeyframeId reference,
+                          const tracking::TrackResult& track, const sensor::Pinhole& camera);
   void keyframe_made();
 
  private:

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Local bundle adjustment (METHOD section 3): a keyframe, what it shares landmarks or surfaces with, and what they
-// see. Three steps, so that the middle one can run beside the tracker: take from the map, adjust, put back.
+// Local bundle adjustment (METHOD section 3): a keyframe, what it shares landmarks or surfaces with, and what
+// they see. Three steps, so that the middle one can run beside the tracker: take from the map, adjust, put
+// back.
 #include <vector>
 
 #include "plumbline/maps/map.hpp"
@@ -25,13 +26,13 @@ struct LocalBundle {
 };
 
 struct LocalBundleOptions {
-  int keyframes = 12;           ///< how many may move
-  double max_turn_rate = 0.6;   ///< rad/s; keyframes taken while turning faster are held, and do not speak
+  int keyframes = 12;          ///< how many may move
+  double max_turn_rate = 0.6;  ///< rad/s; keyframes taken while turning faster are held, and do not speak
   double orb_scale_factor = 1.2;
 };
 
-/// Keyframes around those that may move, that see the same landmarks, are held. Without any of these the oldest
-/// keyframe is held.
+/// Keyframes around those that may move, that see the same landmarks, are held. Without any of these the
+/// oldest keyframe is held.
 LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, const sensor::Pinhole& camera,
                               const LocalBundleOptions& options);
 

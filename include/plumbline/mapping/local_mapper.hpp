@@ -32,7 +32,8 @@ struct LocalMapperOptions {
 
 class LocalMapper {
  public:
-  LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera) : options_(options), camera_(camera) {}
+  LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera)
+      : options_(options), camera_(camera) {}
 
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth.
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
@@ -42,10 +43,11 @@ class LocalMapper {
   /// Counts which landmarks a tracked frame should have seen and did.
   void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
 
-  /// Aligns the surfaces of neighbouring keyframes with the depth image of the new one; what they say about its
-  /// pose stays in the map as edges.
+  /// Aligns the surfaces of neighbouring keyframes with the depth image of the new one; what they say about
+  /// its pose stays in the map as edges.
   void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
-                         const geometry::Rigid3& depth_from_camera, const std::vector<core::KeyframeId>& neighbours);
+                         const geometry::Rigid3& depth_from_camera,
+                         const std::vector<core::KeyframeId>& neighbours);
 
   /// Removes landmarks that were made lately and are seldom found where they should be.
   void cull(maps::Map& map);

@@ -44,12 +44,13 @@ struct FrameReport {
 
 class Slam {
  public:
-  Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot, const core::Executor& executor,
-       core::Log& log);
+  Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
+       const core::Executor& executor, core::Log& log);
   ~Slam();
 
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
-  FrameReport process(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features);
+  FrameReport process(const sensor::RgbdFrame& frame,
+                      std::shared_ptr<const features::FrameFeatures> features);
   /// Ends what still runs beside the tracker; call once, after the last frame.
   void finish();
 
@@ -69,8 +70,8 @@ class Slam {
     geometry::Rigid3 camera_from_reference;
     bool tracked = false;
   };
-  void start_map(const sensor::RgbdFrame& frame, const std::shared_ptr<const features::FrameFeatures>& features,
-                 FrameReport& report);
+  void start_map(const sensor::RgbdFrame& frame,
+                 const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;

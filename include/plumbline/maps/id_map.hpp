@@ -39,7 +39,8 @@ class IdMap {
   /// Inserts or replaces.
   void insert(IdType id, T value) {
     auto& slots = slots_[id.robot];
-    if (static_cast<std::size_t>(id.index) >= slots.size()) slots.resize(static_cast<std::size_t>(id.index) + 1);
+    if (static_cast<std::size_t>(id.index) >= slots.size())
+      slots.resize(static_cast<std::size_t>(id.index) + 1);
     auto& slot = slots[static_cast<std::size_t>(id.index)];
     if (!slot) ++size_;
     slot = std::move(value);

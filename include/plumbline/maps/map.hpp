@@ -33,7 +33,7 @@ struct SurfaceSample {
 struct Keyframe {
   KeyframeId id;
   std::int64_t frame_index = -1;
-  double stamp = 0.0;  ///< seconds
+  double stamp = 0.0;      ///< seconds
   double turn_rate = 0.0;  ///< rad/s: how fast the camera turned while the picture was taken
   std::shared_ptr<const features::FrameFeatures> features;
   std::vector<SurfaceSample> surface;  ///< well spread over directions and over the picture
@@ -47,10 +47,10 @@ struct Observation {
 
 struct MapPoint {
   PointId id;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, metres
-  features::Descriptor256 descriptor{};                ///< the most typical of its observations
-  float angle = 0.0F;                                  ///< of that observation, degrees in its picture
-  KeyframeId angle_keyframe;                           ///< whose picture
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();         ///< world, metres
+  features::Descriptor256 descriptor{};                       ///< the most typical of its observations
+  float angle = 0.0F;                                         ///< of that observation, degrees in its picture
+  KeyframeId angle_keyframe;                                  ///< whose picture
   Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
   double reference_distance = 1.0;  ///< metres from the camera of its first observation
   int reference_octave = 0;         ///< in which octave it was seen there
@@ -83,11 +83,14 @@ struct SurfaceEdge {
 class Map {
  public:
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
-  KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe, const geometry::Rigid3& camera_from_world);
+  KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe,
+                          const geometry::Rigid3& camera_from_world);
   [[nodiscard]] KeyframeId next_keyframe_id(std::int32_t robot) const;
   [[nodiscard]] bool has_keyframe(KeyframeId id) const { return keyframes_.contains(id); }
   [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return *keyframes_.at(id).data; }
-  [[nodiscard]] const geometry::Rigid3& camera_from_world(KeyframeId id) const { return keyframes_.at(id).pose; }
+  [[nodiscard]] const geometry::Rigid3& camera_from_world(KeyframeId id) const {
+    return keyframes_.at(id).pose;
+  }
   void set_pose(KeyframeId id, const geometry::Rigid3& camera_from_world);
   [[nodiscard]] std::vector<KeyframeId> keyframe_ids() const { return keyframes_.ids(); }
   [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Bundle adjustment over poses, points and lines, with relative-pose edges from dense alignment (METHOD sections
-// 2 and 3). Plain structs in, plain structs out; Ceres inside. Deterministic: one thread, fixed order.
+// Bundle adjustment over poses, points and lines, with relative-pose edges from dense alignment (METHOD
+// sections 2 and 3). Plain structs in, plain structs out; Ceres inside. Deterministic: one thread, fixed
+// order.
 #include <Eigen/Core>
 #include <string>
 #include <vector>
@@ -45,8 +46,8 @@ struct BundleLineObservation {
   bool outlier = false;
 };
 
-/// b_from_a was measured; xi = log(b_from_a_estimate * measured^-1) has this information (may be singular: what
-/// the surfaces do not hold stays free).
+/// b_from_a was measured; xi = log(b_from_a_estimate * measured^-1) has this information (may be singular:
+/// what the surfaces do not hold stays free).
 struct BundleEdge {
   int a = -1;
   int b = -1;
@@ -65,12 +66,12 @@ struct BundleProblem {
 };
 
 struct BundleOptions {
-  int max_iterations = 8;     ///< of each round
-  int rounds = 2;             ///< after each, outliers are put aside and the solve is repeated
-  double point_loss = 2.45;   ///< Huber, standard deviations
+  int max_iterations = 8;    ///< of each round
+  int rounds = 2;            ///< after each, outliers are put aside and the solve is repeated
+  double point_loss = 2.45;  ///< Huber, standard deviations
   double line_loss = 2.45;
   double edge_loss = 4.0;
-  double point_gate = 7.8;    ///< squared standard deviations; beyond: outlier
+  double point_gate = 7.8;  ///< squared standard deviations; beyond: outlier
   double line_gate = 9.2;
   void declare(core::OptionTable& table);
 };

@@ -31,13 +31,14 @@ struct PoseProblem {
 
 struct PoseSolverOptions {
   int max_iterations = 10;
-  double point_loss = 2.45;  ///< Huber threshold, in standard deviations (chi-square 95 %, 2 degrees of freedom)
+  double point_loss =
+      2.45;  ///< Huber threshold, in standard deviations (chi-square 95 %, 2 degrees of freedom)
   double line_loss = 2.45;
   double plane_loss = 1.0;
   double point_weight = 1.0;  ///< of the whole family: its terms are not quite independent
   double line_weight = 1.0;
   double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
-  double min_step = 1e-6;     ///< metres and radians: a smaller step ends the iteration
+  double min_step = 1e-6;      ///< metres and radians: a smaller step ends the iteration
 
   void declare(core::OptionTable& table);
 };

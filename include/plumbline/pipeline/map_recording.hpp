@@ -24,7 +24,7 @@ struct MapRequest {
   std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
   dataset::OpenOptions open;               ///< format, camera, from, to, every
   bool replace = false;                    ///< replace an earlier result
-  std::filesystem::path debug_video;       ///< folder for a picture a frame of what the tracker sees; empty: none
+  std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
 };
 
 /// Checks everything first (pipeline: kUsage, recording: kInput, output folder: kOutput), then maps. When the

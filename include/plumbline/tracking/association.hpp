@@ -34,9 +34,9 @@ struct AssociationOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Point landmarks by projection: within `radius` pixels (grown with the octave), of a fitting octave, seen from
-/// a fitting side, best and clearly better than the second best, each feature used once. `visible` receives the
-/// landmarks inside the view.
+/// Point landmarks by projection: within `radius` pixels (grown with the octave), of a fitting octave, seen
+/// from a fitting side, best and clearly better than the second best, each feature used once. `visible`
+/// receives the landmarks inside the view.
 std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,
                                      const features::FrameFeatures& frame, const sensor::Pinhole& camera,
                                      const geometry::Rigid3& camera_from_world, double radius,
@@ -54,13 +54,13 @@ struct SurfaceAssociationOptions {
   double max_depth_m = 6.0;
 };
 
-/// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, the depth
-/// measured there is the point that should lie on its tangent plane. `depth_from_camera` carries the camera of the
-/// colour picture to that of the depth picture (they are stamped apart); the measured points come back in the
-/// colour camera's frame. `in_view` receives how many samples face the camera and have a measured depth where they
-/// should be seen, whether it fits or not.
-std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface, const cv::Mat& depth,
-                                                   const sensor::Pinhole& camera,
+/// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, the
+/// depth measured there is the point that should lie on its tangent plane. `depth_from_camera` carries the
+/// camera of the colour picture to that of the depth picture (they are stamped apart); the measured points
+/// come back in the colour camera's frame. `in_view` receives how many samples face the camera and have a
+/// measured depth where they should be seen, whether it fits or not.
+std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,
+                                                   const cv::Mat& depth, const sensor::Pinhole& camera,
                                                    const geometry::Rigid3& camera_from_world,
                                                    const geometry::Rigid3& depth_from_camera,
                                                    const SurfaceAssociationOptions& options,

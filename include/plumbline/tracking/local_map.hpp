@@ -17,9 +17,9 @@ struct WorldSurface {
 };
 
 struct LocalMapOptions {
-  int keyframes = 12;          ///< whose landmarks are tracked
-  int surface_keyframes = 4;   ///< whose surfaces are aligned to
-  double voxel_m = 0.03;       ///< surface samples of all these are fused within
+  int keyframes = 12;         ///< whose landmarks are tracked
+  int surface_keyframes = 4;  ///< whose surfaces are aligned to
+  double voxel_m = 0.03;      ///< surface samples of all these are fused within
   double overlap_angle_rad = 0.6;
   void declare(core::OptionTable& table);
 };
@@ -29,11 +29,11 @@ struct LocalMap {
   std::vector<core::KeyframeId> keyframes;  ///< the reference first
   std::vector<core::PointId> points;        ///< sorted, unique
   std::vector<core::LineId> lines;
-  std::vector<WorldSurface> surface;        ///< interleaved, so that any prefix is spread over all keyframes
+  std::vector<WorldSurface> surface;  ///< interleaved, so that any prefix is spread over all keyframes
 };
 
-/// Keyframes that share landmarks with `reference`, filled up with those that were made last and look the same
-/// way (where there is no texture, nothing else tells that they overlap); their landmarks and surfaces.
+/// Keyframes that share landmarks with `reference`, filled up with those that were made last and look the
+/// same way (where there is no texture, nothing else tells that they overlap); their landmarks and surfaces.
 LocalMap build_local_map(const maps::Map& map, core::KeyframeId reference, const LocalMapOptions& options);
 
 }  // namespace plumbline::tracking

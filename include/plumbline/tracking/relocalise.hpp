@@ -18,10 +18,11 @@ struct Relocalisation {
   int inliers = 0;
 };
 
-/// Tries the keyframes `candidates` in turn (the most promising first) and returns the one with most inliers, if
-/// any has at least `min_inliers`. Deterministic.
-std::optional<Relocalisation> relocalise(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
-                                         const features::FrameFeatures& features, const sensor::Pinhole& camera,
-                                         int min_inliers);
+/// Tries the keyframes `candidates` in turn (the most promising first) and returns the one with most inliers,
+/// if any has at least `min_inliers`. Deterministic.
+std::optional<Relocalisation> relocalise(const maps::Map& map,
+                                         const std::vector<core::KeyframeId>& candidates,
+                                         const features::FrameFeatures& features,
+                                         const sensor::Pinhole& camera, int min_inliers);
 
 }  // namespace plumbline::tracking

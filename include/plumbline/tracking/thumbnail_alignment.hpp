@@ -18,9 +18,10 @@ struct ThumbnailAlignment {
   bool better = false;  ///< clearly better than the first guess
 };
 
-/// `previous`, `current`: CV_32FC1 thumbnails; `previous_depth`: the same size, metres, 0 = none; `camera`: of the
-/// full picture. A change of overall brightness is estimated along.
-ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& previous_depth, const cv::Mat& current,
-                                    const sensor::Pinhole& camera, const geometry::Rigid3& guess);
+/// `previous`, `current`: CV_32FC1 thumbnails; `previous_depth`: the same size, metres, 0 = none; `camera`:
+/// of the full picture. A change of overall brightness is estimated along.
+ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& previous_depth,
+                                    const cv::Mat& current, const sensor::Pinhole& camera,
+                                    const geometry::Rigid3& guess);
 
 }  // namespace plumbline::tracking

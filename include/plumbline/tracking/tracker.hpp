@@ -46,10 +46,11 @@ struct TrackResult {
   std::vector<core::PointId> visible_points;  ///< landmarks that should have been seen
   std::vector<core::LineId> visible_lines;
   optimize::PoseSummary estimate;
-  int surface_in_view = 0;      ///< samples of the local surface where the depth image has a measurement
-  double surface_share = 0.0;   ///< share of the local surface in view that the depth image confirms
-  double min_eigenvalue = 0.0;  ///< of the information matrix, 1/m^2 after scaling rotations by the scene's depth
-  int weak_directions = 0;      ///< of six, that nothing but the motion model holds
+  int surface_in_view = 0;     ///< samples of the local surface where the depth image has a measurement
+  double surface_share = 0.0;  ///< share of the local surface in view that the depth image confirms
+  double min_eigenvalue =
+      0.0;                  ///< of the information matrix, 1/m^2 after scaling rotations by the scene's depth
+  int weak_directions = 0;  ///< of six, that nothing but the motion model holds
   bool relocalised = false;
 };
 
@@ -57,13 +58,14 @@ class Tracker {
  public:
   Tracker(const TrackerOptions& options, const sensor::Pinhole& camera);
 
-  /// The frame is localised against `map`; `reference` is the keyframe whose surroundings are expected in view.
-  /// An empty map gives kInitialising.
+  /// The frame is localised against `map`; `reference` is the keyframe whose surroundings are expected in
+  /// view. An empty map gives kInitialising.
   TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame,
                     const features::FrameFeatures& features);
 
   /// The map has changed (keyframe added, poses corrected). `corrected_from_old`: where the last pose went.
-  void map_changed(const maps::Map& map, core::KeyframeId reference, const geometry::Rigid3& last_camera_from_world);
+  void map_changed(const maps::Map& map, core::KeyframeId reference,
+                   const geometry::Rigid3& last_camera_from_world);
 
   /// How fast the camera turned between the last two frames, rad/s.
   [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
@@ -81,7 +83,8 @@ class Tracker {
   struct Attempt;
 
   [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
-  [[nodiscard]] std::vector<geometry::Rigid3> guesses(const features::FrameFeatures& features, double stamp) const;
+  [[nodiscard]] std::vector<geometry::Rigid3> guesses(const features::FrameFeatures& features,
+                                                      double stamp) const;
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
                                      const features::FrameFeatures& features, const geometry::Rigid3& guess,
                                      double radius) const;
@@ -94,7 +97,8 @@ class Tracker {
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] bool trustworthy(const TrackResult& result, const features::FrameFeatures& features) const;
   void judge(const features::FrameFeatures& features, TrackResult& result) const;
-  void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features, const TrackResult& result);
+  void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                const TrackResult& result);
 
   TrackerOptions options_;
   sensor::Pinhole camera_;
