@@ -28,8 +28,9 @@ World::~World() {
 }
 
 void World::build_bvh() {
-  // One thread: Embree must not start threads of its own.
-  device_ = rtcNewDevice("threads=1,set_affinity=0");
+  // No "threads=" here: Embree would hold all of oneTBB in this process to that number for as long as the
+  // device lives.
+  device_ = rtcNewDevice("set_affinity=0");
   if (device_ == nullptr) throw std::runtime_error("Embree: no device");
   bvh_ = rtcNewScene(device_);
   rtcSetSceneFlags(bvh_, RTC_SCENE_FLAG_ROBUST);
