@@ -2,8 +2,18 @@
 #include "plumbline/maps/line_export.hpp"
 
 #include "plumbline/cloud/ply.hpp"
+#include "plumbline/maps/map.hpp"
 
 namespace plumbline::maps {
+
+std::vector<LineSegment3> line_segments(const Map& map, std::size_t min_observations) {
+  std::vector<LineSegment3> result;
+  for (const core::LineId id : map.line_ids()) {
+    const MapLine& line = map.line(id);
+    if (line.observations.size() >= min_observations) result.emplace_back(line.start, line.end);
+  }
+  return result;
+}
 
 core::Result<void> write_lines_ply(const std::filesystem::path& file,
                                    const std::vector<LineSegment3>& segments,

@@ -105,31 +105,10 @@ void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tra
 
 void Slam::finish() {}
 
-geometry::Trajectory Slam::trajectory() const {
-  geometry::Trajectory result;
-  for (const FramePose& frame : frames_) {
-    if (!frame.tracked) continue;
-    const Rigid3 camera_from_world = frame.camera_from_reference * map_.camera_from_world(frame.reference);
-    result.push_back({frame.stamp, camera_from_world.inverse()});
-  }
-  return result;
-}
+geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frames_, map_); }
 
-geometry::Trajectory Slam::keyframe_trajectory() const {
-  geometry::Trajectory result;
-  for (core::KeyframeId id : map_.keyframe_ids()) {
-    result.push_back({map_.keyframe(id).stamp, map_.camera_from_world(id).inverse()});
-  }
-  return result;
-}
+geometry::Trajectory Slam::keyframe_trajectory() const { return maps::keyframe_trajectory(map_); }
 
-std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> Slam::line_segments() const {
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> result;
-  for (core::LineId id : map_.line_ids()) {
-    const maps::MapLine& line = map_.line(id);
-    if (line.observations.size() >= 2) result.emplace_back(line.start, line.end);
-  }
-  return result;
-}
+std::vector<maps::LineSegment3> Slam::line_segments() const { return maps::line_segments(map_); }
 
 }  // namespace plumbline::mapping

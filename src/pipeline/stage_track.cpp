@@ -56,12 +56,9 @@ class TrackStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     slam_->finish();
     auto result = std::make_shared<MapResult>();
-    result->trajectory = slam_->trajectory();
-    const maps::Map& map = slam_->map();
-    for (const core::KeyframeId id : map.keyframe_ids()) {
-      result->keyframes.push_back({id, map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
-    }
-    result->lines = slam_->line_segments();
+    result->map = std::make_shared<maps::Map>(slam_->map());
+    result->frame_poses = slam_->frame_poses();
+    take_poses_from_map(*result);
     result->frame_columns = kColumns;
     result->frames = rows_;
     lines_ = result->lines.size();

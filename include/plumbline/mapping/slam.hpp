@@ -14,6 +14,8 @@
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
@@ -57,19 +59,15 @@ class Slam {
   [[nodiscard]] const maps::Map& map() const { return map_; }
   /// What the tracker said about the last frame; for pictures of it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
+  /// Every frame in order, relative to its keyframe.
+  [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_; }
   /// Poses after optimisation: tracked frames only, in order of time.
   [[nodiscard]] geometry::Trajectory trajectory() const;
   [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
   /// Line landmarks that enough keyframes have seen, as 3D segments in the world frame, metres.
-  [[nodiscard]] std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> line_segments() const;
+  [[nodiscard]] std::vector<maps::LineSegment3> line_segments() const;
 
  private:
-  struct FramePose {
-    double stamp = 0.0;
-    core::KeyframeId reference;
-    geometry::Rigid3 camera_from_reference;
-    bool tracked = false;
-  };
   void start_map(const sensor::RgbdFrame& frame,
                  const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
@@ -83,7 +81,7 @@ class Slam {
   tracking::TrackResult last_track_;
   KeyframeRule rule_;
   LocalMapper mapper_;
-  std::vector<FramePose> frames_;
+  std::vector<maps::FramePose> frames_;
 };
 
 }  // namespace plumbline::mapping

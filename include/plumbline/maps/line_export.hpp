@@ -4,6 +4,7 @@
 // 3D line landmarks as a file that mesh viewers open.
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <utility>
@@ -14,6 +15,11 @@
 namespace plumbline::maps {
 
 using LineSegment3 = std::pair<Eigen::Vector3d, Eigen::Vector3d>;  ///< endpoints, metres
+
+class Map;
+
+/// Line landmarks that at least `min_observations` keyframes see, in the world frame, by id.
+std::vector<LineSegment3> line_segments(const Map& map, std::size_t min_observations = 2);
 
 /// Binary PLY with two coloured vertices and one coloured edge per segment (MeshLab, CloudCompare and
 /// Open3D's LineSet read it). `colors`: red, green, blue, one per segment, or empty for dark blue. Segments

@@ -11,7 +11,9 @@
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
+#include "plumbline/maps/map.hpp"
 #include "plumbline/pipeline/stage.hpp"
 #include "plumbline/sensor/frame.hpp"
 
@@ -38,6 +40,8 @@ struct KeyframePose {
 
 /// The finished map but for its dense cloud; poses after all optimisation.
 struct MapResult {
+  std::shared_ptr<const maps::Map> map;      ///< null when the poses come from a file
+  std::vector<maps::FramePose> frame_poses;  ///< empty when `map` is null
   geometry::Trajectory trajectory;      ///< tracked frames only
   std::vector<KeyframePose> keyframes;  ///< by id
   std::vector<maps::LineSegment3> lines;
@@ -56,6 +60,9 @@ struct DenseCloud {
   cloud::CloudPtr cloud;
   double voxel_m = 0.0;
 };
+
+/// Trajectory, keyframe poses and lines of `result` as its map says now.
+void take_poses_from_map(MapResult& result);
 
 /// The port types of this library.
 inline PortType frame_port() { return port_type<sensor::RgbdFrame>("frame"); }
