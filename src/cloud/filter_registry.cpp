@@ -35,6 +35,7 @@ FilterRegistry builtin_filters() {
   registry.add(crop_box_filter());
   registry.add(flying_pixels_filter());
   registry.add(incidence_angle_filter());
+  registry.add(mls_filter());
   registry.add(normals_filter());
   registry.add(pass_through_filter());
   registry.add(radius_outlier_filter());

@@ -18,6 +18,7 @@ FilterInfo approximate_voxel_grid_filter();
 FilterInfo crop_box_filter();
 FilterInfo flying_pixels_filter();
 FilterInfo incidence_angle_filter();
+FilterInfo mls_filter();
 FilterInfo normals_filter();
 FilterInfo pass_through_filter();
 FilterInfo radius_outlier_filter();

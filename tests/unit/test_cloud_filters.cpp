@@ -259,6 +259,48 @@ TEST(Filters, NormalsPointToTheViewpoint) {
   expect_normal_z(must("{type: normals}", plane), 1.0F);
 }
 
+/// Root mean square of z - z_of(x, y).
+template <typename Surface>
+double roughness(const Cloud& cloud, const Surface& z_of) {
+  double sum = 0.0;
+  for (const Point& p : cloud.points) sum += std::pow(static_cast<double>(p.z - z_of(p.x, p.y)), 2.0);
+  return std::sqrt(sum / static_cast<double>(cloud.size()));
+}
+
+TEST(Filters, MlsSmoothsAPlaneAndABowl) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(0.0F, 0.003F);
+  const auto plane = [](float, float) { return 1.0F; };
+  const auto bowl = [](float x, float y) { return 1.0F + 2.0F * (x * x + y * y); };
+  auto flat = square(40, 0.005F);
+  auto round = square(40, 0.005F);
+  for (Point& p : flat->points) p.z = plane(p.x, p.y) + noise(random);
+  for (Point& p : round->points) p.z = bowl(p.x, p.y) + noise(random);
+  const auto smooth = must("{type: mls, radius: 3 cm, order: 0}", flat);
+  ASSERT_EQ(smooth->size(), 1600U);
+  EXPECT_LT(roughness(*smooth, plane), 0.25 * roughness(*flat, plane));
+  for (const Point& p : smooth->points) EXPECT_LT(p.normal_z, -0.98F);
+  EXPECT_EQ((*smooth)[0].r, 100) << "colours stay";
+  const double curved = roughness(*must("{type: mls, radius: 3 cm, order: 2}", round), bowl);
+  EXPECT_LT(curved, 0.4 * roughness(*round, bowl));
+  // A plane cannot follow the bowl.
+  EXPECT_GT(roughness(*must("{type: mls, radius: 6 cm, order: 0}", round), bowl),
+            1.5 * roughness(*must("{type: mls, radius: 6 cm, order: 2}", round), bowl));
+}
+
+TEST(Filters, MlsKeepsTheSideOfNormalsAndLosesLonelyPoints) {
+  auto cloud = square(10, 0.01F);
+  for (Point& p : cloud->points) p.normal_z = 1.0F;
+  cloud->push_back(point(5, 5, 5));
+  const auto kept = must("{type: mls, radius: 3 cm}", cloud);
+  ASSERT_EQ(kept->size(), 100U);
+  for (const Point& p : kept->points) EXPECT_NEAR(p.normal_z, 1.0F, 1e-4F);
+  for (Point& p : cloud->points) p.normal_z = kNan;
+  const auto turned = must("{type: mls, radius: 3 cm}", cloud);
+  ASSERT_EQ(turned->size(), 100U);
+  for (const Point& p : turned->points) EXPECT_NEAR(p.normal_z, -1.0F, 1e-4F) << "to the viewpoint";
+}
+
 TEST(Filters, TransformMovesPointsNormalsAndViewpoint) {
   const auto output = must("{type: transform, rotation: [90 deg, 0 deg, 0 deg], translation: [0, 0, 1 m]}",
                            list({point(1, 2, 3), point(kNan, 0, 0)}));
