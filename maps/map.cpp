@@ -74,6 +74,28 @@ void Map::remove_line(LineId id) {
   lines_.erase(id);
 }
 
+void Map::merge_points(PointId kept, PointId gone) {
+  if (kept == gone) throw std::invalid_argument("merge_points: both are one point");
+  MapPoint& k = points_.at(kept);
+  const std::vector<Observation> observations = points_.at(gone).observations;
+  k.visible += points_.at(gone).visible;
+  k.found += points_.at(gone).found;
+  if (k.normal.isZero()) k.normal = points_.at(gone).normal;
+  remove_point(gone);
+  for (const Observation& o : observations) observe(kept, o.keyframe, o.feature);
+  refresh_point(kept);
+}
+
+void Map::merge_lines(LineId kept, LineId gone) {
+  if (kept == gone) throw std::invalid_argument("merge_lines: both are one line");
+  MapLine& k = lines_.at(kept);
+  const std::vector<Observation> observations = lines_.at(gone).observations;
+  k.visible += lines_.at(gone).visible;
+  k.found += lines_.at(gone).found;
+  remove_line(gone);
+  for (const Observation& o : observations) observe(kept, o.keyframe, o.feature);
+}
+
 void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int change) {
   KeyframeEntry& entry = keyframes_.at(keyframe);
   for (const Observation& o : others) {
@@ -146,18 +168,24 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int 
   return result;
 }
 
+int Map::shared(KeyframeId a, KeyframeId b) const {
+  const auto& shared = keyframes_.at(a).shared;
+  const auto found = shared.find(b);
+  return found == shared.end() ? 0 : found->second;
+}
+
 void Map::add_edge(const SurfaceEdge& edge) {
   if (edge.a == edge.b) throw std::invalid_argument("add_edge: both ends are one keyframe");
   KeyframeEntry& a = keyframes_.at(edge.a);  // both must be there before either is changed
   KeyframeEntry& b = keyframes_.at(edge.b);
-  a.edges.push_back(edges_.size());
-  b.edges.push_back(edges_.size());
-  edges_.push_back(edge);
+  a.edges.push_back(next_edge_);
+  b.edges.push_back(next_edge_);
+  edges_.emplace(next_edge_++, edge);
 }
 
 std::vector<SurfaceEdge> Map::edges_of(KeyframeId keyframe) const {
   std::vector<SurfaceEdge> result;
-  for (std::size_t i : keyframes_.at(keyframe).edges) result.push_back(edges_[i]);
+  for (std::uint64_t i : keyframes_.at(keyframe).edges) result.push_back(edges_.at(i));
   return result;
 }
 

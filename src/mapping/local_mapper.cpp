@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "plumbline/mapping/landmark_normal.hpp"
+
 namespace plumbline::mapping {
 
 void LocalMapperOptions::declare(core::OptionTable& table) {
@@ -45,12 +47,14 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
   add_points(map, id);
   add_lines(map, id);
+  map.attach(id);
   return id;
 }
 
 void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
   const features::FrameFeatures& features = *map.keyframe(id).features;
   const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
+  const SurfaceNormals normals(map.keyframe(id).surface, camera_);
   for (std::size_t i = 0; i < features.points.size(); ++i) {
     const features::PointFeature& f = features.points[i];
     if (!(f.depth > 0.0F) || static_cast<double>(f.depth) > options_.max_landmark_depth_m) continue;
@@ -63,6 +67,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     point.angle = f.angle;
     point.angle_keyframe = id;
     point.view_direction = (point.position - world_from_camera.translation).normalized();
+    point.normal = world_from_camera.rotation * normals.at(in_camera);
     point.reference_distance = in_camera.norm();
     point.reference_octave = f.octave;
     point.visible = 1;

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Container of things named by core::Id: constant-time look-up, iteration in order of id.
+// Container of things named by core::Id: constant-time look-up, iteration in order of id. What is erased
+// leaves four bytes behind, so that a map in which landmarks come and go does not grow with the length of a
+// run.
+#include <cstdint>
+#include <deque>
 #include <map>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -13,14 +16,10 @@ namespace plumbline::maps {
 template <typename IdType, typename T>
 class IdMap {
  public:
-  [[nodiscard]] bool contains(IdType id) const { return find(id) != nullptr; }
+  [[nodiscard]] bool contains(IdType id) const { return entry_of(id) >= 0; }
   [[nodiscard]] const T* find(IdType id) const {
-    const auto robot = slots_.find(id.robot);
-    if (robot == slots_.end() || id.index < 0 || static_cast<std::size_t>(id.index) >= robot->second.size()) {
-      return nullptr;
-    }
-    const auto& slot = robot->second[static_cast<std::size_t>(id.index)];
-    return slot ? &*slot : nullptr;
+    const std::int32_t entry = entry_of(id);
+    return entry < 0 ? nullptr : &pool_[static_cast<std::size_t>(entry)];
   }
   [[nodiscard]] T* find(IdType id) { return const_cast<T*>(std::as_const(*this).find(id)); }
   [[nodiscard]] const T& at(IdType id) const {
@@ -29,41 +28,64 @@ class IdMap {
     return *found;
   }
   [[nodiscard]] T& at(IdType id) { return const_cast<T&>(std::as_const(*this).at(id)); }
-  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] std::size_t size() const { return pool_.size() - free_.size(); }
 
   /// The next unused id of a robot.
   [[nodiscard]] IdType next_id(std::int32_t robot) const {
     const auto found = slots_.find(robot);
     return {robot, found == slots_.end() ? 0 : static_cast<std::int32_t>(found->second.size())};
   }
-  /// Inserts or replaces.
+  /// Inserts or replaces; the id must be valid. What other ids name stays where it is in memory.
   void insert(IdType id, T value) {
+    if (id.index < 0) throw std::invalid_argument("IdMap: no valid id");
+    if (T* found = find(id); found != nullptr) {
+      *found = std::move(value);
+      return;
+    }
     auto& slots = slots_[id.robot];
     if (static_cast<std::size_t>(id.index) >= slots.size())
-      slots.resize(static_cast<std::size_t>(id.index) + 1);
-    auto& slot = slots[static_cast<std::size_t>(id.index)];
-    if (!slot) ++size_;
-    slot = std::move(value);
+      slots.resize(static_cast<std::size_t>(id.index) + 1, kNone);
+    std::int32_t& slot = slots[static_cast<std::size_t>(id.index)];
+    if (free_.empty()) {
+      slot = static_cast<std::int32_t>(pool_.size());
+      pool_.push_back(std::move(value));
+    } else {
+      slot = free_.back();
+      free_.pop_back();
+      pool_[static_cast<std::size_t>(slot)] = std::move(value);
+    }
   }
   void erase(IdType id) {
-    if (!contains(id)) return;
-    slots_[id.robot][static_cast<std::size_t>(id.index)].reset();
-    --size_;
+    const std::int32_t entry = entry_of(id);
+    if (entry < 0) return;
+    pool_[static_cast<std::size_t>(entry)] = T{};  // gives its memory back
+    free_.push_back(entry);
+    slots_[id.robot][static_cast<std::size_t>(id.index)] = kNone;
   }
   [[nodiscard]] std::vector<IdType> ids() const {
     std::vector<IdType> result;
-    result.reserve(size_);
+    result.reserve(size());
     for (const auto& [robot, slots] : slots_) {
       for (std::size_t i = 0; i < slots.size(); ++i) {
-        if (slots[i]) result.push_back({robot, static_cast<std::int32_t>(i)});
+        if (slots[i] != kNone) result.push_back({robot, static_cast<std::int32_t>(i)});
       }
     }
     return result;
   }
 
  private:
-  std::map<std::int32_t, std::vector<std::optional<T>>> slots_;
-  std::size_t size_ = 0;
+  static constexpr std::int32_t kNone = -1;
+  [[nodiscard]] std::int32_t entry_of(IdType id) const {
+    const auto robot = slots_.find(id.robot);
+    if (robot == slots_.end() || id.index < 0 || static_cast<std::size_t>(id.index) >= robot->second.size()) {
+      return kNone;
+    }
+    return robot->second[static_cast<std::size_t>(id.index)];
+  }
+
+  std::map<std::int32_t, std::vector<std::int32_t>> slots_;  ///< by id: entry of the pool
+  std::deque<T> pool_;
+  std::vector<std::int32_t> free_;  ///< entries of the pool
 };
 
 }  // namespace plumbline::maps

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -52,8 +51,10 @@ struct MapPoint {
   float angle = 0.0F;                                         ///< of that observation, degrees in its picture
   KeyframeId angle_keyframe;                                  ///< whose picture
   Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
-  double reference_distance = 1.0;  ///< metres from the camera of its first observation
-  int reference_octave = 0;         ///< in which octave it was seen there
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< world, unit, of the surface it lies on, towards the
+                                                     ///< camera that measured it; zero: unknown
+  double reference_distance = 1.0;                   ///< metres from the camera of its first observation
+  int reference_octave = 0;                          ///< in which octave it was seen there
   std::vector<Observation> observations;
   int visible = 0;  ///< frames whose view contained it
   int found = 0;    ///< frames that matched it
@@ -80,6 +81,13 @@ struct SurfaceEdge {
   double rms = 0.0;      ///< of the confirmed samples, standard deviations
 };
 
+/// A keyframe that was taken out of the map: its pose moves with the keyframe that took its place.
+struct RetiredKeyframe {
+  double stamp = 0.0;  ///< seconds
+  KeyframeId heir;     ///< in the map
+  geometry::Rigid3 camera_from_heir;
+};
+
 class Map {
  public:
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
@@ -95,11 +103,40 @@ class Map {
   [[nodiscard]] std::vector<KeyframeId> keyframe_ids() const { return keyframes_.ids(); }
   [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }
 
+  /// Takes a keyframe out: its observations and edges go, and landmarks that nobody else sees. What hung on
+  /// it in the spanning tree goes to its parent or to a sister, whichever shares most. Its heir is its parent
+  /// (of a root: the child that follows it as root). Throws std::invalid_argument for the only keyframe there
+  /// is.
+  void remove_keyframe(KeyframeId id);
+  /// Keyframes that were taken out, by id.
+  [[nodiscard]] std::vector<KeyframeId> retired_ids() const { return retired_.ids(); }
+  [[nodiscard]] const RetiredKeyframe& retired(KeyframeId id) const { return retired_.at(id); }
+  /// camera_from_world of any keyframe that was ever in the map, as its heir lies now.
+  [[nodiscard]] geometry::Rigid3 pose_of(KeyframeId id) const;
+  [[nodiscard]] double stamp_of(KeyframeId id) const;  ///< the same for the stamp, seconds
+
+  // Spanning tree: every keyframe but a root hangs on one that shared much with it when it was made.
+  /// Hangs a new keyframe on the one that shares most with it; if none does, on the robot's last one before
+  /// it.
+  void attach(KeyframeId id);
+  void set_parent(KeyframeId child, KeyframeId parent);  ///< std::invalid_argument: would be a cycle
+  [[nodiscard]] KeyframeId parent(KeyframeId id) const {
+    return keyframes_.at(id).parent;
+  }  ///< invalid: root
+  [[nodiscard]] const std::vector<KeyframeId>& children(KeyframeId id) const {
+    return keyframes_.at(id).children;
+  }
+
   // Landmarks.
   PointId add_point(std::int32_t robot, MapPoint point);
   LineId add_line(std::int32_t robot, MapLine line);
   void remove_point(PointId id);
   void remove_line(LineId id);
+  /// Two landmarks that are one: `kept` takes the observations and counts of `gone`, which is removed. Where
+  /// one keyframe sees both, the feature of `kept` stays. Positions are the caller's business. Throws
+  /// std::invalid_argument when both are the same.
+  void merge_points(PointId kept, PointId gone);
+  void merge_lines(LineId kept, LineId gone);
   [[nodiscard]] const MapPoint* find_point(PointId id) const { return points_.find(id); }
   [[nodiscard]] const MapLine* find_line(LineId id) const { return lines_.find(id); }
   [[nodiscard]] MapPoint& point(PointId id) { return points_.at(id); }
@@ -127,6 +164,9 @@ class Map {
   /// are none, the ones that share most.
   [[nodiscard]] std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId keyframe, int min_shared) const;
 
+  /// Landmarks that both see.
+  [[nodiscard]] int shared(KeyframeId a, KeyframeId b) const;
+
   void add_edge(const SurfaceEdge& edge);
   /// Edges that have `keyframe` at one end, in order of creation.
   [[nodiscard]] std::vector<SurfaceEdge> edges_of(KeyframeId keyframe) const;
@@ -141,14 +181,23 @@ class Map {
     std::vector<PointId> points;  ///< by feature
     std::vector<LineId> lines;    ///< by feature
     std::map<KeyframeId, int> shared;
-    std::vector<std::size_t> edges;
+    std::vector<std::uint64_t> edges;
+    KeyframeId parent;
+    std::vector<KeyframeId> children;  ///< by id
+    std::vector<KeyframeId> retired;   ///< whose heir this is
   };
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
+  void forget_observations(KeyframeId id);
+  void forget_edges(KeyframeId id);
+  void detach(KeyframeId child);
+  KeyframeId leave_tree(KeyframeId id);
 
   IdMap<KeyframeId, KeyframeEntry> keyframes_;
   IdMap<PointId, MapPoint> points_;
   IdMap<LineId, MapLine> lines_;
-  std::vector<SurfaceEdge> edges_;
+  IdMap<KeyframeId, RetiredKeyframe> retired_;
+  std::map<std::uint64_t, SurfaceEdge> edges_;  ///< by order of creation
+  std::uint64_t next_edge_ = 0;
 };
 
 }  // namespace plumbline::maps

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which way the surface under a landmark faces, from the depth image of the keyframe that made it (METHOD
+// section 4 wants it from the local cloud, not from neighbouring sparse points).
+#include <Eigen/Core>
+#include <vector>
+
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::mapping {
+
+/// Look-up of a keyframe's surface samples around a pixel. Keeps a reference to the samples.
+class SurfaceNormals {
+ public:
+  SurfaceNormals(const std::vector<maps::SurfaceSample>& surface, const sensor::Pinhole& camera);
+
+  /// Unit normal (camera frame, towards the camera) at `point` (camera frame, metres): the mean over the
+  /// samples within 32 px whose tangent planes pass through the point, within three standard deviations. Zero
+  /// when there are fewer than three, or when they do not agree: edges of objects have no one normal.
+  [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& point) const;
+
+ private:
+  const std::vector<maps::SurfaceSample>& surface_;
+  sensor::Pinhole camera_;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<std::vector<int>> cells_;
+};
+
+}  // namespace plumbline::mapping
