@@ -8,6 +8,10 @@
 #include <oneapi/tbb/task_group.h>
 
 #include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
 #include <utility>
 
 namespace plumbline::core {
@@ -21,16 +25,39 @@ struct Executor::Impl {
   }
   tbb::global_control allowed;  ///< more threads than cores are given when they are asked for
   mutable tbb::task_arena arena;
+  mutable tbb::task_group beside;  ///< what was submitted
 };
 
+/// Done by whoever claims it first: a thread of the arena or the one that waits.
 struct Executor::Job::State {
-  tbb::task_arena* arena = nullptr;
-  tbb::task_group group;
+  explicit State(std::function<void()> what) : work(std::move(what)) {}
+
+  void run_unless_claimed() {
+    if (claimed.exchange(true)) return;
+    try {
+      work();
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    work = nullptr;
+    const std::lock_guard<std::mutex> lock(mutex);
+    done = true;
+    changed.notify_all();
+  }
+
+  std::function<void()> work;
+  std::atomic<bool> claimed{false};
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;
+  std::exception_ptr failure;
 };
 
 Executor::Executor(int threads)
     : impl_(std::make_unique<Impl>(threads > 0 ? threads : tbb::info::default_concurrency())) {}
-Executor::~Executor() = default;
+Executor::~Executor() {
+  impl_->arena.execute([&] { impl_->beside.wait(); });
+}
 
 int Executor::threads() const { return impl_->arena.max_concurrency(); }
 
@@ -48,9 +75,8 @@ void Executor::parallel_for(std::size_t count, const std::function<void(std::siz
 
 Executor::Job Executor::submit(std::function<void()> work) const {
   Job job;
-  job.state_ = std::make_unique<Job::State>();
-  job.state_->arena = &impl_->arena;
-  impl_->arena.execute([&] { job.state_->group.run(std::move(work)); });
+  job.state_ = std::make_shared<Job::State>(std::move(work));
+  impl_->arena.execute([&] { impl_->beside.run([state = job.state_] { state->run_unless_claimed(); }); });
   return job;
 }
 
@@ -78,10 +104,18 @@ Executor::Job::~Job() {
   }
 }
 bool Executor::Job::valid() const { return state_ != nullptr; }
+bool Executor::Job::ready() const {
+  if (!state_) return false;
+  const std::lock_guard<std::mutex> lock(state_->mutex);
+  return state_->done;
+}
 void Executor::Job::wait() {
   if (!state_) return;
   const auto state = std::move(state_);
-  state->arena->execute([&] { state->group.wait(); });
+  state->run_unless_claimed();
+  std::unique_lock<std::mutex> lock(state->mutex);
+  state->changed.wait(lock, [&] { return state->done; });
+  if (state->failure) std::rethrow_exception(state->failure);
 }
 
 }  // namespace plumbline::core
