@@ -30,6 +30,8 @@ std::string value_name(const core::OptionSpec& spec) {
       return fmt::format("{}", fmt::join(spec.choices, "|"));
     case core::OptionType::kNumbers:
       return "[N, ...]";
+    case core::OptionType::kTextOrList:
+      return "FILE|[...]";
   }
   return "VALUE";
 }

@@ -2,226 +2,14 @@
 #include "plumbline/core/config.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/eventhandler.h>
-#include <yaml-cpp/exceptions.h>
-#include <yaml-cpp/mark.h>
-#include <yaml-cpp/parser.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
-#include <fstream>
-#include <map>
-#include <sstream>
-#include <system_error>
+#include <string_view>
 
 namespace plumbline::core {
 namespace {
-
-constexpr std::size_t kMaxBytes = 1'000'000;
-constexpr std::size_t kMaxDepth = 20;
-constexpr std::size_t kMaxNodes = 100'000;
-
-/// Ends the walk: what follows cannot be read sensibly.
-struct Refused {
-  ConfigProblem problem;
-};
-
-std::size_t count_nodes(const ConfigNode& node) {
-  std::size_t count = 1;
-  for (const ConfigNode& item : node.items) count += count_nodes(item);
-  for (const auto& [key, value] : node.entries) count += count_nodes(value);
-  return count;
-}
-
-std::size_t depth_of(const ConfigNode& node) {
-  std::size_t deepest = 0;
-  for (const ConfigNode& item : node.items) deepest = std::max(deepest, depth_of(item));
-  for (const auto& [key, value] : node.entries) deepest = std::max(deepest, depth_of(value));
-  return deepest + 1;
-}
-
-/// Builds the tree from yaml-cpp's parse events rather than from YAML::Node, which drops duplicate keys and
-/// the places of keys, and expands aliases without counting.
-class TreeBuilder : public YAML::EventHandler {
- public:
-  TreeBuilder(std::string file, ConfigProblems& problems) : file_(std::move(file)), problems_(problems) {}
-
-  ConfigNode take_root() { return std::move(root_); }
-
-  void OnDocumentStart(const YAML::Mark& at) override {
-    if (documents_++ > 0) refuse(mark(at), "text after the end of the document (one document per file)");
-  }
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark& at, YAML::anchor_t anchor) override {
-    ConfigNode node;
-    node.mark = mark(at);
-    leaf(std::move(node), anchor);
-  }
-  void OnScalar(const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor,
-                const std::string& value) override {
-    check_tag(at, tag);
-    ConfigNode node;
-    node.kind = ConfigNode::Kind::kScalar;
-    node.mark = mark(at);
-    node.scalar = value;
-    node.quoted = tag == "!";
-    leaf(std::move(node), anchor);
-  }
-  void OnAlias(const YAML::Mark& at, YAML::anchor_t anchor) override {
-    const auto found = anchors_.find(anchor);
-    if (found == anchors_.end()) refuse(mark(at), "the alias contains itself");
-    // Counted before it is copied: nested aliases grow exponentially.
-    count(found->second.nodes, mark(at));
-    if (open_.size() + found->second.depth > kMaxDepth) too_deep(mark(at));
-    ConfigNode copy = found->second.node;
-    copy.mark = mark(at);
-    attach(std::move(copy));
-  }
-  void OnSequenceStart(const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor,
-                       YAML::EmitterStyle::value /*style*/) override {
-    start(ConfigNode::Kind::kSequence, at, tag, anchor);
-  }
-  void OnMapStart(const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor,
-                  YAML::EmitterStyle::value /*style*/) override {
-    start(ConfigNode::Kind::kMap, at, tag, anchor);
-  }
-  void OnSequenceEnd() override { end(); }
-  void OnMapEnd() override { end(); }
-
- private:
-  struct Open {
-    ConfigNode node;
-    YAML::anchor_t anchor = 0;
-    bool has_key = false;  ///< of a map: the next node is the value of `key`
-    bool duplicate = false;
-    std::string key;
-    ConfigMark key_mark;
-  };
-  struct Anchored {
-    ConfigNode node;
-    std::size_t nodes = 0;
-    std::size_t depth = 0;
-  };
-
-  [[nodiscard]] ConfigMark mark(const YAML::Mark& at) const {
-    if (at.is_null()) return {file_, 0, 0};
-    return {file_, at.line + 1, at.column + 1};
-  }
-  [[noreturn]] void refuse(ConfigMark at, std::string what) const {
-    throw Refused{{std::move(at), path(), std::move(what)}};
-  }
-  [[noreturn]] void too_deep(ConfigMark at) const {
-    refuse(std::move(at), fmt::format("nested too deeply (allowed: {} levels)", kMaxDepth));
-  }
-  void count(std::size_t nodes, const ConfigMark& at) {
-    nodes_ += nodes;
-    if (nodes_ > kMaxNodes) {
-      refuse(at, fmt::format("too many values after alias expansion (allowed: {})", kMaxNodes));
-    }
-  }
-  void check_tag(const YAML::Mark& at, const std::string& tag) {
-    if (tag.empty() || tag == "?" || tag == "!") return;
-    problems_.push_back({mark(at), path(), fmt::format("the tag '{}' means nothing here; remove it", tag)});
-  }
-  /// Dotted path of the node that is being read.
-  [[nodiscard]] std::string path() const {
-    std::string text;
-    for (const Open& open : open_) {
-      if (open.node.kind == ConfigNode::Kind::kMap && open.has_key) {
-        text += (text.empty() ? "" : ".") + open.key;
-      } else if (open.node.kind == ConfigNode::Kind::kSequence) {
-        text += fmt::format("[{}]", open.node.items.size());
-      }
-    }
-    return text;
-  }
-
-  void leaf(ConfigNode node, YAML::anchor_t anchor) {
-    count(1, node.mark);
-    if (anchor != 0) anchors_[anchor] = {node, 1, 1};
-    attach(std::move(node));
-  }
-  void start(ConfigNode::Kind kind, const YAML::Mark& at, const std::string& tag, YAML::anchor_t anchor) {
-    count(1, mark(at));
-    check_tag(at, tag);
-    if (open_.size() >= kMaxDepth) too_deep(mark(at));
-    if (!open_.empty() && open_.back().node.kind == ConfigNode::Kind::kMap && !open_.back().has_key) {
-      refuse(mark(at), "a key must be a plain word");
-    }
-    Open open;
-    open.node.kind = kind;
-    open.node.mark = mark(at);
-    open.anchor = anchor;
-    open_.push_back(std::move(open));
-  }
-  void end() {
-    Open done = std::move(open_.back());
-    open_.pop_back();
-    if (done.anchor != 0) anchors_[done.anchor] = {done.node, count_nodes(done.node), depth_of(done.node)};
-    attach(std::move(done.node));
-  }
-  void attach(ConfigNode node) {
-    if (open_.empty()) {
-      root_ = std::move(node);
-      return;
-    }
-    Open& parent = open_.back();
-    if (parent.node.kind == ConfigNode::Kind::kSequence) {
-      parent.node.items.push_back(std::move(node));
-    } else if (!parent.has_key) {
-      take_key(parent, node);
-    } else {
-      if (!parent.duplicate) {
-        parent.node.entries.emplace_back(parent.key, std::move(node));
-        parent.node.key_marks.push_back(parent.key_mark);
-      }
-      parent.has_key = false;
-    }
-  }
-  void take_key(Open& parent, const ConfigNode& key) {
-    if (key.kind != ConfigNode::Kind::kScalar) refuse(key.mark, "a key must be a plain word");
-    parent.key = key.scalar;
-    parent.key_mark = key.mark;
-    parent.has_key = true;
-    parent.duplicate = false;
-    const auto& entries = parent.node.entries;
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      if (entries[i].first != key.scalar) continue;
-      parent.duplicate = true;
-      problems_.push_back(
-          {key.mark, path(),
-           fmt::format("the key is given twice (first in line {})", parent.node.key_marks[i].line)});
-    }
-  }
-
-  std::string file_;
-  ConfigProblems& problems_;
-  std::vector<Open> open_;
-  std::map<YAML::anchor_t, Anchored> anchors_;
-  std::size_t nodes_ = 0;
-  int documents_ = 0;
-  ConfigNode root_;
-};
-
-/// yaml-cpp takes 0x04 for the end of the file, so control characters would hide what follows them.
-void check_characters(const std::string& text, const std::string& file) {
-  int line = 1;
-  int column = 1;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '\n') {
-      ++line;
-      column = 1;
-      continue;
-    }
-    if (byte < 0x20 && c != '\t' && c != '\r') {
-      throw Refused{{{file, line, column},
-                     "",
-                     fmt::format("control character 0x{:02x}; this is not a text file", byte)}};
-    }
-    ++column;
-  }
-}
 
 /// Edit distance where swapping two neighbours costs one (optimal string alignment).
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -246,6 +34,53 @@ std::string folded(const std::string& word) {
     out += c == '-' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
   return out;
+}
+
+/// Whether a text reads back as itself without quotes.
+bool reads_back_plain(const std::string& text) {
+  const auto is_plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 ||
+           std::string_view(" _/.+-%").find(static_cast<char>(c)) != std::string::npos;
+  };
+  if (text.empty() || text.back() == ' ' || !std::all_of(text.begin(), text.end(), is_plain)) return false;
+  if (folded(text) == "null") return false;
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  const char first = text.front();
+  return std::isalnum(static_cast<unsigned char>(first)) != 0 || first == '/' || first == '.' ||
+         ((first == '-' || first == '+') && text.size() > 1 && digit(text[1]));
+}
+
+std::string text_as_yaml(const std::string& text, bool quoted) {
+  if (!quoted && reads_back_plain(text)) return text;
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (c == '\n') {
+      out += "\\n";
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+/// The candidate with the fewest typing errors, "" when even that has too many.
+template <typename Name>
+std::string nearest(const std::string& word, const std::vector<std::string>& candidates, const Name& name) {
+  constexpr std::size_t kLongestWord = 64;
+  if (word.empty() || word.size() > kLongestWord) return "";
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(1, word.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    const std::string known = name(candidate);
+    if (known.size() > kLongestWord) continue;
+    const std::size_t distance = edit_distance(folded(word), folded(known));
+    if (distance < best_distance && distance < known.size()) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -287,64 +122,36 @@ std::string to_string(const ConfigProblems& problems) {
 
 Error to_error(const ConfigProblems& problems) { return {ErrorKind::kUsage, to_string(problems)}; }
 
-Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name) {
-  ConfigProblems problems;
-  ConfigNode root;
-  try {
-    if (text.size() > kMaxBytes) {
-      throw Refused{{{file_name, 0, 0}, "", "the file is over 1 MB; this is no configuration file"}};
-    }
-    check_characters(text, file_name);
-    std::istringstream stream(text);
-    YAML::Parser parser(stream);
-    TreeBuilder builder(file_name, problems);
-    while (parser.HandleNextDocument(builder)) {
-    }
-    root = builder.take_root();
-    if (root.mark.file.empty()) root.mark.file = file_name;  // an empty document has no place of its own
-  } catch (const Refused& refused) {
-    problems.push_back(refused.problem);
-  } catch (const YAML::Exception& e) {
-    ConfigMark mark{file_name, 0, 0};
-    if (!e.mark.is_null()) mark = {file_name, e.mark.line + 1, e.mark.column + 1};
-    problems.push_back({mark, "", "not valid YAML: " + e.msg});
-  }
-  if (!problems.empty()) return tl::unexpected<Error>(to_error(problems));
-  return root;
-}
-
-Result<ConfigNode> read_yaml(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
-    return usage_error(fmt::format("{}: no such file", file.string()));
-  }
-  if (std::filesystem::is_directory(file, ignored)) {
-    return usage_error(fmt::format("{}: is a folder, not a YAML file", file.string()));
-  }
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return usage_error(fmt::format("{}: cannot be read; check its permissions", file.string()));
-  // One byte more than allowed is enough to tell; the file may be a device without end.
-  std::string text(kMaxBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return usage_error(fmt::format("{}: cannot be read", file.string()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  return parse_yaml(text, file.string());
-}
-
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates) {
-  constexpr std::size_t kLongestWord = 64;
-  if (word.empty() || word.size() > kLongestWord) return "";
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(1, word.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    if (candidate.size() > kLongestWord) continue;
-    const std::size_t distance = edit_distance(folded(word), folded(candidate));
-    if (distance < best_distance && distance < candidate.size()) {
-      best = candidate;
-      best_distance = distance;
-    }
+  std::string near = nearest(word, candidates, [](const std::string& c) { return c; });
+  if (!near.empty()) return near;
+  // "max_rotation" for "keyframe.max_rotation": the group was forgotten.
+  return nearest(word, candidates, [](const std::string& c) { return c.substr(c.rfind('.') + 1); });
+}
+
+std::string hint(const std::string& word, const std::vector<std::string>& allowed) {
+  const std::string near = did_you_mean(word, allowed);
+  return fmt::format("{} (allowed: {})", near.empty() ? "" : fmt::format("; did you mean {}?", near),
+                     allowed.empty() ? "nothing" : fmt::format("{}", fmt::join(allowed, ", ")));
+}
+
+std::string to_flow_yaml(const ConfigNode& node) {
+  std::vector<std::string> parts;
+  switch (node.kind) {
+    case ConfigNode::Kind::kNull:
+      return "~";
+    case ConfigNode::Kind::kScalar:
+      return text_as_yaml(node.scalar, node.quoted);
+    case ConfigNode::Kind::kSequence:
+      for (const ConfigNode& item : node.items) parts.push_back(to_flow_yaml(item));
+      return fmt::format("[{}]", fmt::join(parts, ", "));
+    case ConfigNode::Kind::kMap:
+      for (const auto& [key, value] : node.entries) {
+        parts.push_back(fmt::format("{}: {}", text_as_yaml(key, false), to_flow_yaml(value)));
+      }
+      return fmt::format("{{{}}}", fmt::join(parts, ", "));
   }
-  return best;
+  return "~";
 }
 
 }  // namespace plumbline::core

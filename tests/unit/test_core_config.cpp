@@ -105,6 +105,38 @@ TEST(Config, ReadingNamesTheFile) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(Config, ATreeIsGivenBesideItsProblems) {
+  ConfigProblems problems;
+  const auto tree = parse_yaml("a: 1\na: 2\nb: !x 3\n", "f.yaml", problems);
+  ASSERT_TRUE(tree);
+  EXPECT_EQ(tree->find("a")->scalar, "1");
+  EXPECT_EQ(tree->find("b")->scalar, "3");
+  EXPECT_EQ(problems.size(), 2U);
+  EXPECT_FALSE(parse_yaml("a: [", "f.yaml", problems));
+  EXPECT_EQ(problems.size(), 3U);
+  EXPECT_FALSE(read_yaml("/nowhere/f.yaml", problems));
+  EXPECT_EQ(problems.back().what, "no such file");
+}
+
+TEST(Config, FlowTextReadsBackAsTheSameTree) {
+  const char* const text =
+      "{a: 5 mm, b: [on, -3, +0.5, .5, -1e-3], c: {}, d: \"a: b # \\\"q\\\\\", e: ~, f: \"\", g: \"- x\", h: "
+      "\"null\", "
+      "i: \"%x\", j: 30 %, k: \" x\", l: filters/map.yaml, m: \"1\\n2\"}";
+  const auto tree = parse_yaml(text, "f.yaml");
+  ASSERT_TRUE(tree) << tree.error().message;
+  EXPECT_EQ(to_flow_yaml(*tree), text);
+  ConfigNode odd;
+  odd.kind = Kind::kScalar;
+  for (const char* words : {"- x", "-", "null", "NULL", "~", "a b ", "# no", "&a", "100 %", "a\tb"}) {
+    odd.scalar = words;
+    const auto back = parse_yaml(to_flow_yaml(odd), "f.yaml");
+    ASSERT_TRUE(back) << words;
+    EXPECT_EQ(back->kind, Kind::kScalar) << words;
+    EXPECT_EQ(back->scalar, words);
+  }
+}
+
 TEST(Config, ProblemsAreToldInFileOrder) {
   const ConfigProblems problems{{{"b.yaml", 9, 1}, "x", "late"},
                                 {{"--set", 0, 0}, "track.points", "wrong"},

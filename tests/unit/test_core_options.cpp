@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "plumbline/core/option_schema.hpp"
 #include "plumbline/core/options.hpp"
 
 namespace plumbline::core {
@@ -18,10 +20,12 @@ struct Sample {
   double angle_rad = 0.1;
   double wait_s = 0.5;
   double share = 0.5;
+  double turn_rate = 1.0;
   std::string name = "a name";
   std::string view = "iso";
   Kernel kernel = Kernel::kHuber;
   std::vector<double> box{0.0, 1.0};
+  ConfigNode steps{ConfigNode::Kind::kSequence, {}, {}, false, {}, {}, {}};
 
   OptionTable table() {
     OptionTable t;
@@ -35,7 +39,9 @@ struct Sample {
         .text("name", name, "Name")
         .choice("view", view, {"iso", "top", "front"}, "View")
         .choice("kernel", kernel, {{"huber", Kernel::kHuber}, {"none", Kernel::kNone}}, "Kernel")
-        .numbers("box", box, 2, {-5.0, 5.0}, "m", "Box");
+        .numbers("box", box, 2, {-5.0, 5.0}, "m", "Box")
+        .number("turn_rate", turn_rate, {0.0, 10.0}, "rad/s", "Rad | s")
+        .text_or_list("steps", steps, "steps", "What to do");
     return t;
   }
 };
@@ -83,7 +89,7 @@ TEST(Options, EveryProblemIsToldWithPlaceAndRemedy) {
       told.find("stages.s.leaf: '5 deg': the unit 'deg' does not fit (allowed: a number in m, cm, mm, um)"),
       std::string::npos);
   EXPECT_NE(told.find("stages.s.angle: 'wide' is not a number in rad, deg"), std::string::npos);
-  EXPECT_NE(told.find("'tpo' is not one of the choices (allowed: iso, top, front; did you mean top?)"),
+  EXPECT_NE(told.find("'tpo' is not one of the choices; did you mean top? (allowed: iso, top, front)"),
             std::string::npos);
   EXPECT_NE(told.find("stages.s.box: has 1 numbers (allowed: 2)"), std::string::npos);
   EXPECT_EQ(s.count, 1000);  // nothing was changed
@@ -92,13 +98,16 @@ TEST(Options, EveryProblemIsToldWithPlaceAndRemedy) {
 
 TEST(Options, RefusesWhatOnlyLooksLikeANumber) {
   for (const char* value :
-       {"nan", "inf", "-inf", "\"5\"", "0x5", "1e999", "[1]", "{a: 1}", "~", "5 5", "", "--5"}) {
+       {"nan", "inf", "-inf", "\"5\"", "0x5", "1e999", "[1]", "{a: 1}", "~", "5 5", "", "--5", "+-5"}) {
     Sample s;
     EXPECT_NE(read(s, std::string("leaf: ") + value + "\n"), "") << value;
     EXPECT_EQ(s.leaf_m, 0.01) << value;
   }
   Sample s;
   EXPECT_NE(read(s, "count: 99.5\n").find("not a whole number"), std::string::npos);
+  EXPECT_EQ(read(s, "turn_rate: 90 deg/s\nwait: 1 min\n"), "");
+  EXPECT_DOUBLE_EQ(s.turn_rate, 3.14159265358979323846 / 2.0);
+  EXPECT_EQ(s.wait_s, 60.0);
   EXPECT_NE(read(s, "wait: -1\n").find("at least 0 s"), std::string::npos);
   EXPECT_NE(read(s, "- 1\n").find("not a map"), std::string::npos);
   EXPECT_EQ(read(s, ""), "");
@@ -132,6 +141,56 @@ TEST(Options, SpecsCarryTheDefaults) {
   EXPECT_EQ(table.specs()[3].default_value, "0.01 m");
   EXPECT_EQ(table.value("leaf"), "0.5 m");
   EXPECT_THROW((void)table.value("nothing"), std::logic_error);
+}
+
+TEST(Options, AFileOrAListIsKeptAsItStands) {
+  Sample s;
+  EXPECT_EQ(read(s, "steps: [{type: range, max: 3 m}, {name: \"a: b\"}]\n"), "");
+  ASSERT_EQ(s.steps.kind, ConfigNode::Kind::kSequence);
+  EXPECT_EQ(s.steps.items[1].find("name")->mark.column, 41);
+  EXPECT_EQ(s.table().value("steps"), "[{type: range, max: 3 m}, {name: \"a: b\"}]");
+  EXPECT_EQ(read(s, "steps: some/file.yaml\n"), "");
+  EXPECT_EQ(s.table().value("steps"), "some/file.yaml");
+  EXPECT_NE(read(s, "steps: {a: 1}\n").find("a map is neither a file nor a list of steps"),
+            std::string::npos);
+}
+
+TEST(Options, ForgottenGroupsAreSuggested) {
+  EXPECT_EQ(did_you_mean("max_rotation", {"keyframe.max_rotation", "points"}), "keyframe.max_rotation");
+  EXPECT_EQ(hint("voxl", {"voxel", "filters"}), "; did you mean voxel? (allowed: voxel, filters)");
+  EXPECT_EQ(hint("banana", {"voxel"}), " (allowed: voxel)");
+  EXPECT_EQ(hint("banana", {}), " (allowed: nothing)");
+}
+
+TEST(Options, SchemaOfEveryType) {
+  using Json = nlohmann::ordered_json;
+  Sample s;
+  const OptionTable table = s.table();
+  const Json schema = options_schema(table.specs());
+  ASSERT_EQ(schema.size(), table.specs().size());
+  EXPECT_EQ(schema["lines"]["enum"], Json::parse(R"([true, false, "on", "off", "yes", "no"])"));
+  EXPECT_EQ(schema["count"]["anyOf"][0],
+            Json::parse(R"({"type": "integer", "minimum": 50, "maximum": 10000})"));
+  EXPECT_EQ(schema["wait"]["anyOf"][0], Json::parse(R"({"type": "number", "minimum": 0})"));
+  EXPECT_EQ(schema["leaf"]["anyOf"][1]["pattern"],
+            "^[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?( *(m|cm|mm|um))?$");
+  EXPECT_EQ(schema["kernel"]["enum"], Json::parse(R"(["huber", "none"])"));
+  EXPECT_EQ(schema["box"]["minItems"], 2);
+  EXPECT_EQ(schema["steps"]["anyOf"][1]["$ref"], "#/definitions/steps");
+  EXPECT_EQ(schema["leaf"]["description"], "Leaf (0.001 m to 1 m; default: 0.01 m)");
+}
+
+TEST(Options, TableOfEveryType) {
+  Sample s;
+  const std::string page = options_as_markdown(s.table().specs());
+  for (const char* row :
+       {"| `lines` | on | on, off | Use lines |", "| `leaf` | 0.01 m | 0.001 m to 1 m | Leaf |",
+        "| `box` | [0 m, 1 m] | 2 numbers, -5 m to 5 m | Box |", "| `wait` | 0.5 s | at least 0 s | Wait |",
+        "| `turn_rate` | 1 rad/s | 0 rad/s to 10 rad/s | Rad \\| s |",
+        "| `steps` | [] | file, or list of steps | What to do |"}) {
+    EXPECT_NE(page.find(row), std::string::npos) << row << "\nnot in\n" << page;
+  }
+  EXPECT_EQ(options_as_markdown({}), "");
 }
 
 TEST(Options, TheSameKeyTwiceIsABug) {

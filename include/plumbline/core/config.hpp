@@ -4,6 +4,7 @@
 // A parsed configuration file as a plain tree that remembers where everything stood.
 // yaml-cpp stays inside core; everyone else sees these structs.
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,7 +52,21 @@ Error to_error(const ConfigProblems& problems);
 Result<ConfigNode> read_yaml(const std::filesystem::path& file);
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name);
 
-/// The word of `candidates` nearest to `word` if it is near enough to be a typing error, else "".
+/// The same, with the problems added to a list, so that those of a file's meaning can be told with them.
+/// None: nothing sensible can be read (no such file, broken syntax, a limit). Of a key given twice the first
+/// holds.
+std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigProblems& problems);
+std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name,
+                                     ConfigProblems& problems);
+
+/// One line of YAML that reads back as the same tree.
+std::string to_flow_yaml(const ConfigNode& node);
+
+/// The word of `candidates` nearest to `word` if it is near enough to be a typing error, else "". Of dotted
+/// candidates the last part alone will do.
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates);
+
+/// What follows "unknown key": "; did you mean voxel? (allowed: voxel, filters)".
+std::string hint(const std::string& word, const std::vector<std::string>& allowed);
 
 }  // namespace plumbline::core

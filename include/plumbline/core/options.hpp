@@ -29,7 +29,7 @@ struct Range {
   T max = std::numeric_limits<T>::max();
 };
 
-enum class OptionType { kBoolean, kInteger, kNumber, kText, kChoice, kNumbers };
+enum class OptionType { kBoolean, kInteger, kNumber, kText, kChoice, kNumbers, kTextOrList };
 
 /// What is known of one option; values as text in the syntax that the parser accepts.
 struct OptionSpec {
@@ -41,6 +41,7 @@ struct OptionSpec {
   double max = std::numeric_limits<double>::max();
   std::vector<std::string> choices;
   std::size_t length = 0;  ///< of kNumbers: how many numbers, 0 = any
+  std::string list_of;     ///< of kTextOrList: what the list holds, e.g. "filters"
   std::string help;
 };
 
@@ -59,6 +60,8 @@ class OptionTable {
   template <typename Enum>
   OptionTable& choice(std::string key, Enum& value, std::vector<std::pair<std::string, Enum>> allowed,
                       std::string help);
+  /// A file's name, or the list that would stand in the file. The owner reads the tree.
+  OptionTable& text_or_list(std::string key, ConfigNode& value, std::string list_of, std::string help);
 
   /// Reads one value; `path` is the dotted path of the map that holds the key. Numbers may carry a unit ("5
   /// mm", "10 deg", "0.5 s"), converted to the option's unit; booleans are true/false/on/off/yes/no. The
@@ -82,7 +85,7 @@ class OptionTable {
     std::function<std::string(const ConfigNode&)> parse;
     std::function<std::string()> print;
   };
-  void add(OptionSpec spec, Binding binding);
+  OptionTable& add(OptionSpec spec, Binding binding);
 
   std::vector<OptionSpec> specs_;
   std::vector<Binding> bindings_;
@@ -112,8 +115,7 @@ OptionTable& OptionTable::choice(std::string key, Enum& value,
     }
     return "";
   };
-  add(std::move(spec), std::move(binding));
-  return *this;
+  return add(std::move(spec), std::move(binding));
 }
 
 }  // namespace plumbline::core
