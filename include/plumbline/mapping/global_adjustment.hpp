@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The whole map in one optimisation: all keyframes, points and lines, the surface edges of the map, and edges
+// from elsewhere (aligned local maps, closed loops, overlaps of robots). First a pose graph, which takes out
+// drift and tells wrong edges; then bundle adjustment with the edges that are left (METHOD sections 3 and 6).
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/optimize/bundle_adjustment.hpp"
+#include "plumbline/optimize/pose_graph.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::mapping {
+
+/// The camera of each robot that has keyframes in the map.
+using Cameras = std::map<std::int32_t, sensor::Pinhole>;
+
+/// Where keyframe b lies relative to keyframe a, measured. The information of
+/// xi = log(b_from_a_estimate * b_from_a^-1), xi = (rho, phi) in metres and radians, may be singular.
+struct PoseEdge {
+  core::KeyframeId a;
+  core::KeyframeId b;
+  geometry::Rigid3 b_from_a;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();
+  bool trusted = false;  ///< never taken for wrong
+};
+
+/// What a keyframe's pose shall be: camera_from_world.
+using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>;
+
+/// How keyframes lie to each other in the map now: each to the one before it of its robot, to those it shares
+/// at least `min_shared` landmarks with (at most `max_neighbours`), and to those its surface is aligned with.
+/// All trusted; the information grows with what they share. The body of a pose graph.
+std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared = 30, int max_neighbours = 6);
+
+struct MapGraphResult {
+  KeyframePoses poses;                 ///< all keyframes, by id
+  optimize::PoseGraphSummary summary;  ///< its edges: those of `extra`, in their order
+};
+
+/// Pose graph of map_edges(map) and `extra`. `anchor` is held (an invalid id: the map's first keyframe). The
+/// map is not changed. Edges of `extra` between keyframes that the map does not hold throw std::out_of_range.
+MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
+                               const optimize::PoseGraphOptions& options, core::KeyframeId anchor = {});
+
+/// Gives keyframes new poses; points and lines follow the keyframes that see them (mean over these).
+void move_keyframes(maps::Map& map, const KeyframePoses& poses);
+
+struct GlobalAdjustmentOptions {
+  bool pose_graph = true;  ///< before bundle adjustment, when there are edges besides the map's own
+  bool bundle = true;
+  int observations = 250;  ///< points and lines that a keyframe is tied with at most; those seen most often
+  double max_turn_rate = 0.6;  ///< rad/s; the pictures of keyframes that turned faster do not speak
+  double orb_scale_factor = 1.2;
+  optimize::PoseGraphOptions graph;
+  optimize::BundleOptions bundle_options;
+  GlobalAdjustmentOptions();
+  void declare(core::OptionTable& table);
+};
+
+struct GlobalAdjustmentSummary {
+  int keyframes = 0;
+  int points = 0;  ///< adjusted; the others follow their keyframes
+  int lines = 0;
+  int surface_edges = 0;
+  std::vector<optimize::EdgeVerdict> extra;  ///< of each edge of `extra`; empty when no pose graph was solved
+  int rejected = 0;                          ///< edges of `extra` that were taken for wrong
+  optimize::BundleSummary bundle;
+  double mean_shift_m = 0.0;  ///< how far keyframes moved
+  double max_shift_m = 0.0;
+  bool changed = false;  ///< the map was moved
+  std::string message;   ///< why not, or what the solver said
+};
+
+/// Moves all keyframes and landmarks of the map to where everything fits best, and takes observations that do
+/// not fit out of it. `anchor` stays where it is (an invalid id: the map's first keyframe). The same input
+/// gives the same bytes. Every robot of the map must have a camera (throws std::out_of_range).
+GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
+                                   const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {});
+
+}  // namespace plumbline::mapping

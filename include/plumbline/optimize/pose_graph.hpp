@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Pose graph: poses held together by relative measurements only, some of which may be wrong. Wrong edges are
+// found by graduated non-convexity with a truncated quadratic (Yang, Antonante, Tzoumas, Carlone, RA-L 2020):
+// least squares with weights that go from nearly convex to 0 or 1. Plain structs in and out; Ceres inside.
+// Deterministic: one thread, fixed order.
+#include <string>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::optimize {
+
+struct GraphPose {
+  geometry::Rigid3 camera_from_world;
+  bool fixed = false;
+};
+
+/// b_from_a was measured: xi = log(b_from_a_estimate * measured^-1), xi = (rho, phi) in metres and radians,
+/// has this information. It may be singular: what the measurement does not hold stays free.
+struct GraphEdge {
+  int a = -1;
+  int b = -1;
+  geometry::Rigid3 b_from_a;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();
+  bool trusted = false;  ///< odometry: never taken for wrong
+};
+
+struct PoseGraph {
+  std::vector<GraphPose> poses;
+  std::vector<GraphEdge> edges;
+};
+
+enum class EdgeRobustness {
+  kNone,       ///< plain least squares: every edge counts
+  kGraduated,  ///< graduated non-convexity: wrong edges are put aside
+};
+
+struct PoseGraphOptions {
+  EdgeRobustness robust = EdgeRobustness::kGraduated;
+  /// Share of right edges that may be taken for wrong, 0.001 or 0.01 or 0.05: gives the squared error beyond
+  /// which an edge is wrong, by the chi-square distribution of as many degrees of freedom as the edge holds.
+  double false_alarm = 0.001;
+  int max_iterations = 30;    ///< of each least-squares solve
+  int max_rounds = 60;        ///< solves with changed weights
+  double round_factor = 1.6;  ///< how fast the loss turns from convex to truncated
+  void declare(core::OptionTable& table);
+};
+
+/// What became of one edge.
+struct EdgeVerdict {
+  double chi2 = 0.0;    ///< squared error at the solution, in variances, whether the edge counted or not
+  int dimensions = 0;   ///< directions the edge holds: rank of its information
+  double weight = 1.0;  ///< 1: counts; 0: put aside
+  bool rejected = false;
+};
+
+struct PoseGraphSummary {
+  double initial_cost = 0.0;  ///< half the sum of chi2 of all edges at the start
+  double final_cost = 0.0;    ///< of the edges that count, at the solution
+  int iterations = 0;         ///< of all solves
+  int rounds = 0;
+  int rejected = 0;
+  std::vector<EdgeVerdict> edges;  ///< by edge
+  bool usable = false;             ///< poses were updated
+  std::string message;
+};
+
+/// Updates the poses that are not fixed. Parts of the graph that no edges tie to a fixed pose stay near where
+/// they are. Edges that name no pose, or the same twice, throw std::invalid_argument; without a fixed pose
+/// nothing is changed (usable = false, message says why).
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options = {});
+
+/// Number of eigenvalues that are not next to nothing beside the largest one (less than 1e-9 of it).
+int rank_of(const geometry::Matrix6d& information);
+
+/// Squared error that a measurement of `dimensions` (1-6) directions exceeds with probability `false_alarm`.
+double chi_square_gate(int dimensions, double false_alarm);
+
+}  // namespace plumbline::optimize

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/global_adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/geometry/plucker.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Matrix6d;
+using geometry::Rigid3;
+
+/// One keyframe after another, by what the tracker has seen in between. Far weaker than landmarks and
+/// surfaces: it keeps those together that have neither, and along a corridor that nothing else measures.
+Matrix6d weak_chain() {
+  constexpr double kSigma_m = 0.03;
+  constexpr double kSigma_rad = 0.02;
+  geometry::Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(1.0 / (kSigma_m * kSigma_m)),
+      Eigen::Vector3d::Constant(1.0 / (kSigma_rad * kSigma_rad));
+  return diagonal.asDiagonal();
+}
+
+/// Landmarks in the order in which they are worth having: those seen most often first.
+template <typename IdType>
+std::vector<std::pair<int, IdType>> by_sightings(const std::vector<IdType>& ids,
+                                                 const std::vector<int>& sightings) {
+  std::vector<std::pair<int, IdType>> order;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (sightings[i] >= 2) order.emplace_back(-sightings[i], ids[i]);
+  }
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+struct GlobalBundle {
+  optimize::BundleProblem problem;
+  std::vector<KeyframeId> keyframes;   ///< of problem.poses
+  std::vector<core::PointId> points;   ///< of problem.points
+  std::vector<core::LineId> lines;     ///< of problem.lines
+  std::vector<KeyframeId> point_seen;  ///< of problem.point_observations
+  std::vector<KeyframeId> line_seen;   ///< of problem.line_observations
+};
+
+/// Builds the bundle of a whole map. Several cameras become one: pixels are carried to the first robot's
+/// camera, their standard deviations with them.
+class GlobalBuilder {
+ public:
+  GlobalBuilder(const maps::Map& map, const Cameras& cameras, const GlobalAdjustmentOptions& options,
+                KeyframeId anchor)
+      : map_(map), cameras_(cameras), options_(options) {
+    bundle_.problem.camera = cameras.at(anchor.robot);
+    for (const KeyframeId id : map.keyframe_ids()) {
+      index_[id] = static_cast<int>(bundle_.keyframes.size());
+      bundle_.keyframes.push_back(id);
+      bundle_.problem.poses.push_back({map.camera_from_world(id), id == anchor});
+    }
+    tied_.assign(bundle_.keyframes.size(), 0);
+  }
+
+  /// As many landmarks as every keyframe needs: one is left out when all keyframes that see it have enough.
+  void add_points() {
+    const std::vector<core::PointId> ids = map_.point_ids();
+    std::vector<int> sightings;
+    for (const core::PointId id : ids) sightings.push_back(calm_views(map_.point(id).observations));
+    for (const auto& [order, id] : by_sightings(ids, sightings)) {
+      if (wanted(map_.point(id).observations, options_.observations)) add(map_.point(id));
+    }
+  }
+  void add_lines() {
+    std::fill(tied_.begin(), tied_.end(), 0);
+    const std::vector<core::LineId> ids = map_.line_ids();
+    std::vector<int> sightings;
+    for (const core::LineId id : ids) sightings.push_back(calm_views(map_.line(id).observations));
+    for (const auto& [order, id] : by_sightings(ids, sightings)) {
+      if (wanted(map_.line(id).observations, options_.observations)) add(map_.line(id));
+    }
+  }
+  int add_surface_edges() {
+    int count = 0;
+    for (const KeyframeId id : bundle_.keyframes) {
+      for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
+        if (edge.b != id) continue;  // each edge once, at its newer end
+        add_edge(edge.a, edge.b, edge.b_from_a, edge.information);
+        ++count;
+      }
+    }
+    return count;
+  }
+  void add_chain() {
+    for (std::size_t i = 1; i < bundle_.keyframes.size(); ++i) {
+      const KeyframeId a = bundle_.keyframes[i - 1];
+      const KeyframeId b = bundle_.keyframes[i];
+      if (a.robot != b.robot) continue;
+      add_edge(a, b, map_.camera_from_world(b) * map_.camera_from_world(a).inverse(), weak_chain());
+    }
+  }
+  void add_edge(KeyframeId a, KeyframeId b, const Rigid3& b_from_a, const Matrix6d& information) {
+    bundle_.problem.edges.push_back({index_.at(a), index_.at(b), b_from_a, information});
+  }
+  GlobalBundle take() { return std::move(bundle_); }
+
+ private:
+  [[nodiscard]] bool calm(KeyframeId id) const {
+    return map_.keyframe(id).turn_rate <= options_.max_turn_rate;
+  }
+  [[nodiscard]] int calm_views(const std::vector<maps::Observation>& seen) const {
+    return static_cast<int>(std::count_if(seen.begin(), seen.end(),
+                                          [&](const maps::Observation& o) { return calm(o.keyframe); }));
+  }
+  bool wanted(const std::vector<maps::Observation>& seen, int enough) {
+    bool any = false;
+    for (const maps::Observation& o : seen) {
+      any = any || (calm(o.keyframe) && tied_[static_cast<std::size_t>(index_.at(o.keyframe))] < enough);
+    }
+    if (!any) return false;
+    for (const maps::Observation& o : seen) ++tied_[static_cast<std::size_t>(index_.at(o.keyframe))];
+    return true;
+  }
+  /// Pixel and its standard deviation as the problem's camera would have it.
+  [[nodiscard]] Eigen::Vector2d pixel(KeyframeId id, const Eigen::Vector2f& seen, double& sigma) const {
+    const sensor::Pinhole& from = cameras_.at(id.robot);
+    const sensor::Pinhole& to = bundle_.problem.camera;
+    const Eigen::Vector2d p = seen.cast<double>();
+    sigma *= std::sqrt(to.fx * to.fy / (from.fx * from.fy));
+    return {(p.x() - from.cx) * (to.fx / from.fx) + to.cx, (p.y() - from.cy) * (to.fy / from.fy) + to.cy};
+  }
+
+  void add(const maps::MapPoint& point) {
+    const int index = static_cast<int>(bundle_.points.size());
+    bundle_.points.push_back(point.id);
+    bundle_.problem.points.push_back(point.position);
+    for (const maps::Observation& o : point.observations) {
+      if (!calm(o.keyframe)) continue;
+      const features::PointFeature& f =
+          map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
+      optimize::BundlePointObservation seen;
+      seen.pose = index_.at(o.keyframe);
+      seen.point = index;
+      seen.pixel_sigma = std::pow(options_.orb_scale_factor, f.octave);
+      seen.pixel = pixel(o.keyframe, f.pixel, seen.pixel_sigma);
+      seen.depth = static_cast<double>(f.depth);
+      seen.depth_sigma = f.depth > 0.0F ? sensor::depth_sigma(seen.depth) : 1.0;
+      bundle_.problem.point_observations.push_back(seen);
+      bundle_.point_seen.push_back(o.keyframe);
+    }
+  }
+  void add(const maps::MapLine& line) {
+    const int index = static_cast<int>(bundle_.lines.size());
+    bundle_.lines.push_back(line.id);
+    bundle_.problem.lines.push_back(geometry::line_through(line.start, line.end));
+    for (const maps::Observation& o : line.observations) {
+      if (!calm(o.keyframe)) continue;
+      const features::LineFeature& f =
+          map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
+      optimize::BundleLineObservation seen;
+      seen.pose = index_.at(o.keyframe);
+      seen.line = index;
+      seen.pixel_sigma = 0.6;
+      double sigma = seen.pixel_sigma;
+      seen.start = pixel(o.keyframe, f.segment.start, seen.pixel_sigma);
+      seen.end = pixel(o.keyframe, f.segment.end, sigma);
+      if (f.line3) {
+        seen.has_depth = true;
+        seen.start_camera = f.line3->start;
+        seen.end_camera = f.line3->end;
+        seen.start_sigma = std::max(0.003, std::sqrt(f.line3->start_covariance.trace()));
+        seen.end_sigma = std::max(0.003, std::sqrt(f.line3->end_covariance.trace()));
+      }
+      bundle_.problem.line_observations.push_back(seen);
+      bundle_.line_seen.push_back(o.keyframe);
+    }
+  }
+
+  const maps::Map& map_;
+  const Cameras& cameras_;
+  const GlobalAdjustmentOptions& options_;
+  GlobalBundle bundle_;
+  std::map<KeyframeId, int> index_;
+  std::vector<int> tied_;  ///< landmarks taken that a keyframe sees
+};
+
+/// Landmarks that no keyframe sees any more are gone.
+void drop_outliers(const GlobalBundle& bundle, maps::Map& map) {
+  for (std::size_t i = 0; i < bundle.point_seen.size(); ++i) {
+    const optimize::BundlePointObservation& o = bundle.problem.point_observations[i];
+    if (!o.outlier) continue;
+    const core::PointId id = bundle.points[static_cast<std::size_t>(o.point)];
+    map.unobserve(id, bundle.point_seen[i]);
+    if (map.point(id).observations.empty()) map.remove_point(id);
+  }
+  for (std::size_t i = 0; i < bundle.line_seen.size(); ++i) {
+    const optimize::BundleLineObservation& o = bundle.problem.line_observations[i];
+    if (!o.outlier) continue;
+    const core::LineId id = bundle.lines[static_cast<std::size_t>(o.line)];
+    map.unobserve(id, bundle.line_seen[i]);
+    if (map.line(id).observations.empty()) map.remove_line(id);
+  }
+}
+
+void put_back(const GlobalBundle& bundle, maps::Map& map) {
+  KeyframePoses poses;
+  for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
+    poses.emplace_back(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
+  }
+  move_keyframes(map, poses);  // and with them what the bundle left out
+  for (std::size_t i = 0; i < bundle.points.size(); ++i) {
+    map.point(bundle.points[i]).position = bundle.problem.points[i];
+  }
+  for (std::size_t i = 0; i < bundle.lines.size(); ++i) {
+    maps::MapLine& line = map.line(bundle.lines[i]);
+    line.start = geometry::nearest_point(bundle.problem.lines[i], line.start);
+    line.end = geometry::nearest_point(bundle.problem.lines[i], line.end);
+  }
+  drop_outliers(bundle, map);
+}
+
+void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
+                    const GlobalAdjustmentOptions& options, KeyframeId anchor,
+                    GlobalAdjustmentSummary& summary) {
+  const MapGraphResult graph = solve_map_graph(map, extra, options.graph, anchor);
+  summary.message = graph.summary.message;
+  if (!graph.summary.usable) return;
+  summary.extra = graph.summary.edges;
+  for (const optimize::EdgeVerdict& verdict : summary.extra) summary.rejected += verdict.rejected ? 1 : 0;
+  move_keyframes(map, graph.poses);
+  summary.changed = true;
+}
+
+void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
+                const GlobalAdjustmentOptions& options, KeyframeId anchor, GlobalAdjustmentSummary& summary) {
+  GlobalBuilder builder(map, cameras, options, anchor);
+  builder.add_points();
+  builder.add_lines();
+  summary.surface_edges = builder.add_surface_edges();
+  builder.add_chain();
+  for (std::size_t i = 0; i < extra.size(); ++i) {
+    if (!summary.extra.empty() && summary.extra[i].rejected) continue;
+    builder.add_edge(extra[i].a, extra[i].b, extra[i].b_from_a, extra[i].information);
+  }
+  GlobalBundle bundle = builder.take();
+  summary.points = static_cast<int>(bundle.points.size());
+  summary.lines = static_cast<int>(bundle.lines.size());
+  summary.bundle = optimize::adjust_bundle(bundle.problem, options.bundle_options);
+  summary.message = summary.bundle.message;
+  if (!summary.bundle.usable) return;
+  put_back(bundle, map);
+  summary.changed = true;
+}
+
+}  // namespace
+
+GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
+  bundle_options.max_iterations = 10;
+  bundle_options.rounds = 2;
+}
+
+void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
+  table.boolean("adjust.pose_graph", pose_graph,
+                "Solve a pose graph first, which tells wrong alignments and loops");
+  table.boolean("adjust.bundle", bundle, "Adjust all keyframes, points, lines and surfaces together");
+  table.integer("adjust.observations", observations, {10, 100000}, "",
+                "Points, and lines, that a keyframe is tied with at most");
+  table.integer("adjust.iterations", bundle_options.max_iterations, {1, 1000}, "",
+                "Iterations of each round of the adjustment at most");
+  table.integer("adjust.rounds", bundle_options.rounds, {1, 10}, "",
+                "Rounds of the adjustment; between them outliers are put aside");
+  table.choice<optimize::EdgeRobustness>(
+      "adjust.robust", graph.robust,
+      {{"none", optimize::EdgeRobustness::kNone}, {"graduated", optimize::EdgeRobustness::kGraduated}},
+      "What the pose graph does about wrong edges: nothing, or graduated non-convexity");
+}
+
+GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
+                                   const GlobalAdjustmentOptions& options, KeyframeId anchor) {
+  GlobalAdjustmentSummary summary;
+  const std::vector<KeyframeId> ids = map.keyframe_ids();
+  summary.keyframes = static_cast<int>(ids.size());
+  if (ids.size() < 2) {
+    summary.message = "fewer than two keyframes: nothing to adjust";
+    return summary;
+  }
+  if (!anchor.valid()) anchor = ids.front();
+  std::vector<Rigid3> before;
+  for (const KeyframeId id : ids) before.push_back(map.camera_from_world(id));
+  if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, summary);
+  if (options.bundle) run_bundle(map, cameras, extra, options, anchor, summary);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const double shift =
+        (before[i].inverse().translation - map.camera_from_world(ids[i]).inverse().translation).norm();
+    summary.mean_shift_m += shift / static_cast<double>(ids.size());
+    summary.max_shift_m = std::max(summary.max_shift_m, shift);
+  }
+  return summary;
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pose graph of a map, and what moves when keyframes do.
+#include <algorithm>
+#include <stdexcept>
+
+#include "plumbline/mapping/global_adjustment.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Matrix6d;
+using geometry::Rigid3;
+
+// How well the map knows a relative pose: of keyframes that share a landmark (falls with the root of their
+// number, down to the floor), and of one keyframe after another, which the tracker has seen through.
+constexpr double kLandmarkSigma_m = 0.03;
+constexpr double kLandmarkSigma_rad = 0.02;
+constexpr double kFloorSigma_m = 0.003;
+constexpr double kFloorSigma_rad = 0.002;
+constexpr double kNextSigma_m = 0.01;
+constexpr double kNextSigma_rad = 0.01;
+
+Matrix6d information(double metres, double radians) {
+  geometry::Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(1.0 / (metres * metres)),
+      Eigen::Vector3d::Constant(1.0 / (radians * radians));
+  return diagonal.asDiagonal();
+}
+
+Matrix6d information_of_shared(int shared) {
+  const double root = std::sqrt(static_cast<double>(std::max(1, shared)));
+  return information(std::max(kFloorSigma_m, kLandmarkSigma_m / root),
+                     std::max(kFloorSigma_rad, kLandmarkSigma_rad / root));
+}
+
+/// Collects edges between pairs of keyframes, each pair once, as the map has them now.
+class EdgeCollector {
+ public:
+  explicit EdgeCollector(const maps::Map& map) : map_(map) {}
+  void add(KeyframeId a, KeyframeId b, const Matrix6d& information) {
+    if (b < a) std::swap(a, b);
+    const auto [found, inserted] = edges_.try_emplace({a, b});
+    PoseEdge& edge = found->second;
+    if (inserted) {
+      edge = {a, b, map_.camera_from_world(b) * map_.camera_from_world(a).inverse(), Matrix6d::Zero(), true};
+    }
+    if (information.trace() > edge.information.trace()) edge.information = information;
+  }
+  [[nodiscard]] std::vector<PoseEdge> take() {
+    std::vector<PoseEdge> result;
+    for (const auto& [pair, edge] : edges_) result.push_back(edge);
+    return result;
+  }
+
+ private:
+  const maps::Map& map_;
+  std::map<std::pair<KeyframeId, KeyframeId>, PoseEdge> edges_;
+};
+
+/// Mean of the places where a landmark's keyframes would take it.
+Eigen::Vector3d carried(const Eigen::Vector3d& p, const std::vector<maps::Observation>& seen,
+                        const std::map<KeyframeId, Rigid3>& new_from_old) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const maps::Observation& o : seen) {
+    const auto found = new_from_old.find(o.keyframe);
+    sum += found == new_from_old.end() ? p : found->second * p;
+  }
+  return sum / static_cast<double>(seen.size());
+}
+
+}  // namespace
+
+std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_neighbours) {
+  EdgeCollector edges(map);
+  KeyframeId last;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    if (last.valid() && last.robot == id.robot) {
+      edges.add(last, id, information(kNextSigma_m, kNextSigma_rad));
+    }
+    last = id;
+    int neighbours = 0;
+    for (const auto& [other, shared] : map.covisible(id, min_shared)) {
+      if (shared < min_shared || ++neighbours > max_neighbours) break;
+      edges.add(id, other, information_of_shared(shared));
+    }
+    for (const maps::SurfaceEdge& edge : map.edges_of(id)) {
+      if (edge.b == id) edges.add(edge.a, id, information(kNextSigma_m, kNextSigma_rad));
+    }
+  }
+  return edges.take();
+}
+
+MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
+                               const optimize::PoseGraphOptions& options, KeyframeId anchor) {
+  MapGraphResult result;
+  const std::vector<KeyframeId> ids = map.keyframe_ids();
+  if (ids.empty()) {
+    result.summary.message = "the map is empty";
+    return result;
+  }
+  if (!anchor.valid()) anchor = ids.front();
+  std::map<KeyframeId, int> index;
+  optimize::PoseGraph graph;
+  for (const KeyframeId id : ids) {
+    index[id] = static_cast<int>(graph.poses.size());
+    graph.poses.push_back({map.camera_from_world(id), id == anchor});
+  }
+  for (const PoseEdge& e : extra) {
+    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information, e.trusted});
+  }
+  for (const PoseEdge& e : map_edges(map)) {
+    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information, true});
+  }
+  result.summary = optimize::solve_pose_graph(graph, options);
+  result.summary.edges.resize(extra.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    result.poses.emplace_back(ids[i], graph.poses[i].camera_from_world);
+  }
+  return result;
+}
+
+void move_keyframes(maps::Map& map, const KeyframePoses& poses) {
+  std::map<KeyframeId, Rigid3> new_from_old;
+  for (const auto& [id, pose] : poses) {
+    new_from_old[id] = pose.inverse() * map.camera_from_world(id);
+    map.set_pose(id, pose);
+  }
+  for (const core::PointId id : map.point_ids()) {
+    maps::MapPoint& point = map.point(id);
+    if (!point.observations.empty())
+      point.position = carried(point.position, point.observations, new_from_old);
+  }
+  for (const core::LineId id : map.line_ids()) {
+    maps::MapLine& line = map.line(id);
+    if (line.observations.empty()) continue;
+    line.start = carried(line.start, line.observations, new_from_old);
+    line.end = carried(line.end, line.observations, new_from_old);
+  }
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/optimize/pose_graph.hpp"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+#include "cost_edge.hpp"
+#include "manifolds.hpp"
+
+namespace plumbline::optimize {
+namespace {
+
+/// Every pose is held to where it started by 30 m and 30 rad: nothing beside a measurement, but enough for
+/// directions that no edge holds.
+constexpr double kHoldInformation = 1e-3;
+
+/// The graph as Ceres wants it, with a weight for each edge that may change between solves. All poses in one
+/// buffer, so that the order of sums does not hang on where the heap puts them.
+class Solver {
+ public:
+  Solver(const PoseGraph& graph, const PoseGraphOptions& options)
+      : graph_(graph), options_(options), problem_(problem_options()), numbers_(7 * graph.poses.size()) {
+    from_rigid({}, origin_.data());
+    for (std::size_t i = 0; i < graph.poses.size(); ++i) {
+      from_rigid(graph.poses[i].camera_from_world, block(i));
+      problem_.AddParameterBlock(block(i), 7, &manifold_);
+      if (graph.poses[i].fixed) problem_.SetParameterBlockConstant(block(i));
+    }
+    for (const GraphEdge& edge : graph.edges) {
+      losses_.push_back(std::make_unique<ceres::LossFunctionWrapper>(nullptr, ceres::TAKE_OWNERSHIP));
+      problem_.AddResidualBlock(new EdgeCost({edge.a, edge.b, edge.b_from_a, edge.information}),
+                                losses_.back().get(), block(edge.a), block(edge.b));
+    }
+    hold();
+  }
+
+  void set_weight(std::size_t edge, double weight) {
+    losses_[edge]->Reset(new ceres::ScaledLoss(nullptr, weight, ceres::TAKE_OWNERSHIP),
+                         ceres::TAKE_OWNERSHIP);
+  }
+
+  ceres::Solver::Summary solve(int iterations) {
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    solver.num_threads = 1;  // sums in a fixed order
+    solver.max_num_iterations = iterations;
+    solver.function_tolerance = 1e-7;
+    solver.parameter_tolerance = 1e-9;
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem_, &summary);
+    return summary;
+  }
+
+  /// Squared error of an edge as the poses are now.
+  [[nodiscard]] double chi2(std::size_t edge) const {
+    const GraphEdge& e = graph_.edges[edge];
+    const geometry::Rigid3 b_from_a =
+        pose(static_cast<std::size_t>(e.b)) * pose(static_cast<std::size_t>(e.a)).inverse();
+    const geometry::Vector6d xi = geometry::log_se3(b_from_a * e.b_from_a.inverse());
+    return std::max(0.0, xi.dot(e.information * xi));
+  }
+  [[nodiscard]] geometry::Rigid3 pose(std::size_t i) const { return to_rigid(numbers_.data() + 7 * i); }
+
+ private:
+  static ceres::Problem::Options problem_options() {
+    ceres::Problem::Options options;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+  double* block(std::size_t i) { return numbers_.data() + 7 * i; }
+  double* block(int i) { return block(static_cast<std::size_t>(i)); }
+
+  void hold() {
+    for (std::size_t i = 0; i < graph_.poses.size(); ++i) {
+      if (graph_.poses[i].fixed) continue;
+      const BundleEdge stay{-1, static_cast<int>(i), graph_.poses[i].camera_from_world,
+                            kHoldInformation * geometry::Matrix6d::Identity()};
+      problem_.AddResidualBlock(new EdgeCost(stay), nullptr, origin_.data(), block(i));
+    }
+    if (problem_.HasParameterBlock(origin_.data())) problem_.SetParameterBlockConstant(origin_.data());
+  }
+
+  const PoseGraph& graph_;
+  const PoseGraphOptions& options_;
+  PoseManifold manifold_;
+  std::vector<std::unique_ptr<ceres::LossFunctionWrapper>> losses_;  ///< must outlive problem_
+  ceres::Problem problem_;
+  std::vector<double> numbers_;
+  PoseBlock origin_;
+};
+
+/// Weight of a truncated quadratic that is mu away from convex (0) and from truncated (infinity); `ratio` is
+/// the squared error over the gate. Equation 14 of the paper.
+double graduated_weight(double ratio, double mu) {
+  if (ratio >= (mu + 1.0) / mu) return 0.0;
+  if (ratio <= mu / (mu + 1.0)) return 1.0;
+  return std::clamp(std::sqrt(mu * (mu + 1.0) / ratio) - mu, 0.0, 1.0);
+}
+
+/// Least squares again and again, with weights that turn into 0 and 1.
+class Graduated {
+ public:
+  Graduated(const PoseGraph& graph, const PoseGraphOptions& options, Solver& solver,
+            PoseGraphSummary& summary)
+      : graph_(graph), options_(options), solver_(solver), summary_(summary) {
+    for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+      gates_.push_back(chi_square_gate(std::max(1, summary.edges[i].dimensions), options.false_alarm));
+    }
+  }
+
+  /// The weights start from where the poses are, not from a least-squares solve that wrong edges have already
+  /// torn. Returns false when a solve failed.
+  bool run() {
+    double worst = 1.0;
+    for (std::size_t i = 0; i < gates_.size(); ++i) {
+      if (!graph_.edges[i].trusted) worst = std::max(worst, ratio(i));
+    }
+    double mu = worst > 1.0 ? 1.0 / (2.0 * worst - 1.0) : 1e6;
+    for (int round = 0; round < options_.max_rounds; ++round) {
+      const bool decided = set_weights(mu);
+      const ceres::Solver::Summary solved = solver_.solve(decided ? options_.max_iterations : 5);
+      ++summary_.rounds;
+      summary_.iterations += static_cast<int>(solved.iterations.size());
+      summary_.message = solved.message;
+      if (!solved.IsSolutionUsable()) return false;
+      if (decided && !set_weights(mu, true)) break;
+      mu *= options_.round_factor;
+    }
+    return true;
+  }
+
+ private:
+  [[nodiscard]] double ratio(std::size_t i) const { return solver_.chi2(i) / gates_[i]; }
+
+  /// Returns whether all weights are 0 or 1; with `compare` only whether any of them would change.
+  bool set_weights(double mu, bool compare = false) {
+    bool decided = true;
+    bool changed = false;
+    for (std::size_t i = 0; i < gates_.size(); ++i) {
+      if (graph_.edges[i].trusted) continue;
+      const double weight = graduated_weight(ratio(i), mu);
+      decided = decided && (weight < 1e-3 || weight > 1.0 - 1e-3);
+      double& current = summary_.edges[i].weight;
+      changed = changed || std::abs(weight - current) > 1e-3;
+      if (compare) continue;
+      current = weight;
+      solver_.set_weight(i, weight);
+    }
+    return compare ? changed : decided;
+  }
+
+  const PoseGraph& graph_;
+  const PoseGraphOptions& options_;
+  Solver& solver_;
+  PoseGraphSummary& summary_;
+  std::vector<double> gates_;
+};
+
+void check(const PoseGraph& graph) {
+  const auto count = static_cast<int>(graph.poses.size());
+  for (const GraphEdge& edge : graph.edges) {
+    if (edge.a < 0 || edge.b < 0 || edge.a >= count || edge.b >= count || edge.a == edge.b) {
+      throw std::invalid_argument("solve_pose_graph: an edge must join two poses of the graph");
+    }
+  }
+}
+
+}  // namespace
+
+void PoseGraphOptions::declare(core::OptionTable& table) {
+  table.choice<EdgeRobustness>("robust", robust,
+                               {{"none", EdgeRobustness::kNone}, {"graduated", EdgeRobustness::kGraduated}},
+                               "What to do about wrong edges: nothing, or graduated non-convexity");
+  table.integer("iterations", max_iterations, {1, 1000}, "", "Iterations of each solve of the pose graph");
+}
+
+int rank_of(const geometry::Matrix6d& information) {
+  const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(information, Eigen::EigenvaluesOnly);
+  const double largest = eigen.eigenvalues()(5);
+  return largest > 0.0 ? static_cast<int>((eigen.eigenvalues().array() > 1e-9 * largest).count()) : 0;
+}
+
+double chi_square_gate(int dimensions, double false_alarm) {
+  if (dimensions < 1 || dimensions > 6) throw std::invalid_argument("chi_square_gate: 1 to 6 dimensions");
+  static constexpr std::array<double, 6> k05{3.841, 5.991, 7.815, 9.488, 11.070, 12.592};
+  static constexpr std::array<double, 6> k01{6.635, 9.210, 11.345, 13.277, 15.086, 16.812};
+  static constexpr std::array<double, 6> k001{10.828, 13.816, 16.266, 18.467, 20.515, 22.458};
+  const auto i = static_cast<std::size_t>(dimensions - 1);
+  if (false_alarm >= 0.05) return k05[i];
+  return false_alarm >= 0.01 ? k01[i] : k001[i];
+}
+
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options) {
+  check(graph);
+  PoseGraphSummary summary;
+  if (std::none_of(graph.poses.begin(), graph.poses.end(), [](const GraphPose& p) { return p.fixed; })) {
+    summary.message = "no pose is fixed: the solution would float";
+    return summary;
+  }
+  Solver solver(graph, options);
+  summary.edges.resize(graph.edges.size());
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    summary.edges[i].dimensions = rank_of(graph.edges[i].information);
+    summary.initial_cost += 0.5 * solver.chi2(i);
+  }
+  if (options.robust == EdgeRobustness::kGraduated) {
+    if (!Graduated(graph, options, solver, summary).run()) return summary;
+  } else {
+    const ceres::Solver::Summary solved = solver.solve(options.max_iterations);
+    summary.rounds = 1;
+    summary.iterations = static_cast<int>(solved.iterations.size());
+    summary.message = solved.message;
+    if (!solved.IsSolutionUsable()) return summary;
+  }
+  for (std::size_t i = 0; i < graph.edges.size(); ++i) {
+    EdgeVerdict& verdict = summary.edges[i];
+    verdict.chi2 = solver.chi2(i);
+    verdict.rejected = verdict.weight < 0.5;
+    summary.rejected += verdict.rejected ? 1 : 0;
+    if (!verdict.rejected) summary.final_cost += 0.5 * verdict.chi2;
+  }
+  for (std::size_t i = 0; i < graph.poses.size(); ++i) {
+    if (!graph.poses[i].fixed) graph.poses[i].camera_from_world = solver.pose(i);
+  }
+  summary.usable = true;
+  return summary;
+}
+
+}  // namespace plumbline::optimize
