@@ -40,6 +40,10 @@ std::size_t count_finite(const Cloud& cloud) {
   return count;
 }
 
+std::filesystem::path normal(const std::string& file) {
+  return std::filesystem::path(file).lexically_normal();
+}
+
 std::string entry_yaml(const std::string& type, const core::OptionTable& table) {
   std::string text = fmt::format("  - type: {}\n", type);
   for (const auto& option : table.specs())
@@ -95,6 +99,7 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
         {filters == nullptr ? node.mark : filters->mark, prefix + "filters", "must be a list of filters"});
     return chain;
   }
+  std::vector<std::filesystem::path> written;
   for (std::size_t i = 0; i < filters->items.size(); ++i) {
     const ConfigNode& entry = filters->items[i];
     const std::string place = fmt::format("{}filters[{}]", prefix, i);
@@ -110,6 +115,11 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
       if (!wrong.empty()) problems.push_back({entry.mark, place, wrong});
     }
     chain.filters_.push_back({info->type, filter, entry_yaml(info->type, table)});
+    if (const std::string file = filter->writes(); !file.empty()) {
+      const bool taken = std::find(written.begin(), written.end(), normal(file)) != written.end();
+      if (taken) problems.push_back({entry.mark, place, file + " is written by an earlier filter already"});
+      written.push_back(normal(file));
+    }
   }
   return chain;
 }
@@ -130,26 +140,51 @@ std::string FilterChain::to_yaml() const {
   return text;
 }
 
-core::Result<CloudPtr> FilterChain::apply(const CloudConstPtr& input, const FilterContext& context,
-                                          std::vector<FilterReport>* reports) const {
+core::Error FilterChain::at(std::size_t step, const core::Error& error) const {
+  return {error.kind,
+          fmt::format("chain {}: filters[{}] ({}): {}", name_, step, filters_[step].type, error.message)};
+}
+
+core::Result<void> FilterChain::ready(const FilterContext& context) const {
+  for (std::size_t i = 0; i < filters_.size(); ++i) {
+    if (auto fit = filters_[i].filter->ready(context); !fit) {
+      return tl::unexpected<core::Error>(at(i, fit.error()));
+    }
+  }
+  return {};
+}
+
+std::vector<std::string> FilterChain::writes() const {
+  std::vector<std::string> files;
+  for (const Step& step : filters_) {
+    if (std::string file = step.filter->writes(); !file.empty()) files.push_back(std::move(file));
+  }
+  return files;
+}
+
+core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterContext& context,
+                                          std::vector<FilterReport>* reports,
+                                          const ChainProgress& progress) const {
+  if (auto fit = ready(context); !fit) return tl::unexpected<core::Error>(fit.error());
   if (filters_.empty()) return std::make_shared<Cloud>(*input);
+  CloudConstPtr current = std::move(input);
   CloudPtr output;
-  CloudConstPtr current = input;
+  std::size_t points = count_finite(*current);
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     const Step& step = filters_[i];
+    if (progress) progress(i, filters_.size(), step.type);
+    output.reset();  // `current` alone holds the input
     const auto start = std::chrono::steady_clock::now();
     auto result = step.filter->apply(current, context);
     const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
-    if (!result) {
-      return core::failure(result.error().kind, fmt::format("chain {}: filters[{}] ({}): {}", name_, i,
-                                                            step.type, result.error().message));
-    }
-    output = *result;
-    if (reports != nullptr) {
-      reports->push_back({step.type, count_finite(*current), count_finite(*output), elapsed.count()});
-    }
+    if (!result) return tl::unexpected<core::Error>(at(i, result.error()));
+    output = std::move(*result);
     current = output;
+    const std::size_t left = count_finite(*current);
+    if (reports != nullptr) reports->push_back({step.type, points, left, elapsed.count()});
+    points = left;
   }
+  if (progress) progress(filters_.size(), filters_.size(), "");
   return output;
 }
 

@@ -37,12 +37,22 @@ std::string check_extent(const Cloud& cloud, double leaf) {
       leaf, size.x(), size.y(), size.z(), cells.prod(), needed);
 }
 
-/// Unknown normals become 0, so that they do not spoil the mean normal of their cell.
-void forget_unknown_normals(Cloud& cloud) {
-  for (Point& p : cloud.points) {
+/// Unknown normals become 0, so that they do not spoil the mean normal of their cell. Where all are known, or
+/// none, there is nothing to spoil and nothing is copied.
+CloudConstPtr without_unknown_normals(const CloudConstPtr& cloud) {
+  std::size_t known = 0;
+  std::size_t curved = 0;
+  for (const Point& p : cloud->points) {
+    known += has_normal(p) ? 1U : 0U;
+    curved += std::isfinite(p.curvature) ? 1U : 0U;
+  }
+  if ((known == 0 || known == cloud->size()) && curved == cloud->size()) return cloud;
+  auto changed = std::make_shared<Cloud>(*cloud);
+  for (Point& p : changed->points) {
     if (!has_normal(p)) p.normal_x = p.normal_y = p.normal_z = 0.0F;
     if (!std::isfinite(p.curvature)) p.curvature = 0.0F;
   }
+  return changed;
 }
 
 /// Unit normals again; NaN where no point of the cell had one.
@@ -60,10 +70,10 @@ class GridFilter : public Filter {
     table.number("leaf", leaf_m_, {1e-4, 1000.0}, "m", "Edge length of a cell");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    CloudPtr points = finite_list(*input);
+    const CloudConstPtr points = finite_list(input);
     const std::string problem = check_extent(*points, leaf_m_);
     if (!problem.empty()) return core::usage_error(problem);
-    if (points->empty()) return points;
+    if (points->empty()) return like(*input);
     CloudPtr output = resample(points);
     output->sensor_origin_ = input->sensor_origin_;
     output->sensor_orientation_ = input->sensor_orientation_;
@@ -72,8 +82,8 @@ class GridFilter : public Filter {
   }
 
  protected:
-  /// `points`: finite, not empty, owned by the caller; may be changed.
-  virtual CloudPtr resample(const CloudPtr& points) const = 0;
+  /// `points`: finite, not empty.
+  virtual CloudPtr resample(const CloudConstPtr& points) const = 0;
   [[nodiscard]] float leaf() const { return static_cast<float>(leaf_m_); }
 
  private:
@@ -86,12 +96,11 @@ class VoxelGridFilter : public GridFilter {
     GridFilter::declare(table);
     table.integer("min_points", min_points_, {1, 100000}, "", "Cells with fewer points give none");
   }
-  CloudPtr resample(const CloudPtr& points) const override {
-    forget_unknown_normals(*points);
+  CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::VoxelGrid<Point> grid;
     grid.setLeafSize(leaf(), leaf(), leaf());
     grid.setMinimumPointsNumberPerVoxel(static_cast<unsigned>(min_points_));
-    grid.setInputCloud(points);
+    grid.setInputCloud(without_unknown_normals(points));
     auto output = std::make_shared<Cloud>();
     grid.filter(*output);
     restore_normals(*output);
@@ -104,11 +113,10 @@ class VoxelGridFilter : public GridFilter {
 
 class ApproximateVoxelGridFilter : public GridFilter {
  public:
-  CloudPtr resample(const CloudPtr& points) const override {
-    forget_unknown_normals(*points);
+  CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::ApproximateVoxelGrid<Point> grid;
     grid.setLeafSize(leaf(), leaf(), leaf());
-    grid.setInputCloud(points);
+    grid.setInputCloud(without_unknown_normals(points));
     auto output = std::make_shared<Cloud>();
     grid.filter(*output);
     restore_normals(*output);
@@ -119,7 +127,7 @@ class ApproximateVoxelGridFilter : public GridFilter {
 class UniformSamplingFilter : public GridFilter {
  public:
   /// PCL gives the points in the order of a hash table; here they stay in the order of the input.
-  CloudPtr resample(const CloudPtr& points) const override {
+  CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::UniformSampling<Point> sampling(true);
     sampling.setRadiusSearch(static_cast<double>(leaf()));
     sampling.setInputCloud(points);

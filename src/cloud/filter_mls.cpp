@@ -15,7 +15,7 @@ class MlsFilter : public Filter {
                   "Of the polynomial; 0 and 1 fit a plane, which is quicker and rounds edges more");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
-    const CloudPtr points = finite_list(*input);
+    const CloudConstPtr points = finite_list(input);
     if (points->size() < 3) return like(*input);
     pcl::MovingLeastSquares<Point, Point> mls;
     mls.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pcl/features/normal_3d.h>
-#include <pcl/search/kdtree.h>
 
 #include "filter_tools.hpp"
+#include "parallel_search.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -25,7 +25,7 @@ class NormalsFilter : public Filter {
     if (points->empty()) return points;
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
     pcl::NormalEstimation<Point, pcl::Normal> estimation;
-    estimation.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());
+    estimation.setSearchMethod(std::make_shared<ParallelSearch>(context.executor, true));
     if (neighbours_ > 0) {
       estimation.setKSearch(neighbours_);
     } else {

@@ -13,8 +13,8 @@ class RandomSamplingFilter : public Filter {
     table.integer("seed", seed_, {0, 2147483647}, "", "Added to the run's seed");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
-    const CloudPtr points = finite_list(*input);
-    if (points->size() <= static_cast<std::size_t>(count_)) return points;
+    const CloudConstPtr points = finite_list(input);
+    if (points->size() <= static_cast<std::size_t>(count_)) return finite_list(*points);
     pcl::RandomSample<Point> sample;
     sample.setSample(static_cast<unsigned>(count_));
     sample.setSeed(context.seed + static_cast<unsigned>(seed_));

@@ -32,16 +32,23 @@ std::vector<std::string> FilterRegistry::types() const {
 FilterRegistry builtin_filters() {
   FilterRegistry registry;
   registry.add(approximate_voxel_grid_filter());
+  registry.add(clusters_filter());
+  registry.add(color_filter());
   registry.add(crop_box_filter());
+  registry.add(curvature_filter());
   registry.add(flying_pixels_filter());
   registry.add(incidence_angle_filter());
+  registry.add(merge_filter());
   registry.add(mls_filter());
+  registry.add(normal_consistency_filter());
   registry.add(normals_filter());
   registry.add(pass_through_filter());
+  registry.add(plane_filter());
   registry.add(radius_outlier_filter());
   registry.add(random_sampling_filter());
   registry.add(range_filter());
   registry.add(statistical_outlier_filter());
+  registry.add(tee_filter());
   registry.add(transform_filter());
   registry.add(uniform_sampling_filter());
   registry.add(voxel_grid_filter());

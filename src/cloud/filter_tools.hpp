@@ -5,6 +5,7 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -15,16 +16,23 @@ namespace plumbline::cloud {
 
 // One function per filter, each in its own file; the registry lists them.
 FilterInfo approximate_voxel_grid_filter();
+FilterInfo clusters_filter();
+FilterInfo color_filter();
 FilterInfo crop_box_filter();
+FilterInfo curvature_filter();
 FilterInfo flying_pixels_filter();
 FilterInfo incidence_angle_filter();
+FilterInfo merge_filter();
 FilterInfo mls_filter();
+FilterInfo normal_consistency_filter();
 FilterInfo normals_filter();
 FilterInfo pass_through_filter();
+FilterInfo plane_filter();
 FilterInfo radius_outlier_filter();
 FilterInfo random_sampling_filter();
 FilterInfo range_filter();
 FilterInfo statistical_outlier_filter();
+FilterInfo tee_filter();
 FilterInfo transform_filter();
 FilterInfo uniform_sampling_filter();
 FilterInfo voxel_grid_filter();
@@ -79,7 +87,7 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
   return output;
 }
 
-/// The finite points as a list: what PCL's searches and grids can be given without harm.
+/// The finite points as a list of the caller's own: what PCL's searches and grids can be given without harm.
 inline CloudPtr finite_list(const Cloud& input) {
   auto output = like(input);
   output->points.reserve(input.size());
@@ -88,6 +96,13 @@ inline CloudPtr finite_list(const Cloud& input) {
   }
   make_list(*output);
   return output;
+}
+
+/// The same for those who only look: the input itself when it is such a list already.
+inline CloudConstPtr finite_list(const CloudConstPtr& input) {
+  const bool list = !organised(*input) && input->width == input->size() && input->is_dense &&
+                    std::all_of(input->begin(), input->end(), finite);
+  return list ? input : CloudConstPtr(finite_list(*input));
 }
 
 }  // namespace plumbline::cloud

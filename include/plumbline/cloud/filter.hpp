@@ -13,6 +13,7 @@
 
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 
 namespace plumbline::cloud {
@@ -22,6 +23,10 @@ struct FilterContext {
   /// Where the sensor stood, in the cloud's frame; without it the cloud's own sensor_origin_.
   std::optional<Eigen::Vector3f> viewpoint;
   std::uint32_t seed = 0;  ///< of random choices
+  /// Threads for the filters that can use several; without it one. Results do not depend on it.
+  const core::Executor* executor = nullptr;
+  /// Which run of many this is ("12"): part of the names of files that filters write. Empty: the only one.
+  std::string run;
 };
 
 class Filter {
@@ -31,6 +36,10 @@ class Filter {
   virtual void declare(core::OptionTable& table) = 0;
   /// What is wrong with the options taken together, "" if nothing.
   [[nodiscard]] virtual std::string check() const { return ""; }
+  /// What keeps the filter from running, found before the chain begins: files that are missing.
+  [[nodiscard]] virtual core::Result<void> ready(const FilterContext& /*context*/) const { return {}; }
+  /// The file that it writes, "" if none: no two filters may write the same.
+  [[nodiscard]] virtual std::string writes() const { return ""; }
   /// The input is never changed; returning it as it came is not allowed. Filters that only choose points keep
   /// an organised cloud organised (rejected points become NaN). Const and free of hidden state: one filter
   /// may run on several threads. Errors: kUsage when the options do not fit this cloud (message without the

@@ -11,6 +11,7 @@
 //       leaf: 1 cm
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,6 +29,9 @@ struct FilterReport {
   double ms = 0.0;
 };
 
+/// How far a chain is: filters done, filters there are, and the one that runs now ("" at the end).
+using ChainProgress = std::function<void(std::size_t done, std::size_t total, const std::string& type)>;
+
 /// Filters in the order they are applied. Cheap to copy; const use from several threads is safe.
 class FilterChain {
  public:
@@ -42,12 +46,22 @@ class FilterChain {
   /// The chain with every option spelt out, as YAML that `load` accepts.
   [[nodiscard]] std::string to_yaml() const;
 
-  /// Runs the chain; an empty chain gives a copy. Errors name chain, place and filter. `reports` (may be
-  /// null) gets one entry per filter run.
-  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context = {},
-                               std::vector<FilterReport>* reports = nullptr) const;
+  /// What keeps the chain from running, such as a missing file of merge; nothing is read or written yet.
+  [[nodiscard]] core::Result<void> ready(const FilterContext& context = {}) const;
+  /// The files that its filters write (tee), in their order.
+  [[nodiscard]] std::vector<std::string> writes() const;
+
+  /// Runs the chain when it is ready; an empty chain gives a copy. Errors name chain, place and filter. Every
+  /// filter's input is let go once it is used: who moves `input` in never pays for more than two clouds.
+  /// `reports` (may be null) gets one entry per filter run; `progress` is called before each filter and at
+  /// the end.
+  core::Result<CloudPtr> apply(CloudConstPtr input, const FilterContext& context = {},
+                               std::vector<FilterReport>* reports = nullptr,
+                               const ChainProgress& progress = {}) const;
 
  private:
+  [[nodiscard]] core::Error at(std::size_t step, const core::Error& error) const;
+
   struct Step {
     std::string type;
     std::shared_ptr<const Filter> filter;

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <pcl/common/centroid.h>
+#include <pcl/common/colors.h>
+#include <pcl/search/kdtree.h>
+#include <pcl/segmentation/extract_clusters.h>
+#include <pcl/segmentation/sac_segmentation.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "filter_tools.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+enum class Mode { kKeep, kRemove, kLabel };
+constexpr int kNoSegment = -1;
+
+/// Segment of every finite point of `input`, in their order, made into what `mode` says.
+CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode mode) {
+  std::size_t next = 0;
+  if (mode != Mode::kLabel) {
+    return select(input, [&](std::size_t, const Point&) {
+      return (segments[next++] != kNoSegment) == (mode == Mode::kKeep);
+    });
+  }
+  CloudPtr output = select(input, [](std::size_t, const Point&) { return true; });
+  for (Point& p : output->points) {
+    if (!finite(p)) continue;
+    const int segment = segments[next++];
+    // Glasbey's colours are told apart easily; the first is black.
+    const auto color = static_cast<std::size_t>(segment + 1) % (pcl::GlasbeyLUT::size() - 1) + 1;
+    const pcl::RGB rgb = segment == kNoSegment ? pcl::RGB(128, 128, 128) : pcl::GlasbeyLUT::at(color);
+    p.r = rgb.r;
+    p.g = rgb.g;
+    p.b = rgb.b;
+  }
+  return output;
+}
+
+/// Points on a line, or fewer than three places: PCL would complain on the console.
+bool spans_a_plane(const Cloud& points, const pcl::Indices& indices) {
+  if (indices.size() < 3) return false;
+  Eigen::Matrix3d covariance;
+  Eigen::Vector4d centroid;
+  pcl::computeMeanAndCovarianceMatrix(points, indices, covariance, centroid);
+  const Eigen::Vector3d size = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues();
+  return size[1] > 1e-10 * size[2] && size[1] > 1e-14;
+}
+
+class PlaneFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.number("distance", distance_m_, {1e-4, 10.0}, "m", "Points up to this far off belong to the plane");
+    table.integer("planes", planes_, {1, 100}, "", "How many planes are looked for, the largest first");
+    table.integer("min_points", min_points_, {3, 100000000}, "", "Planes with fewer points are none");
+    table.integer("iterations", iterations_, {1, 1000000}, "", "Tries of RANSAC, at most");
+    table.boolean("refine", refine_, "Fit each plane to all of its points, then choose its points again");
+    table.choice<Mode>("mode", mode_,
+                       {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},
+                       "Keep the planes, remove them, or colour each (and grey the rest)");
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    const CloudConstPtr points = finite_list(input);
+    std::vector<int> segments(points->size(), kNoSegment);
+    auto rest = std::make_shared<pcl::Indices>(points->size());
+    for (std::size_t i = 0; i < rest->size(); ++i) (*rest)[i] = static_cast<pcl::index_t>(i);
+    for (int plane = 0; plane < planes_ && spans_a_plane(*points, *rest); ++plane) {
+      const pcl::Indices found = largest_plane(points, rest);
+      if (found.size() < static_cast<std::size_t>(min_points_)) break;
+      for (const auto i : found) segments[static_cast<std::size_t>(i)] = plane;
+      rest->erase(std::remove_if(rest->begin(), rest->end(),
+                                 [&](auto i) { return segments[static_cast<std::size_t>(i)] != kNoSegment; }),
+                  rest->end());
+    }
+    return by_segment(*input, segments, mode_);
+  }
+
+ private:
+  pcl::Indices largest_plane(const CloudConstPtr& points, const pcl::IndicesPtr& among) const {
+    pcl::SACSegmentation<Point> segmentation;  // always the same random numbers
+    segmentation.setModelType(pcl::SACMODEL_PLANE);
+    segmentation.setMethodType(pcl::SAC_RANSAC);
+    segmentation.setDistanceThreshold(distance_m_);
+    segmentation.setMaxIterations(iterations_);
+    segmentation.setOptimizeCoefficients(refine_);
+    segmentation.setInputCloud(points);
+    segmentation.setIndices(among);
+    pcl::PointIndices inliers;
+    pcl::ModelCoefficients coefficients;
+    segmentation.segment(inliers, coefficients);
+    return inliers.indices;
+  }
+
+  double distance_m_ = 0.02;
+  int planes_ = 1;
+  int min_points_ = 100;
+  int iterations_ = 1000;
+  bool refine_ = true;
+  Mode mode_ = Mode::kKeep;
+};
+
+class ClustersFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.number("distance", distance_m_, {1e-4, 10.0}, "m", "Points nearer than this belong together");
+    table.integer("min_points", min_points_, {1, 100000000}, "", "Clusters with fewer points are none");
+    table.integer("count", count_, {0, 1000000}, "", "How many clusters, the largest first; 0: all");
+    table.choice<Mode>("mode", mode_,
+                       {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},
+                       "Keep the clusters, remove them, or colour each (and grey the rest)");
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    const CloudConstPtr points = finite_list(input);
+    std::vector<int> segments(points->size(), kNoSegment);
+    std::vector<pcl::PointIndices> clusters = find(points);
+    // Largest first; of equals the one that comes first in the cloud.
+    std::sort(clusters.begin(), clusters.end(), [](const pcl::PointIndices& a, const pcl::PointIndices& b) {
+      if (a.indices.size() != b.indices.size()) return a.indices.size() > b.indices.size();
+      return a.indices.front() < b.indices.front();
+    });
+    if (count_ > 0) clusters.resize(std::min(clusters.size(), static_cast<std::size_t>(count_)));
+    for (std::size_t c = 0; c < clusters.size(); ++c) {
+      for (const auto i : clusters[c].indices) segments[static_cast<std::size_t>(i)] = static_cast<int>(c);
+    }
+    return by_segment(*input, segments, mode_);
+  }
+
+ private:
+  std::vector<pcl::PointIndices> find(const CloudConstPtr& points) const {
+    std::vector<pcl::PointIndices> clusters;
+    if (points->empty()) return clusters;
+    pcl::EuclideanClusterExtraction<Point> extraction;
+    extraction.setClusterTolerance(distance_m_);
+    extraction.setMinClusterSize(min_points_);
+    auto tree = std::make_shared<pcl::search::KdTree<Point>>(false);
+    tree->setInputCloud(points);
+    extraction.setSearchMethod(tree);
+    extraction.setInputCloud(points);
+    extraction.extract(clusters);
+    return clusters;
+  }
+
+  double distance_m_ = 0.05;
+  int min_points_ = 100;
+  int count_ = 1;
+  Mode mode_ = Mode::kKeep;
+};
+
+}  // namespace
+
+FilterInfo plane_filter() {
+  return {"plane", "Finds the largest planes and keeps, removes or colours their points.",
+          "PCL's SACSegmentation, one plane after the other in what is left. The same cloud gives the same "
+          "planes. Only the points themselves count: a plane goes through everything near it, also through "
+          "furniture that it cuts.",
+          "- type: plane\n  distance: 2 cm\n  planes: 2\n  mode: remove\n",
+          [] { return std::make_unique<PlaneFilter>(); }};
+}
+
+FilterInfo clusters_filter() {
+  return {
+      "clusters", "Finds what hangs together and keeps, removes or colours the largest pieces.",
+      "PCL's EuclideanClusterExtraction: two points are in one cluster when steps of at most `distance` lead "
+      "from one to the other.",
+      "- type: clusters\n  distance: 5 cm\n  min_points: 200\n  count: 1\n  mode: keep\n",
+      [] { return std::make_unique<ClustersFilter>(); }};
+}
+
+}  // namespace plumbline::cloud
