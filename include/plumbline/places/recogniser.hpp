@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// From scores to candidates worth verifying (METHOD section 5): scores relative to that of a neighbouring
+// keyframe, grouped by covisibility, seen several times in a row.
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/places/database.hpp"
+
+namespace plumbline::places {
+
+struct RecogniserOptions {
+  double min_score = 0.25;    ///< eta, relative to the neighbour's score
+  double min_absolute = 0.015;
+  int consistent = 3;  ///< keyframes in a row that must see the same surroundings
+  int hits = 30;       ///< best keyframes that are looked at
+  int groups = 3;      ///< candidates at most
+  void declare(core::OptionTable& table);
+};
+
+struct Candidate {
+  core::KeyframeId keyframe;  ///< the best of its group
+  double score = 0.0;
+  double relative = 0.0;     ///< score over that of the query's neighbour
+  double group_score = 0.0;  ///< sum over its covisible keyframes among the hits
+  int in_a_row = 1;          ///< queries in a row that found these surroundings
+};
+
+/// Keyframes that see much the same as a keyframe (itself left out), the closest first. Made from a
+/// maps::Map, or from several.
+using Neighbours = std::function<std::vector<core::KeyframeId>(core::KeyframeId)>;
+
+/// Remembers what the last queries of each robot found.
+class Recogniser {
+ public:
+  explicit Recogniser(const RecogniserOptions& options) : options_(options) {}
+
+  /// Candidates for keyframe `query` that looks like `picture`: best group first. `neighbour` is a keyframe
+  /// that saw nearly the same as the query (usually the one before): its score is what a good score is here;
+  /// invalid: scores are not compared. Keyframes that `allowed` refuses (the query's own surroundings) are
+  /// left out. Those seen fewer than options.consistent times in a row come too, with their in_a_row.
+  std::vector<Candidate> look(const Database& database, core::KeyframeId query,
+                              const features::FrameFeatures& picture, core::KeyframeId neighbour,
+                              const std::function<bool(core::KeyframeId)>& allowed,
+                              const Neighbours& neighbours);
+
+  [[nodiscard]] const RecogniserOptions& options() const { return options_; }
+
+ private:
+  struct Group {
+    std::vector<core::KeyframeId> members;  ///< sorted
+    int in_a_row = 1;
+  };
+  RecogniserOptions options_;
+  std::map<std::int32_t, std::vector<Group>> last_;  ///< by robot
+};
+
+}  // namespace plumbline::places

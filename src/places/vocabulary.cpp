@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/places/vocabulary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "plumbline/places/majority.hpp"
+
+namespace plumbline::places {
+
+using features::Descriptor256;
+
+namespace {
+
+constexpr int kMaxBranching = 64;
+
+std::size_t at(Word word) { return static_cast<std::size_t>(word); }
+
+const std::array<int, kMaxBranching>& first_indices() {
+  static const std::array<int, kMaxBranching> kIndices = [] {
+    std::array<int, kMaxBranching> indices{};
+    std::iota(indices.begin(), indices.end(), 0);
+    return indices;
+  }();
+  return kIndices;
+}
+
+}  // namespace
+
+void VocabularyOptions::declare(core::OptionTable& table) {
+  table.integer("vocabulary.branching", branching, {2, kMaxBranching}, "", "Children of a node at most");
+  table.integer("vocabulary.levels", levels, {1, 12}, "", "Levels of the tree at most");
+  table.integer("vocabulary.split", split, {10, 100000}, "",
+                "A word with more features than this is divided");
+  table.integer("vocabulary.iterations", iterations, {1, 100}, "", "Rounds of clustering");
+}
+
+Vocabulary::Vocabulary(const VocabularyOptions& options) : options_(options) {
+  options_.branching = std::clamp(options_.branching, 2, kMaxBranching);
+  for (const Kind kind : kKinds) {
+    Node root;
+    root.kind = kind;
+    root.divide_at = patience(0);
+    nodes_.push_back(root);
+    centres_.push_back({});
+  }
+}
+
+std::int64_t Vocabulary::patience(int level) const {
+  const int more = level == 0 ? 20 : level == 1 ? 5 : 1;
+  return static_cast<std::int64_t>(options_.split) * more;
+}
+
+Word Vocabulary::word(Kind kind, const Descriptor256& descriptor) const {
+  auto node = static_cast<Word>(kind);
+  std::array<int, kMaxBranching> distances{};
+  while (nodes_[at(node)].children > 0) {
+    const Node& n = nodes_[at(node)];
+    const auto count = static_cast<std::size_t>(n.children);
+    features::hamming_distances(descriptor, &centres_[at(n.first_child)], first_indices().data(), count,
+                                distances.data());
+    const auto nearest = std::min_element(distances.begin(), distances.begin() + n.children);
+    node = n.first_child + static_cast<Word>(nearest - distances.begin());
+  }
+  return node;
+}
+
+double Vocabulary::weight(Word word) const {
+  const std::int64_t in_word = nodes_[at(word)].features;
+  const std::int64_t all = nodes_[0].features + nodes_[1].features;
+  if (in_word <= 0 || all <= in_word) return 0.0;
+  return std::log(static_cast<double>(all) / static_cast<double>(in_word));
+}
+
+void Vocabulary::count(Word word) {
+  if (fixed_) throw std::logic_error("Vocabulary: a fixed vocabulary does not learn");
+  Node& node = nodes_[at(word)];
+  ++node.features;
+  const auto root = static_cast<Word>(node.kind);
+  if (root != word) ++nodes_[at(root)].features;
+}
+
+bool Vocabulary::overfull(Word word) const {
+  const Node& node = nodes_[at(word)];
+  return !fixed_ && node.children == 0 && node.level < options_.levels && node.features > node.divide_at;
+}
+
+Word Vocabulary::add_children(Word parent, const std::vector<Descriptor256>& centres) {
+  const auto first = static_cast<Word>(nodes_.size());
+  for (const Descriptor256& centre : centres) {
+    Node child;
+    child.kind = nodes_[at(parent)].kind;
+    child.level = static_cast<std::int8_t>(nodes_[at(parent)].level + 1);
+    child.divide_at = patience(child.level);
+    nodes_.push_back(child);
+    centres_.push_back(centre);
+  }
+  nodes_[at(parent)].first_child = first;
+  nodes_[at(parent)].children = static_cast<std::int16_t>(centres.size());
+  return first;
+}
+
+std::vector<Word> Vocabulary::divide(Word word, const std::vector<Descriptor256>& members) {
+  if (!overfull(word)) throw std::logic_error("Vocabulary: this word is not to be divided");
+  const Clusters clusters =
+      k_majority(members, options_.branching, options_.iterations, static_cast<std::uint64_t>(word));
+  if (clusters.centres.size() < 2) {
+    nodes_[at(word)].divide_at = 2 * nodes_[at(word)].features;
+    return {};
+  }
+  const Word first = add_children(word, clusters.centres);
+  std::vector<Word> words;
+  words.reserve(members.size());
+  for (const int c : clusters.member_of) {
+    words.push_back(first + static_cast<Word>(c));
+    ++nodes_[at(words.back())].features;
+  }
+  return words;
+}
+
+Vocabulary Vocabulary::train(const std::vector<Descriptor256>& points,
+                             const std::vector<Descriptor256>& lines, const VocabularyOptions& options) {
+  Vocabulary vocabulary(options);
+  struct Task {
+    Word word;
+    std::vector<Descriptor256> members;
+  };
+  std::vector<Task> tasks{{0, points}, {1, lines}};
+  vocabulary.nodes_[0].features = static_cast<std::int64_t>(points.size());
+  vocabulary.nodes_[1].features = static_cast<std::int64_t>(lines.size());
+  // Trained at once, every level has seen all there is: none has to wait.
+  const auto enough = static_cast<std::size_t>(vocabulary.options_.branching);
+  while (!tasks.empty()) {
+    const Task task = std::move(tasks.back());
+    tasks.pop_back();
+    if (vocabulary.nodes_[at(task.word)].level >= options.levels || task.members.size() <= enough) continue;
+    const Clusters clusters = k_majority(task.members, vocabulary.options_.branching, options.iterations,
+                                         static_cast<std::uint64_t>(task.word));
+    if (clusters.centres.size() < 2) continue;
+    const Word first = vocabulary.add_children(task.word, clusters.centres);
+    std::vector<Task> children(clusters.centres.size());
+    for (std::size_t c = 0; c < children.size(); ++c) children[c].word = first + static_cast<Word>(c);
+    for (std::size_t i = 0; i < task.members.size(); ++i) {
+      children[static_cast<std::size_t>(clusters.member_of[i])].members.push_back(task.members[i]);
+    }
+    for (Task& child : children) {
+      vocabulary.nodes_[at(child.word)].features = static_cast<std::int64_t>(child.members.size());
+      tasks.push_back(std::move(child));
+    }
+  }
+  vocabulary.fixed_ = true;
+  return vocabulary;
+}
+
+std::size_t Vocabulary::word_count(Kind kind) const {
+  return static_cast<std::size_t>(std::count_if(
+      nodes_.begin(), nodes_.end(), [&](const Node& n) { return n.kind == kind && n.children == 0; }));
+}
+
+std::int64_t Vocabulary::feature_count(Kind kind) const {
+  return nodes_[static_cast<std::size_t>(kind)].features;
+}
+
+int Vocabulary::depth(Kind kind) const {
+  int deepest = 0;
+  for (const Node& n : nodes_) {
+    if (n.kind == kind) deepest = std::max(deepest, static_cast<int>(n.level));
+  }
+  return deepest;
+}
+
+}  // namespace plumbline::places
