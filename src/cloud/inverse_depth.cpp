@@ -115,6 +115,28 @@ Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float mi
   return smoothed;
 }
 
+void widen_means(Grid& grid, int step, float noise, float wanted_m) {
+  constexpr float kStraight = 2.5F * 2.45F;  // sigmas of before + after - 2 x middle
+  const auto along = [&](std::ptrdiff_t stride, bool rows) {
+    const std::vector<float> before_pass = grid.values;
+    for (int j = 0; j < grid.height; ++j) {
+      if (!rows && (j < step || j >= grid.height - step)) continue;
+      const float* from = before_pass.data() + static_cast<std::ptrdiff_t>(j) * grid.width;
+      float* to = grid.row(j);
+      for (int i = rows ? step : 0; i < grid.width - (rows ? step : 0); ++i) {
+        const float middle = from[i];
+        const float sigma = noise * inverse_depth_sigma(middle);
+        const float pair = from[i - stride] + from[i + stride];
+        const bool noisy = sigma > wanted_m * middle * middle;
+        const bool straight = std::abs(pair - 2.0F * middle) < kStraight * sigma;
+        to[i] = noisy && straight ? (pair + middle) * (1.0F / 3.0F) : middle;
+      }
+    }
+  };
+  along(step, true);
+  along(static_cast<std::ptrdiff_t>(step) * grid.width, false);
+}
+
 Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
   const std::size_t count = grid.values.size();
   Reach reach{std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count),

@@ -34,6 +34,12 @@ struct Grid {
 Grid smooth_inverse_depth(const cv::Mat& depth, int stride, int window, float min_depth, float max_depth,
                           float focal);
 
+/// One more pass of means, over three cells `step` apart along rows and then along columns: where the noise
+/// of the means so far, `noise` times that of one measurement, is more than `wanted_m` metres and the three
+/// lie on a line as far as that noise tells. A plane of any slant stays a plane, a step or fold stays as it
+/// is.
+void widen_means(Grid& inverse_depth, int step, float noise, float wanted_m);
+
 /// For every cell how many cells the surface goes on in a direction without a jump, at most `longest`.
 struct Reach {
   std::vector<std::uint8_t> left, right, up, down;

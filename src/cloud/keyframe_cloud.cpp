@@ -41,7 +41,8 @@ class PointMaker {
         grid_(smooth_inverse_depth(frame.depth, stride_, options.smooth_px,
                                    static_cast<float>(options.min_depth_m),
                                    static_cast<float>(options.max_depth_m), fx_)),
-        reach_(surface_reach(grid_, stride_, fx_, longest_)) {}
+        reach_(surface_reach(grid_, stride_, fx_, longest_)),
+        position_(options.smooth_position ? positions() : Grid()) {}
 
   [[nodiscard]] int width() const { return grid_.width; }
   [[nodiscard]] int height() const { return grid_.height; }
@@ -66,7 +67,7 @@ class PointMaker {
         continue;
       }
       const float x = (static_cast<float>(u) - cx_) / fx_;
-      p.z = depth[u];
+      p.z = position_.values.empty() ? depth[u] : 1.0F / position_.row(j)[i];
       p.x = x * p.z;
       p.y = y * p.z;
       set_normal(w + i, j, i, x, y, p);
@@ -74,6 +75,16 @@ class PointMaker {
   }
 
  private:
+  /// The inverse depth that gives the points' positions: means over what a plane explains, the wider the
+  /// noisier the depth.
+  [[nodiscard]] Grid positions() const {
+    constexpr float kWanted_m = 0.0015F;
+    Grid means = grid_;
+    const int step = std::max(2, static_cast<int>(std::lround(8.0 / stride_)));
+    widen_means(means, step, noise_ * 1.75F, kWanted_m);
+    widen_means(means, 2 * step, noise_ * 0.7F, kWanted_m);
+    return means;
+  }
   void set_normal(const float* w, int j, int i, float x, float y, Point& p) const {
     const auto cell =
         static_cast<std::size_t>(j) * static_cast<std::size_t>(grid_.width) + static_cast<std::size_t>(i);
@@ -105,6 +116,7 @@ class PointMaker {
   float noise_;  ///< of the smoothed inverse depth over the raw one, neighbours being correlated
   Grid grid_;
   Reach reach_;
+  Grid position_;  ///< empty: raw depth
 };
 
 }  // namespace
@@ -114,6 +126,9 @@ void KeyframeCloudOptions::declare(core::OptionTable& table) {
   table.number("min_depth", min_depth_m, {0.05, 20.0}, "m", "Nearer measurements are no points");
   table.number("max_depth", max_depth_m, {0.1, 20.0}, "m", "Measurements beyond are no points");
   table.integer("smooth", smooth_px, {1, 31}, "px", "Window of the edge-aware mean of inverse depth, odd");
+  table.boolean("smooth_position", smooth_position,
+                "Points lie on the edge-aware mean of the depth round them, the wider the noisier it is; "
+                "off: the raw measurement");
   table.number("base", base_px, {2.0, 60.0}, "px", "Half base of the differences for normals at 2 m");
 }
 

@@ -10,6 +10,7 @@
 
 #include "plumbline/sensor/depth_noise.hpp"
 #include "scalar.hpp"
+#include "voxel_key.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -18,16 +19,6 @@ constexpr int kAxisBits = 21;
 constexpr std::int64_t kHalf = std::int64_t{1} << (kAxisBits - 1);
 constexpr std::size_t kFirstTable = 1024;
 constexpr float kOpposed = -0.2F;  // a fold of up to 100 degrees is still one side
-
-/// Spreads neighbouring keys over the table (finaliser of MurmurHash3, public domain).
-std::size_t mix(std::uint64_t key) {
-  key ^= key >> 33;
-  key *= 0xff51afd7ed558ccdULL;
-  key ^= key >> 33;
-  key *= 0xc4ceb9fe1a85ec53ULL;
-  key ^= key >> 33;
-  return static_cast<std::size_t>(key);
-}
 
 /// The bits of a key that tell the voxels of a block of 2 x 2 x 2 and their sides apart.
 constexpr std::uint64_t kBlockBits =
@@ -58,6 +49,7 @@ struct VoxelMap::Sample {
   Eigen::Vector3f color{0, 0, 0};
   float weight = 0.0F;
   float scatter = 0.0F;            ///< within the sample itself
+  float variance = 0.0F;           ///< weight times the sensor's variance
   std::uint32_t observations = 1;  ///< views it stands for
   bool normal_known = false;
 };
@@ -157,6 +149,7 @@ void VoxelMap::add(const Sample& sample) {
     side->normal += sample.weight * sample.normal;
   }
   side->scatter += sample.scatter;
+  side->variance += sample.variance;
   side->mean += share * before;
   side->color += share * (sample.color - side->color);
   side->weight = total;
@@ -169,7 +162,8 @@ void VoxelMap::add(const Sample& sample) {
   }
 }
 
-void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud) {
+void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud,
+                      const Eigen::AlignedBox3d* region) {
   ++view_;
   const double unit = sensor::depth_sigma(1.0);
   std::vector<Sample> samples;
@@ -177,6 +171,8 @@ void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_f
   for (const Point& p : camera_cloud.points) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !(p.z > 0.0F) || !std::isfinite(p.z)) continue;
     const Eigen::Vector3d point(p.x, p.y, p.z);
+    const Eigen::Vector3d in_world = world_from_cloud * point;
+    if (region != nullptr && !region->contains(in_world)) continue;
     const Eigen::Vector3d to_camera = -point.normalized();
     Eigen::Vector3d normal(p.normal_x, p.normal_y, p.normal_z);
     Sample sample;
@@ -187,11 +183,13 @@ void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_f
       cosine = std::abs(normal.dot(to_camera));
       if (cosine < options_.min_cos_incidence) continue;
     }
-    if (!locate(world_from_cloud * point, sample)) continue;
-    const double ratio = unit / sensor::depth_sigma(point.z());
+    if (!locate(in_world, sample)) continue;
+    const double sigma = sensor::depth_sigma(point.z());
+    const double ratio = unit / sigma;
     sample.normal = (world_from_cloud.rotation * (sample.normal_known ? normal : to_camera)).cast<float>();
     sample.color = Eigen::Vector3f(p.r, p.g, p.b);
     sample.weight = static_cast<float>(std::max(cosine, 1e-3) * ratio * ratio);
+    sample.variance = sample.weight * static_cast<float>(sigma * sigma);
     samples.push_back(sample);
   }
   add_all(samples);
@@ -211,7 +209,29 @@ void VoxelMap::merge(const VoxelMap& other, const geometry::Rigid3& this_from_ot
     sample.color = side.color;
     sample.weight = side.weight;
     sample.scatter = side.scatter;
+    sample.variance = side.variance;
     sample.observations = side.observations;
+    samples.push_back(sample);
+  }
+  add_all(samples);
+}
+
+void VoxelMap::merge(const FusedCloud& points) {
+  ++view_;
+  const Cloud& cloud = *points.cloud;
+  std::vector<Sample> samples;
+  samples.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    Sample sample;
+    if (!locate(cloud[i].getVector3fMap().cast<double>(), sample)) continue;
+    const Eigen::Vector3f normal = cloud[i].getNormalVector3fMap();
+    sample.normal_known = normal.allFinite();
+    if (sample.normal_known) sample.normal = normal;
+    sample.color = Eigen::Vector3f(cloud[i].r, cloud[i].g, cloud[i].b);
+    sample.weight = points.weight[i];
+    sample.scatter = points.weight[i] * points.spread_m[i] * points.spread_m[i];
+    sample.variance = points.weight[i] * points.noise_m[i] * points.noise_m[i];
+    sample.observations = points.columns.observations[i];
     samples.push_back(sample);
   }
   add_all(samples);
@@ -245,6 +265,8 @@ FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
   fused.columns.observations.reserve(order.size());
   fused.columns.confidence.reserve(order.size());
   fused.spread_m.reserve(order.size());
+  fused.weight.reserve(order.size());
+  fused.noise_m.reserve(order.size());
   for (const auto& [key, index] : order) {
     const Side& side = sides_[index];
     const Eigen::Vector3f position = this->position(side).cast<float>();
@@ -267,6 +289,8 @@ FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
     fused.columns.observations.push_back(side.observations);
     fused.columns.confidence.push_back(side.weight / (side.weight + 1.0F));
     fused.spread_m.push_back(std::sqrt(side.scatter / side.weight));
+    fused.weight.push_back(side.weight);
+    fused.noise_m.push_back(std::sqrt(side.variance / side.weight));
   }
   fused.cloud->width = static_cast<std::uint32_t>(fused.cloud->size());
   fused.cloud->height = 1;

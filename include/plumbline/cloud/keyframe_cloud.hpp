@@ -13,16 +13,18 @@ struct KeyframeCloudOptions {
   int stride_px = 2;         ///< one point per stride x stride pixels
   double min_depth_m = 0.2;  ///< measurements outside [min, max] are no points
   double max_depth_m = 8.0;
-  int smooth_px = 7;      ///< window of the edge-aware mean before differences are taken, odd
+  int smooth_px = 7;            ///< window of the edge-aware mean before differences are taken, odd
+  bool smooth_position = true;  ///< positions from the mean, not from the single measurement
   double base_px = 12.0;  ///< half base of the differences at 2 m; grows and shrinks with sigma_z(z) / z
 
   void declare(core::OptionTable& table);
 };
 
 /// Organised cloud, width / stride by height / stride (rounded up), camera frame, point (i, j) the
-/// measurement of pixel (stride i, stride j); NaN where there is none. Positions are the raw measurement.
-/// `curvature` is the bend of the surface across the base in radians. `frame.depth` CV_32FC1 of the camera's
-/// size, `frame.color` BGR of the same size (may be empty: white).
+/// measurement of pixel (stride i, stride j); NaN where there is none. Positions lie on the pixel's ray at
+/// the raw depth or, with `smooth_position`, at the mean of what a plane explains around: half to a sixth of
+/// the noise. `curvature` is the bend of the surface across the base in radians. `frame.depth` CV_32FC1 of
+/// the camera's size, `frame.color` BGR of the same size (may be empty: white).
 ///
 /// Normals: on a plane the inverse depth is linear in the pixel, 1/z = a x + b y + c with normal ~ (a, b, c)
 /// and x = (u - cx) / fx, so the normal is the gradient of the smoothed inverse depth. Differences span a

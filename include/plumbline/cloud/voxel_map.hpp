@@ -4,6 +4,7 @@
 // Many views fused in hashed voxels. The cost of a view depends on its own points only, never on the map's
 // size.
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -33,6 +34,8 @@ struct FusedCloud {
   CloudPtr cloud;
   CloudColumns columns;         ///< observations and confidence (weight / (weight + 1)) of each point
   std::vector<float> spread_m;  ///< standard deviation of the measurements along the normal
+  std::vector<float> weight;    ///< sum over the measurements, see VoxelMap
+  std::vector<float> noise_m;   ///< standard deviation that the sensor's noise lets one measurement have
 };
 
 /// A voxel keeps the weighted means of position, normal and colour of its measurements; the weight is
@@ -46,10 +49,14 @@ class VoxelMap {
   /// Fuses one view. `camera_cloud` is in the camera frame (z along the optical axis gives the depth noise);
   /// points that are not finite are passed over, points without normal count half and take the side they are
   /// seen from. One call is one observation of every voxel it touches.
-  void insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud);
+  /// Points outside of `region` (world; null: everywhere) are passed over.
+  void insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud,
+              const Eigen::AlignedBox3d* region = nullptr);
 
   /// Fuses a finished map, weights and observations included: local maps into the global one.
   void merge(const VoxelMap& other, const geometry::Rigid3& this_from_other);
+  /// The same for points that an extract() gave and that moved since.
+  void merge(const FusedCloud& points);
 
   /// Points in the order of their voxel (x, then y, then z, front before back); `curvature` is 0.
   [[nodiscard]] FusedCloud extract(const VoxelExtractOptions& options = {}) const;
@@ -63,7 +70,7 @@ class VoxelMap {
   void clear();
 
  private:
-  /// Running weighted means of one side of one voxel; 64 bytes.
+  /// Running weighted means of one side of one voxel.
   struct Side {
     std::uint64_t key = 0;          ///< voxel and side, ordered as the output
     Eigen::Vector3f mean{0, 0, 0};  ///< metres from the voxel's centre
@@ -71,7 +78,8 @@ class VoxelMap {
                            0};       ///< weighted sum; while none is known, the direction to the first camera
     Eigen::Vector3f color{0, 0, 0};  ///< weighted mean, 0-255
     float weight = 0.0F;
-    float scatter = 0.0F;  ///< weighted sum of squared distances from the mean along the normal
+    float scatter = 0.0F;   ///< weighted sum of squared distances from the mean along the normal
+    float variance = 0.0F;  ///< weighted sum of the sensor's variance of the measurements
     std::uint32_t observations = 0;
     std::uint32_t last_view = 0;
     std::uint32_t last_observations : 31;  ///< what the last view added

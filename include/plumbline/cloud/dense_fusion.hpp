@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The views of a whole run as one cloud with thin, single walls.
+//
+// Views are laid down in a voxel map tile by tile, so that memory follows the tile and not the run; within a
+// tile the points of flat pieces of surface come to lie on their common plane (sheets.hpp), what other views
+// look through is removed (free_space.hpp), and colours are evened out between views (exposure.hpp).
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::cloud {
+
+struct DenseFusionOptions {
+  VoxelMapOptions voxels;
+  int min_observations = 1;  ///< views that must have seen a voxel for it to stay
+  bool settle = true;        ///< points of flat pieces of surface lie on their plane
+  bool free_space = true;    ///< what other views look through goes
+  bool exposure = true;      ///< colours are evened out between views
+  int min_support = 6;       ///< points with fewer like them within about 3 blocks are dust; 0: none is
+  double tile_mb = 250.0;    ///< memory that one tile may take
+
+  void declare(core::OptionTable& table);
+};
+
+struct FusionReport {
+  std::size_t tiles = 0;
+  std::size_t seen_through = 0;  ///< points removed since views look through them
+  std::size_t dust = 0;          ///< points removed as too lonely
+  double least_gain = 1.0;       ///< of the colours of a view
+  double most_gain = 1.0;
+};
+
+/// Gives the cloud of view `i`, in its camera frame; may be called for several views at a time.
+using ReadView = std::function<core::Result<CloudPtr>(std::size_t)>;
+
+/// Fuses the views. Reads each once to plan and once for every tile it reaches into. `camera` is the one that
+/// the clouds were taken with. Points come tile by tile, in a fixed order; the same for any number of
+/// threads. Errors are those of `read`. `report` may be null.
+core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
+                                    const ReadView& read, const sensor::Pinhole& camera,
+                                    const DenseFusionOptions& options, const core::Executor& executor,
+                                    FusionReport* report = nullptr);
+
+/// A cloud and its columns again in larger voxels, weighted by confidence when that is known.
+FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m);
+
+}  // namespace plumbline::cloud

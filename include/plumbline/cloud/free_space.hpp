@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What views say about places that are not on their surfaces: nothing can be where a view looks through.
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "plumbline/cloud/sheets.hpp"
+#include "plumbline/cloud/types.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::cloud {
+
+/// A small depth picture of a view: range of measured depth within cells of 4 x 4 pixels.
+struct DepthRaster {
+  static constexpr int kCell_px = 4;
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint16_t> nearest;  ///< millimetres, 0: none
+  float furthest_m = 0.0F;             ///< of all cells
+};
+
+/// From a view's cloud, camera frame.
+DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera);
+
+/// What one view says about a place.
+enum class Evidence { kNone, kSurface, kFree, kHidden };
+
+/// `point`: metres, camera frame. Free: all cells around (3 x 3, at least 7 measured) lie further away than
+/// the sensor's noise and 3 cm explain. kNone outside of the picture or where too little was measured.
+Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
+
+/// For every sheet whether it is to go: at least two views look through it, and at least half as many as see
+/// a surface there.
+std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
+                                       const std::vector<geometry::Rigid3>& world_from_camera,
+                                       const sensor::Pinhole& camera);
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Pieces of surface of a fused cloud: what makes walls thin, and what free space is judged by.
+//
+// A voxel much smaller than the sensor's noise averages little: a wall seen from afar becomes a slab of
+// voxels. Points that face the same way within a small block form a sheet; sheets of neighbouring blocks are
+// taken together as long as one plane explains their points within the noise, and points come to lie on the
+// plane.
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plumbline/cloud/voxel_map.hpp"
+
+namespace plumbline::cloud {
+
+/// Points of one block that face the same way (within 45 degrees of their mean). Plain sums, metres from
+/// the block's centre.
+struct Sheet {
+  Eigen::Vector3i block{0, 0, 0};
+  Eigen::Vector3f normal_sum{0, 0, 0};
+  Eigen::Vector3f first{0, 0, 0};  ///< weighted sum of positions
+  Eigen::Matrix3f second;          ///< weighted sum of their outer products
+  float weight = 0.0F;
+  float variance = 0.0F;  ///< weighted sum of what the sensor's noise explains, m^2
+  float scatter = 0.0F;   ///< weighted sum of squared spreads within voxels, m^2
+  std::uint32_t points = 0;
+
+  // What fit_planes() finds: the plane normal . (p - origin) = 0 of this sheet and its surroundings.
+  Eigen::Vector3f origin{0, 0, 0};  ///< metres from the block's centre
+  Eigen::Vector3f normal{0, 0, 0};  ///< unit
+  float noise_m = 0.0F;             ///< standard deviation of one measurement
+  std::uint32_t support = 0;        ///< points of the surroundings that face the same way, its own included
+  bool flat = false;                ///< the plane explains the points within the noise
+
+  Sheet() : second(Eigen::Matrix3f::Zero()) {}
+};
+
+/// The sheets of a cloud in blocks of `block_m`; points without normal belong to none.
+class Sheets {
+ public:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+  Sheets(const FusedCloud& points, double block_m);
+
+  [[nodiscard]] const std::vector<Sheet>& all() const { return sheets_; }
+  /// Sheet of point `i` of the cloud, or kNone.
+  [[nodiscard]] std::uint32_t of(std::size_t i) const { return sheet_of_[i]; }
+  [[nodiscard]] double block_m() const { return block_m_; }
+  [[nodiscard]] Eigen::Vector3d centre(const Eigen::Vector3i& block) const {
+    return (block.cast<double>().array() + 0.5) * block_m_;
+  }
+  /// Mean position of a sheet's points, metres.
+  [[nodiscard]] Eigen::Vector3d position(const Sheet& sheet) const;
+
+  /// Finds the planes: over all 27 blocks around if one plane explains them, else over the sheet alone.
+  void fit_planes();
+  /// Moves the points of flat sheets along their normals to the planes, which are blended between blocks, and
+  /// gives them the planes' normals.
+  void settle(FusedCloud& points) const;
+
+ private:
+  struct Entry {
+    std::uint64_t key = 0;
+    std::uint32_t first = kNone;  ///< sheet
+  };
+  [[nodiscard]] std::uint32_t first_of(const Eigen::Vector3i& block) const;
+  std::uint32_t& slot(const Eigen::Vector3i& block);
+  void add(const FusedCloud& points, std::size_t i);
+  template <typename Visit>
+  void visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal, const Visit& visit) const;
+  /// Plane of a weighted set of points; false when it does not explain them.
+  static bool fit(const Sheet& sums, Sheet& sheet);
+
+  double block_m_;
+  std::vector<Sheet> sheets_;
+  std::vector<std::uint32_t> next_;      ///< next sheet of the same block
+  std::vector<std::uint32_t> sheet_of_;  ///< by point
+  std::vector<Entry> table_;             ///< open addressing by block
+  std::size_t blocks_ = 0;
+};
+
+}  // namespace plumbline::cloud

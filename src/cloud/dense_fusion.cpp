@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/dense_fusion.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "fusion_tiles.hpp"
+#include "plumbline/cloud/exposure.hpp"
+#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/sheets.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr double kCell_m = 0.1;  ///< of plans and colours; also the margin of tiles
+constexpr std::size_t kTilesAtATime = 4;
+
+/// Edge of the blocks of sheets: wide enough for a plane through noise, narrow enough for furniture.
+double block_m(double voxel_m) { return std::max(0.02, 2.0 * voxel_m); }
+
+/// Occupied cells that a tile of `tile_mb` may hold.
+std::size_t cells_per_tile(const DenseFusionOptions& options) {
+  constexpr double kBytesPerSide = 220.0;  // in the voxel map, extracted, and in sheets
+  constexpr double kLayers = 1.2;          // occupied voxels per voxel of a cell's side
+  const double per_axis = std::max(1.0, kCell_m / options.voxels.voxel_m);
+  const double bytes_per_cell = kLayers * per_axis * per_axis * kBytesPerSide;
+  return static_cast<std::size_t>(std::max(64.0, options.tile_mb * 1e6 / bytes_per_cell));
+}
+
+/// The first error in the order of the items, if any.
+template <typename T>
+std::optional<core::Error> first_error(const std::vector<core::Result<T>>& results) {
+  for (const auto& result : results) {
+    if (!result) return result.error();
+  }
+  return std::nullopt;
+}
+
+/// The points that `keep` says, columns and all.
+template <typename Keep>
+FusedCloud chosen(const FusedCloud& points, const Keep& keep) {
+  FusedCloud result;
+  result.cloud = std::make_shared<Cloud>();
+  for (std::size_t i = 0; i < points.cloud->size(); ++i) {
+    if (!keep(i)) continue;
+    result.cloud->points.push_back((*points.cloud)[i]);
+    result.columns.observations.push_back(points.columns.observations[i]);
+    result.columns.confidence.push_back(points.columns.confidence[i]);
+    result.spread_m.push_back(points.spread_m[i]);
+    result.weight.push_back(points.weight[i]);
+    result.noise_m.push_back(points.noise_m[i]);
+  }
+  return result;
+}
+
+void append(FusedCloud&& from, FusedCloud& to) {
+  const auto move = [](auto& source, auto& target) {
+    target.insert(target.end(), source.begin(), source.end());
+    source = {};
+  };
+  to.cloud->points.insert(to.cloud->points.end(), from.cloud->points.begin(), from.cloud->points.end());
+  from.cloud.reset();
+  move(from.columns.observations, to.columns.observations);
+  move(from.columns.confidence, to.columns.confidence);
+  move(from.spread_m, to.spread_m);
+  move(from.weight, to.weight);
+  move(from.noise_m, to.noise_m);
+}
+
+class Fusion {
+ public:
+  Fusion(const std::vector<geometry::Rigid3>& world_from_camera, const ReadView& read,
+         const sensor::Pinhole& camera, const DenseFusionOptions& options, const core::Executor& executor)
+      : poses_(world_from_camera), read_(read), camera_(camera), options_(options), executor_(executor) {}
+
+  core::Result<FusedCloud> run(FusionReport& report) {
+    if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
+    FusedCloud all;
+    all.cloud = std::make_shared<Cloud>();
+    for (std::size_t first = 0; first < tiles_.size(); first += kTilesAtATime) {
+      const std::size_t count = std::min(kTilesAtATime, tiles_.size() - first);
+      std::vector<core::Result<FusedCloud>> parts(count);
+      std::vector<FusionReport> reports(count);
+      executor_.parallel_for(count, [&](std::size_t k) { parts[k] = fuse(tiles_[first + k], reports[k]); });
+      if (const auto error = first_error(parts)) return tl::unexpected<core::Error>(*error);
+      for (std::size_t k = 0; k < count; ++k) {
+        append(std::move(*parts[k]), all);
+        report.dust += reports[k].dust;
+        report.seen_through += reports[k].seen_through;
+      }
+    }
+    all.cloud->width = static_cast<std::uint32_t>(all.cloud->size());
+    all.cloud->height = 1;
+    all.cloud->is_dense = true;
+    return all;
+  }
+
+ private:
+  /// Reads every view once: where it reaches, what it looks through, its colours.
+  core::Result<void> look(FusionReport& report) {
+    std::vector<std::vector<ColorCell>> cells(poses_.size());
+    std::vector<core::Result<void>> done(poses_.size());
+    rasters_.resize(poses_.size());
+    executor_.parallel_for(poses_.size(), [&](std::size_t v) {
+      const auto cloud = read_(v);
+      if (!cloud) {
+        done[v] = tl::unexpected<core::Error>(cloud.error());
+        return;
+      }
+      cells[v] = color_cells(**cloud, poses_[v], kCell_m);
+      if (options_.free_space) rasters_[v] = depth_raster(**cloud, camera_);
+    });
+    if (const auto error = first_error(done)) return tl::unexpected<core::Error>(*error);
+    tiles_ = plan_tiles(cells, cells_per_tile(options_));
+    report.tiles = tiles_.size();
+    if (!options_.exposure) return {};
+    gains_ = color_gains(cells);
+    for (const Eigen::Vector3f& gain : gains_) {
+      report.least_gain = std::min(report.least_gain, static_cast<double>(gain.minCoeff()));
+      report.most_gain = std::max(report.most_gain, static_cast<double>(gain.maxCoeff()));
+    }
+    return {};
+  }
+
+  [[nodiscard]] core::Result<FusedCloud> fuse(const FusionTile& tile, FusionReport& report) const {
+    const Eigen::AlignedBox3d box = tile.box(kCell_m);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCell_m);
+    const Eigen::AlignedBox3d region(box.min() - margin, box.max() + margin);
+    VoxelMap voxels(options_.voxels);
+    for (const std::uint32_t v : tile.views) {
+      const auto cloud = read_(v);
+      if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+      if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
+      voxels.insert(**cloud, poses_[v], &region);
+    }
+    FusedCloud points = voxels.extract();
+    voxels.clear();
+    points = cleaned(points, report);
+    if (options_.settle) {
+      voxels.merge(points);
+      points = voxels.extract();
+    }
+    const auto least = static_cast<std::uint32_t>(options_.min_observations);
+    return chosen(points, [&](std::size_t i) {
+      const Eigen::Vector3d p = (*points.cloud)[i].getVector3fMap().cast<double>();
+      return points.columns.observations[i] >= least && (p.array() >= box.min().array()).all() &&
+             (p.array() < box.max().array()).all();
+    });
+  }
+
+  /// Without what is seen through and without dust; settled.
+  FusedCloud cleaned(FusedCloud& points, FusionReport& report) const {
+    Sheets sheets(points, block_m(options_.voxels.voxel_m));
+    std::vector<std::uint8_t> goes(sheets.all().size(), 0);
+    if (options_.free_space) goes = seen_through(sheets, rasters_, poses_, camera_);
+    sheets.fit_planes();
+    if (options_.settle) sheets.settle(points);
+    const auto least = static_cast<std::uint32_t>(options_.min_support);
+    return chosen(points, [&](std::size_t i) {
+      const std::uint32_t s = sheets.of(i);
+      if (s == Sheets::kNone) return true;
+      if (goes[s] != 0) {
+        ++report.seen_through;
+        return false;
+      }
+      if (sheets.all()[s].support >= least) return true;
+      ++report.dust;
+      return false;
+    });
+  }
+
+  const std::vector<geometry::Rigid3>& poses_;
+  const ReadView& read_;
+  const sensor::Pinhole& camera_;
+  const DenseFusionOptions& options_;
+  const core::Executor& executor_;
+  std::vector<FusionTile> tiles_;
+  std::vector<DepthRaster> rasters_;    ///< by view
+  std::vector<Eigen::Vector3f> gains_;  ///< by view; empty: colours as they are
+};
+
+}  // namespace
+
+void DenseFusionOptions::declare(core::OptionTable& table) {
+  voxels.declare(table);
+  table.integer("min_observations", min_observations, {1, 1000}, "",
+                "Keyframes that must have seen a voxel for it to stay");
+  table.boolean("settle", settle,
+                "Lay the points of flat pieces of surface on their common plane: thin walls");
+  table.boolean("free_space", free_space, "Remove what other keyframes look through: people, flying pixels");
+  table.boolean("exposure", exposure, "Even out colours between keyframes");
+  table.integer("min_support", min_support, {0, 1000}, "",
+                "Points with fewer others around that face the same way are dust and go; 0: none");
+  table.number("tile_mb", tile_mb, {16.0, 100000.0}, "", "Memory that one tile of the map may take, MB");
+}
+
+core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
+                                    const ReadView& read, const sensor::Pinhole& camera,
+                                    const DenseFusionOptions& options, const core::Executor& executor,
+                                    FusionReport* report) {
+  FusionReport unused;
+  return Fusion(world_from_camera, read, camera, options, executor).run(report == nullptr ? unused : *report);
+}
+
+FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m) {
+  constexpr float kMost = 0.9999F;
+  FusedCloud points;
+  points.cloud = std::make_shared<Cloud>(cloud);
+  const std::size_t count = cloud.size();
+  points.columns.observations = columns.observations;
+  points.columns.observations.resize(count, 1);
+  points.weight.assign(count, 1.0F);
+  for (std::size_t i = 0; i < columns.confidence.size(); ++i) {
+    const float confidence = std::clamp(columns.confidence[i], 1e-4F, kMost);
+    points.weight[i] = confidence / (1.0F - confidence);
+  }
+  points.spread_m.assign(count, 0.0F);
+  points.noise_m.assign(count, 0.0F);
+  VoxelMapOptions options;
+  options.voxel_m = voxel_m;
+  VoxelMap voxels(options);
+  voxels.merge(points);
+  return voxels.extract();
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/exposure.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "scalar.hpp"
+#include "voxel_key.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr int kRounds = 20;
+constexpr float kRobust = 0.15F;  // residuals of the logarithm beyond this weigh less
+constexpr float kPrior = 3.0F;    // a view's gain is held at 1 by as much as this many cells
+constexpr float kFewestPoints = 5.0F;
+constexpr float kMostLog = 0.693F;
+
+/// A cell as a view saw it: index of the cell among all shared ones, and logarithms of its colour.
+struct Sighting {
+  std::uint32_t cell;
+  Eigen::Array3f log_color;
+};
+
+/// Keeps cells that two views or more saw in colour, numbered from 0.
+std::vector<std::vector<Sighting>> shared_cells(const std::vector<std::vector<ColorCell>>& views,
+                                                std::size_t& count) {
+  std::vector<std::uint64_t> keys;
+  for (const auto& view : views) {
+    for (const ColorCell& cell : view) {
+      if (cell.points >= kFewestPoints) keys.push_back(cell.cell);
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint64_t> shared;
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i] == keys[i - 1] && (shared.empty() || shared.back() != keys[i])) shared.push_back(keys[i]);
+  }
+  count = shared.size();
+  std::vector<std::vector<Sighting>> sightings(views.size());
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (const ColorCell& cell : views[v]) {
+      if (cell.points < kFewestPoints) continue;
+      const auto found = std::lower_bound(shared.begin(), shared.end(), cell.cell);
+      if (found == shared.end() || *found != cell.cell) continue;
+      sightings[v].push_back({static_cast<std::uint32_t>(found - shared.begin()), cell.color.array().log()});
+    }
+  }
+  return sightings;
+}
+
+Eigen::Array3f robust_weight(const Eigen::Array3f& residual) { return kRobust / residual.abs().max(kRobust); }
+
+}  // namespace
+
+std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Rigid3& world_from_camera,
+                                   double cell_m) {
+  constexpr int kDark = 12;
+  constexpr int kBright = 245;
+  const Eigen::Matrix3f rotation = (world_from_camera.rotation / cell_m).cast<float>();
+  const Eigen::Vector3f translation = (world_from_camera.translation / cell_m).cast<float>();
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+  order.reserve(camera_cloud.size());
+  for (std::size_t i = 0; i < camera_cloud.size(); ++i) {
+    const Point& p = camera_cloud[i];
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
+    const Eigen::Vector3f at = rotation * p.getVector3fMap() + translation;
+    if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
+    order.emplace_back(pack_cell(at.array().floor().cast<int>()), static_cast<std::uint32_t>(i));
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<ColorCell> cells;
+  for (const auto& [key, index] : order) {
+    if (cells.empty() || cells.back().cell != key) cells.push_back({key, Eigen::Vector3f::Zero(), 0.0F});
+    const Point& p = camera_cloud[index];
+    const auto [dark, bright] = std::minmax({p.r, p.g, p.b});
+    if (dark < kDark || bright > kBright) continue;
+    cells.back().color += Eigen::Vector3f(p.r, p.g, p.b);
+    cells.back().points += 1.0F;
+  }
+  for (ColorCell& cell : cells) {
+    if (cell.points > 0.0F) cell.color /= cell.points;
+  }
+  return cells;
+}
+
+std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views) {
+  std::size_t count = 0;
+  const auto sightings = shared_cells(views, count);
+  std::vector<Eigen::Array3f> gains(views.size(), Eigen::Array3f::Zero());  // logarithms
+  std::vector<Eigen::Array3f> mean(count), weight(count);
+  for (int round = 0; round < kRounds; ++round) {
+    // The first round's means are not robust: there is nothing yet to measure residuals from.
+    const std::vector<Eigen::Array3f> before = mean;
+    std::fill(mean.begin(), mean.end(), Eigen::Array3f::Zero());
+    std::fill(weight.begin(), weight.end(), Eigen::Array3f::Zero());
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      for (const Sighting& s : sightings[v]) {
+        const Eigen::Array3f value = s.log_color + gains[v];
+        const Eigen::Array3f w =
+            round == 0 ? Eigen::Array3f::Ones().eval() : robust_weight(value - before[s.cell]);
+        mean[s.cell] += w * value;
+        weight[s.cell] += w;
+      }
+    }
+    for (std::size_t c = 0; c < count; ++c) mean[c] /= weight[c];
+    Eigen::Array3f drift = Eigen::Array3f::Zero();
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      Eigen::Array3f sum = Eigen::Array3f::Zero();
+      Eigen::Array3f total = Eigen::Array3f::Constant(kPrior);
+      for (const Sighting& s : sightings[v]) {
+        const Eigen::Array3f wanted = mean[s.cell] - s.log_color;
+        const Eigen::Array3f w = robust_weight(wanted - gains[v]);
+        sum += w * wanted;
+        total += w;
+      }
+      gains[v] = (sum / total).max(-kMostLog).min(kMostLog);
+      drift += gains[v];
+    }
+    if (!views.empty()) drift /= static_cast<float>(views.size());
+    for (Eigen::Array3f& gain : gains) gain -= drift;
+  }
+  std::vector<Eigen::Vector3f> factors;
+  factors.reserve(views.size());
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    factors.emplace_back(sightings[v].empty() ? Eigen::Vector3f::Ones().eval()
+                                              : gains[v].max(-kMostLog).min(kMostLog).exp().matrix().eval());
+  }
+  return factors;
+}
+
+void apply_gain(Cloud& cloud, const Eigen::Vector3f& gain) {
+  for (Point& p : cloud.points) {
+    p.r = to_byte(static_cast<double>(gain.x() * static_cast<float>(p.r)));
+    p.g = to_byte(static_cast<double>(gain.y() * static_cast<float>(p.g)));
+    p.b = to_byte(static_cast<double>(gain.z() * static_cast<float>(p.b)));
+  }
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/free_space.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr float kSigmas = 3.0F;
+constexpr float kPose_m = 0.03F;  // poses are not exact
+constexpr int kFewestCells = 7;   // of 3 x 3
+
+/// What of a view matters for a box: null transforms are never used.
+struct NearView {
+  const DepthRaster* raster;
+  Eigen::Matrix3f rotation;
+  Eigen::Vector3f translation;
+};
+
+/// Views whose furthest measurement may reach into the box.
+std::vector<NearView> views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
+                                 const std::vector<geometry::Rigid3>& world_from_camera) {
+  constexpr double kWidest = 1.5;  // distance over depth at the picture's corners, at most
+  std::vector<NearView> views;
+  for (std::size_t v = 0; v < rasters.size(); ++v) {
+    const double distance = box.exteriorDistance(world_from_camera[v].translation);
+    if (distance > kWidest * static_cast<double>(rasters[v].furthest_m)) continue;
+    const geometry::Rigid3 camera_from_world = world_from_camera[v].inverse();
+    views.push_back(
+        {&rasters[v], camera_from_world.rotation.cast<float>(), camera_from_world.translation.cast<float>()});
+  }
+  return views;
+}
+
+}  // namespace
+
+DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
+  DepthRaster raster;
+  raster.width = (camera.width + DepthRaster::kCell_px - 1) / DepthRaster::kCell_px;
+  raster.height = (camera.height + DepthRaster::kCell_px - 1) / DepthRaster::kCell_px;
+  raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
+  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+  for (const Point& p : camera_cloud.points) {
+    if (!(p.z > 0.0F) || !(p.z < 65.0F) || !std::isfinite(p.x) || !std::isfinite(p.y)) continue;
+    const int u = static_cast<int>(std::lround(fx * p.x / p.z + cx));
+    const int v = static_cast<int>(std::lround(fy * p.y / p.z + cy));
+    if (u < 0 || v < 0 || u >= camera.width || v >= camera.height) continue;
+    std::uint16_t& cell = raster.nearest[static_cast<std::size_t>(v / DepthRaster::kCell_px) *
+                                             static_cast<std::size_t>(raster.width) +
+                                         static_cast<std::size_t>(u / DepthRaster::kCell_px)];
+    const auto depth = static_cast<std::uint16_t>(std::max(1L, std::lround(1000.0F * p.z)));
+    if (cell == 0 || depth < cell) cell = depth;
+    raster.furthest_m = std::max(raster.furthest_m, p.z);
+  }
+  return raster;
+}
+
+Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point) {
+  if (!(point.z() > 0.05F) || point.z() > raster.furthest_m + 0.5F) return Evidence::kNone;
+  const float u = static_cast<float>(camera.fx) * point.x() / point.z() + static_cast<float>(camera.cx);
+  const float v = static_cast<float>(camera.fy) * point.y() / point.z() + static_cast<float>(camera.cy);
+  const int i = static_cast<int>(std::floor(u / DepthRaster::kCell_px));
+  const int j = static_cast<int>(std::floor(v / DepthRaster::kCell_px));
+  if (i < 1 || j < 1 || i + 1 >= raster.width || j + 1 >= raster.height) return Evidence::kNone;
+  int cells = 0;
+  std::uint16_t nearest = 65535;
+  std::uint16_t furthest = 0;
+  for (int y = j - 1; y <= j + 1; ++y) {
+    const std::uint16_t* row = raster.nearest.data() + static_cast<std::ptrdiff_t>(y) * raster.width;
+    for (int x = i - 1; x <= i + 1; ++x) {
+      if (row[x] == 0) continue;
+      ++cells;
+      nearest = std::min(nearest, row[x]);
+      furthest = std::max(furthest, row[x]);
+    }
+  }
+  if (cells < kFewestCells) return Evidence::kNone;
+  const auto margin = [](float z) {
+    return kSigmas * static_cast<float>(sensor::depth_sigma(static_cast<double>(z))) + kPose_m;
+  };
+  const float near_m = 0.001F * static_cast<float>(nearest);
+  const float far_m = 0.001F * static_cast<float>(furthest);
+  if (point.z() < near_m - margin(near_m)) return Evidence::kFree;
+  return point.z() > far_m + margin(far_m) ? Evidence::kHidden : Evidence::kSurface;
+}
+
+std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
+                                       const std::vector<geometry::Rigid3>& world_from_camera,
+                                       const sensor::Pinhole& camera) {
+  constexpr int kFewestViews = 2;
+  std::vector<std::uint8_t> goes(sheets.all().size(), 0);
+  Eigen::AlignedBox3d box;
+  for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
+  if (sheets.all().empty()) return goes;
+  const std::vector<NearView> views = views_near(box, rasters, world_from_camera);
+  for (std::size_t s = 0; s < goes.size(); ++s) {
+    const Eigen::Vector3f position = sheets.position(sheets.all()[s]).cast<float>();
+    int free = 0;
+    int surface = 0;
+    for (const NearView& view : views) {
+      const Evidence found =
+          evidence(*view.raster, camera, Eigen::Vector3f(view.rotation * position + view.translation));
+      free += found == Evidence::kFree ? 1 : 0;
+      surface += found == Evidence::kSurface ? 1 : 0;
+    }
+    goes[s] = free >= kFewestViews && 2 * free >= surface ? 1 : 0;
+  }
+  return goes;
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fusion_tiles.hpp"
+
+#include <algorithm>
+
+#include "voxel_key.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+using Cells = std::vector<Eigen::Vector3i>;
+
+void cut(const Cells::iterator& begin, const Cells::iterator& end, std::size_t most_cells,
+         std::vector<FusionTile>& tiles) {
+  Eigen::AlignedBox3i box;
+  for (auto cell = begin; cell != end; ++cell) box.extend(*cell);
+  const auto count = static_cast<std::size_t>(end - begin);
+  int axis = 0;
+  const Eigen::Vector3i size = box.sizes();
+  size.maxCoeff(&axis);
+  if (count <= most_cells || size[axis] == 0) {
+    tiles.push_back({box, {}});
+    return;
+  }
+  const auto by_axis = [axis](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+    return a[axis] < b[axis];
+  };
+  const auto middle = begin + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(begin, middle, end, by_axis);
+  // Both sides must get something: the cut lies below the median, unless that is the lowest plane.
+  const int at = std::max((*middle)[axis], box.min()[axis] + 1);
+  const auto border =
+      std::partition(begin, end, [axis, at](const Eigen::Vector3i& cell) { return cell[axis] < at; });
+  cut(begin, border, most_cells, tiles);
+  cut(border, end, most_cells, tiles);
+}
+
+}  // namespace
+
+std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells) {
+  std::vector<std::uint64_t> keys;
+  for (const auto& view : views) {
+    for (const ColorCell& cell : view) keys.push_back(cell.cell);
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  std::vector<FusionTile> tiles;
+  if (keys.empty()) return tiles;
+  Cells cells;
+  cells.reserve(keys.size());
+  for (const std::uint64_t key : keys) cells.push_back(unpack_cell(key));
+  cut(cells.begin(), cells.end(), std::max<std::size_t>(1, most_cells), tiles);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (FusionTile& tile : tiles) {
+      const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),
+                                            tile.cells.max() + Eigen::Vector3i::Ones());
+      const bool reaches = std::any_of(views[v].begin(), views[v].end(), [&](const ColorCell& cell) {
+        return with_margin.contains(unpack_cell(cell.cell));
+      });
+      if (reaches) tile.views.push_back(static_cast<std::uint32_t>(v));
+    }
+  }
+  return tiles;
+}
+
+}  // namespace plumbline::cloud

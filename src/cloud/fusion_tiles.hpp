@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Cuts the space that views reach into boxes of bounded content.
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plumbline/cloud/exposure.hpp"
+
+namespace plumbline::cloud {
+
+/// Box of cells, both ends included, and the views that reach into it or its margin.
+struct FusionTile {
+  Eigen::AlignedBox3i cells;
+  std::vector<std::uint32_t> views;  ///< ascending
+
+  /// Metres, the margin left out: [min, max).
+  [[nodiscard]] Eigen::AlignedBox3d box(double cell_m) const {
+    return {cells.min().cast<double>() * cell_m,
+            (cells.max().cast<double>().array() + 1.0).matrix() * cell_m};
+  }
+};
+
+/// k-d cuts at medians until no box holds more than `most_cells` occupied cells. `views`: the cells of each,
+/// by cell. A view belongs to a tile when it reaches into it or one of the cells around it. In a fixed order.
+std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells);
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/cloud/columns.hpp"
+#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/exposure.hpp"
+#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "test_cloud_worlds.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+using worlds::camera;
+using worlds::frame_of;
+using worlds::plane_depth;
+using worlds::point;
+
+/// Views by cameras that look along z, side by side.
+struct Views {
+  std::vector<geometry::Rigid3> poses;
+  std::vector<CloudPtr> clouds;
+
+  /// The middle of the picture only, which is enough and quick.
+  void add(const cv::Mat& depth, double x_m, const cv::Scalar& bgr = cv::Scalar(60, 90, 120)) {
+    const cv::Rect middle(160, 120, 320, 240);
+    cv::Mat cut(depth.size(), CV_32FC1, cv::Scalar(0));
+    depth(middle).copyTo(cut(middle));
+    add_whole(cut, x_m, bgr);
+  }
+  void add_whole(const cv::Mat& depth, double x_m, const cv::Scalar& bgr = cv::Scalar(60, 90, 120)) {
+    poses.emplace_back(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), Eigen::Vector3d(x_m, 0.0, 0.0));
+    clouds.push_back(organised_cloud(frame_of(depth, bgr), camera()));
+  }
+  [[nodiscard]] core::Result<FusedCloud> fuse(const DenseFusionOptions& options,
+                                              FusionReport* report = nullptr, int threads = 1) const {
+    const core::Executor executor(threads);
+    return fuse_views(
+        poses,
+        [this](std::size_t i) -> core::Result<CloudPtr> { return std::make_shared<Cloud>(*clouds[i]); },
+        camera(), options, executor, report);
+  }
+};
+
+Views wall_views(double distance_m, int count = 4) {
+  Views views;
+  for (int v = 0; v < count; ++v) {
+    views.add(plane_depth({0, 0, 1}, distance_m, 1.0, static_cast<unsigned>(v + 1)), 0.1 * v);
+  }
+  return views;
+}
+
+DenseFusionOptions fine() {
+  DenseFusionOptions options;
+  options.voxels.voxel_m = 0.005;
+  return options;
+}
+
+double rms_to_wall(const Cloud& cloud, double distance_m) {
+  double sum = 0.0;
+  for (const Point& p : cloud.points) sum += std::pow(static_cast<double>(p.z) - distance_m, 2);
+  return std::sqrt(sum / static_cast<double>(cloud.size()));
+}
+
+/// Lays a nearer rectangle into a depth picture.
+cv::Mat with_box(cv::Mat depth, const cv::Rect& where, float z) {
+  depth(where) = z;
+  return depth;
+}
+
+std::size_t nearer_than(const Cloud& cloud, float z) {
+  return static_cast<std::size_t>(
+      std::count_if(cloud.begin(), cloud.end(), [z](const Point& p) { return p.z < z; }));
+}
+
+TEST(DenseFusion, AWallFarAwayIsThin) {
+  const Views views = wall_views(3.0);
+  const auto fused = views.fuse(fine());
+  ASSERT_TRUE(fused.has_value());
+  DenseFusionOptions raw = fine();
+  raw.settle = false;
+  const auto slab = views.fuse(raw);
+  ASSERT_TRUE(slab.has_value());
+  EXPECT_GT(fused->cloud->size(), 10000U);
+  EXPECT_LT(rms_to_wall(*fused->cloud, 3.0), 0.0015);  // one measurement: 14 mm
+  EXPECT_LT(rms_to_wall(*fused->cloud, 3.0), 0.6 * rms_to_wall(*slab->cloud, 3.0));
+  EXPECT_LT(fused->cloud->size(), slab->cloud->size());
+}
+
+TEST(DenseFusion, AStepStaysAStep) {
+  Views views;
+  for (int v = 0; v < 4; ++v) {
+    cv::Mat depth = plane_depth({0, 0, 1}, 1.0, 1.0, static_cast<unsigned>(v + 1));
+    for (int row = 0; row < depth.rows; ++row) {
+      for (int column = 320; column < depth.cols; ++column) depth.at<float>(row, column) += 0.02F;
+    }
+    views.add(depth, 0.0);
+  }
+  const auto fused = views.fuse(fine());
+  ASSERT_TRUE(fused.has_value());
+  std::size_t between = 0;
+  for (const Point& p : fused->cloud->points) between += std::abs(p.z - 1.01F) < 0.006F ? 1U : 0U;
+  EXPECT_LT(static_cast<double>(between), 0.02 * static_cast<double>(fused->cloud->size()));
+  EXPECT_GT(nearer_than(*fused->cloud, 1.005F), fused->cloud->size() / 3);
+}
+
+TEST(DenseFusion, WhatOthersLookThroughGoes) {
+  const cv::Rect box(200, 150, 120, 160);
+  Views views;
+  for (int v = 0; v < 8; ++v) {
+    const cv::Mat wall = plane_depth({0, 0, 1}, 2.5, 1.0, static_cast<unsigned>(v + 1));
+    views.add(v < 2 ? with_box(wall, box, 1.5F) : wall, 0.0);
+  }
+  FusionReport report;
+  const auto cleaned = views.fuse(fine(), &report);
+  ASSERT_TRUE(cleaned.has_value());
+  DenseFusionOptions keep = fine();
+  keep.free_space = false;
+  const auto kept = views.fuse(keep);
+  ASSERT_TRUE(kept.has_value());
+  EXPECT_GT(nearer_than(*kept->cloud, 2.0F), 1000U);
+  EXPECT_LE(nearer_than(*cleaned->cloud, 2.0F), nearer_than(*kept->cloud, 2.0F) / 100);
+  EXPECT_GT(report.seen_through, 1000U);
+}
+
+TEST(DenseFusion, WhatMostSeeStays) {
+  const cv::Rect box(200, 150, 120, 160);
+  Views views;
+  for (int v = 0; v < 8; ++v) {
+    const cv::Mat wall = plane_depth({0, 0, 1}, 2.5, 1.0, static_cast<unsigned>(v + 1));
+    views.add(v != 3 ? with_box(wall, box, 1.5F) : wall, 0.0);  // one view errs
+  }
+  const auto fused = views.fuse(fine());
+  ASSERT_TRUE(fused.has_value());
+  EXPECT_GT(nearer_than(*fused->cloud, 2.0F), 1000U);
+}
+
+TEST(DenseFusion, SameBytesForAnyNumberOfThreadsAndTilesMeet) {
+  const Views views = wall_views(2.0);
+  DenseFusionOptions options = fine();
+  options.tile_mb = 2.0;  // less than the least the option allows: many tiles
+  FusionReport report;
+  const auto one = views.fuse(options, &report, 1);
+  const auto three = views.fuse(options, nullptr, 3);
+  const auto whole = views.fuse(fine());
+  ASSERT_TRUE(one && three && whole);
+  EXPECT_GT(report.tiles, 3U);
+  ASSERT_EQ(one->cloud->size(), three->cloud->size());
+  for (std::size_t i = 0; i < one->cloud->size(); ++i) {
+    const Point& a = (*one->cloud)[i];
+    const Point& b = (*three->cloud)[i];
+    ASSERT_TRUE(a.getVector3fMap() == b.getVector3fMap() && a.rgba == b.rgba);
+  }
+  EXPECT_EQ(one->columns.observations, three->columns.observations);
+  EXPECT_NEAR(static_cast<double>(one->cloud->size()), static_cast<double>(whole->cloud->size()),
+              0.002 * static_cast<double>(whole->cloud->size()));
+}
+
+TEST(DenseFusion, NothingAndErrors) {
+  EXPECT_EQ(Views().fuse(fine())->cloud->size(), 0U);
+  Views blind;
+  blind.add(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0)), 0.0);
+  EXPECT_EQ(blind.fuse(fine())->cloud->size(), 0U);
+  const core::Executor executor(1);
+  const auto failed = fuse_views(
+      blind.poses, [](std::size_t) -> core::Result<CloudPtr> { return core::output_error("gone"); }, camera(),
+      fine(), executor);
+  ASSERT_FALSE(failed.has_value());
+  EXPECT_EQ(failed.error().message, "gone");
+}
+
+TEST(DenseFusion, EveryPointKnowsHowWellItIsKnown) {
+  const auto fused = wall_views(2.0).fuse(fine());
+  ASSERT_TRUE(fused.has_value());
+  const std::size_t count = fused->cloud->size();
+  ASSERT_EQ(fused->columns.confidence.size(), count);
+  ASSERT_EQ(fused->columns.observations.size(), count);
+  std::uint32_t most = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    EXPECT_GT(fused->columns.confidence[i], 0.0F);
+    EXPECT_LT(fused->columns.confidence[i], 1.0F);
+    most = std::max(most, fused->columns.observations[i]);
+  }
+  EXPECT_EQ(most, 4U);
+}
+
+TEST(DenseFusion, CoarserLevelsHaveFewerPoints) {
+  const auto fused = wall_views(2.0).fuse(fine());
+  ASSERT_TRUE(fused.has_value());
+  const FusedCloud coarse = coarser(*fused->cloud, fused->columns, 0.02);
+  EXPECT_LT(coarse.cloud->size(), fused->cloud->size() / 6);
+  EXPECT_GT(coarse.cloud->size(), fused->cloud->size() / 40);
+  EXPECT_LT(rms_to_wall(*coarse.cloud, 2.0), 0.002);
+}
+
+TEST(Exposure, ViewsAgreeOnColours) {
+  Views views;
+  views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 1), 0.0, cv::Scalar(100, 100, 100));
+  views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 2), 0.1, cv::Scalar(100, 100, 100));
+  views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 3), 0.2, cv::Scalar(140, 120, 100));
+  std::vector<std::vector<ColorCell>> cells;
+  for (std::size_t v = 0; v < 3; ++v) cells.push_back(color_cells(*views.clouds[v], views.poses[v], 0.1));
+  const auto gains = color_gains(cells);
+  ASSERT_EQ(gains.size(), 3U);
+  EXPECT_NEAR(gains[0].z() / gains[2].z(), 1.4F, 0.03F);  // blue
+  EXPECT_NEAR(gains[0].y() / gains[2].y(), 1.2F, 0.02F);
+  EXPECT_NEAR(gains[0].x() / gains[2].x(), 1.0F, 0.01F);
+  EXPECT_NEAR((gains[0].z() * gains[1].z() * gains[2].z()), 1.0F, 0.02F);
+}
+
+TEST(Exposure, WithoutAnythingSharedNothingChanges) {
+  Views views;
+  views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 1), 0.0, cv::Scalar(50, 50, 50));
+  views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 2), 50.0, cv::Scalar(200, 200, 200));
+  std::vector<std::vector<ColorCell>> cells;
+  for (std::size_t v = 0; v < 2; ++v) cells.push_back(color_cells(*views.clouds[v], views.poses[v], 0.1));
+  for (const Eigen::Vector3f& gain : color_gains(cells)) EXPECT_EQ(gain, Eigen::Vector3f(1, 1, 1));
+  EXPECT_TRUE(color_gains({}).empty());
+}
+
+TEST(FreeSpace, EvidenceOfAView) {
+  Views views;
+  views.add_whole(with_box(plane_depth({0, 0, 1}, 2.0, 0.0), cv::Rect(0, 0, 160, 480), 1.0F), 0.0);
+  const DepthRaster raster = depth_raster(*views.clouds[0], camera());
+  const auto at = [&](double u, double v, double z) {
+    return evidence(raster, camera(), camera().unproject(u, v, z).cast<float>());
+  };
+  EXPECT_EQ(at(400, 240, 1.0), Evidence::kFree);
+  EXPECT_EQ(at(400, 240, 2.0), Evidence::kSurface);
+  EXPECT_EQ(at(400, 240, 2.03), Evidence::kSurface);  // within noise
+  EXPECT_EQ(at(400, 240, 2.4), Evidence::kHidden);
+  EXPECT_EQ(at(80, 240, 1.4), Evidence::kHidden);
+  EXPECT_EQ(at(80, 240, 2.7), Evidence::kNone);      // beyond all that the view measured
+  EXPECT_EQ(at(162, 240, 1.5), Evidence::kSurface);  // at the box's border: not sure
+  EXPECT_EQ(at(-50, 240, 1.0), Evidence::kNone);
+  EXPECT_EQ(at(400, 240, -1.0), Evidence::kNone);
+}
+
+TEST(Columns, FollowThePointsThatWereChosen) {
+  Cloud before;
+  for (int i = 0; i < 10; ++i) before.push_back(point(static_cast<float>(i), 0, 1));
+  CloudColumns columns;
+  for (std::uint32_t i = 0; i < 10; ++i) columns.observations.push_back(100 + i);
+  Cloud after;
+  for (const std::size_t i : {2U, 3U, 7U}) after.push_back(before[i]);
+  EXPECT_EQ(carry_columns(before, columns, after).observations, (std::vector<std::uint32_t>{102, 103, 107}));
+  std::swap(after[0], after[2]);
+  EXPECT_EQ(carry_columns(before, columns, after).observations, (std::vector<std::uint32_t>{107, 103, 102}));
+  after[1].x += 0.1F;  // moved
+  EXPECT_TRUE(carry_columns(before, columns, after).observations.empty());
+  EXPECT_TRUE(carry_columns(before, columns, Cloud()).observations.empty());
+}
+
+}  // namespace
+}  // namespace plumbline::cloud
