@@ -114,10 +114,25 @@ void cast_shadow(cv::Mat1f& depth, float focal_baseline) {
   }
 }
 
-/// How much light of the projector comes back from each face; the cosine is added per pixel.
-struct Return {
-  float infrared, gloss;
+constexpr float kLeastLight = 0.075F;  // less of the projector's light is no measurement
+
+/// How much light of the projector comes back: 1 = plenty.
+float light_back(const Material& m, float cosine, float z) {
+  if (m.gloss > 0.25F && cosine > 0.997F) return 0.0F;  // glint straight back
+  return m.infrared * cosine * (1.0F - m.gloss * (1.0F - cosine)) * 3.0F / (0.6F + 0.4F * z * z);
+}
+
+/// Columns from `first` to before `end` of a row have depth. The registered picture's edge is a little askew.
+struct Seen {
+  int first, end;
 };
+Seen seen_columns(const Device& d, int width, int height, int y) {
+  const auto w = static_cast<float>(width), h = static_cast<float>(height), fy = static_cast<float>(y);
+  if (fy < h * d.top || fy > h * (1.0F - d.bottom)) return {0, 0};
+  const float lean = 0.3F * fy / h;
+  return {static_cast<int>(w * d.left * (0.7F + lean)),
+          width - static_cast<int>(w * d.right * (0.9F + 0.6F * lean))};
+}
 
 class Measurement {
  public:
@@ -140,7 +155,6 @@ class Measurement {
   }
 
  private:
-  /// Weight of the projector's light: 1 = plenty, under 0.05 nothing is measured.
   [[nodiscard]] float signal(int face, int x, int y, float z) const {
     const auto id = static_cast<std::size_t>(face);
     const Material& m = *world_.materials[id];
@@ -153,9 +167,7 @@ class Measurement {
     const float dx = (px - cx) / fx, dy = (py - cy) / fy;
     const float cosine = std::abs(nx * dx + ny * dy + nz) /
                          std::sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + 1.0F));
-    float s = m.infrared * cosine * (1.0F - m.gloss * (1.0F - cosine)) * 3.0F / (0.6F + 0.4F * z * z);
-    if (m.gloss > 0.25F && cosine > 0.997F) s = 0.0F;  // glint straight back
-    return s;
+    return light_back(m, cosine, z);
   }
 
   void row(int y, const cv::Mat1f& depth, const cv::Mat1b& border, std::uint16_t* out) const {
@@ -166,13 +178,7 @@ class Measurement {
     const float fixed = std::sqrt(device_.fixed_share), fresh = std::sqrt(1.0F - device_.fixed_share);
     const float step2 = device_.step * device_.step / 12.0F;
     std::fill(out, out + depth.cols, std::uint16_t{0});
-    const auto w = static_cast<float>(depth.cols), h = static_cast<float>(depth.rows),
-               fy = static_cast<float>(y);
-    // The registered picture's edge is a little askew.
-    if (fy < h * device_.top || fy > h * (1.0F - device_.bottom)) return;
-    const float lean = 0.3F * fy / h;
-    const int first = static_cast<int>(w * device_.left * (0.7F + lean));
-    const int end = depth.cols - static_cast<int>(w * device_.right * (0.9F + 0.6F * lean));
+    const auto [first, end] = seen_columns(device_, depth.cols, depth.rows, y);
     int lit = -1;  // the face that `weak` was worked out for, anew every four pixels
     float weak = 0.0F;
     for (int x = first; x < end; ++x) {
@@ -188,7 +194,7 @@ class Measurement {
       }
       if (ids[x] != lit || (x & 3) == 0) weak = signal(ids[x], x, y, z);
       lit = ids[x];
-      if (weak < 0.075F + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
+      if (weak < kLeastLight + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
       const auto zd = static_cast<double>(z);
       if (zd < range_.min || zd > range_.max + 0.15 * static_cast<double>(blobs.at(x, y))) continue;
       const float per_metre = device_.focal_baseline / (z * z);
@@ -218,6 +224,15 @@ DepthRange depth_range(Sensor sensor) {
   if (sensor == Sensor::kKinect) return {0.45, 7.0};
   if (sensor == Sensor::kRealsense) return {0.25, 9.0};
   return {0.05, 13.1};
+}
+
+bool measures(Sensor sensor, const Material& material, const cv::Size& size, const cv::Point2d& pixel,
+              double z, double cosine) {
+  if (sensor == Sensor::kIdeal) return true;
+  constexpr float kFlicker = 0.05F;  // about two standard deviations of the least light
+  const Seen seen = seen_columns(device(sensor), size.width, size.height, static_cast<int>(pixel.y));
+  if (pixel.x < seen.first || pixel.x >= seen.end) return false;
+  return light_back(material, static_cast<float>(cosine), static_cast<float>(z)) > kLeastLight + kFlicker;
 }
 
 NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {

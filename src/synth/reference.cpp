@@ -143,6 +143,11 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     if (c.z() < range.min || c.z() > std::min(range.max, world_->options.visible_range)) return false;
     const Vector2d pixel = camera.project(c);
     if (!camera.contains(pixel, 1.0)) return false;
+    const Vector3d ray = (p - world_from_camera.translation).normalized();
+    if (!measures(world_->options.sensor, *world_->materials[index], {camera.width, camera.height},
+                  {pixel.x(), pixel.y()}, c.z(), std::abs(ray.dot(world_->scene.faces[index].normal)))) {
+      return false;
+    }
     return view.ids(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) ==
            static_cast<int>(index);
   };
