@@ -118,8 +118,8 @@ std::string parse_line(const std::string& key, std::istringstream& words, PcdHea
   const auto number = parse_count(word);
   if (key != "WIDTH" && key != "HEIGHT" && key != "POINTS")
     return "'" + key.substr(0, 40) + "' is not a PCD header word";
-  if (!number || *number > (std::uint64_t{1} << 40))
-    return key + ": '" + word + "' is not a plausible number";
+  if (!number || *number > 0xFFFFFFFFU)  // so that a product of two fits 64 bits
+    return key + ": '" + word.substr(0, 40) + "' is not a number up to 2^32";
   (key == "WIDTH" ? header.width : key == "HEIGHT" ? header.height : header.points) = *number;
   return "";
 }
@@ -162,6 +162,12 @@ std::string read_binary(ByteReader& reader, const PcdHeader& header, CloudBuilde
   return "";
 }
 
+/// Colours are also written as signed integers; what is no such number at all is black.
+std::uint32_t packed_color(double value) {
+  const bool fits = value >= -2147483648.0 && value <= 4294967295.0;
+  return fits ? static_cast<std::uint32_t>(static_cast<std::int64_t>(value)) : 0U;
+}
+
 std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder& builder) {
   std::string word;
   for (std::uint64_t row = 0; row < header.points; ++row) {
@@ -178,7 +184,7 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
           std::memcpy(&bits, &number, 4);
           builder.set_packed_color(row, bits);
         } else {
-          builder.set_packed_color(row, static_cast<std::uint32_t>(static_cast<std::int64_t>(*value)));
+          builder.set_packed_color(row, packed_color(*value));
         }
       }
     }

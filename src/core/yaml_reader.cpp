@@ -19,6 +19,10 @@ namespace {
 constexpr std::size_t kMaxBytes = 1'000'000;
 constexpr std::size_t kMaxDepth = 20;
 constexpr std::size_t kMaxNodes = 100'000;
+// yaml-cpp reads to the end of a line, and of the brackets opened in it, before it tells of anything, at some
+// 200 bytes a token; nothing that a person writes comes near these.
+constexpr int kMaxColumns = 100'000;
+constexpr int kMaxOpenBrackets = 1000;
 
 /// Ends the walk: what follows cannot be read sensibly.
 struct Refused {
@@ -95,6 +99,7 @@ class TreeBuilder : public YAML::EventHandler {
     bool duplicate = false;
     std::string key;
     ConfigMark key_mark;
+    std::map<std::string, int> lines;  ///< of the keys so far
   };
   struct Anchored {
     ConfigNode node;
@@ -156,7 +161,11 @@ class TreeBuilder : public YAML::EventHandler {
   void end() {
     Open done = std::move(open_.back());
     open_.pop_back();
-    if (done.anchor != 0) anchors_[done.anchor] = {done.node, count_nodes(done.node), depth_of(done.node)};
+    if (done.anchor != 0) {
+      const std::size_t nodes = count_nodes(done.node);
+      count(nodes, done.node.mark);  // the anchor keeps a copy: anchors within anchors add up
+      anchors_[done.anchor] = {done.node, nodes, depth_of(done.node)};
+    }
     attach(std::move(done.node));
   }
   void attach(ConfigNode node) {
@@ -183,14 +192,11 @@ class TreeBuilder : public YAML::EventHandler {
     parent.key_mark = key.mark;
     parent.has_key = true;
     parent.duplicate = false;
-    const auto& entries = parent.node.entries;
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      if (entries[i].first != key.scalar) continue;
-      parent.duplicate = true;
-      problems_.push_back(
-          {key.mark, path(),
-           fmt::format("the key is given twice (first in line {})", parent.node.key_marks[i].line)});
-    }
+    const auto [first, fresh] = parent.lines.emplace(key.scalar, key.mark.line);
+    if (fresh) return;
+    parent.duplicate = true;
+    problems_.push_back(
+        {key.mark, path(), fmt::format("the key is given twice (first in line {})", first->second)});
   }
 
   std::string file_;
@@ -202,11 +208,20 @@ class TreeBuilder : public YAML::EventHandler {
   ConfigNode root_;
 };
 
-/// yaml-cpp takes 0x04 for the end of the file, so control characters would hide what follows them.
+/// What would cost time or memory out of proportion, and control characters: yaml-cpp takes 0x04 for the end
+/// of the file, so control characters would hide what follows them.
 void check_characters(const std::string& text, const std::string& file) {
   int line = 1;
   int column = 1;
+  int open = 0;  // brackets, those in comments and quotes as well
   for (const char c : text) {
+    open += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+    if (column > kMaxColumns || open > kMaxOpenBrackets) {
+      throw Refused{{{file, line, column},
+                     "",
+                     column > kMaxColumns ? fmt::format("the line is over {} characters long", kMaxColumns)
+                                          : fmt::format("over {} brackets are open here", kMaxOpenBrackets)}};
+    }
     const auto byte = static_cast<unsigned char>(c);
     if (c == '\n') {
       ++line;
