@@ -76,7 +76,10 @@ class CurvatureFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     using Compare = pcl::FieldComparison<Point>;
-    return select_where(input,
+    // PCL takes NaN for equal to anything.
+    const CloudConstPtr known =
+        select(*input, [](std::size_t, const Point& p) { return std::isfinite(p.curvature); });
+    return select_where(known,
                         {std::make_shared<Compare>("curvature", pcl::ComparisonOps::GE, min_),
                          std::make_shared<Compare>("curvature", pcl::ComparisonOps::LE, max_)},
                         true);

@@ -16,6 +16,20 @@ constexpr const char* kIntroduction =
     "carry a unit (`5 mm`, `75 deg`). Every problem of a file is told at once, with line and column.\n\n"
     "```yaml\nchain: keyframe\nfilters:\n  - type: range\n    max: 3.5 m\n  - type: voxel_grid\n    leaf: 1 "
     "cm\n```\n\n"
+    "`plumbline filter CHAIN IN... OUT` runs a chain on files (several inputs are merged), `plumbline "
+    "filters "
+    "list`,\n"
+    "`describe NAME` and `check CHAIN` tell about them; pipelines name chains in the `filters` of their "
+    "stages. "
+    "Every\n"
+    "filter has a chain that can be run as it is in `pipelines/filters/examples`, by name: `plumbline filter "
+    "examples/mls\n"
+    "IN OUT`. In the pictures the cloud before the example's last filter is on the left, after it on the "
+    "right.\n"
+    "Filters of your own are loaded with `--plugin`; see "
+    "[examples/plugin_filter](../examples/plugin_filter). "
+    "Speed and\n"
+    "memory are measured in [benchmarks.md](benchmarks.md#filters).\n\n"
     "Filters that only choose points keep an organised cloud (one that still has the rows and columns of the "
     "depth\n"
     "picture) organised: rejected points become NaN. The others give a list of points without NaN.\n";
@@ -36,7 +50,10 @@ std::string allowed(const core::OptionSpec& option) {
 }
 
 std::string entry(const FilterInfo& info) {
-  std::string text = fmt::format("\n## {}\n\n{}\n\n{}\n\n", info.type, info.summary, info.details);
+  std::string text = fmt::format(
+      "\n## {0}\n\n{1}\n\n![{0}: before and after](images/filters/{0}.png)\n\n{2} "
+      "([example](../pipelines/filters/examples/{0}.yaml))\n\n",
+      info.type, info.summary, info.details);
   text += fmt::format("```yaml\n{}```\n\n| option | default | allowed | unit | |\n|---|---|---|---|---|\n",
                       info.example);
   const auto filter = info.make();

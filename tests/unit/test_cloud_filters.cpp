@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
+#include <pcl/filters/radius_outlier_removal.h>
 #include <pcl/filters/statistical_outlier_removal.h>
 #include <pcl/filters/voxel_grid.h>
 
+#include <cstring>
 #include <set>
 
-#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
-#include "test_cloud_worlds.hpp"
+#include "test_cloud_filter_run.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -15,39 +17,11 @@ namespace {
 using worlds::finite_points;
 using worlds::point;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-/// Runs one filter written as YAML list entry.
-core::Result<CloudPtr> run(const std::string& entry, const CloudConstPtr& input,
-                           const FilterContext& context = {}) {
-  core::ConfigProblems problems;
-  const auto node = core::parse_yaml("chain: test\nfilters:\n  - " + entry, "test.yaml");
-  if (!node) return tl::unexpected<core::Error>(node.error());
-  const auto chain = FilterChain::parse(*node, "", builtin_filters(), problems);
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
-  return chain.apply(input, context);
-}
-
-CloudPtr must(const std::string& entry, const CloudConstPtr& input, const FilterContext& context = {}) {
-  auto result = run(entry, input, context);
-  EXPECT_TRUE(result) << (result ? "" : result.error().message);
-  return result ? *result : std::make_shared<Cloud>();
-}
-
-CloudPtr list(const std::vector<Point>& points) {
-  auto cloud = std::make_shared<Cloud>();
-  for (const Point& p : points) cloud->push_back(p);
-  return cloud;
-}
-
-/// Points of a square plane in z = 1, `n` x `n`, `step` metres apart.
-CloudPtr square(int n, float step) {
-  auto cloud = std::make_shared<Cloud>();
-  for (int i = 0; i < n * n; ++i) {
-    cloud->push_back(point(static_cast<float>(i % n) * step, static_cast<float>(i / n) * step, 1.0F));
-  }
-  return cloud;
-}
+using worlds::kNan;
+using worlds::list;
+using worlds::must;
+using worlds::run;
+using worlds::square;
 
 TEST(Filters, RangeByDepthAndByDistance) {
   const auto cloud =
@@ -226,10 +200,7 @@ TEST(Filters, OutliersGoWithNanPointsAndOrganisedClouds) {
 }
 
 TEST(Filters, StatisticalOutlierIsPclsPointForPoint) {
-  std::mt19937 random(3);
-  std::normal_distribution<float> gauss(0.0F, 1.0F);
-  auto cloud = std::make_shared<Cloud>();
-  for (int i = 0; i < 2000; ++i) cloud->push_back(point(gauss(random), gauss(random), gauss(random)));
+  const auto cloud = worlds::gauss_ball(2000);
   const auto output = must("{type: statistical_outlier, neighbours: 10, deviations: 1}", cloud);
   pcl::StatisticalOutlierRemoval<Point> removal;
   removal.setMeanK(10);
@@ -241,6 +212,39 @@ TEST(Filters, StatisticalOutlierIsPclsPointForPoint) {
   ASSERT_LT(expected.size(), 1990U);
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_EQ((*output)[i].getVector3fMap(), expected[i].getVector3fMap());
+  }
+}
+
+TEST(Filters, RadiusOutlierIsPclsPointForPoint) {
+  const auto cloud = worlds::gauss_ball(2000);
+  const auto output = must("{type: radius_outlier, radius: 30 cm, min_neighbours: 6}", cloud);
+  pcl::RadiusOutlierRemoval<Point> removal;
+  removal.setRadiusSearch(0.3);
+  removal.setMinNeighborsInRadius(6);
+  removal.setInputCloud(cloud);
+  Cloud expected;
+  removal.filter(expected);
+  ASSERT_EQ(output->size(), expected.size());
+  ASSERT_LT(expected.size(), 1900U);
+  ASSERT_GT(expected.size(), 100U);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ((*output)[i].getVector3fMap(), expected[i].getVector3fMap());
+  }
+}
+
+TEST(Filters, AnyNumberOfThreadsGivesTheSameBytes) {
+  const auto cloud = worlds::gauss_ball(40000);  // several blocks of the search
+  const core::Executor three(3);
+  FilterContext threads;
+  threads.executor = &three;
+  for (const std::string entry : {"{type: statistical_outlier}", "{type: radius_outlier, radius: 10 cm}",
+                                  "{type: normals}", "{type: normal_consistency, neighbours: 8}"}) {
+    const auto alone = must(entry, cloud);
+    const auto together = must(entry, cloud, threads);
+    ASSERT_EQ(alone->size(), together->size()) << entry;
+    EXPECT_EQ(std::memcmp(alone->points.data(), together->points.data(), alone->size() * sizeof(Point)), 0)
+        << entry;
+    EXPECT_GT(alone->size(), 1000U) << entry;
   }
 }
 
@@ -323,7 +327,7 @@ TEST(Filters, EveryFilterBearsEmptySingleDuplicateAndNanClouds) {
   for (const auto& info : registry.filters()) {
     for (const auto& cloud : clouds) {
       const bool refused = info.type == "flying_pixels" && cloud->height == 1 && !cloud->empty();
-      const auto result = run("{type: " + info.type + "}", cloud);
+      const auto result = run(worlds::least_entry(info.type), cloud);
       EXPECT_EQ(static_cast<bool>(result), !refused) << info.type;
       if (!result) continue;
       EXPECT_LE(finite_points(**result), finite_points(*cloud)) << info.type;
