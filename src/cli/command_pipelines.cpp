@@ -1,64 +1,196 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// plumbline pipelines list|check
+// plumbline pipelines list|describe|check|schema|graph
 #include <fmt/format.h>
 
 #include <memory>
 #include <vector>
 
 #include "app.hpp"
+#include "plumbline/cloud/filter_schema.hpp"
+#include "plumbline/core/option_schema.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/pipeline/graph.hpp"
+#include "plumbline/pipeline/reference.hpp"
+#include "plumbline/viz/graph_picture.hpp"
 
 namespace plumbline::cli {
 namespace {
 
-struct CheckRequest {
-  std::string pipeline;
+/// What the commands are given; each uses its part.
+struct PipelinesRequest {
+  std::string name;  ///< of a pipeline or a stage
   std::vector<std::string> overrides;
+  std::filesystem::path output;
+  bool markdown = false;
 };
+using RequestPtr = std::shared_ptr<PipelinesRequest>;
 
-core::Result<pipeline::Graph> load(const std::string& name, const std::vector<std::string>& overrides,
-                                   const pipeline::StageRegistry& registry, const Session& session) {
+/// All stages, and the filters of the plugins that the command was given.
+core::Result<pipeline::StageRegistry> all_stages(const Session& session) {
+  const auto filters = session.filters();
+  if (!filters) return tl::unexpected<core::Error>(filters.error());
+  pipeline::StageRegistry registry;
+  pipeline::register_stages(registry);
+  registry.filters() = *filters;
+  return registry;
+}
+
+core::Result<pipeline::Graph> load(const PipelinesRequest& request, const pipeline::StageRegistry& registry,
+                                   const Session& session) {
   const auto folder = session.pipelines_folder();
   if (!folder) return tl::unexpected<core::Error>(folder.error());
-  const auto file = pipeline::find_pipeline(name, *folder);
+  const auto file = pipeline::find_pipeline(request.name, *folder);
   if (!file) return tl::unexpected<core::Error>(file.error());
-  return pipeline::load_graph(*file, registry, *folder, overrides);
+  return pipeline::load_graph(*file, registry, *folder, request.overrides);
+}
+
+core::Result<const pipeline::StageType*> find_stage(const std::string& name,
+                                                    const pipeline::StageRegistry& registry) {
+  const pipeline::StageType* type = registry.find(name);
+  if (type != nullptr) return type;
+  return core::usage_error(fmt::format("there is no stage '{}'{}", name, core::hint(name, registry.names())));
 }
 
 int list(Session& session) {
   const auto folder = session.pipelines_folder();
   if (!folder) return session.fail(folder.error());
-  pipeline::StageRegistry registry;
-  pipeline::register_stages(registry);
+  const auto registry = all_stages(session);
+  if (!registry) return session.fail(registry.error());
+  fmt::print("pipelines:\n");
   for (const std::string& name : pipeline::pipeline_names(*folder)) {
-    const auto graph = load(name, {}, registry, session);
-    fmt::print("{:<16} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
+    const auto graph = load({name, {}, {}, false}, *registry, session);
+    fmt::print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
+  }
+  fmt::print("stages:\n");
+  for (const pipeline::StageType* type : registry->types())
+    fmt::print("  {:<14} {}\n", type->name, type->help);
+  return 0;
+}
+
+void describe_ports(const std::vector<pipeline::Port>& ports, const char* title) {
+  if (ports.empty()) return;
+  fmt::print("\n{}:\n", title);
+  for (const pipeline::Port& port : ports) {
+    fmt::print("  {:<22} {}, {}{}\n", port.name, port.type.name,
+               port.type.rate == pipeline::Rate::kFrame ? "each frame" : "once, at the end",
+               port.required ? "" : "; may be left open");
+  }
+}
+
+int describe(Session& session, const PipelinesRequest& request) {
+  const auto registry = all_stages(session);
+  if (!registry) return session.fail(registry.error());
+  if (request.name.empty()) {
+    fmt::print("{}", pipeline::stages_reference(*registry));
+    return 0;
+  }
+  const auto type = find_stage(request.name, *registry);
+  if (!type) return session.fail(type.error());
+  if (request.markdown) {
+    fmt::print("{}", pipeline::stage_reference(**type));
+    return 0;
+  }
+  fmt::print("{}: {}\n", (*type)->name, (*type)->help);
+  describe_ports((*type)->inputs, "inputs");
+  describe_ports((*type)->outputs, "outputs");
+  const auto stage = (*type)->make();
+  core::OptionTable table;
+  stage->declare(table);
+  if (!table.specs().empty()) fmt::print("\noptions:\n");
+  for (const core::OptionSpec& spec : table.specs()) {
+    fmt::print("  {:<22} {} (allowed: {}; default: {})\n", spec.key, spec.help, core::allowed_text(spec),
+               spec.default_value);
   }
   return 0;
 }
 
-int check(Session& session, const CheckRequest& request) {
-  pipeline::StageRegistry registry;
-  pipeline::register_stages(registry);
-  const auto graph = load(request.pipeline, request.overrides, registry, session);
+int check(Session& session, const PipelinesRequest& request) {
+  const auto registry = all_stages(session);
+  if (!registry) return session.fail(registry.error());
+  const auto graph = load(request, *registry, session);
   if (!graph) return session.fail(graph.error());
-  fmt::print("{}: {} stages, nothing wrong\n", request.pipeline, graph->nodes.size());
+  fmt::print("{}: {} stages, nothing wrong\n", request.name, graph->stage_count());
   if (session.verbose) fmt::print("{}", pipeline::to_yaml(*graph));
   return 0;
+}
+
+int schema(Session& session, const PipelinesRequest& request) {
+  const auto registry = all_stages(session);
+  if (!registry) return session.fail(registry.error());
+  if (request.name.empty()) {
+    fmt::print("{}", pipeline::pipeline_schema(*registry));
+    return 0;
+  }
+  const auto type = find_stage(request.name, *registry);
+  if (!type) return session.fail(type.error());
+  fmt::print("{}", pipeline::stage_schema(**type, *registry));
+  return 0;
+}
+
+int graph(Session& session, const PipelinesRequest& request) {
+  const auto registry = all_stages(session);
+  if (!registry) return session.fail(registry.error());
+  const auto loaded = load(request, *registry, session);
+  if (!loaded) return session.fail(loaded.error());
+  const std::string dot = pipeline::to_dot(*loaded);
+  if (request.output.empty()) {
+    fmt::print("{}", dot);
+    return 0;
+  }
+  core::Result<void> written;
+  if (request.output.extension() == ".dot") {
+    core::OutputFile out(request.output);
+    out.write(dot);
+    written = out.commit();
+  } else {
+    written = viz::draw_graph(dot, request.output);
+  }
+  return written ? 0 : session.fail(written.error());
+}
+
+void add_pipeline_arguments(CLI::App& command, const RequestPtr& request) {
+  command.add_option("PIPELINE", request->name, "Shipped pipeline or file")->required();
+  command.add_option("--set", request->overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+}
+
+/// Below `filters`; beside the schema of pipelines, which has it inside.
+void add_chain_schema(CLI::App& filters, Session& session) {
+  CLI::App* command =
+      add_command(filters, session, "schema", "JSON Schema of filter chains, for editors", [&session] {
+        const auto known = session.filters();
+        if (!known) return session.fail(known.error());
+        fmt::print("{}", cloud::filter_chain_schema(*known));
+        return 0;
+      });
+  add_plugin_option(*command, session);
 }
 
 }  // namespace
 
 void add_pipelines(CLI::App& app, Session& session) {
-  CLI::App* group = add_group(app, "pipelines", "What pipelines there are");
-  add_command(*group, session, "list", "The shipped pipelines", [&session] { return list(session); });
-  const auto request = std::make_shared<CheckRequest>();
-  CLI::App* command = add_command(*group, session, "check", "Check a pipeline without running it",
-                                  [&session, request] { return check(session, *request); });
-  command->add_option("PIPELINE", request->pipeline, "Shipped pipeline or file")->required();
-  command->add_option("--set", request->overrides, "Set an option of a stage; may be repeated")
-      ->type_name("stage.key=value")
-      ->allow_extra_args(false);
+  CLI::App* group = add_group(app, "pipelines", "What pipelines and stages there are");
+  const auto request = std::make_shared<PipelinesRequest>();
+  const auto command = [&](const char* name, const char* help,
+                           int (*run)(Session&, const PipelinesRequest&)) {
+    return add_command(*group, session, name, help,
+                       [&session, request, run] { return run(session, *request); });
+  };
+  add_command(*group, session, "list", "The shipped pipelines, and the stages that pipelines are made of",
+              [&session] { return list(session); });
+  CLI::App* described =
+      command("describe", "A stage: ports and options; without STAGE the whole reference", describe);
+  described->add_option("STAGE", request->name, "Type of a stage");
+  described->add_flag("--markdown", request->markdown, "As a section of the reference page");
+  add_pipeline_arguments(*command("check", "Check a pipeline without running it", check), request);
+  command("schema", "JSON Schema of pipeline files, or of one stage, for editors", schema)
+      ->add_option("STAGE", request->name, "Type of a stage");
+  CLI::App* drawn = command("graph", "Draw a pipeline; without -o print it in Graphviz's language", graph);
+  add_pipeline_arguments(*drawn, request);
+  drawn->add_option("-o,--output", request->output, "Picture to write: .png, .svg, .pdf or .dot")
+      ->type_name("FILE");
+  add_chain_schema(*app.get_subcommand("filters"), session);
 }
 
 }  // namespace plumbline::cli

@@ -28,7 +28,7 @@ Json filter_schema(const FilterInfo& info) {
 Json filter_definitions(const FilterRegistry& registry) {
   Json entry;
   entry["type"] = "object";
-  entry["required"] = {"type"};
+  entry["required"] = Json::array({"type"});
   entry["properties"]["type"]["enum"] = registry.types();
   Json definitions;
   Json cases = Json::array();
@@ -37,7 +37,7 @@ Json filter_definitions(const FilterRegistry& registry) {
     definitions[name] = filter_schema(info);
     // if/then instead of oneOf: an editor then tells what is wrong with this filter, not with all of them.
     Json rule;
-    rule["if"] = {{"properties", {{"type", {{"const", info.type}}}}}, {"required", {"type"}}};
+    rule["if"] = {{"properties", {{"type", {{"const", info.type}}}}}, {"required", Json::array({"type"})}};
     rule["then"] = {{"$ref", "#/definitions/" + name}};
     cases.push_back(std::move(rule));
   }
@@ -51,9 +51,10 @@ std::string filter_chain_schema(const FilterRegistry& registry) {
   schema["$schema"] = "http://json-schema.org/draft-07/schema#";
   schema["title"] = "Plumbline filter chain";
   schema["type"] = "object";
-  schema["required"] = {"chain", "filters"};
+  schema["required"] = Json::array({"chain", "filters"});
   schema["additionalProperties"] = false;
-  schema["properties"]["chain"] = {{"type", {"string", "number"}}, {"pattern", "^[A-Za-z0-9_.-]+$"}};
+  schema["properties"]["chain"] = {{"type", Json::array({"string", "number"})},
+                                   {"pattern", "^[A-Za-z0-9_.-]+$"}};
   schema["properties"]["description"] = {{"type", "string"}};
   schema["properties"]["filters"] = {{"$ref", "#/definitions/filters"}};
   schema["definitions"] = filter_definitions(registry);

@@ -50,7 +50,7 @@ Json number_schema(const OptionSpec& spec) {
   text["type"] = "string";
   text["pattern"] = fmt::format("^[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?{}$",
                                 units.empty() ? "" : fmt::format("( *({}))?", fmt::join(units, "|")));
-  return {{"anyOf", {number, text}}};
+  return {{"anyOf", Json::array({number, text})}};
 }
 
 Json numbers_schema(const OptionSpec& spec) {
@@ -64,18 +64,20 @@ Json numbers_schema(const OptionSpec& spec) {
 Json type_schema(const OptionSpec& spec) {
   switch (spec.type) {
     case OptionType::kBoolean:
-      return {{"enum", {true, false, "on", "off", "yes", "no"}}};
+      return {{"enum", Json::array({true, false, "on", "off", "yes", "no"})}};
     case OptionType::kInteger:
     case OptionType::kNumber:
       return number_schema(spec);
     case OptionType::kText:
-      return {{"type", {"string", "number", "boolean"}}};  // an unquoted 12 is a text here, but not to JSON
+      return {{"type", Json::array({"string", "number",
+                                    "boolean"})}};  // an unquoted 12 is a text here, but not to JSON
     case OptionType::kChoice:
       return {{"enum", words(spec.choices)}};
     case OptionType::kNumbers:
       return numbers_schema(spec);
     case OptionType::kTextOrList:
-      return {{"anyOf", {{{"type", "string"}}, {{"$ref", "#/definitions/" + spec.list_of}}}}};
+      return {{"anyOf",
+               Json::array({Json{{"type", "string"}}, Json{{"$ref", "#/definitions/" + spec.list_of}}})}};
   }
   return Json::object();
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// An option that names a filter chain's file.
+// The option `filters`: a filter chain's file, or the list of filters itself.
 #include <string>
+#include <vector>
 
 #include "plumbline/cloud/filter_chain.hpp"
 #include "plumbline/pipeline/stage.hpp"
@@ -11,16 +12,21 @@ namespace plumbline::pipeline {
 
 class ChainOption {
  public:
-  explicit ChainOption(std::string file) : file_(std::move(file)) {}
+  /// `file`: used unless the pipeline says otherwise; empty: no filters.
+  explicit ChainOption(const std::string& file);
 
-  void declare(core::OptionTable& table, const std::string& help) { table.text("filters", file_, help); }
-  /// Loads the chain; its problems are told among those of the pipeline.
-  void check(const CheckContext& context, const core::ConfigMark& mark, const std::string& path,
-             core::ConfigProblems& problems);
+  void declare(core::OptionTable& table, const std::string& help) {
+    table.text_or_list("filters", value_, "filters", help);
+  }
+  /// Reads the chain; its problems are told among those of the pipeline, each in the file it stands in. From
+  /// then on the option's value is the list with every option spelt out.
+  void check(const CheckContext& context, const std::string& path, core::ConfigProblems& problems);
   [[nodiscard]] const cloud::FilterChain& chain() const { return chain_; }
+  /// Files that the filters write, absolute.
+  [[nodiscard]] std::vector<std::string> files() const;
 
  private:
-  std::string file_;
+  core::ConfigNode value_;
   cloud::FilterChain chain_;
 };
 

@@ -2,6 +2,7 @@
 // cloud: the filtered cloud of every keyframe.
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "chain_option.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
@@ -17,10 +18,11 @@ class CloudStage : public Stage {
     options_.declare(table);
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
-  void check(const CheckContext& context, const core::ConfigMark& mark, const std::string& path,
+  void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
              core::ConfigProblems& problems) override {
-    filters_.check(context, mark, path, problems);
+    filters_.check(context, path, problems);
   }
+  [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
   core::Result<void> start(const RunContext& context) override {
     camera_ = context.source->camera().color;
     return {};

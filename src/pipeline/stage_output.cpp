@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <sstream>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
@@ -28,6 +30,8 @@ class OutputStage : public Stage {
   void declare(core::OptionTable& table) override {
     table.boolean("ply", ply_, "Write map.ply");
     table.boolean("pcd", pcd_, "Write map.pcd");
+    table.integer("levels", levels_, {0, 6}, "",
+                  "Coarser clouds for viewing in levels/, each of twice the voxel size of the one before");
     table.boolean("lines", lines_, "Write lines.ply, the 3D line landmarks");
     table.text("views", views_,
                "Pictures in snapshots/: any of iso top bottom front back left right; empty: none");
@@ -46,12 +50,19 @@ class OutputStage : public Stage {
         chosen_.push_back(kViews[static_cast<std::size_t>(found - names.begin())]);
         continue;
       }
-      const std::string near = core::did_you_mean(word, names);
       problems.push_back(
-          {mark, path + ".views",
-           fmt::format("there is no view '{}' (allowed: iso, top, bottom, front, back, left, right{})", word,
-                       near.empty() ? "" : "; did you mean " + near + "?")});
+          {mark, path + ".views", fmt::format("there is no view '{}'{}", word, core::hint(word, names))});
     }
+  }
+
+  [[nodiscard]] std::vector<std::string> files() const override {
+    std::vector<std::string> files{"trajectory.txt", "keyframes.txt", "frames.csv"};
+    if (ply_) files.emplace_back("map.ply");
+    if (pcd_) files.emplace_back("map.pcd");
+    if (lines_) files.emplace_back("lines.ply");
+    if (levels_ > 0) files.emplace_back("levels/map_*mm.ply");
+    for (const viz::View view : chosen_) files.push_back("snapshots/" + viz::view_name(view) + ".png");
+    return files;
   }
 
   core::Result<void> start(const RunContext& context) override {
@@ -61,19 +72,20 @@ class OutputStage : public Stage {
   core::Result<void> process(StageIo& /*io*/) override { return {}; }  // all its inputs come at the end
 
   core::Result<void> finish(StageIo& io) override {
-    const auto map = io.input<MapResult>("map");
     const auto dense = io.input<DenseCloud>("cloud");
+    const MapResult map = moved(*io.input<MapResult>("map"), dense->output_from_map);
     const std::filesystem::path& folder = context_->output_folder;
+    const cloud::CloudColumns& columns = dense->columns;
+    const core::Result<void> nothing;
     const std::vector<std::function<core::Result<void>()>> steps{
-        [&] { return ply_ ? cloud::write_ply(folder / "map.ply", *dense->cloud) : core::Result<void>(); },
-        [&] { return pcd_ ? cloud::write_pcd(folder / "map.pcd", *dense->cloud) : core::Result<void>(); },
-        [&] {
-          return lines_ ? maps::write_lines_ply(folder / "lines.ply", map->lines) : core::Result<void>();
-        },
-        [&] { return dataset::write_trajectory(folder / "trajectory.txt", map->trajectory); },
-        [&] { return dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(*map)); },
-        [&] { return write_frames(folder / "frames.csv", *map, io.frame()); },
-        [&] { return write_snapshots(folder / "snapshots", *map, *dense); },
+        [&] { return ply_ ? cloud::write_ply(folder / "map.ply", *dense->cloud, columns) : nothing; },
+        [&] { return pcd_ ? cloud::write_pcd(folder / "map.pcd", *dense->cloud, columns) : nothing; },
+        [&] { return write_levels(folder / "levels", *dense); },
+        [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
+        [&] { return dataset::write_trajectory(folder / "trajectory.txt", map.trajectory); },
+        [&] { return dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(map)); },
+        [&] { return write_frames(folder / "frames.csv", map, io.frame()); },
+        [&] { return write_snapshots(folder / "snapshots", map, *dense); },
     };
     for (const auto& step : steps) {
       if (auto written = step(); !written) return written;
@@ -82,6 +94,42 @@ class OutputStage : public Stage {
   }
 
  private:
+  /// Poses and lines in the output's frame.
+  static MapResult moved(MapResult map, const geometry::Rigid3& output_from_map) {
+    for (geometry::StampedPose& pose : map.trajectory) {
+      pose.world_from_camera = output_from_map * pose.world_from_camera;
+    }
+    for (KeyframePose& keyframe : map.keyframes) {
+      keyframe.world_from_camera = output_from_map * keyframe.world_from_camera;
+    }
+    for (auto& [start, end] : map.lines) {
+      start = output_from_map * start;
+      end = output_from_map * end;
+    }
+    return map;
+  }
+
+  static core::Result<void> make_folder(const std::filesystem::path& folder) {
+    std::error_code ec;
+    std::filesystem::create_directories(folder, ec);
+    if (!ec) return {};
+    return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  }
+
+  core::Result<void> write_levels(const std::filesystem::path& folder, const DenseCloud& dense) const {
+    if (levels_ == 0) return {};
+    if (auto made = make_folder(folder); !made) return made;
+    double voxel_m = dense.voxel_m;
+    for (int level = 0; level < levels_; ++level) {
+      voxel_m *= 2.0;
+      const cloud::FusedCloud coarse = cloud::coarser(*dense.cloud, dense.columns, voxel_m);
+      const std::string name = fmt::format("map_{:g}mm.ply", std::round(1e6 * voxel_m) / 1e3);
+      if (auto written = cloud::write_ply(folder / name, *coarse.cloud, coarse.columns); !written)
+        return written;
+    }
+    return {};
+  }
+
   static geometry::Trajectory keyframe_trajectory(const MapResult& map) {
     geometry::Trajectory poses;
     for (const KeyframePose& keyframe : map.keyframes)
@@ -111,10 +159,7 @@ class OutputStage : public Stage {
   core::Result<void> write_snapshots(const std::filesystem::path& folder, const MapResult& map,
                                      const DenseCloud& dense) const {
     if (chosen_.empty()) return {};
-    std::error_code ec;
-    std::filesystem::create_directories(folder, ec);
-    if (ec)
-      return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+    if (auto made = make_folder(folder); !made) return made;
     viz::Scene scene;
     scene.cloud = dense.cloud;
     scene.title = context_->source->name();
@@ -124,6 +169,7 @@ class OutputStage : public Stage {
     for (const viz::View view : chosen_) {
       viz::SnapshotOptions options;
       options.view = view;
+      if (dense.upright) options.up = Eigen::Vector3d::UnitZ();
       options.width_px = width_px_;
       options.height_px = height_px_;
       auto drawn = viz::render_snapshot(scene, options, folder / (viz::view_name(view) + ".png"));
@@ -134,6 +180,7 @@ class OutputStage : public Stage {
 
   bool ply_ = true;
   bool pcd_ = true;
+  int levels_ = 0;
   bool lines_ = true;
   std::string views_ = "iso top front";
   int width_px_ = 1600;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "plumbline/pipeline/graph.hpp"
 #include "test_pipeline_toys.hpp"
@@ -81,10 +82,9 @@ flags: 1
 )",
                                       {"twice.by=x", "tice.by=1", "sum", "twice.type=sum"});
   for (const char* told :
-       {"g.yaml:2:17: stages.count.type: unknown stage type 'cuont' (allowed: collect, count, scale, sum; "
-        "did you "
-        "mean count?)",
-        "g.yaml:5:14: stages.twice.inputs.nmber: unknown input (allowed: number; did you mean number?)",
+       {"g.yaml:2:17: stages.count.type: unknown stage type 'cuont'; did you mean count? "
+        "(allowed: collect, count, scale, sum)",
+        "g.yaml:5:14: stages.twice.inputs.nmber: unknown input; did you mean number? (allowed: number)",
         "g.yaml:5:13: stages.twice.inputs: the input number is missing",
         "g.yaml:6:9: stages.twice.by: 50 is out of range", "g.yaml:7:5: stages.twice.colour: unknown key",
         "g.yaml:8:37: stages.sum.inputs.number: there is no stage 'twise'", "did you mean twice?",
@@ -134,8 +134,8 @@ TEST_F(GraphFile, AnUnknownTypeIsToldOnceAndNotForEveryNeighbour) {
   EXPECT_EQ(
       refusal("stages:\n  a: {type: count}\n  b: {type: scael, inputs: {number: a}}\n"
               "  c: {type: sum, inputs: {number: b}}\n  d: {type: collect, inputs: {total: c}}\n"),
-      "g.yaml:3:13: stages.b.type: unknown stage type 'scael' (allowed: collect, count, scale, sum; did you "
-      "mean scale?)");
+      "g.yaml:3:13: stages.b.type: unknown stage type 'scael'; did you mean scale? (allowed: collect, count, "
+      "scale, sum)");
 }
 
 TEST_F(GraphFile, FilesAreFoundBesideThePipelineAndAmongTheShipped) {
@@ -156,6 +156,85 @@ TEST_F(GraphFile, FilesAreFoundBesideThePipelineAndAmongTheShipped) {
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("did you mean rgbd?"), std::string::npos);
   std::filesystem::remove_all(folder);
+}
+
+TEST_F(GraphFile, SuggestionsComeFirst) {
+  EXPECT_EQ(
+      refusal(kGood, {"twice.faile_at=3"}),
+      "--set twice.faile_at: unknown key; did you mean fail_at? (allowed: by, fail_at, throw_at, drop_odd, "
+      "late, file)");
+}
+
+TEST_F(GraphFile, ProblemsOfAFileAreToldTogetherWithThoseOfItsText) {
+  const std::string message = refusal("stages:\n  a: {type: count, n: 3, n: x}\n  b: {type: scael}\n");
+  EXPECT_NE(message.find("g.yaml:2:26: stages.a.n: the key is given twice"), std::string::npos) << message;
+  EXPECT_NE(message.find("g.yaml:3:13: stages.b.type: unknown stage type"), std::string::npos) << message;
+}
+
+TEST_F(GraphFile, ProblemsOfAStagesOwnChecksAreToldWhereTheKeyStands) {
+  expect_told("stages:\n  a: {type: count}\n  b: {type: scale, inputs: {number: a}, file: nowhere}\n",
+              "g.yaml:3:47: stages.b.file: no such file");
+  EXPECT_EQ(refusal(kGood, {"twice.file=nowhere"}), "--set twice.file: no such file");
+}
+
+TEST_F(GraphFile, NoTwoStagesWriteOneFile) {
+  const std::string two = std::string(kGood) + "  more: {type: collect, inputs: {total: sum}";
+  EXPECT_EQ(refusal(two + "}\n"),
+            "g.yaml:10:3: stages.more: writes total.txt, which stages.collect writes as well");
+  EXPECT_EQ(refusal(two + ", writes: ./x/../total.txt}\n"),
+            "g.yaml:10:3: stages.more: writes ./x/../total.txt, which stages.collect writes as well");
+  EXPECT_EQ(refusal(two + ", writes: more.txt}\n"), "accepted");
+  EXPECT_EQ(refusal(kGood, {"collect.writes=summary.json"}),
+            "g.yaml:3:3: stages.collect: writes summary.json, which the run itself writes as well");
+  const std::string taps =
+      std::string(kGood) + "taps:\n  - {port: sum, file: a/b.txt}\n  - {port: twice, file: ";
+  EXPECT_NE(refusal(taps + "a/b.txt/*.txt}\n").find("taps[1]: writes a/b.txt/*.txt"), std::string::npos);
+  EXPECT_NE(refusal(taps + "a/*.txt}\n").find("which taps[0] writes as well (a/b.txt)"), std::string::npos);
+  EXPECT_EQ(refusal(taps + "a/n*.txt}\n"), "accepted");
+}
+
+TEST_F(GraphFile, TapsAreNodesBehindAllStages) {
+  const std::string text = std::string(kGood) +
+                           "taps:\n  - {port: twice, file: t/*.txt}\n"
+                           "  - port: sum.total\n    file: total2.txt\n";
+  const auto graph = parse(text);
+  ASSERT_TRUE(graph) << graph.error().message;
+  EXPECT_EQ(graph->stage_count(), 4U);
+  ASSERT_EQ(graph->nodes.size(), 6U);
+  EXPECT_EQ(graph->nodes[4].name, "tap:twice.number");
+  EXPECT_EQ(graph->nodes[5].name, "tap:sum.total");
+  EXPECT_EQ(graph->nodes[5].inputs[0]->node, 2U);
+  const auto again = parse(to_yaml(*graph));
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(to_yaml(*again), to_yaml(*graph));
+}
+
+TEST_F(GraphFile, ATapMustNameAPortThatCanBeWritten) {
+  const std::string taps = std::string(kGood) + "taps:\n  - ";
+  for (const auto& [tap, told] : std::map<std::string, std::string>{
+           {"{port: sun, file: a.txt}",
+            "g.yaml:11:12: taps[0].port: there is no stage 'sun'; did you mean sum?"},
+           {"{port: sum.totl, file: a.txt}", "taps[0].port: 'sum' has no port 'totl'; did you mean total?"},
+           {"{port: collect, file: a.txt}", "taps[0].port: 'collect' gives nothing that could be written"},
+           {"{file: a.txt}", "g.yaml:11:5: taps[0]: must name a port"},
+           {"sum", "taps[0]: must name a port"},
+           {"{port: sum, file: a.txt, colour: red}", "g.yaml:11:30: taps[0].colour: unknown key"}}) {
+    expect_told(taps + tap + "\n", told);
+  }
+  expect_told(std::string(kGood) + "taps: {port: sum}\n", "g.yaml:10:7: taps: must be a list");
+}
+
+TEST_F(GraphFile, DotShowsStagesPortsAndTaps) {
+  const auto graph = parse(std::string(kGood) + "taps: [{port: sum, file: \"t.txt\"}]\n");
+  ASSERT_TRUE(graph) << graph.error().message;
+  const std::string dot = to_dot(*graph);
+  for (const char* line : {"\"twice\" [label=\"twice\\n(scale)\"];", "\"sum\" [label=\"sum\"];",
+                           "\"count\" -> \"twice\" [label=\"number\"];",
+                           "\"sum\" -> \"collect\" [label=\"total\", style=dashed];",
+                           "\"sum\" -> \"tap:sum.total\" [label=\"total\", style=dashed];",
+                           "\"tap:sum.total\" [label=\"t.txt\", shape=note"}) {
+    EXPECT_NE(dot.find(line), std::string::npos) << line << "\nnot in\n" << dot;
+  }
 }
 
 TEST(Registry, ANameIsTakenOnce) {

@@ -15,6 +15,9 @@ const char* const kGraph = R"(stages:
   b: {type: scale, inputs: {number: a}}
   sum: {type: sum, inputs: {number: b, other: a}}
   collect: {type: collect, inputs: {total: sum}}
+taps:
+  - {port: b, file: numbers.txt}
+  - {port: sum, file: totals.txt}
 )";
 
 struct Outcome {
@@ -22,6 +25,7 @@ struct Outcome {
   std::string collected;
   bool collected_called = false;
   int most_under_way = 0;
+  int tapped = 0;
 };
 
 Outcome run(const std::vector<std::string>& overrides, int threads, const Progress& progress = {},
@@ -30,7 +34,7 @@ Outcome run(const std::vector<std::string>& overrides, int threads, const Progre
   StageRegistry registry;
   toys::register_toys(registry, bench);
   auto graph = parse_graph(kGraph, "g.yaml", registry, "/nowhere", overrides);
-  if (!graph) return {tl::unexpected<core::Error>(graph.error()), "", false, 0};
+  if (!graph) return {tl::unexpected<core::Error>(graph.error()), "", false, 0, 0};
   const core::Executor executor(threads);
   const auto log = core::null_log();
   RunContext context;
@@ -38,7 +42,7 @@ Outcome run(const std::vector<std::string>& overrides, int threads, const Progre
   context.log = log.get();
   context.stop = stop;
   auto report = run_graph(*graph, context, progress);
-  return {std::move(report), bench.collected, bench.collected_called, bench.most_under_way};
+  return {std::move(report), bench.collected, bench.collected_called, bench.most_under_way, bench.tapped};
 }
 
 class RunThreads : public testing::TestWithParam<int> {};
@@ -58,6 +62,7 @@ TEST_P(RunThreads, NothingForAFrameSkipsWhatNeedsIt) {
   const Outcome outcome = run({"count.n=6", "b.drop_odd=on"}, GetParam());
   ASSERT_TRUE(outcome.report) << outcome.report.error().message;
   EXPECT_EQ(outcome.collected, "0 +0 4 +2 8 +4 ");
+  EXPECT_EQ(outcome.tapped, 0 + 4 + 8);
   const StageTiming& sum = outcome.report->stages[3];
   ASSERT_EQ(sum.frame_ms.size(), 6U);
   EXPECT_TRUE(std::isnan(sum.frame_ms[1]));

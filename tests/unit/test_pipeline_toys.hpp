@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "plumbline/pipeline/graph.hpp"
 
@@ -23,6 +24,7 @@ struct Bench {
   std::atomic<int> under_way{0};
   std::atomic<int> most_under_way{0};
   std::atomic<int> in_serial{0};
+  std::atomic<int> tapped{0};
   std::string collected;
   bool collected_called = false;
 };
@@ -106,6 +108,10 @@ class Sum : public Stage {
 class Collect : public Stage {
  public:
   explicit Collect(Bench& bench) : bench_(bench) {}
+  void declare(core::OptionTable& table) override {
+    table.text("writes", writes_, "A file it says to write");
+  }
+  [[nodiscard]] std::vector<std::string> files() const override { return {writes_}; }
   core::Result<void> process(StageIo& /*io*/) override { throw std::logic_error("has no frames"); }
   core::Result<void> finish(StageIo& io) override {
     bench_.collected = io.input<Total>("total")->text;
@@ -115,6 +121,30 @@ class Collect : public Stage {
 
  private:
   Bench& bench_;
+  std::string writes_ = "total.txt";
+};
+
+/// A tap that counts what it is given.
+class ToyTap : public Stage {
+ public:
+  explicit ToyTap(Bench& bench) : bench_(bench) {}
+  void declare(core::OptionTable& table) override { table.text("file", file_, "A file it says to write"); }
+  [[nodiscard]] std::vector<std::string> files() const override { return {file_}; }
+  core::Result<void> process(StageIo& io) override {
+    bench_.tapped += *io.input<int>("in");
+    return {};
+  }
+
+ private:
+  Bench& bench_;
+  std::string file_;
+};
+
+/// The same for what comes at the end.
+class ToyEndTap : public ToyTap {
+ public:
+  using ToyTap::ToyTap;
+  core::Result<void> process(StageIo& /*io*/) override { throw std::logic_error("has no frames"); }
 };
 
 inline void register_toys(StageRegistry& registry, Bench& bench) {
@@ -134,6 +164,12 @@ inline void register_toys(StageRegistry& registry, Bench& bench) {
                 {},
                 [&bench] { return std::make_unique<Collect>(bench); },
                 true});
+  registry.add_tap({"number", "", Mode::kStateless, {{"in", number.type, true}}, {}, [&bench] {
+                      return std::make_unique<ToyTap>(bench);
+                    }});
+  registry.add_tap({"total", "", Mode::kSerial, {{"in", total.type, true}}, {}, [&bench] {
+                      return std::make_unique<ToyEndTap>(bench);
+                    }});
 }
 
 }  // namespace plumbline::pipeline::toys

@@ -7,7 +7,8 @@
 //   read ──frame──▶ features ──features──▶ track ──track──▶ cloud ──keyframe_cloud──▶ fuse ──cloud──▶ output
 //
 // Adding a stage: derive from Stage in src/pipeline/stage_<name>.cpp, describe it in a StageType, add one
-// line to register_stages() (src/pipeline/registry.cpp).
+// line to register_stages() (src/pipeline/registry.cpp). A new port type wants a tap as well
+// (tap_<name>.cpp).
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -18,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
@@ -113,11 +115,14 @@ struct RunContext {
 
 /// What a stage may look at while the graph is checked.
 struct CheckContext {
-  std::filesystem::path pipeline_folder;   ///< of the pipeline file
-  std::filesystem::path pipelines_folder;  ///< shipped pipelines, filters and cameras
+  std::filesystem::path pipeline_folder;           ///< of the pipeline file
+  std::filesystem::path pipelines_folder;          ///< shipped pipelines, filters and cameras
+  const cloud::FilterRegistry* filters = nullptr;  ///< what filter chains may name
 
   /// A file named in a pipeline: absolute, beside the pipeline file, or shipped. Empty when there is none.
   [[nodiscard]] std::filesystem::path find(const std::string& file) const;
+  /// The same for a value that stands in a file of its own, such as an included pipeline: beside that.
+  [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 
 /// Life of a stage: constructed, declare, check, start, process once a frame, finish, summarise.
@@ -127,9 +132,13 @@ class Stage {
 
   /// Binds the options; called once.
   virtual void declare(core::OptionTable& /*table*/) {}
-  /// Checks what needs more than one option, e.g. files named by options. `mark` and `path` are the stage's.
+  /// Checks what needs more than one option, e.g. files named by options. `mark` and `path` are the stage's;
+  /// a problem of path `path`.key is told where the key's value stands.
   virtual void check(const CheckContext& /*context*/, const core::ConfigMark& /*mark*/,
                      const std::string& /*path*/, core::ConfigProblems& /*problems*/) {}
+  /// Asked after check: the files that will be written, relative to the result folder ('*' = a number); no
+  /// two stages may write the same.
+  [[nodiscard]] virtual std::vector<std::string> files() const { return {}; }
   virtual core::Result<void> start(const RunContext& /*context*/) { return {}; }
   /// Of sources: how many frames there are; asked after start.
   [[nodiscard]] virtual std::size_t frames() const { return 0; }
@@ -161,15 +170,28 @@ struct StageType {
   [[nodiscard]] bool is_source() const;
 };
 
-/// The stage types a pipeline file may name.
+/// The stage types a pipeline file may name, how its taps write the values of ports, and the filters of its
+/// chains.
 class StageRegistry {
  public:
   void add(StageType type);  ///< throws std::logic_error for a name that is taken
   [[nodiscard]] const StageType* find(const std::string& name) const;
-  [[nodiscard]] std::vector<std::string> names() const;  ///< sorted
+  [[nodiscard]] std::vector<std::string> names() const;       ///< sorted
+  [[nodiscard]] std::vector<const StageType*> types() const;  ///< as added
+
+  /// A tap is a stage with one input and no output; throws std::logic_error when its port type has one.
+  void add_tap(StageType type);
+  [[nodiscard]] const StageType* find_tap(const PortType& type) const;  ///< null: cannot be tapped
+  [[nodiscard]] std::vector<const StageType*> taps() const;             ///< as added
+
+  /// The built-in filters and what plugins add.
+  [[nodiscard]] const cloud::FilterRegistry& filters() const { return filters_; }
+  cloud::FilterRegistry& filters() { return filters_; }
 
  private:
   std::vector<std::unique_ptr<const StageType>> types_;
+  std::vector<std::unique_ptr<const StageType>> taps_;
+  cloud::FilterRegistry filters_ = cloud::builtin_filters();
 };
 
 /// All stages of this library.

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What is told of the stages to people and editors, made from their own declarations.
+#include <string>
+
+#include "plumbline/pipeline/stage.hpp"
+
+namespace plumbline::pipeline {
+
+/// JSON Schema (draft 7) of pipeline files. What needs the whole graph (inputs that fit, cycles, files
+/// written twice) is beyond a schema and left to load_graph.
+std::string pipeline_schema(const StageRegistry& registry);
+
+/// The same of one stage's map.
+std::string stage_schema(const StageType& type, const StageRegistry& registry);
+
+/// Ports and options of one stage as Markdown, a section of stages_reference.
+std::string stage_reference(const StageType& type);
+
+/// docs/stages.md: every stage, port type and tap.
+std::string stages_reference(const StageRegistry& registry);
+
+}  // namespace plumbline::pipeline

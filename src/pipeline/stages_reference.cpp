@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include "plumbline/core/option_schema.hpp"
+#include "plumbline/pipeline/reference.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+constexpr const char* kIntroduction =
+    "<!-- Made by `plumbline pipelines describe`; a test compares. -->\n"
+    "# Stages\n\n"
+    "What may stand under `stages:` of a [pipeline file](pipelines.md). Lengths, angles and times may carry "
+    "a "
+    "unit\n"
+    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default.\n";
+
+constexpr const char* kTaps =
+    "\n## Taps\n\n"
+    "`taps:` of a pipeline writes what flows through a port to the result folder. By the type of the "
+    "port:\n\n"
+    "| port type | file | what is written |\n|---|---|---|\n";
+
+std::string rate_text(Rate rate) { return rate == Rate::kFrame ? "each frame" : "once, at the end"; }
+
+std::string ports(const StageType& type) {
+  if (type.inputs.empty() && type.outputs.empty()) return "";
+  std::string text = "| port | | type | |\n|---|---|---|---|\n";
+  for (const Port& port : type.inputs) {
+    text += fmt::format("| `{}` | {} | {} | {} |\n", port.name,
+                        port.required ? "input" : "input, may be left open", port.type.name,
+                        rate_text(port.type.rate));
+  }
+  for (const Port& port : type.outputs) {
+    text +=
+        fmt::format("| `{}` | output | {} | {} |\n", port.name, port.type.name, rate_text(port.type.rate));
+  }
+  return text;
+}
+
+std::vector<core::OptionSpec> options(const StageType& type) {
+  const std::unique_ptr<Stage> stage = type.make();
+  core::OptionTable table;
+  stage->declare(table);
+  return table.specs();
+}
+
+std::string tap_row(const StageType& tap) {
+  std::string file;
+  for (const core::OptionSpec& spec : options(tap)) {
+    if (spec.key == "file") file = spec.help;
+  }
+  return fmt::format("| {} | {} | {} |\n", tap.name, file, tap.help);
+}
+
+}  // namespace
+
+std::string stage_reference(const StageType& type) {
+  std::string text = fmt::format("## {}\n\n{}.\n\n{}", type.name, type.help, ports(type));
+  const std::string table = core::options_as_markdown(options(type));
+  return table.empty() ? text : text + "\n" + table;
+}
+
+std::string stages_reference(const StageRegistry& registry) {
+  std::string text = kIntroduction;
+  for (const StageType* type : registry.types()) text += "\n" + stage_reference(*type);
+  text += kTaps;
+  for (const StageType* tap : registry.taps()) text += tap_row(*tap);
+  text += "\nTaps of frames and features take `every: N` as well: each N-th frame only.\n";
+  return text;
+}
+
+}  // namespace plumbline::pipeline
