@@ -1,79 +1,96 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// fuse: keyframe clouds at their final poses, merged into one voxel map.
+// fuse: keyframe clouds at their final poses as one cloud. Until then they wait on disk.
+#include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
-#include <cmath>
+#include <map>
 #include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "chain_option.hpp"
-#include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/cloud_spool.hpp"
+#include "plumbline/cloud/columns.hpp"
+#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "stages.hpp"
+#include "up_frame.hpp"
 
 namespace plumbline::pipeline {
 namespace {
 
-/// Finite points only: holes of an organised cloud cost memory until the end of the run.
-cloud::CloudPtr compact(const cloud::Cloud& cloud) {
-  auto kept = std::make_shared<cloud::Cloud>();
-  const auto finite = [](const cloud::Point& p) {
-    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-  };
-  kept->points.reserve(static_cast<std::size_t>(std::count_if(cloud.begin(), cloud.end(), finite)));
-  std::copy_if(cloud.begin(), cloud.end(), std::back_inserter(kept->points), finite);
-  kept->width = static_cast<std::uint32_t>(kept->points.size());
-  kept->height = 1;
-  return kept;
+void move_cloud(cloud::Cloud& cloud, const geometry::Rigid3& to_from) {
+  for (cloud::Point& p : cloud.points) {
+    p.getVector3fMap() = (to_from * p.getVector3fMap().cast<double>()).cast<float>();
+    p.getNormalVector3fMap() = (to_from.rotation * p.getNormalVector3fMap().cast<double>()).cast<float>();
+  }
 }
 
 class FuseStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.integer("min_observations", min_observations_, {1, 1000}, "",
-                  "Keyframes that must have seen a voxel for it to stay");
+    table.choice<Up>(
+        "up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
+        "Frame of all results: z up and 0 on the floor, z up as the first camera was held, or the "
+        "frame of the poses as they are");
+    table.boolean("keyframe_clouds", keyframe_clouds_,
+                  "Write the cloud of every keyframe to keyframes/, in the frame of the results");
     filters_.declare(table, "Filter chain for the merged cloud; empty: none");
   }
-  void check(const CheckContext& context, const core::ConfigMark& mark, const std::string& path,
+  void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
              core::ConfigProblems& problems) override {
-    filters_.check(context, mark, path, problems);
+    filters_.check(context, path, problems);
+  }
+  [[nodiscard]] std::vector<std::string> files() const override {
+    std::vector<std::string> files = filters_.files();
+    if (keyframe_clouds_) files.emplace_back("keyframes/*.ply");
+    return files;
   }
 
   core::Result<void> start(const RunContext& context) override {
-    log_ = context.log;
+    context_ = &context;
+    auto spool = cloud::CloudSpool::create(context.output_folder);
+    if (!spool) return tl::unexpected<core::Error>(spool.error());
+    spool_.emplace(std::move(*spool));
     return {};
   }
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("cloud");
-    clouds_.push_back({keyframe->id, compact(*keyframe->cloud)});
-    return {};
+    places_[keyframe->id] = spool_->size();
+    return spool_->append(*keyframe->cloud);
   }
 
   /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
   /// keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
-    cloud::VoxelMap voxels(options_);
-    for (const KeyframePose& keyframe : map->keyframes) {
-      const auto found = std::find_if(clouds_.begin(), clouds_.end(),
-                                      [&](const KeyframeCloud& c) { return c.id == keyframe.id; });
-      if (found == clouds_.end()) continue;
-      voxels.insert(*found->cloud, keyframe.world_from_camera);
-      found->cloud.reset();
-    }
-    cloud::VoxelExtractOptions extract;
-    extract.min_observations = min_observations_;
-    std::vector<cloud::FilterReport> reports;
-    auto filtered = filters_.chain().apply(voxels.extract(extract).cloud, {}, &reports);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-    if (!reports.empty()) log_->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
+    auto fused = fuse(*map);
+    if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
-    dense->cloud = compact(**filtered);
-    dense->voxel_m = options_.voxel_m;
+    dense->voxel_m = options_.voxels.voxel_m;
+    frame_ = find_up(up_, fused->cloud, map->trajectory);
+    dense->output_from_map = frame_.output_from_map;
+    dense->upright = frame_.up != "none";
+    if (dense->upright) move_cloud(*fused->cloud, frame_.output_from_map);
+    if (keyframe_clouds_) {
+      if (auto written = write_keyframes(*map); !written) return written;
+    }
+    spool_.reset();
+    std::vector<cloud::FilterReport> reports;
+    cloud::FilterContext context;
+    context.executor = context_->executor;
+    auto filtered = filters_.chain().apply(fused->cloud, context, &reports);
+    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!reports.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
+    dense->columns = cloud::carry_columns(*fused->cloud, fused->columns, **filtered);
+    dense->cloud = std::move(*filtered);
     points_ = dense->cloud->size();
     io.output<DenseCloud>("cloud", dense);
     return {};
@@ -81,15 +98,62 @@ class FuseStage : public Stage {
 
   void summarise(RunSummary& summary) const override {
     summary.cloud_points = points_;
-    summary.voxel_m = options_.voxel_m;
+    summary.voxel_m = options_.voxels.voxel_m;
+    summary.up = frame_.up;
+    summary.output_from_map = frame_.output_from_map;
   }
 
  private:
-  core::Log* log_ = nullptr;
-  cloud::VoxelMapOptions options_;
-  int min_observations_ = 1;
+  core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
+    std::vector<geometry::Rigid3> poses;
+    std::vector<std::size_t> places;
+    for (const KeyframePose& keyframe : map.keyframes) {
+      const auto found = places_.find(keyframe.id);
+      if (found == places_.end()) continue;
+      poses.push_back(keyframe.world_from_camera);
+      places.push_back(found->second);
+    }
+    cloud::FusionReport report;
+    auto fused = cloud::fuse_views(
+        poses, [&](std::size_t i) { return spool_->read(places[i]); }, context_->source->camera().color,
+        options_, *context_->executor, &report);
+    context_->log->debug(
+        fmt::format("{} keyframe clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
+                    "dust; colour "
+                    "gains {:.2f} to {:.2f}",
+                    poses.size(), static_cast<double>(spool_->bytes()) / 1e6, report.tiles,
+                    report.seen_through, report.dust, report.least_gain, report.most_gain));
+    return fused;
+  }
+
+  core::Result<void> write_keyframes(const MapResult& map) const {
+    const std::filesystem::path folder = context_->output_folder / "keyframes";
+    std::error_code ec;
+    std::filesystem::create_directories(folder, ec);
+    if (ec)
+      return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+    for (const KeyframePose& keyframe : map.keyframes) {
+      const auto found = places_.find(keyframe.id);
+      if (found == places_.end()) continue;
+      const auto cloud = spool_->read(found->second);
+      if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+      move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera);
+      const std::string name = keyframe.id.robot == 0
+                                   ? fmt::format("{:06}.ply", keyframe.id.index)
+                                   : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
+      if (auto written = cloud::write_ply(folder / name, **cloud); !written) return written;
+    }
+    return {};
+  }
+
+  const RunContext* context_ = nullptr;
+  cloud::DenseFusionOptions options_;
+  Up up_ = Up::kFloor;
+  bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::vector<KeyframeCloud> clouds_;  ///< camera frame, until the end
+  std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
+  std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
+  UpFrame frame_;
   std::size_t points_ = 0;
 };
 
@@ -97,7 +161,7 @@ class FuseStage : public Stage {
 
 StageType fuse_stage() {
   return {"fuse",
-          "Merges the keyframes' clouds at their final poses in a voxel map",
+          "Merges the keyframes' clouds at their final poses into one cloud with thin walls",
           Mode::kSerial,
           {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
           {{"cloud", cloud_port()}},

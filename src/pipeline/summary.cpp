@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -22,6 +23,16 @@ core::Result<void> write_text(const std::filesystem::path& file, const std::stri
   core::OutputFile out(file);
   out.write(text);
   return out.commit();
+}
+
+/// The 4 x 4 matrix, row by row.
+nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
+  nlohmann::ordered_json matrix = nlohmann::ordered_json::array();
+  const Eigen::Matrix4d values = transform.isometry().matrix();
+  for (int row = 0; row < 4; ++row) {
+    matrix.push_back({values(row, 0), values(row, 1), values(row, 2), values(row, 3)});
+  }
+  return matrix;
 }
 
 }  // namespace
@@ -68,6 +79,14 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
                           {"p95", rounded(stage.p95_ms)},
                           {"finish", rounded(stage.finish_ms)}};
   }
+  nlohmann::ordered_json parts = nlohmann::ordered_json::object();
+  for (const StageTiming& part : s.parts) {
+    const auto times =
+        std::count_if(part.frame_ms.begin(), part.frame_ms.end(), [](float ms) { return !std::isnan(ms); });
+    parts[part.name] = {{"times", times},
+                        {"median", rounded(part.quantile_ms(0.5))},
+                        {"p95", rounded(part.quantile_ms(0.95))}};
+  }
   const nlohmann::ordered_json json = {
       {"input", s.input},
       {"pipeline", s.pipeline},
@@ -86,14 +105,24 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
       {"loops",
        {{"candidates", s.loops.candidates}, {"verified", s.loops.verified}, {"accepted", s.loops.accepted}}},
+      {"refine",
+       {{"local_maps", s.refine.local_maps},
+        {"tried", s.refine.tried},
+        {"accepted", s.refine.accepted},
+        {"rejected", s.refine.rejected},
+        {"mean_rms", rounded(s.refine.mean_rms)},
+        {"mean_shift_m", rounded(s.refine.mean_shift_m)},
+        {"max_shift_m", rounded(s.refine.max_shift_m)}}},
       {"merges", nlohmann::ordered_json::array()},
       {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},
+      {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
       {"timing",
        {{"wall_s", rounded(s.wall_s)},
         {"map_s", rounded(s.map_s)},
         {"fps", rounded(s.fps())},
         {"export_s", rounded(s.export_s)},
         {"stages_ms", stages},
+        {"parts_ms", parts},
         {"threads", s.threads}}},
       {"memory", {{"peak_rss_mb", rounded(s.peak_rss_mb)}}},
       {"version", core::version()},
@@ -103,14 +132,18 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
 }
 
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
-                                const dataset::FrameSource& source) {
+                                const std::vector<StageTiming>& parts, const dataset::FrameSource& source) {
+  std::vector<const StageTiming*> columns;
+  for (const StageTiming& stage : report.stages) columns.push_back(&stage);
+  for (const StageTiming& part : parts) columns.push_back(&part);
   std::string text = "frame,stamp";
-  for (const StageTiming& stage : report.stages) text += "," + stage.name + "_ms";
+  for (const StageTiming* column : columns) text += "," + column->name + "_ms";
   text += '\n';
   for (std::size_t f = 0; f < report.frames; ++f) {
     text += fmt::format("{},{:.6f}", f, source.info(f).stamp);
-    for (const StageTiming& stage : report.stages) {
-      text += std::isnan(stage.frame_ms[f]) ? "," : fmt::format(",{:.3f}", stage.frame_ms[f]);
+    for (const StageTiming* column : columns) {
+      const bool worked = f < column->frame_ms.size() && !std::isnan(column->frame_ms[f]);
+      text += worked ? fmt::format(",{:.3f}", column->frame_ms[f]) : ",";
     }
     text += '\n';
   }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/ids.hpp"
 #include "plumbline/features/frame_features.hpp"
@@ -55,10 +56,13 @@ struct KeyframeCloud {
   cloud::CloudPtr cloud;
 };
 
-/// The merged cloud, map frame.
+/// The merged cloud in the output's frame, which output_from_map leads to: all results are written in it.
 struct DenseCloud {
   cloud::CloudPtr cloud;
+  cloud::CloudColumns columns;  ///< of the cloud's points; empty when a filter moved points
   double voxel_m = 0.0;
+  geometry::Rigid3 output_from_map;
+  bool upright = false;  ///< z is up in the output's frame
 };
 
 /// Trajectory, keyframe poses and lines of `result` as its map says now.

@@ -9,6 +9,7 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/pipeline/run.hpp"
 
 namespace plumbline::pipeline {
@@ -35,8 +36,19 @@ struct RunSummary {
     std::size_t verified = 0;
     std::size_t accepted = 0;
   } loops;
+  struct Refine {
+    std::size_t local_maps = 0;
+    std::size_t tried = 0;     ///< alignments of two local maps
+    std::size_t accepted = 0;  ///< of these, used
+    std::size_t rejected = 0;  ///< of the accepted, taken for wrong by the pose graph
+    double mean_rms = 0.0;     ///< of the accepted, standard deviations of the depth noise
+    double mean_shift_m = 0.0;  ///< how far keyframes moved
+    double max_shift_m = 0.0;
+  } refine;
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;
+  std::string up = "none";           ///< what the output's frame stands on: floor, camera or none
+  geometry::Rigid3 output_from_map;  ///< to that frame from the one that tracking began in
   double wall_s = 0.0;    ///< the whole run
   double map_s = 0.0;     ///< first frame read to last change of the map
   double export_s = 0.0;  ///< clouds, pictures and tables
@@ -47,6 +59,7 @@ struct RunSummary {
     double finish_ms = 0.0;
   };
   std::vector<StageTime> stages;
+  std::vector<StageTiming> parts;  ///< of stages, as "stage.part": by frame; NaN: nothing to do
   double peak_rss_mb = 0.0;
   int threads = 0;
   int seed = 0;
@@ -63,9 +76,9 @@ void judge(RunSummary& summary);
 /// The one place that writes summary.json. Errors (kOutput) name the file.
 core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& summary);
 
-/// One line a frame: its number, stamp and the milliseconds of every stage (empty = nothing to do).
+/// One line a frame: its number, stamp and the milliseconds of every stage and part (empty = nothing to do).
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
-                                const dataset::FrameSource& source);
+                                const std::vector<StageTiming>& parts, const dataset::FrameSource& source);
 
 /// A few lines for people.
 std::string to_text(const RunSummary& summary);
