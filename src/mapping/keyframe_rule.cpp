@@ -2,6 +2,7 @@
 #include "plumbline/mapping/keyframe_rule.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace plumbline::mapping {
@@ -30,9 +31,29 @@ View view_of(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from
           static_cast<double>(*middle)};
 }
 
+bool sees(const std::vector<maps::Observation>& observations, core::KeyframeId keyframe) {
+  return std::any_of(observations.begin(), observations.end(),
+                     [&](const maps::Observation& o) { return o.keyframe == keyframe; });
+}
+
+/// How many of the keyframe's own landmarks the frame has matched.
+int landmarks_in_common(const maps::Map& map, core::KeyframeId keyframe, const tracking::TrackResult& track) {
+  int common = 0;
+  for (const auto& m : track.points) common += sees(map.point(m.point).observations, keyframe) ? 1 : 0;
+  for (const auto& m : track.lines) common += sees(map.line(m.line).observations, keyframe) ? 1 : 0;
+  return common;
+}
+
+/// In a scene that has fewer landmarks than a rule asks for, half of what should be seen will do.
+bool enough(std::size_t matched, int wanted, std::size_t visible) {
+  return 2 * matched >= std::min(2 * static_cast<std::size_t>(wanted), visible);
+}
+
 }  // namespace
 
 void KeyframeRuleOptions::declare(core::OptionTable& table) {
+  table.choice("keyframe.rule", rule, {{"plain", Rule::kPlain}, {"cone", Rule::kCone}},
+               "plain: movement and what is lost from view; cone: from which sides landmarks are seen");
   table.integer("keyframe.min_frames", min_frames, {1, 1000}, "", "Frames between keyframes, at least");
   table.integer("keyframe.max_frames", max_frames, {1, 10000}, "",
                 "Frames between keyframes, at most, while the camera moves");
@@ -46,10 +67,62 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                "More rotation makes a keyframe");
   table.integer("keyframe.min_features", min_features, {0, 10000}, "",
                 "With fewer features tracked a keyframe is urgent, if the scene has more to offer");
+  table.integer("keyframe.cone_patience", cone_patience, {0, 10000}, "",
+                "Cone rule: after so many frames a bundle under way no longer holds a keyframe up");
+  table.number("keyframe.cone_max_shared", cone_max_shared, {0.05, 1.0}, "",
+               "Cone rule: no keyframe while a larger share of the last one's landmarks is matched");
+  table.integer("keyframe.cone_min_points", cone_min_points, {0, 10000}, "",
+                "Cone rule: points a keyframe must match, or half of what should be seen");
+  table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "", "The same of lines");
+  table.number("keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
+               "Cone rule: points whose viewing angle changed more are asked to spread over the picture");
+}
+
+bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {
+  const bool moved = d.parallax > options_.max_parallax || d.rotation_rad > options_.max_rotation_rad;
+  const bool left = d.shared < options_.min_shared || d.overlap < options_.min_surface_overlap;
+  const bool starving =
+      d.frames_since >= options_.max_frames &&
+      (d.parallax > 0.25 * options_.max_parallax || d.rotation_rad > 0.25 * options_.max_rotation_rad);
+  return moved || left || starving;
+}
+
+ConeTerms KeyframeRule::look_at_cones(const maps::Map& map, core::KeyframeId reference,
+                                      const tracking::TrackResult& track, const sensor::Pinhole& camera,
+                                      const KeyframeCircumstances& circumstances) {
+  ConeTerms terms;
+  const Eigen::Vector3d centre_then = map.camera_from_world(reference).inverse().translation;
+  const Eigen::Vector3d centre_now = track.camera_from_world.inverse().translation;
+  GridCounts grid{};
+  terms.now.all = circumstances.frame_points;
+  for (const tracking::PointMatch& match : track.points) {
+    const maps::MapPoint& point = map.point(match.point);
+    if (point.normal.isZero()) continue;
+    ++terms.now.matched;
+    const double then = viewing_angle(point.position, point.normal, centre_then);
+    const double now = viewing_angle(point.position, point.normal, centre_now);
+    if (viewing_zone(then) != viewing_zone(now)) ++terms.now.changed;
+    if (std::abs(now - then) > options_.cone_min_change_rad) {
+      count_in_grid(camera.project(track.camera_from_world * point.position), camera.width, camera.height,
+                    grid);
+    }
+  }
+  const int common = landmarks_in_common(map, reference, track);
+  if (first_.keyframe != reference) first_ = {reference, common, terms.now};
+  terms.shared = first_.landmarks > 0 ? static_cast<double>(common) / first_.landmarks : 1.0;
+  terms.threshold = cone_threshold(terms.now, first_.counts);
+  terms.balance = grid_balance(grid);
+  terms.candidate = (frames_since_ > options_.cone_patience || circumstances.mapper_idle) &&
+                    enough(track.points.size(), options_.cone_min_points, track.visible_points.size()) &&
+                    enough(track.lines.size(), options_.cone_min_lines, track.visible_lines.size()) &&
+                    terms.shared <= options_.cone_max_shared;
+  terms.fires = terms.now.changed > terms.threshold.adaptive && terms.balance.ecog > terms.balance.offset;
+  return terms;
 }
 
 KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId reference,
-                                      const tracking::TrackResult& track, const sensor::Pinhole& camera) {
+                                      const tracking::TrackResult& track, const sensor::Pinhole& camera,
+                                      const KeyframeCircumstances& circumstances) {
   KeyframeDecision d;
   d.frames_since = ++frames_since_;
   const int tracked = static_cast<int>(track.points.size() + track.lines.size());
@@ -63,18 +136,20 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
   d.urgent = d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap ||
              (tracked < options_.min_features && d.shared < 0.8);
-  const bool moved = d.parallax > options_.max_parallax || d.rotation_rad > options_.max_rotation_rad;
-  const bool left = d.shared < options_.min_shared || d.overlap < options_.min_surface_overlap;
-  const bool starving =
-      d.frames_since >= options_.max_frames &&
-      (d.parallax > 0.25 * options_.max_parallax || d.rotation_rad > 0.25 * options_.max_rotation_rad);
-  d.wanted = d.frames_since >= options_.min_frames && (d.urgent || moved || left || starving);
+  d.mapper_idle = circumstances.mapper_idle;
+  d.cone = look_at_cones(map, reference, track, camera, circumstances);
+  // Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
+  const bool by_cones =
+      options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= options_.cone_min_points;
+  const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
+  d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
   return d;
 }
 
 void KeyframeRule::keyframe_made() {
   frames_since_ = 0;
   features_after_keyframe_ = 0;
+  first_ = {};
 }
 
 }  // namespace plumbline::mapping

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -15,8 +16,10 @@ using geometry::Rigid3;
 
 constexpr int kMaxHeld = 20;
 
-/// The keyframe, those that share most with it, and those its surface is aligned with.
-std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe, int wanted) {
+/// The keyframe, those not adjusted yet, those its surface is aligned with, and those that share most with
+/// it.
+std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe,
+                                  const std::vector<KeyframeId>& also, int wanted) {
   std::vector<KeyframeId> window{keyframe};
   const auto append = [&](KeyframeId id) {
     if (static_cast<int>(window.size()) < wanted &&
@@ -24,6 +27,9 @@ std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe, int
       window.push_back(id);
     }
   };
+  for (KeyframeId id : also) {
+    if (map.has_keyframe(id)) append(id);
+  }
   for (const maps::SurfaceEdge& edge : map.edges_of(keyframe)) append(edge.a == keyframe ? edge.b : edge.a);
   for (const auto& [id, shared] : map.covisible(keyframe, 20)) append(id);
   return window;
@@ -40,7 +46,8 @@ class Builder {
     const auto [found, inserted] = index_.try_emplace(id, static_cast<int>(bundle_.keyframes.size()));
     if (inserted) {
       bundle_.keyframes.push_back(id);
-      bundle_.problem.poses.push_back({map_.camera_from_world(id), fixed});
+      bundle_.taken.push_back(map_.camera_from_world(id));
+      bundle_.problem.poses.push_back({bundle_.taken.back(), fixed});
     }
     return found->second;
   }
@@ -138,7 +145,7 @@ class Builder {
       seen.depth = static_cast<double>(f.depth);
       seen.depth_sigma = f.depth > 0.0F ? sensor::depth_sigma(seen.depth) : 1.0;
       bundle_.problem.point_observations.push_back(seen);
-      bundle_.point_seen.push_back({index, o.keyframe});
+      bundle_.point_seen.push_back({index, o});
     }
   }
 
@@ -165,7 +172,7 @@ class Builder {
         seen.end_sigma = std::max(0.003, std::sqrt(f.line3->end_covariance.trace()));
       }
       bundle_.problem.line_observations.push_back(seen);
-      bundle_.line_seen.push_back({index, o.keyframe});
+      bundle_.line_seen.push_back({index, o});
     }
   }
 
@@ -175,40 +182,67 @@ class Builder {
   std::map<KeyframeId, int> index_;
 };
 
-/// Landmarks that nobody else sees keep their place in front of their keyframe.
-void carry_single_landmarks(maps::Map& map, KeyframeId id, const Rigid3& new_from_old_world) {
-  for (core::PointId p : map.points_of(id)) {
-    if (p.valid() && map.point(p).observations.size() == 1) {
-      map.point(p).position = new_from_old_world * map.point(p).position;
+/// Where the world around each keyframe went: those of the bundle that moved, then those made after the take.
+class CorrectionFinder {
+ public:
+  CorrectionFinder(const LocalBundle& bundle, const maps::Map& map) : bundle_(bundle), map_(map) {
+    for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
+      const optimize::BundlePose& pose = bundle.problem.poses[i];
+      if (!pose.fixed) found_[bundle.keyframes[i]] = pose.camera_from_world.inverse() * bundle.taken[i];
+    }
+    for (KeyframeId id = bundle.next; id.index < map.next_keyframe_id(id.robot).index; ++id.index) {
+      if (map.has_keyframe(id)) carry(id);
     }
   }
+  [[nodiscard]] MapCorrection take() { return std::move(found_); }
+
+ private:
+  /// The tree may hang a keyframe on a younger one: parents first.
+  void carry(KeyframeId id) {
+    const KeyframeId parent = map_.parent(id);
+    if (found_.count(id) != 0 || !parent.valid()) return;
+    if (parent.robot == bundle_.next.robot && parent.index >= bundle_.next.index) carry(parent);
+    const auto moved = found_.find(parent);
+    if (moved != found_.end()) found_[id] = Rigid3(moved->second);
+  }
+
+  const LocalBundle& bundle_;
+  const maps::Map& map_;
+  MapCorrection found_;
+};
+
+/// Landmarks outside the bundle keep their place in front of the keyframe that saw them first.
+void carry_landmarks(const LocalBundle& bundle, KeyframeId id, const Rigid3& new_from_old_world,
+                     maps::Map& map) {
+  const auto mine = [&](const std::vector<maps::Observation>& seen) { return seen.front().keyframe == id; };
+  for (core::PointId p : map.points_of(id)) {
+    if (!p.valid() || !mine(map.point(p).observations)) continue;
+    if (std::binary_search(bundle.points.begin(), bundle.points.end(), p)) continue;
+    maps::MapPoint& point = map.point(p);
+    point.position = new_from_old_world * point.position;
+    point.normal = new_from_old_world.rotation * point.normal;
+  }
   for (core::LineId l : map.lines_of(id)) {
-    if (!l.valid() || map.line(l).observations.size() != 1) continue;
+    if (!l.valid() || !mine(map.line(l).observations)) continue;
+    if (std::binary_search(bundle.lines.begin(), bundle.lines.end(), l)) continue;
     map.line(l).start = new_from_old_world * map.line(l).start;
     map.line(l).end = new_from_old_world * map.line(l).end;
   }
 }
 
-}  // namespace
-
-LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const sensor::Pinhole& camera,
-                              const LocalBundleOptions& options) {
-  Builder builder(map, camera, options);
-  const std::vector<KeyframeId> window = window_of(map, keyframe, options.keyframes);
-  for (KeyframeId id : window) builder.add_pose(id, id.index == 0 || !builder.calm(id));
-  builder.add_landmarks(window);
-  builder.add_edges();
-  return builder.take();
+bool same(const Rigid3& a, const Rigid3& b) {
+  return a.rotation == b.rotation && a.translation == b.translation;
 }
 
-void put_back(const LocalBundle& bundle, maps::Map& map) {
+bool moved_otherwise(const LocalBundle& bundle, const maps::Map& map) {
   for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
-    if (bundle.problem.poses[i].fixed) continue;
     const KeyframeId id = bundle.keyframes[i];
-    const Rigid3& adjusted = bundle.problem.poses[i].camera_from_world;
-    carry_single_landmarks(map, id, adjusted.inverse() * map.camera_from_world(id));
-    map.set_pose(id, adjusted);
+    if (map.has_keyframe(id) && !same(map.camera_from_world(id), bundle.taken[i])) return true;
   }
+  return false;
+}
+
+void put_back_landmarks(const LocalBundle& bundle, maps::Map& map) {
   for (std::size_t i = 0; i < bundle.points.size(); ++i) {
     if (map.find_point(bundle.points[i]) != nullptr)
       map.point(bundle.points[i]).position = bundle.problem.points[i];
@@ -219,20 +253,60 @@ void put_back(const LocalBundle& bundle, maps::Map& map) {
     line.start = geometry::nearest_point(bundle.problem.lines[i], line.start);
     line.end = geometry::nearest_point(bundle.problem.lines[i], line.end);
   }
+}
+
+/// Observations that did not fit go, unless the landmark is seen otherwise by now.
+void drop_outliers(const LocalBundle& bundle, maps::Map& map) {
   for (std::size_t i = 0; i < bundle.point_seen.size(); ++i) {
     if (!bundle.problem.point_observations[i].outlier) continue;
-    const core::PointId id = bundle.points[static_cast<std::size_t>(bundle.point_seen[i].landmark)];
-    if (map.find_point(id) == nullptr) continue;
-    map.unobserve(id, bundle.point_seen[i].keyframe);
+    const LocalBundle::Seen& seen = bundle.point_seen[i];
+    const core::PointId id = bundle.points[static_cast<std::size_t>(seen.landmark)];
+    if (!map.has_keyframe(seen.by.keyframe) || map.point_of(seen.by.keyframe, seen.by.feature) != id)
+      continue;
+    map.unobserve(id, seen.by.keyframe);
     if (map.point(id).observations.empty()) map.remove_point(id);
   }
   for (std::size_t i = 0; i < bundle.line_seen.size(); ++i) {
     if (!bundle.problem.line_observations[i].outlier) continue;
-    const core::LineId id = bundle.lines[static_cast<std::size_t>(bundle.line_seen[i].landmark)];
-    if (map.find_line(id) == nullptr) continue;
-    map.unobserve(id, bundle.line_seen[i].keyframe);
+    const LocalBundle::Seen& seen = bundle.line_seen[i];
+    const core::LineId id = bundle.lines[static_cast<std::size_t>(seen.landmark)];
+    if (!map.has_keyframe(seen.by.keyframe) || map.line_of(seen.by.keyframe, seen.by.feature) != id) continue;
+    map.unobserve(id, seen.by.keyframe);
     if (map.line(id).observations.empty()) map.remove_line(id);
   }
+}
+
+}  // namespace
+
+LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const sensor::Pinhole& camera,
+                              const LocalBundleOptions& options, const std::vector<KeyframeId>& also) {
+  Builder builder(map, camera, options);
+  const std::vector<KeyframeId> window = window_of(map, keyframe, also, options.keyframes);
+  for (KeyframeId id : window) builder.add_pose(id, id.index == 0 || !builder.calm(id));
+  builder.add_landmarks(window);
+  builder.add_edges();
+  LocalBundle bundle = builder.take();
+  bundle.next = map.next_keyframe_id(keyframe.robot);
+  return bundle;
+}
+
+std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map) {
+  if (moved_otherwise(bundle, map)) return std::nullopt;
+  MapCorrection correction = CorrectionFinder(bundle, map).take();
+  for (const auto& [id, new_from_old_world] : correction) {
+    if (map.has_keyframe(id)) carry_landmarks(bundle, id, new_from_old_world, map);
+  }
+  put_back_landmarks(bundle, map);
+  for (const auto& [id, new_from_old_world] : correction) {  // those made after the take
+    if (id.robot == bundle.next.robot && id.index >= bundle.next.index && map.has_keyframe(id))
+      map.set_pose(id, map.camera_from_world(id) * new_from_old_world.inverse());
+  }
+  for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
+    if (!bundle.problem.poses[i].fixed && map.has_keyframe(bundle.keyframes[i]))
+      map.set_pose(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
+  }
+  drop_outliers(bundle, map);
+  return correction;
 }
 
 }  // namespace plumbline::mapping

@@ -2,9 +2,8 @@
 #include "plumbline/mapping/slam.hpp"
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <utility>
-
-#include "plumbline/mapping/local_bundle.hpp"
 
 namespace plumbline::mapping {
 
@@ -14,6 +13,9 @@ void SlamOptions::declare(core::OptionTable& table) {
   tracker.declare(table);
   keyframe.declare(table);
   mapper.declare(table);
+  table.integer("bundle.lag", bundle_lag, {0, 1000}, "",
+                "Frames after which an adjusted bundle is put back into the map; the tracker goes on "
+                "meanwhile. 0: it waits on the spot");
 }
 
 /// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all
@@ -25,14 +27,17 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
 }
 
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
-           const core::Executor& /*executor*/, core::Log& log)
+           const core::Executor& executor, core::Log& log)
     : options_(options),
       camera_(camera),
       robot_(robot),
       log_(&log),
       tracker_(options.tracker, camera),
       rule_(options.keyframe),
-      mapper_(options.mapper, camera) {}
+      mapper_(options.mapper, camera),
+      bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate,
+               options.tracker.association.scale_factor},
+              options.mapper.bundle_options, options.bundle_lag, camera, executor) {}
 
 Slam::~Slam() = default;
 
@@ -43,7 +48,18 @@ void Slam::start_map(const sensor::RgbdFrame& frame,
   report.reference = report.keyframe;
   report.state = tracking::TrackState::kTracked;
   rule_.keyframe_made();
+  last_camera_from_world_ = origin.camera_from_world;
   tracker_.map_changed(map_, report.keyframe, origin.camera_from_world);
+}
+
+/// What the tracker knows moves with its reference keyframe. The motion model is a motion between cameras:
+/// the world's place does not matter to it.
+void Slam::put_back_bundle(BundleReport& report) {
+  const std::optional<MapCorrection> correction = bundle_.commit(map_, clock_, report);
+  if (!correction) return;
+  const auto moved = correction->find(tracker_.reference());
+  if (moved != correction->end()) last_camera_from_world_ = last_camera_from_world_ * moved->second.inverse();
+  tracker_.map_changed(map_, tracker_.reference(), last_camera_from_world_);
 }
 
 FrameReport Slam::process(const sensor::RgbdFrame& frame,
@@ -51,6 +67,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   FrameReport report;
   report.frame_index = frame.index;
   report.stamp = frame.stamp;
+  ++clock_;
+  if (bundle_.due(clock_)) put_back_bundle(report.bundle);
   last_track_ = tracker_.track(map_, frame, *features);
   const tracking::TrackResult& track = last_track_;
   report.state = track.state;
@@ -67,34 +85,34 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.min_eigenvalue = track.min_eigenvalue;
   report.weak_directions = track.weak_directions;
   report.relocalised = track.relocalised;
-  const bool tracked = track.state == tracking::TrackState::kTracked;
-  if (tracked) {
-    mapper_.count_sightings(map_, track);
-    report.decision = rule_.decide(map_, tracker_.reference(), track, camera_);
-    if (report.decision.wanted) {
-      report.keyframe = mapper_.insert(map_, robot_, frame, features, track, tracker_.turn_rate());
-      report.reference = report.keyframe;
-      if (options_.mapper.edges && options_.tracker.depth) {
-        mapper_.add_surface_edges(map_, report.keyframe, frame.depth, track.depth_from_camera,
-                                  tracker_.local_map().keyframes);
-      }
-      mapper_.cull(map_);
-      if (options_.mapper.bundle && tracker_.turn_rate() <= options_.mapper.bundle_max_turn_rate) {
-        const LocalBundleOptions window{options_.mapper.bundle_keyframes,
-                                        options_.mapper.bundle_max_turn_rate,
-                                        options_.tracker.association.scale_factor};
-        LocalBundle bundle = take_local_bundle(map_, report.keyframe, camera_, window);
-        if (optimize::adjust_bundle(bundle.problem, options_.mapper.bundle_options).usable)
-          put_back(bundle, map_);
-      }
-      rule_.keyframe_made();
-      tracker_.map_changed(map_, report.keyframe, map_.camera_from_world(report.keyframe));
-      remember_pose(frame.stamp, map_.camera_from_world(report.keyframe), true);
-      return report;
-    }
+  if (track.state != tracking::TrackState::kTracked) {
+    remember_pose(frame.stamp, track.camera_from_world, false);
+    return report;
   }
-  remember_pose(frame.stamp, track.camera_from_world, tracked);
+  last_camera_from_world_ = track.camera_from_world;
+  mapper_.count_sightings(map_, track);
+  report.decision = rule_.decide(map_, tracker_.reference(), track, camera_,
+                                 {static_cast<int>(features->points.size()), bundle_.idle()});
+  if (report.decision.wanted) make_keyframe(frame, features, report);
+  remember_pose(frame.stamp, last_camera_from_world_, true);
   return report;
+}
+
+void Slam::make_keyframe(const sensor::RgbdFrame& frame,
+                         const std::shared_ptr<const features::FrameFeatures>& features,
+                         FrameReport& report) {
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, tracker_.turn_rate());
+  report.reference = report.keyframe;
+  if (options_.mapper.edges && options_.tracker.depth) {
+    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_.depth_from_camera,
+                              tracker_.local_map().keyframes);
+  }
+  mapper_.refine(map_, report.keyframe);
+  rule_.keyframe_made();
+  tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
+  if (!options_.mapper.bundle || tracker_.turn_rate() > options_.mapper.bundle_max_turn_rate) return;
+  bundle_.request(map_, report.keyframe, clock_);
+  if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
 }
 
 void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
@@ -103,7 +121,12 @@ void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tra
       {stamp, reference, camera_from_world * map_.camera_from_world(reference).inverse(), tracked});
 }
 
-void Slam::finish() {}
+void Slam::finish() {
+  while (!bundle_.idle()) {
+    BundleReport ignored;
+    put_back_bundle(ignored);
+  }
+}
 
 geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frames_, map_); }
 

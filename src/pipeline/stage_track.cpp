@@ -2,6 +2,7 @@
 // track: the SLAM of one robot, frame by frame: poses, keyframes, landmarks.
 #include <fmt/format.h>
 
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -17,15 +18,33 @@ namespace {
 const char* const kColumns =
     "stamp,reference,keyframe,relocalised,points,points_rms,lines,lines_rms,surface,surface_rms,min_"
     "eigenvalue,"
-    "weak_directions,frames_since_keyframe,shared,overlap,parallax,rotation_rad,wanted,urgent";
+    "weak_directions,frames_since_keyframe,shared,overlap,parallax,rotation_rad,mapper_idle,cone_candidate,"
+    "cone_shared,cone_matched,cone_all,cone_changed,cone_theta,cone_beta,cone_alpha,cone_initial,cone_"
+    "adaptive,"
+    "cone_ecog,cone_offset,wanted,urgent,bundle,bundle_cost,bundle_outliers";
+
+std::string columns_of(const mapping::ConeTerms& c) {
+  return fmt::format("{},{:.4f},{},{},{},{:.4f},{:.4f},{:.4f},{:.2f},{:.2f},{:.4f},{:.4f}",
+                     c.candidate ? 1 : 0, c.shared, c.now.matched, c.now.all, c.now.changed,
+                     c.threshold.theta, c.threshold.beta, c.threshold.alpha, c.threshold.initial,
+                     c.threshold.adaptive, c.balance.ecog, c.balance.offset);
+}
+
+std::string columns_of(const mapping::BundleReport& b) {
+  if (!b.keyframe.valid()) return "-1,,";
+  const double ratio = b.summary.initial_cost > 0.0 ? b.summary.final_cost / b.summary.initial_cost : 1.0;
+  return fmt::format("{},{:.4f},{}", b.keyframe.index, ratio,
+                     b.summary.point_outliers + b.summary.line_outliers);
+}
 
 std::string columns(const mapping::FrameReport& r) {
   const mapping::KeyframeDecision& d = r.decision;
   return fmt::format(
-      "{:.6f},{},{},{},{},{:.4f},{},{:.4f},{},{:.4f},{:.6g},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{}", r.stamp,
-      r.reference.index, r.keyframe.index, r.relocalised ? 1 : 0, r.points.inliers, r.points.rms,
+      "{:.6f},{},{},{},{},{:.4f},{},{:.4f},{},{:.4f},{:.6g},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{},{}",
+      r.stamp, r.reference.index, r.keyframe.index, r.relocalised ? 1 : 0, r.points.inliers, r.points.rms,
       r.lines.inliers, r.lines.rms, r.surface.inliers, r.surface.rms, r.min_eigenvalue, r.weak_directions,
-      d.frames_since, d.shared, d.overlap, d.parallax, d.rotation_rad, d.wanted ? 1 : 0, d.urgent ? 1 : 0);
+      d.frames_since, d.shared, d.overlap, d.parallax, d.rotation_rad, d.mapper_idle ? 1 : 0,
+      columns_of(d.cone), d.wanted ? 1 : 0, d.urgent ? 1 : 0, columns_of(r.bundle));
 }
 
 class TrackStage : public Stage {
@@ -45,6 +64,7 @@ class TrackStage : public Stage {
     const auto features = io.input<features::FrameFeatures>("features");
     const mapping::FrameReport report = slam_->process(*frame, features);
     rows_.push_back({io.frame(), tracking::to_string(report.state), columns(report)});
+    note_times(io.frame(), report.bundle);
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->keyframe = report.keyframe;
     tracked->stamp = report.stamp;
@@ -71,14 +91,26 @@ class TrackStage : public Stage {
     summary.keyframes = slam_->map().keyframe_count();
     summary.points = slam_->map().point_count();
     summary.lines = lines_;
+    summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
+    summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
   }
 
  private:
+  void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
+    if (!bundle.keyframe.valid()) return;
+    bundle_wait_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
+    bundle_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
+    bundle_wait_ms_.back() = static_cast<float>(bundle.wait_ms);
+    bundle_ms_.back() = static_cast<float>(bundle.solve_ms);
+  }
+
   mapping::SlamOptions options_;
   sensor::Pinhole camera_;
   std::filesystem::path debug_folder_;
   std::unique_ptr<mapping::Slam> slam_;
   std::vector<FrameRow> rows_;
+  std::vector<float> bundle_wait_ms_;  ///< by frame; NaN: no bundle was put back
+  std::vector<float> bundle_ms_;
   std::size_t lines_ = 0;
 };
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 
 #include "plumbline/mapping/keyframe_rule.hpp"
 
@@ -26,16 +27,46 @@ class Rule : public testing::Test {
         keyframe->surface.push_back(s);
       }
     }
+    keyframe->features = std::make_shared<features::FrameFeatures>(many_features());
     map_.add_keyframe(keyframe, {});
+    add_landmarks();
     rule_.keyframe_made();
   }
-  KeyframeDecision decide(const Rigid3& pose, std::size_t features) {
+  static features::FrameFeatures many_features() {
+    features::FrameFeatures features;
+    features.points.resize(300);
+    features.descriptors.resize(300);
+    features.lines.resize(50);
+    return features;
+  }
+  /// On the wall, evenly over the picture, facing the camera.
+  void add_landmarks() {
+    for (int i = 0; i < 300; ++i) {
+      maps::MapPoint point;
+      point.position = kCamera.unproject(16 + 32 * (i % 20), 16 + 32 * ((i * 7) % 15), 2.0);
+      point.normal = -Eigen::Vector3d::UnitZ();
+      map_.observe(map_.add_point(0, point), {0, 0}, i);
+    }
+    for (int i = 0; i < 50; ++i) {
+      maps::MapLine line;
+      line.start = {0.0, 0.02 * i, 2.0};
+      line.end = {0.5, 0.02 * i, 2.0};
+      map_.observe(map_.add_line(0, line), {0, 0}, i);
+    }
+  }
+  static tracking::TrackResult track(const Rigid3& pose, std::size_t points, std::size_t lines) {
     tracking::TrackResult track;
     track.state = tracking::TrackState::kTracked;
     track.camera_from_world = pose;
-    track.points.resize(features * 9 / 10);
-    track.lines.resize(features - features * 9 / 10);
-    return rule_.decide(map_, {0, 0}, track, kCamera);
+    for (std::size_t i = 0; i < points; ++i)
+      track.points.push_back({{0, static_cast<std::int32_t>(i)}, static_cast<int>(i), 0});
+    for (std::size_t i = 0; i < lines; ++i)
+      track.lines.push_back({{0, static_cast<std::int32_t>(i)}, static_cast<int>(i), 0});
+    return track;
+  }
+  KeyframeDecision decide(const Rigid3& pose, std::size_t features) {
+    return rule_.decide(map_, {0, 0}, track(pose, features * 9 / 10, features - features * 9 / 10), kCamera,
+                        {});
   }
   static Rigid3 moved(double x) { return {Eigen::Matrix3d::Identity(), {-x, 0.0, 0.0}}; }
   static Rigid3 turned(double yaw) { return {geometry::exp_so3({0.0, yaw, 0.0}), Eigen::Vector3d::Zero()}; }
@@ -140,14 +171,122 @@ TEST_F(Rule, AKeyframeWithoutDepthStillHasARule) {
   auto blind = std::make_shared<maps::Keyframe>();
   blind->id = {0, 1};
   map_.add_keyframe(blind, {});
-  tracking::TrackResult track;
-  track.points.resize(100);
-  rule_.decide(map_, {0, 1}, track, kCamera);
-  track.camera_from_world = moved(0.5);
-  const KeyframeDecision d = rule_.decide(map_, {0, 1}, track, kCamera);
+  rule_.decide(map_, {0, 1}, track({}, 100, 0), kCamera, {});
+  const KeyframeDecision d = rule_.decide(map_, {0, 1}, track(moved(0.5), 100, 0), kCamera, {});
   EXPECT_EQ(d.overlap, 1.0);
   EXPECT_TRUE(std::isfinite(d.parallax));
   EXPECT_TRUE(d.wanted);
+}
+
+/// The same wall, the cone rule; 200 points and 40 lines are matched right after the keyframe.
+class ConeRule : public Rule {
+ protected:
+  void SetUp() override {
+    Rule::SetUp();
+    KeyframeRuleOptions options;
+    options.rule = KeyframeRuleOptions::Rule::kCone;
+    rule_ = KeyframeRule(options);
+    see({}, 200, 40);
+  }
+  /// Sideways, still looking at the same place.
+  static Rigid3 around(double x) {
+    return Rigid3(geometry::exp_so3({0.0, -std::atan(x / 2.0), 0.0}), Eigen::Vector3d(x, 0.0, 0.0)).inverse();
+  }
+  KeyframeDecision see(const Rigid3& pose, std::size_t points, std::size_t lines, bool idle = true,
+                       std::size_t visible = 300) {
+    tracking::TrackResult result = track(pose, points, lines);
+    result.visible_points.resize(visible);
+    result.visible_lines.resize(visible / 6);
+    return rule_.decide(map_, {0, 0}, result, kCamera, {500, idle});
+  }
+};
+
+TEST_F(ConeRule, StandingStillNeverMakesAKeyframe) {
+  for (int i = 0; i < 100; ++i) {
+    const KeyframeDecision d = see(moved(0.001 * (i % 3)), 140, 30);
+    ASSERT_FALSE(d.wanted) << i;
+    EXPECT_TRUE(d.cone.candidate);
+    EXPECT_LT(d.cone.now.changed, 10);
+  }
+}
+
+TEST_F(ConeRule, FiresWhenTheWallIsSeenFromAnotherSide) {
+  const KeyframeDecision little = see(moved(0.1), 140, 30);  // 3 degrees
+  EXPECT_FALSE(little.wanted);
+  EXPECT_EQ(little.cone.balance.ecog, 0.0) << "no angle has changed by 10 degrees";
+  const KeyframeDecision d = see(around(0.6), 140, 30);  // 17 degrees
+  EXPECT_EQ(d.cone.now.matched, 140);
+  EXPECT_EQ(d.cone.now.all, 500);
+  EXPECT_GT(d.cone.now.changed, d.cone.threshold.adaptive);
+  EXPECT_GT(d.cone.balance.ecog, d.cone.balance.offset);
+  EXPECT_TRUE(d.cone.fires);
+  EXPECT_TRUE(d.wanted);
+  EXPECT_FALSE(d.urgent);
+}
+
+TEST_F(ConeRule, OneSidedChangesAreNoKeyframe) {
+  const KeyframeDecision d = see(moved(0.6), 140, 30);  // the wall moves out of one side of the picture
+  EXPECT_GT(d.cone.now.changed, d.cone.threshold.adaptive);
+  EXPECT_LT(d.cone.balance.ecog, d.cone.balance.offset);
+  EXPECT_FALSE(d.wanted);
+}
+
+TEST_F(ConeRule, TurningOnTheSpotSeesNothingFromAnotherSide) {
+  const KeyframeDecision d = see(turned(0.15), 140, 30);
+  EXPECT_EQ(d.cone.now.changed, 0);
+  EXPECT_FALSE(d.wanted);
+}
+
+TEST_F(ConeRule, ManySharedLandmarksHoldItUp) {
+  const KeyframeDecision d = see(around(0.6), 180, 38);
+  EXPECT_NEAR(d.cone.shared, 218.0 / 240.0, 1e-12);
+  EXPECT_TRUE(d.cone.fires);
+  EXPECT_FALSE(d.cone.candidate);
+  EXPECT_FALSE(d.wanted);
+}
+
+TEST_F(ConeRule, ABundleUnderWayHoldsItUpForTwentyFrames) {
+  KeyframeDecision d;
+  for (int since = 2; since <= 21; ++since) {
+    d = see(around(0.6), 140, 30, false);
+    EXPECT_EQ(d.frames_since, since);
+    EXPECT_EQ(d.wanted, since > 20) << since;
+  }
+  EXPECT_TRUE(d.cone.candidate);
+}
+
+TEST_F(ConeRule, TooFewMatchesAreNoCandidateUnlessTheSceneHasNoMore) {
+  EXPECT_FALSE(see(around(0.6), 140, 8).cone.candidate) << "lines: 8 of 15, 50 in view";
+  EXPECT_TRUE(see(around(0.6), 140, 8, true, 96).cone.candidate) << "16 in view: 8 will do";
+  EXPECT_FALSE(see(around(0.6), 45, 20).cone.candidate) << "points: 45 of 50, 300 in view";
+  EXPECT_TRUE(see(around(0.6), 45, 20, true, 90).cone.candidate);
+}
+
+TEST_F(ConeRule, AboutToBeLostIsAKeyframeWhateverTheRuleSays) {
+  const KeyframeDecision d = see(moved(0.001), 20, 2, false);
+  EXPECT_FALSE(d.cone.fires);
+  EXPECT_FALSE(d.cone.candidate);
+  EXPECT_TRUE(d.urgent);
+  EXPECT_TRUE(d.wanted);
+}
+
+TEST_F(ConeRule, WithoutNormalsThePlainRuleSpeaks) {
+  for (core::PointId id : map_.point_ids()) map_.point(id).normal.setZero();
+  rule_.keyframe_made();
+  EXPECT_EQ(see({}, 200, 40).cone.now.matched, 0);
+  EXPECT_FALSE(see(moved(0.1), 200, 40).wanted);
+  const KeyframeDecision d = see(moved(0.3), 200, 40);
+  EXPECT_FALSE(d.cone.fires);
+  EXPECT_TRUE(d.wanted) << "parallax";
+}
+
+TEST_F(ConeRule, ANewKeyframeStartsTheCountsAgain) {
+  EXPECT_TRUE(see(around(0.6), 140, 30).wanted);
+  rule_.keyframe_made();
+  const KeyframeDecision first = see(around(0.6), 140, 30);
+  EXPECT_EQ(first.frames_since, 1);
+  EXPECT_DOUBLE_EQ(first.cone.shared, 1.0);
+  EXPECT_EQ(first.cone.threshold.theta, 0.0);
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ TEST(LocalBundle, AKeyframeTakenWhileTurningFastIsHeldAndSilent) {
   SmallMap world(5.0);
   const Rigid3 before = world.map.camera_from_world({0, 2});
   LocalBundle bundle = take_local_bundle(world.map, {0, 1}, kCamera, {});
-  for (const auto& seen : bundle.point_seen) EXPECT_NE(seen.keyframe, (KeyframeId{0, 2}));
+  for (const auto& seen : bundle.point_seen) EXPECT_NE(seen.by.keyframe, (KeyframeId{0, 2}));
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
   put_back(bundle, world.map);
   EXPECT_EQ(tests::distance(world.map.camera_from_world({0, 2}), before), 0.0);
@@ -121,6 +121,79 @@ TEST(LocalBundle, ASingleKeyframeIsHeld) {
   options.keyframes = 1;
   const LocalBundle bundle = take_local_bundle(world.map, {0, 0}, kCamera, options);
   EXPECT_TRUE(bundle.problem.poses.front().fixed);
+}
+
+TEST(LocalBundle, WhatWasMadeMeanwhileIsCarried) {
+  SmallMap world;
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  const Rigid3 three_from_two = Rigid3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-0.1, 0.0, 0.0));
+  const Rigid3 four_from_three = Rigid3(geometry::exp_so3({0.0, 0.1, 0.0}), Eigen::Vector3d(0.0, 0.0, 0.1));
+  const Rigid3 askew = world.map.camera_from_world({0, 2});
+  world.truth.push_back(three_from_two * askew);
+  world.add_keyframe(3, 0.0);
+  world.truth.push_back(four_from_three * three_from_two * askew);
+  world.add_keyframe(4, 0.0);
+  world.map.set_parent({0, 3}, {0, 2});
+  world.map.set_parent({0, 4}, {0, 3});
+  // A landmark that keyframe 3 made and 4 sees as well, and one of the bundle that 3 sees by now.
+  maps::MapPoint made;
+  made.position = world.truth[3].inverse() * Eigen::Vector3d(0.2, -0.1, 1.5);
+  const core::PointId fresh = world.map.add_point(0, made);
+  world.map.observe(fresh, {0, 3}, 7);
+  world.map.observe(fresh, {0, 4}, 7);
+  world.map.observe(core::PointId{0, 9}, {0, 3}, 9);
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  const auto correction = put_back(bundle, world.map);
+  ASSERT_TRUE(correction.has_value());
+  const auto pose = [&](int k) { return world.map.camera_from_world({0, k}); };
+  ASSERT_GT(tests::distance(pose(2), askew), 0.01) << "it has moved";
+  EXPECT_LT(tests::distance(pose(3), three_from_two * pose(2)), 1e-9);
+  EXPECT_LT(tests::distance(pose(4), four_from_three * pose(3)), 1e-9);
+  EXPECT_LT((pose(3) * world.map.point(fresh).position - Eigen::Vector3d(0.2, -0.1, 1.5)).norm(), 1e-9);
+  EXPECT_LT((world.map.point(core::PointId{0, 9}).position - world.points[9]).norm(), 2e-3)
+      << "as adjusted, not carried";
+  EXPECT_LT(tests::distance(pose(3), world.truth[3] * correction->at({0, 3}).inverse()), 1e-9);
+}
+
+TEST(LocalBundle, WhatIsGoneMeanwhileIsLeftOut) {
+  SmallMap world;
+  world.map.set_parent({0, 1}, {0, 0});
+  world.map.set_parent({0, 2}, {0, 0});
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  world.map.remove_point(core::PointId{0, 4});
+  world.map.merge_points(core::PointId{0, 5}, core::PointId{0, 6});
+  world.map.remove_keyframe({0, 1});
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  ASSERT_TRUE(put_back(bundle, world.map).has_value());
+  EXPECT_EQ(world.map.find_point(core::PointId{0, 4}), nullptr);
+  EXPECT_EQ(world.map.find_point(core::PointId{0, 6}), nullptr);
+  EXPECT_FALSE(world.map.has_keyframe({0, 1}));
+  EXPECT_LT(tests::distance(world.map.camera_from_world({0, 2}), world.truth[2]), 1e-3);
+  EXPECT_LT((world.map.point(core::PointId{0, 8}).position - world.points[8]).norm(), 2e-3);
+}
+
+TEST(LocalBundle, AMapThatSomethingElseHasMovedIsLeftAlone) {
+  SmallMap world;
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  const Rigid3 elsewhere = Rigid3(Eigen::Matrix3d::Identity(), {1.0, 0.0, 0.0});
+  world.map.set_pose({0, 1}, elsewhere * world.map.camera_from_world({0, 1}));
+  const Rigid3 before = world.map.camera_from_world({0, 2});
+  EXPECT_FALSE(put_back(bundle, world.map).has_value());
+  EXPECT_EQ(tests::distance(world.map.camera_from_world({0, 2}), before), 0.0);
+}
+
+TEST(LocalBundle, AnObservationThatIsAnotherByNowIsNotDropped) {
+  SmallMap world;
+  world.map.unobserve(core::PointId{0, 0}, {0, 1});
+  world.map.unobserve(core::PointId{0, 1}, {0, 1});
+  ASSERT_TRUE(world.map.observe(core::PointId{0, 0}, {0, 1}, 1));
+  LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
+  ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
+  world.map.unobserve(core::PointId{0, 0}, {0, 1});
+  ASSERT_TRUE(world.map.observe(core::PointId{0, 0}, {0, 1}, 0));  // put right while the bundle was under way
+  ASSERT_TRUE(put_back(bundle, world.map).has_value());
+  EXPECT_EQ(world.map.point_of({0, 1}, 0), (core::PointId{0, 0}));
 }
 
 }  // namespace

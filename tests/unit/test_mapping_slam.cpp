@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/mapping/slam.hpp"
@@ -57,7 +59,9 @@ struct SlamRun {
   geometry::Trajectory trajectory;
   geometry::Trajectory keyframes;
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> lines;
+  std::vector<double> landmarks;  ///< all there is to know of their places and counts
   std::size_t points = 0;
+  int bundles = 0;
 
   [[nodiscard]] int count(TrackState state) const {
     return static_cast<int>(
@@ -65,13 +69,32 @@ struct SlamRun {
   }
 };
 
+std::vector<double> landmarks_of(const maps::Map& map) {
+  std::vector<double> numbers;
+  for (core::PointId id : map.point_ids()) {
+    const maps::MapPoint& p = map.point(id);
+    numbers.insert(numbers.end(), {static_cast<double>(id.index), p.position.x(), p.position.y(),
+                                   p.position.z(), static_cast<double>(p.observations.size())});
+  }
+  for (core::LineId id : map.line_ids()) {
+    const maps::MapLine& l = map.line(id);
+    numbers.insert(numbers.end(), {static_cast<double>(id.index), l.start.x(), l.start.y(), l.start.z(),
+                                   l.end.x(), l.end.y(), l.end.z()});
+  }
+  return numbers;
+}
+
 SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& options = {}) {
   const core::Executor executor(threads);
   const auto log = core::null_log();
   Slam slam(options, Recording::get().camera, 0, executor, *log);
   SlamRun result;
-  for (const Shot& shot : shots) result.reports.push_back(slam.process(shot.frame, shot.features));
+  for (const Shot& shot : shots) {
+    result.reports.push_back(slam.process(shot.frame, shot.features));
+    result.bundles += result.reports.back().bundle.keyframe.valid() ? 1 : 0;
+  }
   slam.finish();
+  result.landmarks = landmarks_of(slam.map());
   result.trajectory = slam.trajectory();
   result.keyframes = slam.keyframe_trajectory();
   result.lines = slam.line_segments();
@@ -145,6 +168,37 @@ TEST(Slam, SameBytesTwiceAndForAnyNumberOfThreads) {
   for (std::size_t i = 0; i < a.lines.size(); ++i) {
     EXPECT_EQ(a.lines[i].first, b.lines[i].first);
     EXPECT_EQ(a.lines[i].second, b.lines[i].second);
+  }
+  EXPECT_EQ(a.landmarks, b.landmarks);
+  EXPECT_GE(a.bundles, 2) << "else nothing was done beside the tracker";
+}
+
+TEST(Slam, SameBytesWhileOthersKeepTheMachineBusy) {
+  const Recording& recording = Recording::get();
+  const SlamRun quiet = run(recording.shots, 2);
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> others;
+  for (int i = 0; i < 4; ++i) {
+    others.emplace_back([&] {
+      volatile double x = 1.0;
+      while (!stop) x = x * 1.0000001;
+    });
+  }
+  const SlamRun busy = run(recording.shots, 2);
+  stop = true;
+  for (std::thread& other : others) other.join();
+  EXPECT_TRUE(same_bytes(quiet.trajectory, busy.trajectory));
+  EXPECT_EQ(quiet.landmarks, busy.landmarks);
+}
+
+TEST(Slam, ALaterPutBackIsAsGoodAsOneOnTheSpot) {
+  const Recording& recording = Recording::get();
+  SlamOptions options;
+  for (const int lag : {0, 3, 12}) {
+    options.bundle_lag = lag;
+    const SlamRun result = run(recording.shots, 1, options);
+    EXPECT_EQ(result.count(TrackState::kTracked), 36) << lag;
+    EXPECT_LT(ate(result.trajectory, recording.truth), 0.005) << lag;
   }
 }
 

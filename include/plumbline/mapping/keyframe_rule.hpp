@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// When does a frame become a keyframe?
+// When does a frame become a keyframe? Two rules: by what moved and what is lost (plain), or by the sides
+// from which landmarks are seen (cone, METHOD section 4).
 #include <cstdint>
 
 #include "plumbline/core/options.hpp"
+#include "plumbline/mapping/viewing_cones.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
 namespace plumbline::mapping {
 
 struct KeyframeRuleOptions {
+  enum class Rule { kPlain, kCone };
+  Rule rule = Rule::kPlain;
   int min_frames = 2;
   int max_frames = 60;
   double min_shared = 0.6;
@@ -18,7 +22,22 @@ struct KeyframeRuleOptions {
   double max_parallax = 0.12;
   double max_rotation_rad = 0.26;
   int min_features = 60;
+  int cone_patience = 20;
+  double cone_max_shared = 0.75;
+  int cone_min_points = 50;
+  int cone_min_lines = 15;
+  double cone_min_change_rad = 0.1745;
   void declare(core::OptionTable& table);
+};
+
+/// What the cone rule saw (METHOD section 4); the counts are against the reference keyframe.
+struct ConeTerms {
+  double shared = 1.0;  ///< landmarks of the keyframe matched, as a share of those right after it
+  ConeCounts now;
+  ConeThreshold threshold;
+  GridBalance balance;
+  bool candidate = false;  ///< old enough or nothing better to do, enough matched, enough lost
+  bool fires = false;      ///< D_c above its threshold, and balanced
 };
 
 /// The terms of one decision, as written to frames.csv.
@@ -28,23 +47,45 @@ struct KeyframeDecision {
   double overlap = 1.0;   ///< share of the reference keyframe's surface that is in view
   double parallax = 0.0;  ///< movement since the reference keyframe over the scene's depth
   double rotation_rad = 0.0;
+  bool mapper_idle = true;
+  ConeTerms cone;
   bool wanted = false;
   bool urgent = false;  ///< tracking is about to be lost
 };
 
-/// The plain rule: enough parallax, rotation or loss of common features and surface; at once when tracking
-/// gets thin; never so rarely that the map starves.
+/// What the rule knows besides the track.
+struct KeyframeCircumstances {
+  int frame_points = 0;     ///< corners in the picture
+  bool mapper_idle = true;  ///< no bundle waits to be put back
+};
+
+/// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
+/// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the picture; where next
+/// to no landmark knows its normal the plain rule speaks. Both: at once when tracking gets thin.
 class KeyframeRule {
  public:
   explicit KeyframeRule(const KeyframeRuleOptions& options) : options_(options) {}
   KeyframeDecision decide(const maps::Map& map, core::KeyframeId reference,
-                          const tracking::TrackResult& track, const sensor::Pinhole& camera);
+                          const tracking::TrackResult& track, const sensor::Pinhole& camera,
+                          const KeyframeCircumstances& circumstances);
   void keyframe_made();
 
  private:
+  [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;
+  ConeTerms look_at_cones(const maps::Map& map, core::KeyframeId reference,
+                          const tracking::TrackResult& track, const sensor::Pinhole& camera,
+                          const KeyframeCircumstances& circumstances);
+
   KeyframeRuleOptions options_;
   int frames_since_ = 0;
   int features_after_keyframe_ = 0;
+  /// The first frame after the keyframe that cones are counted against.
+  struct First {
+    core::KeyframeId keyframe;
+    int landmarks = 0;  ///< of the keyframe, matched
+    ConeCounts counts;
+  };
+  First first_;
 };
 
 }  // namespace plumbline::mapping

@@ -3,7 +3,9 @@
 
 // Local bundle adjustment (METHOD section 3): a keyframe, what it shares landmarks or surfaces with, and what
 // they see. Three steps, so that the middle one can run beside the tracker: take from the map, adjust, put
-// back.
+// back. The map may grow and lose keyframes and landmarks between the first step and the last.
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "plumbline/maps/map.hpp"
@@ -15,11 +17,13 @@ namespace plumbline::mapping {
 struct LocalBundle {
   optimize::BundleProblem problem;
   std::vector<core::KeyframeId> keyframes;  ///< of problem.poses
-  std::vector<core::PointId> points;
-  std::vector<core::LineId> lines;
+  std::vector<geometry::Rigid3> taken;      ///< camera_from_world of these when they were taken
+  std::vector<core::PointId> points;        ///< of problem.points, sorted
+  std::vector<core::LineId> lines;          ///< of problem.lines, sorted
+  core::KeyframeId next;                    ///< this robot's keyframes from here on were made after the take
   struct Seen {
     int landmark = -1;  ///< index into points or lines
-    core::KeyframeId keyframe;
+    maps::Observation by;
   };
   std::vector<Seen> point_seen;  ///< of problem.point_observations
   std::vector<Seen> line_seen;
@@ -31,12 +35,20 @@ struct LocalBundleOptions {
   double orb_scale_factor = 1.2;
 };
 
-/// Keyframes around those that may move, that see the same landmarks, are held. Without any of these the
-/// oldest keyframe is held.
+/// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most
+/// with. Keyframes around these, that see the same landmarks, are held. Without any of these the oldest
+/// keyframe is held.
 LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, const sensor::Pinhole& camera,
-                              const LocalBundleOptions& options);
+                              const LocalBundleOptions& options,
+                              const std::vector<core::KeyframeId>& also = {});
 
-/// Poses, landmarks and outliers back into the map. Landmarks that only one keyframe sees move with it.
-void put_back(const LocalBundle& bundle, maps::Map& map);
+/// new_from_old_world around keyframes that moved.
+using MapCorrection = std::map<core::KeyframeId, geometry::Rigid3>;
+
+/// Poses, landmarks and outliers back into the map. What is gone from the map by now is left out. Keyframes
+/// made after the take keep their pose relative to their parent in the spanning tree; landmarks that were not
+/// part of the bundle move with the keyframe that saw them first. Nothing is done when a keyframe's pose is
+/// not the one that was taken: somebody else has moved the map, and knew more.
+std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map);
 
 }  // namespace plumbline::mapping

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One robot's SLAM: frames in, poses and a map out. Serial and deterministic.
+// One robot's SLAM: frames in, poses and a map out. Bundles are adjusted beside the tracker; what comes out
+// is the same for any number of threads.
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "plumbline/core/options.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/mapping/background_bundle.hpp"
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
 #include "plumbline/maps/frame_pose.hpp"
@@ -25,6 +27,7 @@ struct SlamOptions {
   tracking::TrackerOptions tracker;
   KeyframeRuleOptions keyframe;
   LocalMapperOptions mapper;
+  int bundle_lag = 6;  ///< frames
   void declare(core::OptionTable& table);
 };
 
@@ -42,6 +45,7 @@ struct FrameReport {
   int weak_directions = 0;
   bool relocalised = false;
   KeyframeDecision decision;
+  BundleReport bundle;  ///< put back before this frame was tracked (with a lag of 0: after)
 };
 
 class Slam {
@@ -70,6 +74,9 @@ class Slam {
  private:
   void start_map(const sensor::RgbdFrame& frame,
                  const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
+  void make_keyframe(const sensor::RgbdFrame& frame,
+                     const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
+  void put_back_bundle(BundleReport& report);
   void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;
@@ -81,6 +88,9 @@ class Slam {
   tracking::TrackResult last_track_;
   KeyframeRule rule_;
   LocalMapper mapper_;
+  BackgroundBundle bundle_;
+  std::int64_t clock_ = 0;                   ///< frames so far: logical time
+  geometry::Rigid3 last_camera_from_world_;  ///< of the last tracked frame, in the map as it is now
   std::vector<maps::FramePose> frames_;
 };
 

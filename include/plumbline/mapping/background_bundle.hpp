@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Local bundle adjustment beside the tracker, by logical time: a bundle is taken from the map at frame k,
+// adjusted on another thread, and put back before frame k + lag is tracked, whatever the clock says. So the
+// map does not depend on how fast or on how many threads the work is done.
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/mapping/local_bundle.hpp"
+
+namespace plumbline::mapping {
+
+/// What one adjustment took; times are for people, nothing is decided by them.
+struct BundleReport {
+  core::KeyframeId keyframe;  ///< around which; invalid: nothing was put back
+  optimize::BundleSummary summary;
+  double wait_ms = 0.0;   ///< how long the tracker had to wait for it
+  double solve_ms = 0.0;  ///< wall time of the adjustment
+};
+
+/// One bundle is under way at a time. Of the keyframes that ask meanwhile, the newest gets the next one,
+/// taken as soon as the one under way is put back: its surroundings hold the others.
+class BackgroundBundle {
+ public:
+  /// `lag`: frames between taking and putting back; 0: adjusted on the spot. The executor must outlive this.
+  BackgroundBundle(const LocalBundleOptions& window, const optimize::BundleOptions& solver, int lag,
+                   const sensor::Pinhole& camera, const core::Executor& executor)
+      : window_(window), solver_(solver), lag_(lag), camera_(camera), executor_(&executor) {}
+
+  /// Asks for the surroundings of a keyframe that was made at `frame`.
+  void request(const maps::Map& map, core::KeyframeId keyframe, std::int64_t frame);
+  /// Whether a bundle is to be put back now.
+  [[nodiscard]] bool due(std::int64_t frame) const { return running_ != nullptr && frame >= running_->due; }
+  /// Waits for the bundle under way, puts it back, begins the next one if one was asked for. What moved;
+  /// nothing when the bundle was of no use.
+  std::optional<MapCorrection> commit(maps::Map& map, std::int64_t frame, BundleReport& report);
+  /// No bundle is under way or asked for.
+  [[nodiscard]] bool idle() const { return running_ == nullptr && waiting_.empty(); }
+
+ private:
+  struct Running {
+    core::KeyframeId keyframe;
+    std::int64_t due = 0;
+    LocalBundle bundle;
+    optimize::BundleSummary summary;
+    double solve_ms = 0.0;
+    core::Executor::Job job;  ///< last: done before the rest goes
+  };
+  void begin(const maps::Map& map, std::int64_t frame);
+
+  LocalBundleOptions window_;
+  optimize::BundleOptions solver_;
+  int lag_;
+  sensor::Pinhole camera_;
+  const core::Executor* executor_;
+  std::unique_ptr<Running> running_;
+  std::vector<core::KeyframeId> waiting_;  ///< the newest first
+};
+
+}  // namespace plumbline::mapping

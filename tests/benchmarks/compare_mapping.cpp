@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What local mapping and the keyframe rule are worth: every recording is mapped side by side with local
+// mapping off and on, with the cone rule, and with the plain rule at several densities of keyframes, of which
+// the one is shown that comes nearest to the cone rule's number.
+//   compare_mapping [--csv] [--threads N] [--set key=value]... [--off key=value]... INPUT...
+// INPUT: a recording's folder with truth, or synth:SCENE?... ; --set holds for all, --off for local mapping
+// off alone. Coverage: of the 5 cm voxels that depth images of all frames fill (at the true poses), the share
+// that those of the keyframes fill. The numbers are the same on every run.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <opencv2/core/utility.hpp>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/evaluate/trajectory.hpp"
+#include "plumbline/mapping/slam.hpp"
+#include "plumbline/synth/source.hpp"
+
+namespace {
+
+using namespace plumbline;
+using Texts = std::vector<std::string>;
+
+constexpr std::size_t kChunk = 16;  // frames in memory
+constexpr double kVoxel = 0.05;     // m
+constexpr int kStride = 8;          // px, of the depth images that coverage is counted with
+constexpr double kMaxDepth = 6.0;   // m
+/// Factors on what the plain rule allows between keyframes.
+constexpr std::array<double, 9> kDensities{0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1, 2.8};
+
+core::Result<mapping::SlamOptions> options_of(const Texts& texts) {
+  mapping::SlamOptions options;
+  core::OptionTable table;
+  options.declare(table);
+  core::ConfigProblems problems;
+  for (const std::string& text : texts) {
+    const std::size_t equals = std::min(text.find('='), text.size());
+    const auto value = core::parse_yaml(equals < text.size() ? text.substr(equals + 1) : "", text);
+    if (!value) return tl::unexpected<core::Error>(value.error());
+    table.set(text.substr(0, equals), *value, "--set " + text, problems);
+  }
+  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  return options;
+}
+
+/// Rarer or denser keyframes by the plain rule.
+mapping::SlamOptions at_density(mapping::SlamOptions options, double factor) {
+  mapping::KeyframeRuleOptions& rule = options.keyframe;
+  rule.rule = mapping::KeyframeRuleOptions::Rule::kPlain;
+  rule.max_parallax *= factor;
+  rule.max_rotation_rad *= factor;
+  rule.min_shared = std::max(0.05, 1.0 - factor * (1.0 - rule.min_shared));
+  rule.min_surface_overlap = std::max(0.05, 1.0 - factor * (1.0 - rule.min_surface_overlap));
+  rule.max_frames = std::max(2, static_cast<int>(std::lround(rule.max_frames * factor)));
+  return options;
+}
+
+using Voxels = std::vector<std::uint64_t>;  // sorted, unique
+
+void sort_unique(Voxels& voxels) {
+  std::sort(voxels.begin(), voxels.end());
+  voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+}
+
+Voxels voxels_of(const cv::Mat& depth, const sensor::Pinhole& camera,
+                 const geometry::Rigid3& world_from_camera) {
+  Voxels voxels;
+  for (int v = kStride / 2; v < depth.rows; v += kStride) {
+    for (int u = kStride / 2; u < depth.cols; u += kStride) {
+      const auto z = static_cast<double>(depth.at<float>(v, u));
+      if (!(z > 0.0 && z < kMaxDepth)) continue;
+      const Eigen::Vector3d p = world_from_camera * camera.unproject(u, v, z);
+      std::uint64_t key = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto cell = static_cast<std::int64_t>(std::floor(p(axis) / kVoxel)) + (1 << 20);
+        key = (key << 21) | (static_cast<std::uint64_t>(cell) & 0x1fffffU);
+      }
+      voxels.push_back(key);
+    }
+  }
+  sort_unique(voxels);
+  return voxels;
+}
+
+struct Prepared {
+  bool readable = false;
+  sensor::RgbdFrame frame;
+  std::shared_ptr<const features::FrameFeatures> features;
+};
+
+/// One variant on its way through a recording.
+struct Run {
+  Run(const mapping::SlamOptions& options, const sensor::Pinhole& camera)
+      : log(core::null_log()), slam(options, camera, 0, executor, *log) {}
+  void process(std::size_t number, const Prepared& prepared) {
+    if (!prepared.readable) return;
+    const mapping::FrameReport report = slam.process(prepared.frame, prepared.features);
+    if (report.state == tracking::TrackState::kTracked) ++tracked;
+    if (report.keyframe.valid()) keyframes.push_back(number);
+  }
+  core::Executor executor{1};
+  std::shared_ptr<core::Log> log;
+  mapping::Slam slam;
+  std::size_t tracked = 0;
+  std::vector<std::size_t> keyframes;  ///< numbers of frames
+};
+
+double coverage(const Run& run, const std::vector<Voxels>& seen, std::size_t all) {
+  Voxels covered;
+  for (const std::size_t k : run.keyframes) covered.insert(covered.end(), seen[k].begin(), seen[k].end());
+  sort_unique(covered);
+  return all > 0 ? static_cast<double>(covered.size()) / static_cast<double>(all) : 0.0;
+}
+
+class Comparison {
+ public:
+  Comparison(const dataset::FrameSource& source, geometry::Trajectory truth)
+      : source_(source), truth_(std::move(truth)), camera_(source.camera().color), extractor_({}, camera_) {}
+
+  void add(const mapping::SlamOptions& options) { runs_.push_back(std::make_unique<Run>(options, camera_)); }
+
+  void run(const core::Executor& executor) {
+    const std::size_t frames = source_.size();
+    seen_.resize(frames);
+    for (std::size_t begin = 0; begin < frames; begin += kChunk) {
+      std::vector<Prepared> chunk(std::min(kChunk, frames - begin));
+      executor.parallel_for(chunk.size(), [&](std::size_t i) { chunk[i] = prepare(begin + i); });
+      executor.parallel_for(runs_.size(), [&](std::size_t r) {
+        for (std::size_t i = 0; i < chunk.size(); ++i) runs_[r]->process(begin + i, chunk[i]);
+      });
+    }
+    Voxels all;
+    for (const Voxels& voxels : seen_) {
+      all.insert(all.end(), voxels.begin(), voxels.end());
+      if (all.size() > 4000000) sort_unique(all);
+    }
+    sort_unique(all);
+    voxels_ = all.size();
+    for (const auto& run : runs_) run->slam.finish();
+  }
+
+  [[nodiscard]] const Run& of(std::size_t run) const { return *runs_[run]; }
+
+  void print(bool csv, const std::string& sequence, const char* name, std::size_t r) const {
+    const Run& run = *runs_[r];
+    const auto report = evaluate::evaluate_trajectory(run.slam.trajectory(), truth_);
+    const double ate = report ? report->ate_m.rmse : std::nan("");
+    const double percent = 100.0 * static_cast<double>(run.tracked) / static_cast<double>(source_.size());
+    std::printf(csv ? "%s,%s,%zu,%.1f,%.4f,%zu,%.3f,%zu,%zu\n"
+                    : "| %s | %s | %zu | %.1f | %.4f | %zu | %.3f | %zu | %zu |\n",
+                sequence.c_str(), name, source_.size(), percent, ate, run.keyframes.size(),
+                coverage(run, seen_, voxels_), run.slam.map().point_count(), run.slam.map().line_count());
+    std::fflush(stdout);
+  }
+
+ private:
+  Prepared prepare(std::size_t index) {
+    Prepared prepared;
+    auto frame = source_.read(index);
+    if (!frame) return prepared;
+    prepared.readable = true;
+    prepared.frame = std::move(*frame);
+    prepared.features = std::make_shared<const features::FrameFeatures>(extractor_.extract(prepared.frame));
+    if (const auto pose = geometry::pose_at(truth_, prepared.frame.stamp)) {
+      seen_[index] = voxels_of(prepared.frame.depth, camera_, *pose);
+    }
+    return prepared;
+  }
+
+  const dataset::FrameSource& source_;
+  geometry::Trajectory truth_;
+  sensor::Pinhole camera_;
+  features::FeatureExtractor extractor_;
+  std::vector<std::unique_ptr<Run>> runs_;
+  std::vector<Voxels> seen_;  ///< by frame
+  std::size_t voxels_ = 0;
+};
+
+core::Result<void> compare(const std::string& input, const std::string& pipelines,
+                           const mapping::SlamOptions& on, const mapping::SlamOptions& off,
+                           const core::Executor& executor, bool csv) {
+  const auto log = core::stderr_log(core::LogLevel::kWarning);
+  dataset::OpenOptions open;
+  open.cameras_folder = pipelines + "/cameras";
+  const bool synthetic = synth::is_synth_url(input);
+  const auto source = synthetic ? synth::open_synth(input, pipelines + "/scenes", executor, *log)
+                                : dataset::open_recording(input, open, *log);
+  if (!source) return tl::unexpected<core::Error>(source.error());
+  const auto truth = (*source)->truth();
+  if (!truth) return core::input_error(input + ": comes without truth; there is nothing to compare with");
+  Comparison comparison(**source, *truth);
+  mapping::SlamOptions cone = on;
+  cone.keyframe.rule = mapping::KeyframeRuleOptions::Rule::kCone;
+  comparison.add(off);
+  comparison.add(on);
+  comparison.add(cone);
+  for (const double density : kDensities) comparison.add(at_density(on, density));
+  comparison.run(executor);
+  const auto wanted = static_cast<double>(comparison.of(2).keyframes.size());
+  std::size_t nearest = 3;
+  for (std::size_t r = 3; r < 3 + kDensities.size(); ++r) {
+    const auto distance = [&](std::size_t run) {
+      return std::abs(static_cast<double>(comparison.of(run).keyframes.size()) - wanted);
+    };
+    if (distance(r) < distance(nearest)) nearest = r;
+  }
+  const std::string sequence = synthetic ? input.substr(input.find(':') + 1) : (*source)->name();
+  comparison.print(csv, sequence, "local mapping off", 0);
+  comparison.print(csv, sequence, "on", 1);
+  comparison.print(csv, sequence, "cone rule", 2);
+  comparison.print(csv, sequence, "plain rule, as many", nearest);
+  return {};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Maps recordings with local mapping off and on and by both keyframe rules");
+  Texts inputs;
+  Texts overrides;
+  Texts off{"bundle=off", "edges=off"};
+  std::string pipelines = PLUMBLINE_SOURCE_DIR "/pipelines";
+  bool csv = false;
+  int threads = 1;
+  app.add_option("INPUT", inputs, "Recordings with truth, or synth:SCENE?...")->required();
+  app.add_flag("--csv", csv, "Comma-separated values instead of a Markdown table");
+  app.add_option("--threads", threads, "Frames and variants side by side")->check(CLI::Range(1, 256));
+  app.add_option("--set", overrides, "Set an option of the track stage; may be repeated")
+      ->type_name("key=value")
+      ->allow_extra_args(false);
+  app.add_option("--off", off, "What local mapping off means, instead of bundle=off edges=off")
+      ->type_name("key=value")
+      ->allow_extra_args(false);
+  app.add_option("--pipelines-dir", pipelines, "Folder with cameras/ and scenes/");
+  CLI11_PARSE(app, argc, argv);
+
+  cv::setNumThreads(1);
+  const auto fail = [](const core::Error& error) {
+    std::fprintf(stderr, "compare_mapping: %s\n", error.message.c_str());
+    return static_cast<int>(error.kind);
+  };
+  const auto on = options_of(overrides);
+  if (!on) return fail(on.error());
+  Texts without = overrides;
+  without.insert(without.end(), off.begin(), off.end());
+  const auto plain = options_of(without);
+  if (!plain) return fail(plain.error());
+  const core::Executor executor(threads);
+  std::printf(
+      csv ? "sequence,variant,frames,tracked_percent,ate_rmse_m,keyframes,coverage,points,lines\n"
+          : "| sequence | variant | frames | tracked %% | ATE m | keyframes | coverage | points | lines |\n"
+            "|---|---|---|---|---|---|---|---|---|\n");
+  for (const std::string& input : inputs) {
+    if (auto done = compare(input, pipelines, *on, *plain, executor, csv); !done) return fail(done.error());
+  }
+  return 0;
+}
