@@ -115,7 +115,7 @@ const char* to_string(TrackState state) {
 }
 
 void TrackerOptions::declare(core::OptionTable& table) {
-  table.boolean("points", points, "Track ORB points");
+  table.boolean("points", points, "Track ORB points, and look for a lost place by them");
   table.boolean("lines", lines, "Track lines");
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
   table.boolean("align_stamps", align_stamps,
@@ -212,27 +212,50 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     }
   }
   result.camera_from_world = pose;
+  judge(std::move(problem), result);
   return result;
 }
 
-void Tracker::judge(const features::FrameFeatures& features, TrackResult& result) const {
-  const Directions directions = weigh_directions(result.estimate.information);
+/// Every direction must be held by families that can be trusted: a handful of chance matches would otherwise
+/// hold what a wall leaves free.
+void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
+  const optimize::PoseSummary& estimate = result.estimate;
+  result.surface_share = result.surface_in_view > 0
+                             ? static_cast<double>(estimate.planes.inliers) / result.surface_in_view
+                             : 0.0;
+  const bool by_features = estimate.points.inliers + 2 * estimate.lines.inliers >= options_.min_inliers;
+  const bool by_surface = estimate.planes.inliers >= options_.min_surface && result.surface_share > 0.5;
+  geometry::Matrix6d information = estimate.information;
+  if (by_features != by_surface) {
+    if (by_features) problem.planes.clear();
+    if (by_surface) problem.points.clear();
+    if (by_surface) problem.lines.clear();
+    optimize::PoseSolverOptions look = options_.solver;
+    look.max_iterations = 0;
+    information = optimize::solve_pose(problem, result.camera_from_world, look).information;
+  }
+  const Directions directions = weigh_directions(information);
   result.min_eigenvalue = directions.eigenvalues(0);
   result.weak_directions = static_cast<int>((directions.eigenvalues.array() < kWeak).count());
-  result.surface_share = result.surface_in_view > 0
-                             ? static_cast<double>(result.estimate.planes.inliers) / result.surface_in_view
-                             : 0.0;
-  result.state = trustworthy(result, features) ? TrackState::kTracked : TrackState::kLost;
+  const bool held = result.weak_directions == 0 ? by_features || by_surface : by_features && by_surface;
+  result.state =
+      held && result.camera_from_world.translation.allFinite() ? TrackState::kTracked : TrackState::kLost;
 }
 
-bool Tracker::trustworthy(const TrackResult& result, const features::FrameFeatures& /*features*/) const {
-  if (!result.camera_from_world.translation.allFinite()) return false;
-  const int features_used = result.estimate.points.inliers + 2 * result.estimate.lines.inliers;
-  const bool by_features = features_used >= options_.min_inliers;
-  const bool by_surface =
-      result.estimate.planes.inliers >= options_.min_surface && result.surface_share > 0.5;
-  if (result.weak_directions > 0) return by_features && by_surface;
-  return by_features || by_surface;
+/// Places can look alike: what only the small picture suggested must be confirmed by every family that is in
+/// use and has something to say there.
+bool Tracker::beyond_doubt(const TrackResult& result) const {
+  constexpr double kMostOfTheSurface = 0.75;
+  constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
+  if (result.weak_directions > 0) return false;
+  if (options_.depth &&
+      (result.estimate.planes.inliers < options_.min_surface || result.surface_share < kMostOfTheSurface)) {
+    return false;
+  }
+  if (!options_.points && !options_.lines) return true;
+  const auto found = static_cast<double>(result.points.size() + 2 * result.lines.size());
+  const auto expected = static_cast<double>(result.visible_points.size() + 2 * result.visible_lines.size());
+  return found >= options_.min_inliers && found >= kMostOfTheFeatures * expected;
 }
 
 std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
@@ -240,33 +263,49 @@ std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor
   if (lost_frames_ >= 30) return std::nullopt;
   for (const Rigid3& guess : guesses(features, frame.stamp)) {
     TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
-    judge(features, attempt);
     if (attempt.state == TrackState::kTracked) return attempt;
   }
   return std::nullopt;
 }
 
+std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,
+                                                        const features::FrameFeatures& features) const {
+  constexpr int kLookAlikes = 24;
+  constexpr std::size_t kAligned = 3;
+  const std::vector<LookAlike> alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
+  std::vector<Guess> guesses;
+  if (options_.points) {
+    std::vector<core::KeyframeId> candidates;
+    const auto add = [&candidates](core::KeyframeId id) {
+      if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
+    };
+    for (core::KeyframeId id : local_map_.keyframes) add(id);
+    for (const LookAlike& a : alike) add(a.keyframe);
+    const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers);
+    if (seen) guesses.push_back({seen->keyframe, seen->camera_from_world, false});
+  }
+  for (std::size_t i = 0; i < std::min(kAligned, alike.size()); ++i) {
+    const core::KeyframeId id = alike[i].keyframe;
+    guesses.push_back({id, align_look_alike(map, id, features, camera_), true});
+  }
+  return guesses;
+}
+
 std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                const features::FrameFeatures& features) {
-  std::vector<core::KeyframeId> candidates = local_map_.keyframes;
-  const std::vector<core::KeyframeId> all = map.keyframe_ids();
-  for (auto id = all.rbegin(); id != all.rend() && candidates.size() < 40; ++id) {
-    if (std::find(candidates.begin(), candidates.end(), *id) == candidates.end()) candidates.push_back(*id);
-  }
-  const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers);
-  if (!seen) return std::nullopt;
+  const std::vector<Guess> guesses = guesses_by_picture(map, features);
   LocalMap before = std::move(local_map_);
-  local_map_ = build_local_map(map, seen->keyframe, options_.local_map);
-  TrackResult attempt = estimate(map, frame, features, seen->camera_from_world, 10.0);
-  judge(features, attempt);
-  attempt.relocalised = true;
-  if (attempt.state != TrackState::kTracked) {
-    local_map_ = std::move(before);  // a mistake must not take the surroundings away
-    return std::nullopt;
+  for (const Guess& guess : guesses) {
+    local_map_ = build_local_map(map, guess.keyframe, options_.local_map);
+    TrackResult attempt = estimate(map, frame, features, guess.camera_from_world, guess.rough ? 24.0 : 10.0);
+    if (attempt.state != TrackState::kTracked || (guess.rough && !beyond_doubt(attempt))) continue;
+    attempt.relocalised = true;
+    velocity_.setZero();
+    last_.valid = false;
+    return attempt;
   }
-  velocity_.setZero();
-  last_.valid = false;
-  return attempt;
+  local_map_ = std::move(before);  // a mistake must not take the surroundings away
+  return std::nullopt;
 }
 
 TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,

@@ -98,17 +98,20 @@ class Run {
   std::unique_ptr<mapping::Slam> slam_;
 };
 
-PreparedFrame prepare(const dataset::FrameSource& source, std::size_t index,
-                      const std::vector<features::FeatureExtractor>& extractors) {
+/// Extractors by kind; none where no set wants it.
+using Extractors = std::array<std::unique_ptr<const features::FeatureExtractor>, 4>;
+
+PreparedFrame prepare(const dataset::FrameSource& source, std::size_t index, const Extractors& extractors) {
   PreparedFrame prepared;
   auto frame = source.read(index);
   if (!frame) return prepared;
   prepared.readable = true;
   prepared.frame = std::move(*frame);
   for (std::size_t kind = 0; kind < extractors.size(); ++kind) {
+    if (!extractors[kind]) continue;
     const double start = thread_ms();
     prepared.features[kind] =
-        std::make_shared<const features::FrameFeatures>(extractors[kind].extract(prepared.frame));
+        std::make_shared<const features::FrameFeatures>(extractors[kind]->extract(prepared.frame));
     prepared.features_ms[kind] = thread_ms() - start;
   }
   return prepared;
@@ -165,12 +168,12 @@ core::Result<void> ablate(const std::string& input, const std::string& pipelines
   const auto truth = (*source)->truth();
   if (!truth) return core::input_error(input + ": comes without truth; there is nothing to compare with");
   const sensor::Pinhole& camera = (*source)->camera().color;
-  std::vector<features::FeatureExtractor> extractors;
-  for (std::size_t kind = 0; kind < 4; ++kind) {
+  Extractors extractors;
+  for (const FamilySet& set : sets) {
     features::FeatureOptions o;
-    o.points = (kind & 1U) != 0;
-    o.lines = (kind & 2U) != 0;
-    extractors.emplace_back(o, camera);
+    o.points = set.points;
+    o.lines = set.lines;
+    extractors[kind_of(set)] = std::make_unique<features::FeatureExtractor>(o, camera);
   }
   std::vector<std::unique_ptr<Run>> runs;
   for (const FamilySet& set : sets) runs.push_back(std::make_unique<Run>(set, options, camera));

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pose from nothing but what the picture looks like: descriptors against keyframes, then P3P in RANSAC.
+// Pose from nothing but what the picture looks like: descriptors against keyframes, then P3P in RANSAC; or,
+// without any feature, the small picture against those of the keyframes.
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/rigid3.hpp"
@@ -24,5 +26,22 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
                                          const std::vector<core::KeyframeId>& candidates,
                                          const features::FrameFeatures& features,
                                          const sensor::Pinhole& camera, int min_inliers);
+
+/// A keyframe and how much the picture as a whole looks like it: normalised correlation of the thumbnails,
+/// best over shifts of up to a fifth of the picture (compare Klein & Murray, ECCV 2008).
+struct LookAlike {
+  core::KeyframeId keyframe;
+  double correlation = 0.0;
+};
+
+/// Those of `candidates` that the picture looks like, most alike first, at most `count`. A picture without
+/// contrast looks like nothing.
+std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
+                                   const features::FrameFeatures& features, int count);
+
+/// Pose from aligning the thumbnail with a keyframe's. Places can look alike: a guess that landmarks and
+/// surfaces must confirm.
+geometry::Rigid3 align_look_alike(const maps::Map& map, core::KeyframeId keyframe,
+                                  const features::FrameFeatures& features, const sensor::Pinhole& camera);
 
 }  // namespace plumbline::tracking

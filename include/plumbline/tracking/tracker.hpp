@@ -48,9 +48,10 @@ struct TrackResult {
   optimize::PoseSummary estimate;
   int surface_in_view = 0;     ///< samples of the local surface where the depth image has a measurement
   double surface_share = 0.0;  ///< share of the local surface in view that the depth image confirms
-  double min_eigenvalue =
-      0.0;                  ///< of the information matrix, 1/m^2 after scaling rotations by the scene's depth
-  int weak_directions = 0;  ///< of six, that nothing but the motion model holds
+  /// Of the information matrix of the families that are trusted, 1/m^2, rotations scaled by the scene's
+  /// depth.
+  double min_eigenvalue = 0.0;
+  int weak_directions = 0;  ///< of six, that no trusted family holds, but the motion model at best
   bool relocalised = false;
 };
 
@@ -80,7 +81,12 @@ class Tracker {
     cv::Mat thumbnail_depth;
     bool valid = false;
   };
-  struct Attempt;
+  /// Where the camera may be; `rough`: only the small picture says so.
+  struct Guess {
+    core::KeyframeId keyframe;
+    geometry::Rigid3 camera_from_world;
+    bool rough = false;
+  };
 
   [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
   [[nodiscard]] std::vector<geometry::Rigid3> guesses(const features::FrameFeatures& features,
@@ -91,12 +97,14 @@ class Tracker {
   /// From where the camera should be by now; none when nothing there can be trusted.
   [[nodiscard]] std::optional<TrackResult> by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                      const features::FrameFeatures& features) const;
+  [[nodiscard]] std::vector<Guess> guesses_by_picture(const maps::Map& map,
+                                                      const features::FrameFeatures& features) const;
   /// From what the picture looks like; the local map moves there.
   [[nodiscard]] std::optional<TrackResult> by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                       const features::FrameFeatures& features);
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
-  [[nodiscard]] bool trustworthy(const TrackResult& result, const features::FrameFeatures& features) const;
-  void judge(const features::FrameFeatures& features, TrackResult& result) const;
+  [[nodiscard]] bool beyond_doubt(const TrackResult& result) const;
+  void judge(optimize::PoseProblem problem, TrackResult& result) const;
   void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                 const TrackResult& result);
 
