@@ -230,6 +230,20 @@ void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions&
   report.reference_error_m = completeness.error_m;
 }
 
+/// Numbers of a cloud that lies elsewhere say nothing about the map; say so rather than print metres.
+void warn_when_apart(const CloudOptions& options, CloudReport& report) {
+  constexpr double kApartMm = 100.0;
+  if (report.accuracy_mm.median < kApartMm) return;
+  report.warnings.push_back(fmt::format(
+      "half of the cloud lies {:.0f} mm or more from the reference: {}", report.accuracy_mm.median,
+      options.align == CloudAlignment::kNone
+          ? "the two are hardly in one frame; lay them on each other first with --align se3 (and "
+            "--trajectory "
+            "EST --truth GT if these are not found by themselves)"
+          : "the alignment found no good start; give it the cloud's path and its truth with --trajectory EST "
+            "--truth GT"));
+}
+
 }  // namespace
 
 void CloudOptions::declare(core::OptionTable& table) {
@@ -282,6 +296,7 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
   if (options.align != CloudAlignment::kNone)
     prepared->index = std::make_unique<PointIndex>(prepared->samples->points);
   compare(*prepared, *truth, options, executor, report);
+  warn_when_apart(options, report);
   return report;
 }
 

@@ -5,9 +5,9 @@
 #include <array>
 #include <cmath>
 
-namespace plumbline::synth {
+#include "ray_batch.hpp"
 
-using Eigen::Vector3d;
+namespace plumbline::synth {
 
 namespace {
 
@@ -24,107 +24,6 @@ using Byte4 = std::uint8_t __attribute__((vector_size(4)));
 #define PLUMBLINE_INLINE inline __attribute__((always_inline))
 
 constexpr int kChunk = 8;  // pixels that share level of detail and interpolated light
-
-/// Texels of level 0 per metre along u and v.
-struct TexelScale {
-  double u, v;
-};
-TexelScale texel_scale(const World& world, std::size_t face) {
-  const Face& f = world.scene.faces[face];
-  const Texture2d::Level& top = world.textures[static_cast<std::size_t>(world.texture_of[face])].levels[0];
-  const double tile = world.tile_m[face];
-  const bool tiled =
-      f.stretch_u <= 0.0 || (world.options.texture == Texture::kNone && world.materials[face]->large);
-  return {top.width / (tiled ? tile : f.stretch_u), top.height / (tiled ? tile : f.stretch_v)};
-}
-
-FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole& k,
-                   const geometry::Rigid3& camera_from_world) {
-  const Face& face = world.scene.faces[index];
-  const Vector3d n = camera_from_world.rotation * face.normal, origin = camera_from_world * face.origin;
-  const Vector3d ua = camera_from_world.rotation * face.u_axis, va = camera_from_world.rotation * face.v_axis;
-  // d = M p is the ray of pixel p with z = 1.
-  const auto through_pixels = [&k](const Vector3d& w) {
-    return Vector3d(w.x() / k.fx, w.y() / k.fy, w.z() - w.x() * k.cx / k.fx - w.y() * k.cy / k.fy);
-  };
-  const double h = n.dot(origin);
-  const Vector3d c = through_pixels(n) / (std::abs(h) > 1e-9 ? h : 1e-9);
-  const TexelScale scale = texel_scale(world, index);
-  const double shift_u = static_cast<double>(world.offset_u[index]) - ua.dot(origin);
-  const double shift_v = static_cast<double>(world.offset_v[index]) - va.dot(origin);
-  const Vector3d a = scale.u * (through_pixels(ua) + shift_u * c),
-                 b = -scale.v * (through_pixels(va) + shift_v * c);
-  FaceView out;
-  for (int i = 0; i < 3; ++i) {
-    out.a[i] = static_cast<float>(a[i]);
-    out.b[i] = static_cast<float>(b[i]);
-    out.c[i] = static_cast<float>(c[i]);
-  }
-  return out;
-}
-
-/// Collects rays and casts them eight at a time.
-class RayBatch {
- public:
-  RayBatch(const World& world, const View& view) : world_(world) {
-    const geometry::Rigid3& pose = view.world_from_camera;
-    for (int k = 0; k < 3; ++k) {
-      origin_[k] = static_cast<float>(pose.translation[k]);
-      const double x = pose.rotation(k, 0) / view.camera.fx, y = pose.rotation(k, 1) / view.camera.fy;
-      right_[k] = static_cast<float>(x);
-      down_[k] = static_cast<float>(y);
-      corner_[k] = static_cast<float>(pose.rotation(k, 2) - x * view.camera.cx - y * view.camera.cy);
-    }
-  }
-  void add(float x, float y, int* target) {
-    dx_[count_] = corner_[0] + x * right_[0] + y * down_[0];
-    dy_[count_] = corner_[1] + x * right_[1] + y * down_[1];
-    dz_[count_] = corner_[2] + x * right_[2] + y * down_[2];
-    targets_[count_] = target;
-    if (++count_ == 8) flush();
-  }
-  void flush() {
-    if (count_ == 0) return;
-    for (int k = count_; k < 8; ++k) {
-      dx_[k] = dx_[0];
-      dy_[k] = dy_[0];
-      dz_[k] = dz_[0];
-    }
-    int faces[8];
-    world_.cast8(origin_, dx_, dy_, dz_, faces);
-    for (int k = 0; k < count_; ++k) *targets_[k] = faces[k];
-    count_ = 0;
-  }
-
- private:
-  const World& world_;
-  float origin_[3], right_[3], down_[3], corner_[3];
-  float dx_[8], dy_[8], dz_[8];
-  int* targets_[8];
-  int count_ = 0;
-};
-
-void fill_between(const World& world, View& view) {
-  cv::Mat1i& ids = view.ids;
-  const int w = ids.cols, h = ids.rows;
-  RayBatch rays(world, view);
-  for (int y = 0; y < h; ++y) {
-    int* row = ids[y];
-    const bool cast_row = y % 2 == 0;
-    const int* up = ids[y - y % 2];
-    const int* low = cast_row || y + 1 >= h ? up : ids[y + 1];
-    for (int x = cast_row ? 1 : 0; x < w; x += cast_row ? 2 : 1) {
-      const int x0 = x - x % 2, x1 = x % 2 == 0 || x + 1 >= w ? x0 : x + 1;
-      const int id = up[x0];
-      if (id == up[x1] && id == low[x0] && id == low[x1]) {
-        row[x] = id;
-      } else {
-        rays.add(static_cast<float>(x), static_cast<float>(y), &row[x]);
-      }
-    }
-  }
-  rays.flush();
-}
 
 // ---- texture sampling ----
 
@@ -365,43 +264,6 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
 }
 
 }  // namespace
-
-View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera) {
-  View view;
-  view.camera = camera;
-  view.world_from_camera = world_from_camera;
-  const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
-  view.faces.reserve(world.scene.faces.size());
-  for (std::size_t i = 0; i < world.scene.faces.size(); ++i) {
-    view.faces.push_back(view_face(world, i, camera, camera_from_world));
-  }
-  view.ids.create(camera.height, camera.width);
-  RayBatch rays(world, view);
-  for (int y = 0; y < camera.height; y += 2) {
-    int* row = view.ids[y];
-    for (int x = 0; x < camera.width; x += 2) rays.add(static_cast<float>(x), static_cast<float>(y), &row[x]);
-  }
-  rays.flush();
-  fill_between(world, view);
-  return view;
-}
-
-cv::Mat1f exact_depth(const View& view) {
-  cv::Mat1f depth(view.ids.size());
-  for (int y = 0; y < depth.rows; ++y) {
-    const int* ids = view.ids[y];
-    float* row = depth[y];
-    for (int x = 0; x < depth.cols; ++x) {
-      if (ids[x] < 0) {
-        row[x] = 0.0F;
-        continue;
-      }
-      const FaceView& f = view.faces[static_cast<std::size_t>(ids[x])];
-      row[x] = 1.0F / (f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
-    }
-  }
-  return depth;
-}
 
 cv::Mat3b shade(const World& world, const View& view, const Exposure& exposure) {
   cv::Mat3b image(view.ids.size());

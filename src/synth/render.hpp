@@ -24,8 +24,14 @@ struct View {
   cv::Mat1i ids;  ///< face per pixel, -1 = nothing
 };
 
-/// Casts rays at every second pixel of every second row, and at the pixels between where their neighbours
-/// differ.
+/// Texels of level 0 per metre along a face's u and v.
+struct TexelScale {
+  double u, v;
+};
+TexelScale texel_scale(const World& world, std::size_t face);
+
+/// Finds the face behind every pixel. Rays are cast only where an edge may cross the picture: there at every
+/// second pixel of every second row, and at the pixels between where their neighbours differ.
 View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera);
 
 /// Metres along z of what `ids` names; 0 = nothing.

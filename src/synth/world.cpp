@@ -99,14 +99,15 @@ bool World::inside_solid(const Vector3d& point) const {
   return hit.face >= 0 && !hit.front;
 }
 
-void World::cast8(const float origin[3], const float* dx, const float* dy, const float* dz,
-                  int* faces) const {
-  alignas(32) static constexpr int kAll[8] = {-1, -1, -1, -1, -1, -1, -1, -1};
+void World::cast_packet(const float origin[3], const float* dx, const float* dy, const float* dz,
+                        int* faces) const {
+  alignas(64) static constexpr int kAll[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1,
+                                                    -1, -1, -1, -1, -1, -1, -1, -1};
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  alignas(32) RTCRayHit8 q;
-  for (int k = 0; k < 8; ++k) {
+  alignas(64) RTCRayHit16 q;
+  for (int k = 0; k < kPacket; ++k) {
     q.ray.org_x[k] = origin[0];
     q.ray.org_y[k] = origin[1];
     q.ray.org_z[k] = origin[2];
@@ -122,8 +123,8 @@ void World::cast8(const float origin[3], const float* dx, const float* dy, const
     q.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
     q.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
   }
-  rtcIntersect8(kAll, bvh_, &context, &q);
-  for (int k = 0; k < 8; ++k) {
+  rtcIntersect16(kAll, bvh_, &context, &q);
+  for (int k = 0; k < kPacket; ++k) {
     faces[k] = q.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID ? -1 : face_of_triangle_[q.hit.primID[k]];
   }
 }

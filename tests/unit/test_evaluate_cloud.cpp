@@ -68,6 +68,16 @@ TEST(EvaluateCloud, ShiftedPlaneGivesItsShiftAgainstAMesh) {
   }
 }
 
+TEST(EvaluateCloud, SaysWhenCloudAndReferenceAreHardlyInOneFrame) {
+  const auto apart = run(plane(1.0, 0.5, 0.01), reference_of(square_mesh(1.0F)));
+  ASSERT_TRUE(apart);
+  ASSERT_EQ(apart->warnings.size(), 1U);
+  EXPECT_NE(apart->warnings[0].find("--align se3"), std::string::npos);
+  const auto near = run(plane(1.0, 0.05, 0.01), reference_of(square_mesh(1.0F)));
+  ASSERT_TRUE(near);
+  EXPECT_TRUE(near->warnings.empty());
+}
+
 TEST(EvaluateCloud, ShiftedPlaneGivesItsShiftAgainstACloudSampledOtherwise) {
   const SurfaceSamples truth = plane(1.5, 0.0, 0.013);
   SurfaceSamples cloud;
