@@ -33,6 +33,9 @@ bool clash(const std::string& a, const std::string& b) {
   }
   const std::string head_a = a.substr(0, star_a);
   const std::string head_b = b.substr(0, star_b);
+  if (star_b != std::string::npos && starts_with(head_b, a + "/"))
+    return true;  // a file where a folder must be
+  if (star_a != std::string::npos && starts_with(head_a, b + "/")) return true;
   const std::string tail_a = star_a == std::string::npos ? a : a.substr(star_a + 1);
   const std::string tail_b = star_b == std::string::npos ? b : b.substr(star_b + 1);
   return (starts_with(head_a, head_b) || starts_with(head_b, head_a)) &&

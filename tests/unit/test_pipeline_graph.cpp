@@ -85,7 +85,6 @@ flags: 1
        {"g.yaml:2:17: stages.count.type: unknown stage type 'cuont'; did you mean count? "
         "(allowed: collect, count, scale, sum)",
         "g.yaml:5:14: stages.twice.inputs.nmber: unknown input; did you mean number? (allowed: number)",
-        "g.yaml:5:13: stages.twice.inputs: the input number is missing",
         "g.yaml:6:9: stages.twice.by: 50 is out of range", "g.yaml:7:5: stages.twice.colour: unknown key",
         "g.yaml:8:37: stages.sum.inputs.number: there is no stage 'twise'", "did you mean twice?",
         "g.yaml:9:1: flags: unknown key", "--set twice.by: 'x' is not a number",

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <map>
+#include <sstream>
 
 #include "plumbline/cloud/filter_chain.hpp"
 #include "plumbline/pipeline/graph.hpp"
+#include "plumbline/pipeline/reference.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/synth/scene.hpp"
 
@@ -29,7 +32,7 @@ std::string load_pipeline(const fs::path& file) {
 std::string load_filters(const fs::path& file) {
   const auto chain = cloud::FilterChain::load(file, cloud::builtin_filters());
   if (!chain) return chain.error().message;
-  return chain->size() == 0 ? file.string() + ": has no filters" : "";
+  return chain->name() == file.stem() ? "" : file.string() + ": the chain is called " + chain->name();
 }
 
 std::string load_camera(const fs::path& file) {
@@ -44,8 +47,11 @@ std::string load_scene(const fs::path& file) {
 }
 
 TEST(Shipped, EveryFileLoads) {
-  const std::map<std::string, std::string (*)(const fs::path&)> loaders = {
-      {"", load_pipeline}, {"filters", load_filters}, {"cameras", load_camera}, {"scenes", load_scene}};
+  const std::map<std::string, std::string (*)(const fs::path&)> loaders = {{"", load_pipeline},
+                                                                           {"filters", load_filters},
+                                                                           {"filters/examples", load_filters},
+                                                                           {"cameras", load_camera},
+                                                                           {"scenes", load_scene}};
   std::map<std::string, int> loaded;
   for (const auto& entry : fs::recursive_directory_iterator(kShipped)) {
     if (!entry.is_regular_file()) continue;
@@ -57,6 +63,69 @@ TEST(Shipped, EveryFileLoads) {
     ++loaded[loader->first];
   }
   for (const auto& [folder, unused] : loaders) EXPECT_GT(loaded[folder], 0) << folder;
+}
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+TEST(Shipped, StagesPageIsUpToDate) {
+  StageRegistry registry;
+  register_stages(registry);
+  const std::string made = stages_reference(registry);
+  EXPECT_EQ(text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs" / "stages.md"), made)
+      << "make it anew: plumbline pipelines describe > docs/stages.md";
+  for (const std::string& name : registry.names()) {
+    EXPECT_NE(made.find("\n## " + name + "\n"), std::string::npos) << name;
+  }
+}
+
+TEST(Shipped, PipelinesPageKnowsEveryPipeline) {
+  const std::string page = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs" / "pipelines.md");
+  for (const std::string& name : pipeline_names(kShipped)) {
+    EXPECT_NE(page.find("| `" + name + "` |"), std::string::npos)
+        << "docs/pipelines.md does not tell of " << name;
+  }
+}
+
+TEST(Shipped, EveryStageIsUsedByAPipelineOrAnExampleOfThePage) {
+  StageRegistry registry;
+  register_stages(registry);
+  std::string texts = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs" / "pipelines.md");
+  for (const std::string& name : pipeline_names(kShipped)) {
+    const auto graph = load_graph(kShipped / (name + ".yaml"), registry, kShipped);
+    ASSERT_TRUE(graph) << graph.error().message;
+    texts += to_yaml(*graph);
+  }
+  for (const std::string& name : registry.names()) {
+    EXPECT_NE(texts.find("type: " + name), std::string::npos) << "no pipeline has a stage " << name;
+  }
+}
+
+TEST(Shipped, EveryPortCanBeTapped) {
+  StageRegistry registry;
+  register_stages(registry);
+  for (const StageType* type : registry.types()) {
+    for (const Port& port : type->outputs) {
+      EXPECT_NE(registry.find_tap(port.type), nullptr)
+          << type->name << "." << port.name << ": add a tap of " << port.type.name;
+    }
+  }
+}
+
+TEST(Shipped, WhatIsWrittenOutReadsBackTheSame) {
+  StageRegistry registry;
+  register_stages(registry);
+  for (const std::string& name : pipeline_names(kShipped)) {
+    const auto graph = load_graph(kShipped / (name + ".yaml"), registry, kShipped);
+    ASSERT_TRUE(graph) << graph.error().message;
+    const std::string text = to_yaml(*graph);
+    const auto again = parse_graph(text, "/nowhere/config.yaml", registry, "/nowhere");
+    ASSERT_TRUE(again) << name << ": " << again.error().message << text;
+    EXPECT_EQ(to_yaml(*again), text);
+  }
 }
 
 }  // namespace
