@@ -40,7 +40,7 @@ using Vector7d = Eigen::Matrix<double, 7, 1>;
 using Matrix7d = Eigen::Matrix<double, 7, 7>;
 
 struct Step {
-  Matrix7d h = Matrix7d::Zero();
+  Matrix7d h = Matrix7d::Zero();  ///< lower triangle
   Vector7d g = Vector7d::Zero();
   double squares = 0.0;
   int count = 0;
@@ -65,7 +65,10 @@ Step linearise(const std::vector<Pixel>& pixels, const cv::Mat& current, const s
                              -(du * camera.fx * p.x() + dv * camera.fy * p.y()) * iz * iz);
     Vector7d j;
     j << dp, p.cross(dp), -1.0;
-    step.h.noalias() += weight * j * j.transpose();
+    for (int a = 0; a < 7; ++a) {
+      const double wa = weight * j(a);
+      for (int b = 0; b <= a; ++b) step.h(a, b) += wa * j(b);
+    }
     step.g.noalias() += weight * r * j;
     step.squares += weight * r * r;
     ++step.count;
@@ -128,7 +131,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
     h.diagonal() += belief + Vector7d::Constant(1e-6);
     Vector7d g = step.g;
     g.head<6>() += belief.head<6>().cwiseProduct(geometry::log_se3(pose * guess.inverse()));
-    const Vector7d delta = -h.ldlt().solve(g);
+    const Vector7d delta = -h.ldlt().solve(g);  // reads the lower triangle
     if (!delta.allFinite()) break;
     pose = geometry::exp_se3(delta.head<6>()) * pose;
     bias += delta(6);
