@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "paths.hpp"
+#include "plumbline/cloud/filter_plugin.hpp"
 #include "plumbline/core/version.hpp"
 #include "signals.hpp"
 
@@ -25,6 +26,16 @@ const char* const kFooter =
 
 core::Result<std::filesystem::path> Session::pipelines_folder() const {
   return find_pipelines_folder(pipelines_dir);
+}
+
+core::Result<cloud::FilterRegistry> Session::filters() const {
+  cloud::FilterRegistry registry = cloud::builtin_filters();
+  for (const std::string& file : plugins) {
+    if (auto loaded = cloud::load_filter_plugin(file, registry); !loaded) {
+      return tl::unexpected<core::Error>(loaded.error());
+    }
+  }
+  return registry;
 }
 
 Console& Session::console() {
@@ -56,6 +67,12 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
                       "Folder of the shipped pipelines and cameras");
   command->callback([&session, run = std::move(run)] { session.command = run; });
   return command;
+}
+
+void add_plugin_option(CLI::App& command, Session& session) {
+  command.add_option("--plugin", session.plugins, "Shared object with filters of your own; may be repeated")
+      ->type_name("FILE.so")
+      ->allow_extra_args(false);
 }
 
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help) {

@@ -7,8 +7,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "console.hpp"
+#include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 
@@ -20,10 +22,13 @@ struct Session {
   bool verbose = false;
   int threads = 0;  ///< 0 = one per core
   std::string pipelines_dir;
+  std::vector<std::string> plugins;  ///< shared objects with filters, of the commands that take --plugin
 
   std::function<int()> command;  ///< of the command that was named; returns the exit code
 
   [[nodiscard]] core::Result<std::filesystem::path> pipelines_folder() const;
+  /// The built-in filters and those of the plugins.
+  [[nodiscard]] core::Result<cloud::FilterRegistry> filters() const;
   /// Made on first use: messages and progress on stderr.
   Console& console();
   /// Made on first use.
@@ -39,6 +44,8 @@ struct Session {
 /// A command below `parent` with --help, --version, -q, -v, --threads and --pipelines-dir.
 CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
                       std::function<int()> run);
+/// --plugin FILE.so, for commands that use filters.
+void add_plugin_option(CLI::App& command, Session& session);
 /// A word that only groups commands, like `evaluate`.
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// plumbline filter CHAIN.yaml IN OUT, plumbline filters list|describe|check
+// plumbline filter CHAIN.yaml IN... OUT, plumbline filters list|describe|check
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
 
 #include <memory>
 #include <system_error>
@@ -18,8 +20,7 @@ namespace fs = std::filesystem;
 
 struct FilterRequest {
   std::string chain;
-  fs::path input;
-  fs::path output;
+  std::vector<fs::path> files;  ///< inputs, then the output
 };
 
 /// A file, or a shipped chain by name.
@@ -38,39 +39,89 @@ core::Result<fs::path> find_chain(const std::string& name, const Session& sessio
 core::Result<cloud::FilterChain> load_chain(const std::string& name, const Session& session) {
   const auto file = find_chain(name, session);
   if (!file) return tl::unexpected<core::Error>(file.error());
-  return cloud::FilterChain::load(*file, cloud::builtin_filters());
+  const auto registry = session.filters();
+  if (!registry) return tl::unexpected<core::Error>(registry.error());
+  return cloud::FilterChain::load(*file, *registry);
 }
 
-core::Result<void> filter(const FilterRequest& request, const Session& session) {
+/// What is wrong with the output is told before anything is read.
+core::Result<void> check_output(const fs::path& output, const cloud::FilterChain& chain) {
+  const auto extension = output.extension();
+  if (extension != ".ply" && extension != ".pcd") {
+    return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", output.string()));
+  }
+  std::error_code ec;
+  const fs::path folder = output.parent_path();
+  if (!folder.empty() && !fs::is_directory(folder, ec)) {
+    return core::output_error(fmt::format("{}: there is no folder {}", output.string(), folder.string()));
+  }
+  for (const std::string& written : chain.writes()) {
+    if (fs::absolute(written).lexically_normal() == fs::absolute(output).lexically_normal()) {
+      return core::usage_error(output.string() + ": a filter of the chain writes this file already");
+    }
+  }
+  return {};
+}
+
+/// The inputs one after the other.
+core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, Session& session) {
+  cloud::CloudPtr all;
+  for (std::size_t i = 0; i + 1 < request.files.size(); ++i) {
+    auto file = cloud::read_cloud(request.files[i]);
+    if (!file) return tl::unexpected<core::Error>(file.error());
+    const cloud::CloudColumns& columns = file->columns;
+    if (!columns.confidence.empty() || !columns.observations.empty() || !columns.robot.empty()) {
+      session.console().info(request.files[i].string() + ": confidence, observations and robot are not kept");
+    }
+    if (all == nullptr) {
+      all = std::move(file->cloud);
+    } else {
+      *all += *file->cloud;
+    }
+  }
+  return all;
+}
+
+core::Result<void> filter(const FilterRequest& request, Session& session) {
   const auto chain = load_chain(request.chain, session);
   if (!chain) return tl::unexpected<core::Error>(chain.error());
-  const auto extension = request.output.extension();
-  if (extension != ".ply" && extension != ".pcd") {
-    return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", request.output.string()));
-  }
-  const auto file = cloud::read_cloud(request.input);
-  if (!file) return tl::unexpected<core::Error>(file.error());
+  const fs::path& output = request.files.back();
+  cloud::FilterContext context;
+  context.executor = &session.executor();
+  if (auto fit = check_output(output, *chain); !fit) return fit;
+  if (auto fit = chain->ready(context); !fit) return fit;
+  auto input = read_inputs(request, session);
+  if (!input) return tl::unexpected<core::Error>(input.error());
+  Console& console = session.console();
   std::vector<cloud::FilterReport> reports;
-  const auto filtered = chain->apply(file->cloud, {}, &reports);
+  const auto filtered =
+      chain->apply(std::move(*input), context, &reports,
+                   [&console](std::size_t done, std::size_t total, const std::string& type) {
+                     console.progress(done, total, type.empty() ? "filters" : type.c_str());
+                   });
+  console.end_progress();
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (!session.quiet) fmt::print("{}", cloud::to_table(reports));
-  return cloud::write_cloud(request.output, **filtered);
+  return cloud::write_cloud(output, **filtered);
 }
 
-void list_filters() {
-  const cloud::FilterRegistry registry = cloud::builtin_filters();
-  for (const cloud::FilterInfo& info : registry.filters()) {
+int list_filters(Session& session) {
+  const auto registry = session.filters();
+  if (!registry) return session.fail(registry.error());
+  for (const cloud::FilterInfo& info : registry->filters()) {
     fmt::print("{:<24} {}\n", info.type, info.summary);
   }
+  return 0;
 }
 
-core::Result<void> describe_filter(const std::string& name) {
-  const cloud::FilterRegistry registry = cloud::builtin_filters();
-  const cloud::FilterInfo* info = registry.find(name);
+core::Result<void> describe_filter(const std::string& name, const Session& session) {
+  const auto registry = session.filters();
+  if (!registry) return tl::unexpected<core::Error>(registry.error());
+  const cloud::FilterInfo* info = registry->find(name);
   if (info == nullptr) {
-    const std::string near = core::did_you_mean(name, registry.types());
+    const std::string near = core::did_you_mean(name, registry->types());
     return core::usage_error(fmt::format("there is no filter '{}' (allowed: {}{})", name,
-                                         fmt::join(registry.types(), ", "),
+                                         fmt::join(registry->types(), ", "),
                                          near.empty() ? "" : "; did you mean " + near + "?"));
   }
   fmt::print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);
@@ -94,31 +145,36 @@ void add_filter(CLI::App& app, Session& session) {
         return done ? 0 : session.fail(done.error());
       });
   command->add_option("CHAIN", request->chain, "Filter chain: a file or a shipped name")->required();
-  command->add_option("IN", request->input, "Cloud to read: .ply, .pcd, .xyz, .csv")->required();
-  command->add_option("OUT", request->output, "Cloud to write: .ply or .pcd")->required();
+  command
+      ->add_option(
+          "FILES", request->files,
+          "Clouds to read (.ply, .pcd, .xyz, .csv; several are merged), then the one to write (.ply or .pcd)")
+      ->required()
+      ->type_name("IN... OUT")
+      ->expected(2, -1);
+  add_plugin_option(*command, session);
 
   CLI::App* group = add_group(app, "filters", "What filters there are");
-  add_command(*group, session, "list", "All filters", [] {
-    list_filters();
-    return 0;
-  });
+  add_plugin_option(
+      *add_command(*group, session, "list", "All filters", [&session] { return list_filters(session); }),
+      session);
   const auto name = std::make_shared<std::string>();
-  add_command(*group, session, "describe", "One filter: options and an example",
-              [&session, name] {
-                const auto done = describe_filter(*name);
-                return done ? 0 : session.fail(done.error());
-              })
-      ->add_option("NAME", *name, "Type of the filter")
-      ->required();
-  add_command(*group, session, "check", "Check a filter chain without running it",
-              [&session, name] {
-                const auto chain = load_chain(*name, session);
-                if (!chain) return session.fail(chain.error());
-                fmt::print("{}: {} filters, nothing wrong\n", *name, chain->size());
-                return 0;
-              })
-      ->add_option("CHAIN", *name, "Filter chain: a file or a shipped name")
-      ->required();
+  CLI::App* describe =
+      add_command(*group, session, "describe", "One filter: options and an example", [&session, name] {
+        const auto done = describe_filter(*name, session);
+        return done ? 0 : session.fail(done.error());
+      });
+  describe->add_option("NAME", *name, "Type of the filter")->required();
+  add_plugin_option(*describe, session);
+  CLI::App* check =
+      add_command(*group, session, "check", "Check a filter chain without running it", [&session, name] {
+        const auto chain = load_chain(*name, session);
+        if (!chain) return session.fail(chain.error());
+        fmt::print("{}: {} filters, nothing wrong\n", *name, chain->size());
+        return 0;
+      });
+  check->add_option("CHAIN", *name, "Filter chain: a file or a shipped name")->required();
+  add_plugin_option(*check, session);
 }
 
 }  // namespace plumbline::cli

@@ -16,6 +16,9 @@ int map(Session& session, pipeline::MapRequest request) {
   if (!pipelines) return session.fail(pipelines.error());
   request.pipelines_folder = *pipelines;
   request.open.cameras_folder = *pipelines / "cameras";
+  const auto filters = session.filters();
+  if (!filters) return session.fail(filters.error());
+  request.filters = *filters;
   const core::StopToken stop;
   stop_on_signals(stop);
   Console& console = session.console();
@@ -63,6 +66,7 @@ void add_map(CLI::App& app, Session& session) {
       ->add_option("--debug-video", request->debug_video,
                    "Also write a picture of every frame with what the tracker sees")
       ->type_name("DIR");
+  add_plugin_option(*command, session);
   command->add_flag("--force", request->replace, "Replace an earlier result in OUT, and in DIR");
 }
 

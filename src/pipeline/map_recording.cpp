@@ -58,6 +58,7 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   if (!pipeline_file) return fail(pipeline_file.error());
   StageRegistry registry;
   register_stages(registry);
+  registry.filters() = request.filters;
   auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
   if (!graph) return fail(graph.error());
   const bool tracks = std::any_of(graph->nodes.begin(), graph->nodes.end(),
@@ -102,7 +103,8 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   add_report(*report, summary);
   for (const Node& node : graph->nodes) node.stage->summarise(summary);
   judge(summary);
-  if (auto written = write_timing(output->path() / "timing.csv", *report, **source); !written) {
+  if (auto written = write_timing(output->path() / "timing.csv", *report, summary.parts, **source);
+      !written) {
     return fail(written.error());
   }
   summary.peak_rss_mb = peak_rss_mb();

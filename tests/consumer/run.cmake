@@ -13,4 +13,13 @@ run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${WORK}/build -G Ninja
 run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${WORK}/build/consumer ${WORK}/out)
 run(${WORK}/prefix/bin/plumbline pipelines check rgbd)
+# The example of a filter of one's own, built against the same installation and loaded by its program.
+run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/../../examples/plugin_filter -B ${WORK}/plugin -G Ninja
+    -DCMAKE_PREFIX_PATH=${WORK}/prefix -DCMAKE_BUILD_TYPE=Debug "-DCMAKE_CXX_FLAGS=${FLAGS}")
+run(${CMAKE_COMMAND} --build ${WORK}/plugin)
+execute_process(COMMAND ${WORK}/prefix/bin/plumbline filters list --plugin ${WORK}/plugin/libgrey_filter.so
+                OUTPUT_VARIABLE list COMMAND_ERROR_IS_FATAL ANY)
+if(NOT list MATCHES "grey +Takes the colour")
+  message(FATAL_ERROR "the plugin's filter is not in the list:\n${list}")
+endif()
 file(REMOVE_RECURSE ${WORK}/prefix)

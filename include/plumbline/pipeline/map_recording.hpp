@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/log.hpp"
@@ -22,6 +23,7 @@ struct MapRequest {
   std::string pipeline = "rgbd";           ///< shipped name or file
   std::vector<std::string> overrides;      ///< stage.key=value
   std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
+  cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   dataset::OpenOptions open;               ///< format, camera, from, to, every
   bool replace = false;                    ///< replace an earlier result
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Chains give what PCL's own command-line tools give, point for point, where both exist.
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "program.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+using cloud::Point;
+
+class FilterTools : public ProgramTest {
+ protected:
+  void SetUp() override {
+    if (std::system("command -v pcl_voxel_grid >/dev/null 2>&1") != 0)
+      GTEST_SKIP() << "pcl-tools is not installed";
+    // A noisy bowl on a floor, an island and some dust.
+    std::mt19937 random(7);
+    std::normal_distribution<float> noise(0.0F, 0.004F);
+    std::uniform_real_distribution<float> place(-0.5F, 0.5F);
+    cloud::Cloud world;
+    const auto add = [&world](float x, float y, float z) {
+      Point p;
+      p.x = x;
+      p.y = y;
+      p.z = z;
+      p.r = p.g = p.b = 77;
+      world.push_back(p);
+    };
+    for (int i = 0; i < 4000; ++i) {
+      const float x = place(random);
+      const float y = place(random);
+      add(x, y, noise(random) + (i % 4 == 0 ? 0.3F + x * x + y * y : 0.0F));
+    }
+    for (int i = 0; i < 400; ++i)
+      add(2.0F + 0.2F * place(random), 0.2F * place(random), 0.2F * place(random));
+    for (int i = 0; i < 60; ++i) add(4.0F * place(random), 4.0F * place(random), 4.0F * place(random));
+    ASSERT_TRUE(cloud::write_pcd(path("in.pcd"), world));
+  }
+
+  /// Both outputs, sorted when the order is PCL's hash table's.
+  void compare(const std::string& filter, const std::string& tool, const std::string& result = "pcl.pcd",
+               double tolerance = 0.0, bool sorted = false) const {
+    write("chain.yaml", "chain: one\nfilters:\n  - " + filter + "\n");
+    const auto ours = run("filter chain.yaml in.pcd ours.pcd");
+    ASSERT_EQ(ours.code, 0) << filter << "\n" << ours;
+    const std::string command = "cd '" + path("").string() + "' && pcl_" + tool + " >pcl.txt 2>&1 </dev/null";
+    ASSERT_EQ(std::system(command.c_str()), 0) << tool << "\n" << slurp(path("pcl.txt"));
+    const auto a = cloud::read_cloud(path("ours.pcd"));
+    const auto b = cloud::read_cloud(path(result));
+    ASSERT_TRUE(a && b) << tool << "\n" << slurp(path("pcl.txt"));
+    std::vector<Eigen::Vector3f> left = points(*a->cloud, sorted);
+    std::vector<Eigen::Vector3f> right = points(*b->cloud, sorted);
+    ASSERT_EQ(left.size(), right.size()) << filter << "\n" << slurp(path("pcl.txt"));
+    EXPECT_GT(left.size(), 50U) << filter << ": too few points to say much";
+    EXPECT_LT(left.size(), 4461U) << filter;
+    double worst = 0.0;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      worst = std::max(worst, static_cast<double>((left[i] - right[i]).cwiseAbs().maxCoeff()));
+    }
+    EXPECT_LE(worst, tolerance) << filter;
+  }
+
+  static std::vector<Eigen::Vector3f> points(const cloud::Cloud& cloud, bool sorted) {
+    std::vector<Eigen::Vector3f> found;
+    for (const Point& p : cloud.points) {
+      if (std::isfinite(p.x)) found.emplace_back(p.getVector3fMap());
+    }
+    if (sorted) {
+      std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) {
+        return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+      });
+    }
+    return found;
+  }
+};
+
+TEST_F(FilterTools, VoxelGrid) {
+  compare("{type: voxel_grid, leaf: 5 cm}", "voxel_grid in.pcd pcl.pcd -leaf 0.05,0.05,0.05", "pcl.pcd",
+          1e-6);
+}
+
+TEST_F(FilterTools, StatisticalOutlier) {
+  compare("{type: statistical_outlier, neighbours: 8, deviations: 1}",
+          "outlier_removal in.pcd pcl.pcd -method statistical -mean_k 8 -std_dev_mul 1");
+}
+
+TEST_F(FilterTools, RadiusOutlier) {
+  compare("{type: radius_outlier, radius: 5 cm, min_neighbours: 12}",
+          "outlier_removal in.pcd pcl.pcd -method radius -radius 0.05 -min_pts 12");
+}
+
+TEST_F(FilterTools, PassThrough) {
+  compare("{type: pass_through, field: x, min: -0.25, max: 0.3}",
+          "passthrough_filter in.pcd pcl.pcd -field x -min -0.25 -max 0.3");
+  compare("{type: pass_through, field: x, min: -0.25, max: 0.3, inside: off}",
+          "passthrough_filter in.pcd pcl.pcd -field x -min -0.25 -max 0.3 -inside 0");
+}
+
+TEST_F(FilterTools, UniformSampling) {
+  compare("{type: uniform_sampling, leaf: 7 cm}", "uniform_sampling in.pcd pcl.pcd -radius 0.07", "pcl.pcd",
+          0.0, true);
+}
+
+TEST_F(FilterTools, MovingLeastSquares) {
+  compare("{type: mls, radius: 10 cm, order: 2}",
+          "mls_smoothing in.pcd pcl.pcd -radius 0.1 -sqr_gauss_param 0.01 -polynomial_order 2", "pcl.pcd",
+          1e-6);
+}
+
+TEST_F(FilterTools, Normals) {
+  compare("{type: normals, neighbours: 10}", "normal_estimation in.pcd pcl.pcd -k 10");
+  const auto ours = cloud::read_cloud(path("ours.pcd"));
+  const auto theirs = cloud::read_cloud(path("pcl.pcd"));
+  ASSERT_TRUE(ours && theirs);
+  for (std::size_t i = 0; i < ours->cloud->size(); ++i) {
+    const Point& a = (*ours->cloud)[i];
+    const Point& b = (*theirs->cloud)[i];
+    ASSERT_LT((a.getNormalVector3fMap() - b.getNormalVector3fMap()).norm(), 1e-4F) << i;
+    ASSERT_NEAR(a.curvature, b.curvature, 1e-5F) << i;
+  }
+}
+
+TEST_F(FilterTools, Plane) {
+  compare("{type: plane, distance: 1 cm}", "sac_segmentation_plane in.pcd pcl.pcd -thresh 0.01");
+}
+
+TEST_F(FilterTools, Clusters) {
+  compare("{type: clusters, distance: 6 cm, min_points: 100, count: 1}",
+          "cluster_extraction in.pcd pcl.pcd -min 100 -max 100000 -tolerance 0.06", "pcl0.pcd", 0.0, true);
+}
+
+TEST_F(FilterTools, Range) {
+  compare("{type: range, min: 0 m, max: 40 cm, along: distance}", "radius_filter in.pcd pcl.pcd -radius 0.4");
+}
+
+TEST_F(FilterTools, Transform) {
+  compare("{type: transform, translation: [1 m, 2 m, 3 m], rotation: [0 deg, 0 deg, 30 deg]}",
+          "transform_point_cloud in.pcd pcl.pcd -trans 1,2,3 -axisangle 0,0,1,0.5235987756", "pcl.pcd", 1e-5);
+}
+
+class FilterRuns : public ProgramTest {};
+
+TEST_F(FilterRuns, SeveralInputsAreOneCloudAndTheTableSaysWhatHappened) {
+  write("a.xyz", "0 0 1\n1 0 1\n");
+  write("b.csv", "x,y,z\n2,0,1\n3,0,9\n");
+  write("chain.yaml", "chain: a\nfilters:\n  - {type: tee, file: all.ply}\n  - {type: range, max: 3 m}\n");
+  const auto ran = run("filter chain.yaml a.xyz b.csv out.ply");
+  EXPECT_EQ(ran.code, 0) << ran;
+  EXPECT_NE(ran.out.find("filter"), std::string::npos);
+  EXPECT_NE(ran.out.find("range                              4           3"), std::string::npos) << ran;
+  EXPECT_EQ(cloud::read_cloud(path("all.ply"))->cloud->size(), 4U);
+  EXPECT_EQ(cloud::read_cloud(path("out.ply"))->cloud->size(), 3U);
+}
+
+TEST_F(FilterRuns, NothingIsReadOrWrittenWhenTheCommandCannotEndWell) {
+  write("a.xyz", "0 0 1\n");
+  write("tee.yaml", "chain: a\nfilters:\n  - {type: tee, file: ./out.ply}\n");
+  write("merge.yaml",
+        "chain: a\nfilters:\n  - {type: tee, file: t.ply}\n  - {type: merge, file: gone.ply}\n");
+  const auto same = run("filter tee.yaml a.xyz out.ply");
+  EXPECT_EQ(same.code, 2) << same;
+  EXPECT_TRUE(same.told("a filter of the chain writes this file already")) << same;
+  const auto gone = run("filter merge.yaml a.xyz out.ply");
+  EXPECT_EQ(gone.code, 3) << gone;
+  EXPECT_TRUE(gone.told("filters[1] (merge): gone.ply: no such file")) << gone;
+  EXPECT_EQ(run("filter merge.yaml a.xyz out.obj").code, 2);
+  EXPECT_EQ(run("filter merge.yaml a.xyz no/folder/out.ply").code, 5);
+  EXPECT_EQ(run("filter merge.yaml a.xyz").code, 2);
+  EXPECT_FALSE(fs::exists(path("t.ply")) || fs::exists(path("out.ply")));
+}
+
+}  // namespace
+}  // namespace plumbline::integration
