@@ -84,12 +84,16 @@ class Fusion {
     all.cloud = std::make_shared<Cloud>();
     for (std::size_t first = 0; first < tiles_.size(); first += kTilesAtATime) {
       const std::size_t count = std::min(kTilesAtATime, tiles_.size() - first);
-      std::vector<core::Result<FusedCloud>> parts(count);
+      std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
+      if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
+      std::vector<FusedCloud> parts(count);
       std::vector<FusionReport> reports(count);
-      executor_.parallel_for(count, [&](std::size_t k) { parts[k] = fuse(tiles_[first + k], reports[k]); });
-      if (const auto error = first_error(parts)) return tl::unexpected<core::Error>(*error);
+      executor_.parallel_for(count, [&](std::size_t k) {
+        parts[k] = finished(tiles_[first + k], voxels[k], reports[k]);
+        voxels[k] = VoxelMap(options_.voxels);
+      });
       for (std::size_t k = 0; k < count; ++k) {
-        append(std::move(*parts[k]), all);
+        append(std::move(parts[k]), all);
         report.dust += reports[k].dust;
         report.seen_through += reports[k].seen_through;
       }
@@ -127,17 +131,45 @@ class Fusion {
     return {};
   }
 
-  [[nodiscard]] core::Result<FusedCloud> fuse(const FusionTile& tile, FusionReport& report) const {
-    const Eigen::AlignedBox3d box = tile.box(kCell_m);
-    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCell_m);
-    const Eigen::AlignedBox3d region(box.min() - margin, box.max() + margin);
-    VoxelMap voxels(options_.voxels);
-    for (const std::uint32_t v : tile.views) {
-      const auto cloud = read_(v);
-      if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
-      voxels.insert(**cloud, poses_[v], &region);
+  /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
+  /// for all of these tiles, and every tile takes the views in their order.
+  core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) const {
+    constexpr std::size_t kViewsAtATime = 8;
+    std::vector<std::uint32_t> views;
+    for (std::size_t k = 0; k < voxels.size(); ++k) {
+      views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
     }
+    std::sort(views.begin(), views.end());
+    views.erase(std::unique(views.begin(), views.end()), views.end());
+    for (std::size_t begin = 0; begin < views.size(); begin += kViewsAtATime) {
+      const std::size_t count = std::min(kViewsAtATime, views.size() - begin);
+      std::vector<core::Result<CloudPtr>> clouds(count);
+      executor_.parallel_for(count, [&](std::size_t i) {
+        clouds[i] = read_(views[begin + i]);
+        if (clouds[i] && !gains_.empty()) apply_gain(**clouds[i], gains_[views[begin + i]]);
+      });
+      if (const auto error = first_error(clouds)) return tl::unexpected<core::Error>(*error);
+      executor_.parallel_for(voxels.size(), [&](std::size_t k) {
+        const FusionTile& tile = tiles_[first + k];
+        const Eigen::AlignedBox3d region = with_margin(tile.box(kCell_m));
+        for (std::size_t i = 0; i < count; ++i) {
+          const std::uint32_t view = views[begin + i];
+          if (!std::binary_search(tile.views.begin(), tile.views.end(), view)) continue;
+          voxels[k].insert(**clouds[i], poses_[view], &region);
+        }
+      });
+    }
+    return {};
+  }
+
+  static Eigen::AlignedBox3d with_margin(const Eigen::AlignedBox3d& box) {
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCell_m);
+    return {box.min() - margin, box.max() + margin};
+  }
+
+  /// The points of a tile; `voxels` is used up.
+  [[nodiscard]] FusedCloud finished(const FusionTile& tile, VoxelMap& voxels, FusionReport& report) const {
+    const Eigen::AlignedBox3d box = tile.box(kCell_m);
     FusedCloud points = voxels.extract();
     voxels.clear();
     points = cleaned(points, report);
@@ -154,7 +186,7 @@ class Fusion {
   }
 
   /// Without what is seen through and without dust; settled.
-  FusedCloud cleaned(FusedCloud& points, FusionReport& report) const {
+  [[nodiscard]] FusedCloud cleaned(FusedCloud& points, FusionReport& report) const {
     Sheets sheets(points, block_m(options_.voxels.voxel_m));
     std::vector<std::uint8_t> goes(sheets.all().size(), 0);
     if (options_.free_space) goes = seen_through(sheets, rasters_, poses_, camera_);

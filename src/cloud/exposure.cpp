@@ -62,24 +62,29 @@ std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Ri
   constexpr int kBright = 245;
   const Eigen::Matrix3f rotation = (world_from_camera.rotation / cell_m).cast<float>();
   const Eigen::Vector3f translation = (world_from_camera.translation / cell_m).cast<float>();
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
-  order.reserve(camera_cloud.size());
-  for (std::size_t i = 0; i < camera_cloud.size(); ++i) {
-    const Point& p = camera_cloud[i];
+  // Neighbours in a picture mostly share their cube: runs of them are few enough to sort.
+  std::vector<ColorCell> runs;
+  for (const Point& p : camera_cloud.points) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
     const Eigen::Vector3f at = rotation * p.getVector3fMap() + translation;
     if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
-    order.emplace_back(pack_cell(at.array().floor().cast<int>()), static_cast<std::uint32_t>(i));
-  }
-  std::sort(order.begin(), order.end());
-  std::vector<ColorCell> cells;
-  for (const auto& [key, index] : order) {
-    if (cells.empty() || cells.back().cell != key) cells.push_back({key, Eigen::Vector3f::Zero(), 0.0F});
-    const Point& p = camera_cloud[index];
+    const std::uint64_t key = pack_cell(at.array().floor().cast<int>());
+    if (runs.empty() || runs.back().cell != key) runs.push_back({key, Eigen::Vector3f::Zero(), 0.0F});
     const auto [dark, bright] = std::minmax({p.r, p.g, p.b});
     if (dark < kDark || bright > kBright) continue;
-    cells.back().color += Eigen::Vector3f(p.r, p.g, p.b);
-    cells.back().points += 1.0F;
+    runs.back().color += Eigen::Vector3f(p.r, p.g, p.b);
+    runs.back().points += 1.0F;
+  }
+  std::stable_sort(runs.begin(), runs.end(),
+                   [](const ColorCell& a, const ColorCell& b) { return a.cell < b.cell; });
+  std::vector<ColorCell> cells;
+  for (const ColorCell& run : runs) {
+    if (cells.empty() || cells.back().cell != run.cell) {
+      cells.push_back(run);
+      continue;
+    }
+    cells.back().color += run.color;
+    cells.back().points += run.points;
   }
   for (ColorCell& cell : cells) {
     if (cell.points > 0.0F) cell.color /= cell.points;

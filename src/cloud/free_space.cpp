@@ -50,9 +50,12 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
   const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
   for (const Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F) || !(p.z < 65.0F) || !std::isfinite(p.x) || !std::isfinite(p.y)) continue;
-    const int u = static_cast<int>(std::lround(fx * p.x / p.z + cx));
-    const int v = static_cast<int>(std::lround(fy * p.y / p.z + cy));
-    if (u < 0 || v < 0 || u >= camera.width || v >= camera.height) continue;
+    const float column = fx * p.x / p.z + cx + 0.5F;
+    const float row = fy * p.y / p.z + cy + 0.5F;
+    if (!(column >= 0.0F) || !(row >= 0.0F)) continue;
+    const int u = static_cast<int>(std::min(column, 1e6F));
+    const int v = static_cast<int>(std::min(row, 1e6F));
+    if (u >= camera.width || v >= camera.height) continue;
     std::uint16_t& cell = raster.nearest[static_cast<std::size_t>(v / DepthRaster::kCell_px) *
                                              static_cast<std::size_t>(raster.width) +
                                          static_cast<std::size_t>(u / DepthRaster::kCell_px)];
@@ -95,7 +98,6 @@ Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, cons
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
                                        const std::vector<geometry::Rigid3>& world_from_camera,
                                        const sensor::Pinhole& camera) {
-  constexpr int kFewestViews = 2;
   std::vector<std::uint8_t> goes(sheets.all().size(), 0);
   Eigen::AlignedBox3d box;
   for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
@@ -111,7 +113,8 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
       free += found == Evidence::kFree ? 1 : 0;
       surface += found == Evidence::kSurface ? 1 : 0;
     }
-    goes[s] = free >= kFewestViews && 2 * free >= surface ? 1 : 0;
+    // One view against another is enough when no third one knows better.
+    goes[s] = free > 0 && 2 * free >= surface && (free > 1 || surface < 2) ? 1 : 0;
   }
   return goes;
 }

@@ -8,6 +8,9 @@
 namespace plumbline::cloud {
 namespace {
 
+constexpr std::size_t kTiles = 4;
+constexpr std::size_t kFewestCells = 300;  // of a tile that is worth its margin
+
 using Cells = std::vector<Eigen::Vector3i>;
 
 void cut(const Cells::iterator& begin, const Cells::iterator& end, std::size_t most_cells,
@@ -49,7 +52,9 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   Cells cells;
   cells.reserve(keys.size());
   for (const std::uint64_t key : keys) cells.push_back(unpack_cell(key));
-  cut(cells.begin(), cells.end(), std::max<std::size_t>(1, most_cells), tiles);
+  // Several tiles even where one would do: they are worked on side by side.
+  const std::size_t share = std::max(kFewestCells, cells.size() / kTiles + 1);
+  cut(cells.begin(), cells.end(), std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (FusionTile& tile : tiles) {
       const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),

@@ -23,8 +23,9 @@ struct FusionTile {
   }
 };
 
-/// k-d cuts at medians until no box holds more than `most_cells` occupied cells. `views`: the cells of each,
-/// by cell. A view belongs to a tile when it reaches into it or one of the cells around it. In a fixed order.
+/// k-d cuts at medians until no box holds more than `most_cells` occupied cells, and about four boxes at
+/// least where there is enough for them. `views`: the cells of each, by cell. A view belongs to a tile when
+/// it reaches into it or one of the cells around it. In a fixed order.
 std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells);
 
 }  // namespace plumbline::cloud

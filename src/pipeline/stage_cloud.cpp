@@ -16,6 +16,8 @@ class CloudStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
+    table.integer("between", between_, {0, 100000}, "",
+                  "Every so many frames one that is no keyframe gives a cloud as well; 0: none");
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
@@ -30,7 +32,8 @@ class CloudStage : public Stage {
 
   core::Result<void> process(StageIo& io) override {
     const auto track = io.input<TrackedFrame>("track");
-    if (!track->keyframe.valid()) return {};
+    const bool between = between_ > 0 && io.frame() % static_cast<std::size_t>(between_) == 0;
+    if (!track->keyframe.valid() && !between) return {};
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera_, options_);
     cloud::FilterContext context;
@@ -39,6 +42,7 @@ class CloudStage : public Stage {
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
+    result->stamp = track->stamp;
     result->cloud = std::move(*filtered);
     io.output<KeyframeCloud>("cloud", result);
     return {};
@@ -46,6 +50,7 @@ class CloudStage : public Stage {
 
  private:
   cloud::KeyframeCloudOptions options_;
+  int between_ = 10;
   ChainOption filters_{"filters/keyframe.yaml"};
   sensor::Pinhole camera_;
 };

@@ -4,6 +4,7 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <optional>
@@ -63,7 +64,11 @@ class FuseStage : public Stage {
   }
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("cloud");
-    places_[keyframe->id] = spool_->size();
+    if (keyframe->id.valid()) {
+      places_[keyframe->id] = spool_->size();
+    } else {
+      between_.emplace_back(keyframe->stamp, spool_->size());
+    }
     return spool_->append(*keyframe->cloud);
   }
 
@@ -113,12 +118,21 @@ class FuseStage : public Stage {
       poses.push_back(keyframe.world_from_camera);
       places.push_back(found->second);
     }
+    for (const auto& [stamp, place] : between_) {
+      const double at = stamp;
+      const auto found =
+          std::lower_bound(map.trajectory.begin(), map.trajectory.end(), at,
+                           [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
+      if (found == map.trajectory.end() || found->stamp != at) continue;  // a frame that was lost
+      poses.push_back(found->world_from_camera);
+      places.push_back(place);
+    }
     cloud::FusionReport report;
     auto fused = cloud::fuse_views(
         poses, [&](std::size_t i) { return spool_->read(places[i]); }, context_->source->camera().color,
         options_, *context_->executor, &report);
     context_->log->debug(
-        fmt::format("{} keyframe clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
+        fmt::format("{} clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
                     "dust; colour "
                     "gains {:.2f} to {:.2f}",
                     poses.size(), static_cast<double>(spool_->bytes()) / 1e6, report.tiles,
@@ -151,8 +165,9 @@ class FuseStage : public Stage {
   Up up_ = Up::kFloor;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
-  std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
+  std::optional<cloud::CloudSpool> spool_;               ///< the keyframes' clouds, camera frame
+  std::map<core::KeyframeId, std::size_t> places_;       ///< in the spool
+  std::vector<std::pair<double, std::size_t>> between_;  ///< stamp and place of clouds between keyframes
   UpFrame frame_;
   std::size_t points_ = 0;
 };

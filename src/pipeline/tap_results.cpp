@@ -56,6 +56,7 @@ class KeyframeCloudTap : public Tap {
   KeyframeCloudTap() : Tap(TapFile::Count::kMany, {".ply", ".pcd"}) {}
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("in");
+    if (!keyframe->id.valid()) return {};
     return cloud::write_cloud(file_.path(static_cast<std::size_t>(keyframe->id.index)), *keyframe->cloud);
   }
 };

@@ -32,8 +32,8 @@ enum class Evidence { kNone, kSurface, kFree, kHidden };
 /// the sensor's noise and 3 cm explain. kNone outside of the picture or where too little was measured.
 Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
 
-/// For every sheet whether it is to go: at least two views look through it, and at least half as many as see
-/// a surface there.
+/// For every sheet whether it is to go: at least half as many views look through it as see a surface there, two
+/// at least unless no more than one view sees it.
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
                                        const std::vector<geometry::Rigid3>& world_from_camera,
                                        const sensor::Pinhole& camera);

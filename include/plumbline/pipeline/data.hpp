@@ -50,9 +50,10 @@ struct MapResult {
   std::vector<FrameRow> frames;  ///< by frame
 };
 
-/// Filtered cloud of one keyframe, camera frame.
+/// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame.
 struct KeyframeCloud {
-  core::KeyframeId id;
+  core::KeyframeId id;  ///< not valid: a frame between keyframes
+  double stamp = 0.0;   ///< seconds
   cloud::CloudPtr cloud;
 };
 
