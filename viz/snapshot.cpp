@@ -7,6 +7,7 @@
 #include <vtkActor.h>
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
+#include <vtkContext2D.h>
 #include <vtkContextActor.h>
 #include <vtkFloatArray.h>
 #include <vtkIdTypeArray.h>
@@ -18,6 +19,7 @@
 #include <vtkProperty.h>
 #include <vtkRenderer.h>
 #include <vtkShaderProperty.h>
+#include <vtkTransform2D.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
@@ -37,6 +39,19 @@ namespace {
 constexpr int kSupersampling = 2;  // drawn twice as large and scaled down: smooth points, lines and text
 constexpr Rgb kBackground{250, 250, 248};
 constexpr std::size_t kFramingSample = 100000;
+constexpr double kLargest = 30.0 * kSupersampling;  // diameter of a point
+
+// A picture is drawn in bands, since the buffers of a whole one at twice its size take hundreds of megabytes.
+// Points are drawn or not by their centres: bands overlap, so that none is cut at their borders.
+constexpr int kBand_px = 256;
+constexpr int kMargin = 50;  // large pixels: half the largest point, chosen ones included
+static_assert(kMargin >= kLargest / 2 && kMargin >= 50 * kSupersampling / 2);
+
+/// Rows of the large picture that are drawn at a time, from the bottom.
+struct Band {
+  int first = 0;
+  int height = 0;
+};
 
 core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
   if (options.width_px < 64 || options.height_px < 64 || options.width_px > 8192 ||
@@ -112,7 +127,7 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   return directions;
 }
 
-void place_camera(vtkRenderer& renderer, const Projection& projection) {
+void place_camera(vtkRenderer& renderer, const Projection& projection, const Band& band) {
   vtkCamera* camera = renderer.GetActiveCamera();
   const Eigen::Vector3d target = projection.eye + projection.forward;
   camera->SetPosition(projection.eye.data());
@@ -120,11 +135,39 @@ void place_camera(vtkRenderer& renderer, const Projection& projection) {
   camera->SetViewUp(projection.up.data());
   camera->SetParallelProjection(projection.orthographic ? 1 : 0);
   if (projection.orthographic) {
-    camera->SetParallelScale(0.5 * projection.height_px / projection.focal_px);
+    camera->SetParallelScale(0.5 * band.height / projection.focal_px);
   } else {
-    camera->SetViewAngle(2.0 * std::atan(0.5 * projection.height_px / projection.focal_px) * 180.0 / M_PI);
+    camera->SetViewAngle(2.0 * std::atan(0.5 * band.height / projection.focal_px) * 180.0 / M_PI);
   }
   camera->SetClippingRange(projection.near_m, projection.far_m);
+  // In half heights of the band, from the picture's middle to the band's.
+  camera->SetWindowCenter(
+      0.0, (band.first + 0.5 * band.height - 0.5 * projection.height_px) / (0.5 * band.height));
+}
+
+/// Draws band by band what `renderer` of `window` holds; `band` tells the overlay which one.
+Image draw_bands(OffscreenWindow& window, vtkRenderer& renderer, const Projection& projection,
+                 const SnapshotOptions& options, Band& band) {
+  Image picture;
+  picture.width = options.width_px;
+  picture.height = options.height_px;
+  const auto row = 3 * static_cast<std::size_t>(options.width_px);
+  picture.rgb.resize(row * static_cast<std::size_t>(options.height_px));
+  for (int first_px = 0; first_px < options.height_px; first_px += kBand_px) {
+    band.first = kSupersampling * first_px - kMargin;
+    place_camera(renderer, projection, band);
+    const Image large = window.draw();
+    const auto large_row = 3 * static_cast<std::size_t>(large.width);
+    Image inner;
+    inner.width = large.width;
+    inner.height = kSupersampling * std::min(kBand_px, options.height_px - first_px);
+    const auto begin = large.rgb.begin() + static_cast<std::ptrdiff_t>(large_row * kMargin);
+    inner.rgb.assign(begin, begin + static_cast<std::ptrdiff_t>(large_row) * inner.height);
+    const Image small = downsample(inner, kSupersampling);
+    std::copy(small.rgb.begin(), small.rgb.end(),
+              picture.rgb.begin() + static_cast<std::ptrdiff_t>(row) * first_px);
+  }
+  return picture;
 }
 
 /// Points of one size as an actor; `members` index `points` and `colors`.
@@ -183,7 +226,7 @@ void add_points(vtkRenderer& renderer, const Scene& scene, const std::vector<std
                 const std::vector<Rgb>& colors, const SnapshotOptions& options, const Projection& projection,
                 double spacing_m) {
   constexpr double kOverlap = 1.7;  // neighbours at a slant, and voxels that are not quite full
-  constexpr double kSmallest = 2.0 * kSupersampling, kLargest = 30.0 * kSupersampling;
+  constexpr double kSmallest = 2.0 * kSupersampling;
   constexpr double kLonely = 6.0 * kSupersampling;  // a single point
   std::map<int, std::vector<std::uint32_t>> by_size;
   for (std::uint32_t k = 0; k < points.size(); ++k) {
@@ -251,20 +294,26 @@ core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& op
   content.color_scale = styled.scale;
   content.empty = facing.empty() && scene.segments.empty();
 
-  auto window = OffscreenWindow::open(large.width_px, large.height_px);
+  Band band;
+  band.height = kSupersampling * std::min(kBand_px, options.height_px) + 2 * kMargin;
+  auto window = OffscreenWindow::open(large.width_px, band.height);
   if (!window) return tl::unexpected(window.error());
   vtkNew<vtkRenderer> renderer;
   renderer->SetBackground(kBackground.r / 255.0, kBackground.g / 255.0, kBackground.b / 255.0);
   (*window)->window()->AddRenderer(renderer);
   add_points(*renderer, scene, points, styled.colors, options, projection, spacing_m);
   add_segments(*renderer, scene, projection, spacing_m);
-  renderer->AddActor(make_overlay([&content, &options](vtkContext2D* context) {
+  renderer->AddActor(make_overlay([&content, &options, &band](vtkContext2D* context) {
+    vtkNew<vtkTransform2D> to_band;
+    to_band->Translate(0.0, -band.first);
+    context->PushMatrix();
+    context->AppendTransform(to_band);
     Painter painter(context, kSupersampling * options.height_px / 1200.0);
     draw_paths(painter, content);
     draw_annotations(painter, content);
+    context->PopMatrix();
   }));
-  place_camera(*renderer, projection);
-  return write_png(downsample((*window)->draw(), kSupersampling), file);
+  return write_png(draw_bands(**window, *renderer, projection, options, band), file);
 }
 
 }  // namespace plumbline::viz

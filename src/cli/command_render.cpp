@@ -17,6 +17,8 @@
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/result_folder.hpp"
 #include "plumbline/viz/snapshot.hpp"
+#include "plumbline/viz/turntable.hpp"
+#include "video.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -28,6 +30,7 @@ struct RenderRequest {
   fs::path output;
   std::string size;
   bool lines = false;
+  int turntable = 0;  ///< pictures all round; 0: one picture
   viz::SnapshotOptions options;
   core::OptionTable table;
   std::unique_ptr<OptionFlags> flags;
@@ -95,15 +98,43 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
   return {};
 }
 
-core::Result<void> render(RenderRequest& request) {
+/// What the name of the output must be, found before anything is drawn.
+core::Result<void> check_output(const RenderRequest& request) {
+  if (request.turntable == 0) {
+    if (request.output.extension() == ".png") return {};
+    return core::usage_error(
+        fmt::format("{}: pictures are PNG; let the name end in .png", request.output.string()));
+  }
+  if (is_film(request.output)) return can_film();
+  if (!request.output.has_extension()) return {};
+  return core::usage_error(
+      fmt::format("{}: a turntable is a folder of pictures, .gif or .mp4", request.output.string()));
+}
+
+/// All round: a folder of pictures, or a film of them.
+core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, Console& console) {
+  constexpr int kPicturesPerSecond = 15;
+  const bool film = is_film(request.output);
+  fs::path folder = request.output;
+  if (film) folder += ".pictures";
+  auto drawn =
+      viz::render_turntable(scene, request.options, request.turntable, folder, [&](int done, int total) {
+        console.progress(static_cast<std::size_t>(done), static_cast<std::size_t>(total), "pictures");
+      });
+  console.end_progress();
+  if (!film) return drawn;
+  if (drawn) drawn = make_film(folder, kPicturesPerSecond, request.output);
+  std::error_code ignored;
+  fs::remove_all(folder, ignored);
+  return drawn;
+}
+
+core::Result<void> render(RenderRequest& request, Console& console) {
   if (auto applied = request.flags->apply(); !applied) return applied;
   if (!request.size.empty()) {
     if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
   }
-  if (request.output.extension() != ".png") {
-    return core::usage_error(
-        fmt::format("{}: pictures are PNG; let the name end in .png", request.output.string()));
-  }
+  if (auto checked = check_output(request); !checked) return checked;
   std::error_code ec;
   if (!fs::exists(request.input, ec)) {
     return core::input_error(fmt::format("{}: no such map or cloud", request.input.string()));
@@ -127,6 +158,7 @@ core::Result<void> render(RenderRequest& request) {
       !added) {
     return added;
   }
+  if (request.turntable > 0) return turn(request, scene, console);
   return viz::render_snapshot(scene, request.options, request.output);
 }
 
@@ -137,12 +169,19 @@ void add_render(CLI::App& app, Session& session) {
   request->options.declare(request->table);
   CLI::App* command =
       add_command(app, session, "render", "Draw a map or cloud; needs no display", [&session, request] {
-        const auto done = render(*request);
+        const auto done = render(*request, session.console());
         return done ? 0 : session.fail(done.error());
       });
   command->add_option("INPUT", request->input, "A result folder, or a PLY, PCD or XYZ file")->required();
-  command->add_option("-o,--output", request->output, "Picture to write")->required()->type_name("FILE.png");
+  command->add_option("-o,--output", request->output, "Picture to write")
+      ->required()
+      ->type_name("FILE.png|DIR|.gif|.mp4");
   command->add_option("--size", request->size, "Size of the picture, like 1600x1200")->type_name("WxH");
+  command
+      ->add_option("--turntable", request->turntable,
+                   "So many pictures from all sides: into a folder, or as .gif or .mp4 with ffmpeg")
+      ->check(CLI::Range(2, 3600))
+      ->type_name("N");
   command->add_flag("--lines", request->lines, "Draw the map's 3D lines, too");
   request->flags = std::make_unique<OptionFlags>(*command, request->table);
 }
