@@ -20,7 +20,7 @@ using namespace plumbline;
 
 namespace {
 
-constexpr float kLeaf = 0.01F;
+constexpr float kLeaf = 0.02F;
 constexpr int kNeighbours = 16;
 constexpr double kDeviations = 2.0;
 
