@@ -189,6 +189,29 @@ TEST(AdjustBundle, BringsADisturbedMapBackToTheTruth) {
   EXPECT_LT(point_errors[1000], 0.008);
 }
 
+TEST(AdjustBundle, TheCostFallsWithEveryIteration) {
+  Scenario s = noisy();
+  s.keyframes = 6;
+  s.points = 200;
+  s.lines = 30;
+  const World world = make_world(s);
+  BundleOptions options;
+  options.rounds = 1;
+  double last = 0.0;
+  for (int iterations = 1; iterations <= 8; ++iterations) {  // each repeats the one before and goes on
+    options.max_iterations = iterations;
+    BundleProblem problem = world.problem;
+    const BundleSummary summary = adjust_bundle(problem, options);
+    ASSERT_TRUE(summary.usable) << summary.message;
+    if (iterations == 1) last = summary.initial_cost;
+    EXPECT_LE(summary.final_cost, last) << iterations;
+    last = summary.final_cost;
+  }
+  options.max_iterations = 1;
+  BundleProblem problem = world.problem;
+  EXPECT_LT(last, 0.5 * adjust_bundle(problem, options).initial_cost);
+}
+
 TEST(AdjustBundle, LinesHelpWherePointsAreFew) {
   double with_lines = 0.0;
   double points_only = 0.0;
