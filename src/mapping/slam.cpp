@@ -16,6 +16,7 @@ void SlamOptions::declare(core::OptionTable& table) {
   table.integer("bundle.lag", bundle_lag, {0, 1000}, "",
                 "Frames after which an adjusted bundle is put back into the map; the tracker goes on "
                 "meanwhile. 0: it waits on the spot");
+  loops.declare(table);
 }
 
 /// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all
@@ -37,7 +38,14 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       mapper_(options.mapper, camera),
       bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate,
                options.tracker.association.scale_factor},
-              options.mapper.bundle_options, options.bundle_lag, camera, executor) {}
+              options.mapper.bundle_options, options.bundle_lag, camera, executor),
+      closer_(options.loops, camera) {
+  if (!options.loops.enabled) return;
+  constexpr std::size_t kLookAlikes = 12;
+  tracker_.set_place_finder([this](const features::FrameFeatures& picture) {
+    return closer_.look_alikes(map_, picture, kLookAlikes);
+  });
+}
 
 Slam::~Slam() = default;
 
@@ -50,6 +58,7 @@ void Slam::start_map(const sensor::RgbdFrame& frame,
   rule_.keyframe_made();
   last_camera_from_world_ = origin.camera_from_world;
   tracker_.map_changed(map_, report.keyframe, origin.camera_from_world);
+  if (options_.loops.enabled) close_loops(report.keyframe);
 }
 
 /// What the tracker knows moves with its reference keyframe. The motion model is a motion between cameras:
@@ -110,6 +119,7 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   mapper_.refine(map_, report.keyframe);
   rule_.keyframe_made();
   tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
+  if (options_.loops.enabled) close_loops(report.keyframe);
   if (!options_.mapper.bundle || tracker_.turn_rate() > options_.mapper.bundle_max_turn_rate) return;
   bundle_.request(map_, report.keyframe, clock_);
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
@@ -121,12 +131,28 @@ void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tra
       {stamp, reference, camera_from_world * map_.camera_from_world(reference).inverse(), tracked});
 }
 
-void Slam::finish() {
+void Slam::settle_bundles() {
   while (!bundle_.idle()) {
     BundleReport ignored;
     put_back_bundle(ignored);
   }
 }
+
+/// The whole map may move: what was taken from it before must be back. The tracker waits, so that the next
+/// frame is tracked against the map as it is then, whatever the clock says.
+void Slam::close_loops(core::KeyframeId keyframe) {
+  const std::vector<Loop> loops = closer_.look(map_, keyframe);
+  if (loops.empty()) return;
+  settle_bundles();
+  const Rigid3 camera_from_keyframe = last_camera_from_world_ * map_.camera_from_world(keyframe).inverse();
+  std::vector<PoseEdge> edges;
+  for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
+  if (!closer_.close(map_, edges)) return;
+  last_camera_from_world_ = camera_from_keyframe * map_.camera_from_world(keyframe);
+  tracker_.map_changed(map_, keyframe, last_camera_from_world_);
+}
+
+void Slam::finish() { settle_bundles(); }
 
 geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frames_, map_); }
 

@@ -55,6 +55,7 @@ class TrackStage : public Stage {
     constexpr std::int32_t kRobot = 0;
     camera_ = context.source->camera().color;
     debug_folder_ = context.debug_folder;
+    if (auto loaded = options_.loops.load(); !loaded) return loaded;
     slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
     return {};
   }
@@ -91,6 +92,9 @@ class TrackStage : public Stage {
     summary.keyframes = slam_->map().keyframe_count();
     summary.points = slam_->map().point_count();
     summary.lines = lines_;
+    const mapping::LoopCounts& loops = slam_->loop_counts();
+    summary.loops = {static_cast<std::size_t>(loops.candidates), static_cast<std::size_t>(loops.verified),
+                     static_cast<std::size_t>(loops.accepted)};
     summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
     summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
   }

@@ -12,8 +12,8 @@ using features::FrameFeatures;
 
 namespace {
 
-constexpr int kMaxDivisions = 60;        // of words, a keyframe
-constexpr std::size_t kCommon = 4000;    // a word in more features than this tells nothing
+constexpr int kMaxDivisions = 60;      // of words, a keyframe
+constexpr std::size_t kCommon = 4000;  // a word in more features than this tells nothing
 constexpr double kGrowthToReweigh = 1.25;
 
 std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
@@ -159,7 +159,8 @@ std::vector<Hit> Database::Scores::best(std::size_t count,
   std::vector<Hit> hits;
   auto sorted = slots.begin();
   while (hits.size() < count && sorted != slots.end()) {
-    const auto block = std::min<std::ptrdiff_t>(slots.end() - sorted, static_cast<std::ptrdiff_t>(2 * count + 16));
+    const auto block =
+        std::min<std::ptrdiff_t>(slots.end() - sorted, static_cast<std::ptrdiff_t>(2 * count + 16));
     std::partial_sort(sorted, sorted + block, slots.end(), better);
     for (const auto end = sorted + block; sorted != end; ++sorted) {
       const KeyframeId id = database_->keyframes_[at(*sorted)];

@@ -280,6 +280,9 @@ std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,
       if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
     };
     for (core::KeyframeId id : local_map_.keyframes) add(id);
+    if (find_places_) {
+      for (core::KeyframeId id : find_places_(features)) add(id);
+    }
     for (const LookAlike& a : alike) add(a.keyframe);
     const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers);
     if (seen) guesses.push_back({seen->keyframe, seen->camera_from_world, false});

@@ -16,7 +16,8 @@ using tests::picture;
 /// 40 places of two robots, one after the other, seen once.
 Database forty_places() {
   Database database{Vocabulary()};
-  for (std::int32_t i = 0; i < 40; ++i) database.add({i % 2, i / 2}, picture(static_cast<std::uint32_t>(i), 0));
+  for (std::int32_t i = 0; i < 40; ++i)
+    database.add({i % 2, i / 2}, picture(static_cast<std::uint32_t>(i), 0));
   return database;
 }
 KeyframeId id_of(std::int32_t place) { return {place % 2, place / 2}; }

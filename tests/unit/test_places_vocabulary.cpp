@@ -53,7 +53,8 @@ TEST(KMajority, FindsClustersThatAreThere) {
   for (int i = 0; i < 120; ++i) all.push_back(flipped(seeds[static_cast<std::size_t>(i % 4)], 15, bits));
   const Clusters clusters = k_majority(all, 4, 10, 1);
   ASSERT_EQ(clusters.centres.size(), 4U);
-  for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(clusters.member_of[i], clusters.member_of[i % 4]) << i;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    EXPECT_EQ(clusters.member_of[i], clusters.member_of[i % 4]) << i;
   for (const Descriptor256& seed : seeds) {
     int nearest = 257;
     for (const auto& c : clusters.centres) nearest = std::min(nearest, features::hamming_distance(seed, c));
@@ -97,7 +98,8 @@ TEST(Vocabulary, TrainedWordsAreSmallAndWeighLogNOverNw) {
     EXPECT_LE(n, 30);
   }
   const auto& [word, n] = *count.begin();
-  EXPECT_NEAR(v.weight(word), std::log(400.0 / n), 0.7) << "a member may come down another way than in training";
+  EXPECT_NEAR(v.weight(word), std::log(400.0 / n), 0.7)
+      << "a member may come down another way than in training";
   EXPECT_TRUE(v.fixed());
   EXPECT_GT(v.depth(Kind::kPoint), 1);
   EXPECT_EQ(v.word_count(Kind::kLine), 1U);
@@ -152,7 +154,8 @@ TEST(VocabularyFile, DamageIsToldNotRead) {
   ASSERT_TRUE(Vocabulary::from_bytes(good, "good"));
   EXPECT_FALSE(Vocabulary::from_bytes({}, "empty"));
   for (const std::size_t cut : {std::size_t{5}, std::size_t{12}, std::size_t{30}, good.size() - 1}) {
-    EXPECT_FALSE(Vocabulary::from_bytes({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(cut)}, "cut"));
+    EXPECT_FALSE(
+        Vocabulary::from_bytes({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(cut)}, "cut"));
   }
   for (std::size_t i = 0; i < good.size(); i += 97) {
     std::vector<std::uint8_t> bad = good;

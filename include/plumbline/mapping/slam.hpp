@@ -16,6 +16,7 @@
 #include "plumbline/mapping/background_bundle.hpp"
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
+#include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
@@ -28,6 +29,7 @@ struct SlamOptions {
   KeyframeRuleOptions keyframe;
   LocalMapperOptions mapper;
   int bundle_lag = 6;  ///< frames
+  LoopOptions loops;
   void declare(core::OptionTable& table);
 };
 
@@ -53,6 +55,8 @@ class Slam {
   Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
        const core::Executor& executor, core::Log& log);
   ~Slam();
+  Slam(const Slam&) = delete;  // the tracker asks this one for places
+  Slam& operator=(const Slam&) = delete;
 
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
   FrameReport process(const sensor::RgbdFrame& frame,
@@ -61,6 +65,7 @@ class Slam {
   void finish();
 
   [[nodiscard]] const maps::Map& map() const { return map_; }
+  [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
   /// What the tracker said about the last frame; for pictures of it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.
@@ -77,6 +82,8 @@ class Slam {
   void make_keyframe(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   void put_back_bundle(BundleReport& report);
+  void settle_bundles();
+  void close_loops(core::KeyframeId keyframe);
   void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;
@@ -89,6 +96,7 @@ class Slam {
   KeyframeRule rule_;
   LocalMapper mapper_;
   BackgroundBundle bundle_;
+  LoopCloser closer_;
   std::int64_t clock_ = 0;                   ///< frames so far: logical time
   geometry::Rigid3 last_camera_from_world_;  ///< of the last tracked frame, in the map as it is now
   std::vector<maps::FramePose> frames_;

@@ -14,7 +14,7 @@
 namespace plumbline::places {
 
 struct RecogniserOptions {
-  double min_score = 0.25;    ///< eta, relative to the neighbour's score
+  double min_score = 0.25;  ///< eta, relative to the neighbour's score
   double min_absolute = 0.015;
   int consistent = 3;  ///< keyframes in a row that must see the same surroundings
   int hits = 30;       ///< best keyframes that are looked at

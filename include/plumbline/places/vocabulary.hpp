@@ -45,9 +45,7 @@ class Vocabulary {
   /// log(N / n_w): N features in the dictionary, n_w of them in the word; 0 for a word never seen.
   [[nodiscard]] double weight(Word word) const;
   [[nodiscard]] bool fixed() const { return fixed_; }
-  [[nodiscard]] bool is_word(Word node) const {
-    return nodes_[static_cast<std::size_t>(node)].children == 0;
-  }
+  [[nodiscard]] bool is_word(Word node) const { return nodes_[static_cast<std::size_t>(node)].children == 0; }
 
   // Learning; not for a fixed vocabulary.
   /// One more feature in `word`.

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plumbline/core/options.hpp"
@@ -68,6 +69,11 @@ class Tracker {
   void map_changed(const maps::Map& map, core::KeyframeId reference,
                    const geometry::Rigid3& last_camera_from_world);
 
+  /// Who knows which keyframes of the map look like a picture, best first. Asked when tracking is lost, beside
+  /// what the tracker finds by itself.
+  using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
+  void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
+
   /// How fast the camera turned between the last two frames, rad/s.
   [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
@@ -111,6 +117,7 @@ class Tracker {
   TrackerOptions options_;
   sensor::Pinhole camera_;
   LocalMap local_map_;
+  PlaceFinder find_places_;
   Last last_;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
   int lost_frames_ = 0;

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Closes loops (METHOD sections 5 and 6): every keyframe asks whether its place was seen before; what is
+// verified, several times in a row and consistently, becomes an edge of a robust pose graph; what that does
+// not take for wrong moves the map, doubles are merged, and everything is adjusted together.
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/place_verification.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/places/recogniser.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::mapping {
+
+struct LoopOptions {
+  bool enabled = false;
+  double min_gap_s = 3.0;     ///< keyframes made within this time are the present, not a loop
+  int agreeing = 2;           ///< verified keyframes, close to each other, that must say the same
+  double max_apart_m = 0.15;  ///< how far apart they may put the camera
+  double max_turned_rad = 0.06;
+  bool robust = true;  ///< the pose graph may take loops for wrong
+  bool bundle = true;  ///< adjust the whole map after a loop
+  std::uint64_t seed = 1;
+  std::string vocabulary_file;  ///< a trained vocabulary, fixed; empty: one that learns as it goes
+  std::shared_ptr<const places::Vocabulary> trained;  ///< what load() read
+  places::VocabularyOptions vocabulary;
+  places::RecogniserOptions places;
+  VerificationOptions verify;
+  FusionOptions fusion;
+  void declare(core::OptionTable& table);
+  /// Reads vocabulary_file, if one is named.
+  core::Result<void> load();
+};
+
+struct LoopCounts {
+  int candidates = 0;  ///< places that looked like one seen before and were verified
+  int verified = 0;    ///< with success
+  int accepted = 0;    ///< loops that moved the map
+  int rejected = 0;    ///< edges that the pose graph took for wrong
+};
+
+/// A verified pair of keyframes.
+struct Loop {
+  core::KeyframeId query;
+  core::KeyframeId match;
+  PlaceVerification evidence;
+};
+
+class LoopCloser {
+ public:
+  LoopCloser(const LoopOptions& options, const sensor::Pinhole& camera)
+      : options_(options),
+        camera_(camera),
+        database_(options.trained ? *options.trained : places::Vocabulary(options.vocabulary)),
+        recogniser_(options.places) {}
+
+  /// Asks for the place of a new keyframe of the map and adds it to the database. Loops that are sure enough
+  /// to be closed; mostly none.
+  std::vector<Loop> look(const maps::Map& map, core::KeyframeId keyframe);
+
+  /// Pose graph with these edges and those of earlier loops. When it believes one of the new edges: moves the
+  /// map, merges doubles around these, adjusts all. Returns whether the map was moved. Edges may come from
+  /// elsewhere too. Nothing must be under way that was taken from the map before.
+  bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
+
+  /// As an edge of the pose graph: where the query lies relative to the match.
+  static PoseEdge to_edge(const Loop& loop);
+
+  /// Keyframes of the map that a picture looks like, best first; for a tracker that is lost.
+  [[nodiscard]] std::vector<core::KeyframeId> look_alikes(const maps::Map& map,
+                                                          const features::FrameFeatures& picture,
+                                                          std::size_t count) const;
+
+  [[nodiscard]] const LoopCounts& counts() const { return counts_; }
+  /// Edges that closed a loop and are still believed.
+  [[nodiscard]] const std::vector<PoseEdge>& edges() const { return edges_; }
+  [[nodiscard]] const places::Database& database() const { return database_; }
+
+ private:
+  [[nodiscard]] std::vector<Loop> verify(const maps::Map& map, core::KeyframeId keyframe,
+                                         const std::vector<places::Candidate>& candidates);
+  [[nodiscard]] bool agree(const maps::Map& map, const Loop& a, const Loop& b) const;
+  void merge_doubles(maps::Map& map, const PoseEdge& edge) const;
+
+  LoopOptions options_;
+  sensor::Pinhole camera_;
+  places::Database database_;
+  places::Recogniser recogniser_;
+  core::KeyframeId last_;      ///< the keyframe before
+  std::vector<Loop> waiting_;  ///< verified lately, not yet confirmed by others
+  std::vector<PoseEdge> edges_;
+  LoopCounts counts_;
+};
+
+}  // namespace plumbline::mapping

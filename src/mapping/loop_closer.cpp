@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/loop_closer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+
+constexpr int kRelated = 5;         // shared landmarks: the same surroundings, not a loop
+constexpr std::size_t kAround = 8;  // keyframes on each side whose landmarks are compared
+constexpr int kPatience = 6;        // keyframes that a verified loop waits for another one
+
+std::vector<KeyframeId> neighbours_of(const maps::Map& map, KeyframeId id, std::size_t count) {
+  std::vector<KeyframeId> result;
+  if (!map.has_keyframe(id)) return result;
+  for (const auto& [other, shared] : map.covisible(id, 15)) {
+    if (result.size() >= count) break;
+    result.push_back(other);
+  }
+  return result;
+}
+
+/// The query's pose in the world, as the loop says.
+Rigid3 world_from_query(const maps::Map& map, const Loop& loop) {
+  return map.camera_from_world(loop.match).inverse() * loop.evidence.query_from_match.inverse();
+}
+
+}  // namespace
+
+void LoopOptions::declare(core::OptionTable& table) {
+  table.boolean("loops", enabled, "Recognise places and close loops");
+  table.number("loops.min_gap", min_gap_s, {0.0, 3600.0}, "s",
+               "Keyframes made within this time of each other never make a loop");
+  table.integer("loops.agreeing", agreeing, {1, 20}, "",
+                "Verified keyframes that must agree before a loop is closed");
+  table.number("loops.max_apart", max_apart_m, {0.0, 10.0}, "m", "How far apart they may put the camera");
+  table.number("loops.max_turned", max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
+  table.boolean("loops.bundle", bundle, "Adjust the whole map after a loop");
+  table.text("loops.vocabulary", vocabulary_file,
+             "Trained vocabulary file (plumbline vocabulary train); none: it learns from the keyframes");
+  vocabulary.declare(table);
+  places.declare(table);
+  verify.declare(table);
+}
+
+core::Result<void> LoopOptions::load() {
+  trained = nullptr;
+  if (!enabled || vocabulary_file.empty()) return {};
+  auto read = places::Vocabulary::read(vocabulary_file);
+  if (!read) return tl::unexpected<core::Error>(read.error());
+  trained = std::make_shared<const places::Vocabulary>(std::move(*read));
+  return {};
+}
+
+PoseEdge LoopCloser::to_edge(const Loop& loop) {
+  return {loop.match, loop.query, loop.evidence.query_from_match, loop.evidence.information, false};
+}
+
+std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
+                                     const std::vector<places::Candidate>& candidates) {
+  std::vector<Loop> verified;
+  for (const places::Candidate& candidate : candidates) {
+    if (candidate.in_a_row < options_.places.consistent) continue;
+    ++counts_.candidates;
+    Loop loop{keyframe, candidate.keyframe, {}};
+    const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(keyframe.index);
+    loop.evidence =
+        verify_place({&map, keyframe, camera_}, {&map, candidate.keyframe, camera_}, options_.verify, seed);
+    if (!loop.evidence.accepted) continue;
+    ++counts_.verified;
+    verified.push_back(std::move(loop));
+  }
+  return verified;
+}
+
+/// Both say the same about where the world of today lies in that of then, at the place of the second query.
+bool LoopCloser::agree(const maps::Map& map, const Loop& a, const Loop& b) const {
+  const Rigid3 then_from_now_a = world_from_query(map, a) * map.camera_from_world(a.query);
+  const Rigid3 by_a = then_from_now_a * map.camera_from_world(b.query).inverse();
+  const Rigid3 difference = by_a.inverse() * world_from_query(map, b);
+  return difference.translation.norm() <= options_.max_apart_m &&
+         geometry::rotation_angle(difference.rotation) <= options_.max_turned_rad;
+}
+
+std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
+  const auto& features = map.keyframe(keyframe).features;
+  if (features == nullptr) return {};
+  const auto related = map.covisible(keyframe, kRelated);
+  const double now = map.keyframe(keyframe).stamp;
+  const auto allowed = [&](KeyframeId id) {
+    if (!map.has_keyframe(id) || std::abs(now - map.keyframe(id).stamp) < options_.min_gap_s) return false;
+    return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
+  };
+  const auto neighbours = [&](KeyframeId id) { return neighbours_of(map, id, kAround); };
+  const auto candidates = recogniser_.look(database_, keyframe, *features, last_, allowed, neighbours);
+  const std::vector<Loop> verified = verify(map, keyframe, candidates);
+  database_.add(keyframe, features);
+  last_ = keyframe;
+
+  const auto gone = [&](const Loop& l) {
+    return keyframe.index - l.query.index > kPatience || !map.has_keyframe(l.query) ||
+           !map.has_keyframe(l.match);
+  };
+  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());
+  std::vector<Loop> sure;
+  for (const Loop& loop : verified) {
+    std::vector<Loop> together{loop};
+    for (const Loop& w : waiting_) {
+      if (w.query != loop.query && agree(map, w, loop)) together.push_back(w);
+    }
+    if (static_cast<int>(together.size()) >= options_.agreeing && sure.empty()) sure = std::move(together);
+  }
+  waiting_.insert(waiting_.end(), verified.begin(), verified.end());
+  if (!sure.empty()) waiting_.clear();
+  return sure;
+}
+
+void LoopCloser::merge_doubles(maps::Map& map, const PoseEdge& edge) const {
+  std::vector<KeyframeId> old_side = neighbours_of(map, edge.a, kAround);
+  old_side.insert(old_side.begin(), edge.a);
+  std::vector<KeyframeId> new_side = neighbours_of(map, edge.b, kAround);
+  new_side.insert(new_side.begin(), edge.b);
+  for (const KeyframeId id : new_side) {
+    std::vector<KeyframeId> others;
+    for (const KeyframeId other : old_side) {
+      if (other != id) others.push_back(other);
+    }
+    fuse_points(map, id, others, camera_, options_.fusion);
+    fuse_lines(map, id, others, camera_, options_.fusion);
+  }
+}
+
+bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
+  const auto gone = [&](const PoseEdge& e) { return !map.has_keyframe(e.a) || !map.has_keyframe(e.b); };
+  edges_.erase(std::remove_if(edges_.begin(), edges_.end(), gone), edges_.end());
+  std::vector<PoseEdge> all = edges_;
+  std::copy_if(edges.begin(), edges.end(), std::back_inserter(all),
+               [&](const PoseEdge& e) { return !gone(e); });
+  if (all.size() == edges_.size()) return false;
+
+  optimize::PoseGraphOptions graph;
+  graph.robust = options_.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
+  const MapGraphResult solved = solve_map_graph(map, all, graph, {});
+  if (!solved.summary.usable) return false;
+  std::vector<PoseEdge> believed;
+  std::vector<PoseEdge> fresh;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool wrong = i < solved.summary.edges.size() && solved.summary.edges[i].rejected;
+    if (wrong) {
+      ++counts_.rejected;
+      continue;
+    }
+    believed.push_back(all[i]);
+    if (i >= edges_.size()) fresh.push_back(all[i]);
+  }
+  edges_ = std::move(believed);
+  if (fresh.empty()) return false;
+
+  move_keyframes(map, solved.poses);
+  for (const PoseEdge& edge : fresh) merge_doubles(map, edge);
+  ++counts_.accepted;
+  if (options_.bundle) {
+    GlobalAdjustmentOptions adjustment;
+    adjustment.graph = graph;
+    adjustment.orb_scale_factor = options_.verify.orb_scale_factor;
+    const KeyframeId anchor{};
+    adjust_map(map, {{edges.front().b.robot, camera_}}, edges_, adjustment, anchor);
+  }
+  return true;
+}
+
+std::vector<KeyframeId> LoopCloser::look_alikes(const maps::Map& map, const features::FrameFeatures& picture,
+                                                std::size_t count) const {
+  std::vector<KeyframeId> result;
+  for (const places::Hit& hit :
+       database_.query(picture).best(count, [&](KeyframeId id) { return map.has_keyframe(id); })) {
+    result.push_back(hit.keyframe);
+  }
+  return result;
+}
+
+}  // namespace plumbline::mapping
