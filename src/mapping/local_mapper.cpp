@@ -6,14 +6,29 @@
 #include "plumbline/mapping/landmark_normal.hpp"
 
 namespace plumbline::mapping {
+namespace {
+
+/// Keyframes that share most landmarks with `id`.
+std::vector<core::KeyframeId> nearest(const maps::Map& map, core::KeyframeId id, int count) {
+  std::vector<core::KeyframeId> result;
+  for (const auto& [other, shared] : map.covisible(id, 15)) {
+    if (static_cast<int>(result.size()) < count) result.push_back(other);
+  }
+  return result;
+}
+
+}  // namespace
 
 void LocalMapperOptions::declare(core::OptionTable& table) {
   table.number("landmark.max_depth", max_landmark_depth_m, {0.5, 100.0}, "m",
                "Landmarks are made of depth up to here");
-  table.number("landmark.min_found", min_found_share, {0.0, 1.0}, "",
-               "Landmarks found in a smaller share of the frames that should see them are removed");
-  table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
-                "Frames that should have seen a landmark before it is judged");
+  culling.declare(table);
+  table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
+  triangulation.declare(table);
+  table.boolean("fuse", fuse, "Look for landmarks in neighbouring keyframes and merge doubles");
+  fusion.declare(table);
+  table.boolean("redundant", cull_keyframes, "Take redundant keyframes out of the map");
+  keyframe_culling.declare(table);
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
   table.number(
@@ -74,7 +89,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     point.found = 1;
     const core::PointId point_id = map.add_point(id.robot, point);
     map.observe(point_id, id, static_cast<int>(i));
-    recent_points_.push_back(point_id);
+    culler_.watch(point_id, id);
   }
 }
 
@@ -93,7 +108,7 @@ void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
     line.found = 1;
     const core::LineId line_id = map.add_line(id.robot, line);
     map.observe(line_id, id, static_cast<int>(i));
-    recent_lines_.push_back(line_id);
+    culler_.watch(line_id, id);
   }
 }
 
@@ -136,33 +151,30 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
   }
 }
 
-void LocalMapper::cull(maps::Map& map) {
-  const auto seldom = [&](int found, int visible) {
-    return visible >= options_.min_visible && found < options_.min_found_share * visible;
+void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id) {
+  // Pictures taken while turning fast are sheared: their rays lie.
+  const auto sheared = [&](core::KeyframeId k) {
+    return map.keyframe(k).turn_rate > options_.bundle_max_turn_rate;
   };
-  // A landmark is judged once it should have been seen often enough; then it stays.
-  std::vector<core::PointId> points;
-  for (core::PointId id : recent_points_) {
-    const maps::MapPoint* p = map.find_point(id);
-    if (p == nullptr) continue;
-    if (seldom(p->found, p->visible)) {
-      map.remove_point(id);
-    } else if (p->visible < 3 * options_.min_visible) {
-      points.push_back(id);
-    }
+  if (sheared(id)) return;
+  std::vector<core::KeyframeId> neighbours = nearest(map, id, options_.triangulation.keyframes);
+  neighbours.erase(std::remove_if(neighbours.begin(), neighbours.end(), sheared), neighbours.end());
+  const TriangulationOptions& how = options_.triangulation;
+  const double measured = options_.max_landmark_depth_m;
+  for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how))
+    culler_.watch(p, id);
+  for (core::LineId l : triangulate_lines(map, id, neighbours, measured, camera_, how)) culler_.watch(l, id);
+}
+
+void LocalMapper::refine(maps::Map& map, core::KeyframeId id) {
+  if (options_.triangulate) triangulate(map, id);
+  if (options_.fuse) {
+    const std::vector<core::KeyframeId> neighbours = nearest(map, id, options_.fusion.keyframes);
+    fuse_points(map, id, neighbours, camera_, options_.fusion);
+    fuse_lines(map, id, neighbours, camera_, options_.fusion);
   }
-  recent_points_ = std::move(points);
-  std::vector<core::LineId> lines;
-  for (core::LineId id : recent_lines_) {
-    const maps::MapLine* l = map.find_line(id);
-    if (l == nullptr) continue;
-    if (seldom(l->found, l->visible)) {
-      map.remove_line(id);
-    } else if (l->visible < 3 * options_.min_visible) {
-      lines.push_back(id);
-    }
-  }
-  recent_lines_ = std::move(lines);
+  culler_.judge(map, id);
+  if (options_.cull_keyframes) cull_keyframes(map, id, options_.keyframe_culling);
 }
 
 }  // namespace plumbline::mapping

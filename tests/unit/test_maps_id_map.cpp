@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -60,6 +61,23 @@ TEST(IdMap, IdsOfWhatIsGoneAreNotGivenAgain) {
   names.insert(names.next_id(0), "b");
   names.erase({0, 1});
   EXPECT_EQ(names.next_id(0), (PointId{0, 2}));
+}
+
+TEST(IdMap, WhatIsErasedMakesRoomForWhatIsNew) {
+  IdMap<PointId, std::shared_ptr<int>> map;
+  const auto value = std::make_shared<int>(1);
+  for (int i = 0; i < 100; ++i) {
+    map.insert(map.next_id(0), value);
+    if (i >= 4) map.erase({0, i - 4});
+  }
+  EXPECT_EQ(map.size(), 4U);
+  EXPECT_EQ(value.use_count(), 5) << "what is erased is let go";
+  const std::vector<PointId> expected{{0, 96}, {0, 97}, {0, 98}, {0, 99}};
+  EXPECT_EQ(map.ids(), expected);
+  const auto* kept = map.find({0, 96});
+  for (int i = 0; i < 1000; ++i) map.insert(map.next_id(1), nullptr);
+  EXPECT_EQ(map.find({0, 96}), kept) << "insertion moves nothing";
+  EXPECT_THROW(map.insert({0, -1}, nullptr), std::invalid_argument);
 }
 
 }  // namespace

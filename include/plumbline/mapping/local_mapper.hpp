@@ -7,6 +7,10 @@
 
 #include "plumbline/core/options.hpp"
 #include "plumbline/features/frame_features.hpp"
+#include "plumbline/mapping/keyframe_culling.hpp"
+#include "plumbline/mapping/landmark_culling.hpp"
+#include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/landmark_triangulation.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/frame.hpp"
@@ -17,8 +21,13 @@ namespace plumbline::mapping {
 
 struct LocalMapperOptions {
   double max_landmark_depth_m = 8.0;
-  double min_found_share = 0.3;
-  int min_visible = 10;
+  LandmarkCullingOptions culling;
+  bool triangulate = false;
+  TriangulationOptions triangulation;
+  bool fuse = false;
+  FusionOptions fusion;
+  bool cull_keyframes = false;
+  KeyframeCullingOptions keyframe_culling;
   bool bundle = true;
   int bundle_keyframes = 12;
   double bundle_max_turn_rate = 0.6;
@@ -33,7 +42,7 @@ struct LocalMapperOptions {
 class LocalMapper {
  public:
   LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera)
-      : options_(options), camera_(camera) {}
+      : options_(options), camera_(camera), culler_(options.culling) {}
 
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth.
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
@@ -49,17 +58,19 @@ class LocalMapper {
                          const geometry::Rigid3& depth_from_camera,
                          const std::vector<core::KeyframeId>& neighbours);
 
-  /// Removes landmarks that were made lately and are seldom found where they should be.
-  void cull(maps::Map& map);
+  /// What a new keyframe has to say about the map around it, in this order: landmarks without depth are
+  /// triangulated, doubles are fused, landmarks that did not prove themselves go, and so do keyframes that
+  /// others make redundant (never the new one).
+  void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:
   void add_points(maps::Map& map, core::KeyframeId keyframe);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
+  void triangulate(maps::Map& map, core::KeyframeId keyframe);
 
   LocalMapperOptions options_;
   sensor::Pinhole camera_;
-  std::vector<core::PointId> recent_points_;
-  std::vector<core::LineId> recent_lines_;
+  LandmarkCuller culler_;
 };
 
 }  // namespace plumbline::mapping

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// One thing in the world, one landmark: landmarks are looked for in the pictures of keyframes that should see
+// them and did not (METHOD section 3).
+#include <vector>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "plumbline/tracking/association.hpp"
+
+namespace plumbline::mapping {
+
+struct FusionOptions {
+  int keyframes = 10;      ///< neighbours, each way
+  double radius_px = 4.0;  ///< around the projection, at octave 0
+  tracking::AssociationOptions association;
+
+  void declare(core::OptionTable& table);
+};
+
+struct FusionSummary {
+  int observed = 0;  ///< observations that were missing
+  int merged = 0;    ///< landmarks that were doubles
+};
+
+/// Landmarks of `keyframe` are projected into each of `neighbours`, and the neighbours' landmarks into
+/// `keyframe`. Where one meets a feature that looks like it and lies where it lies, in the picture and in
+/// depth: a feature that sees nothing yet becomes an observation; one that sees another landmark shows that
+/// both are one, and the less seen is merged into the other. Two landmarks that one keyframe sees at
+/// different places never merge.
+FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
+                          const std::vector<core::KeyframeId>& neighbours, const sensor::Pinhole& camera,
+                          const FusionOptions& options);
+
+/// The same for lines. A merged line spans what both spanned.
+FusionSummary fuse_lines(maps::Map& map, core::KeyframeId keyframe,
+                         const std::vector<core::KeyframeId>& neighbours, const sensor::Pinhole& camera,
+                         const FusionOptions& options);
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/landmark_culling.hpp"
+
+namespace plumbline::mapping {
+
+constexpr int kMaxAge =
+    100;  // keyframes; who was hardly visible by then is watched no longer: the list stays short
+
+void LandmarkCullingOptions::declare(core::OptionTable& table) {
+  table.number("landmark.min_found", min_found_share, {0.0, 1.0}, "",
+               "Landmarks found in a smaller share of the frames that should see them are removed");
+  table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
+                "Frames that should have seen a landmark before that share is judged");
+  table.integer("landmark.min_keyframes", min_keyframes, {1, 100}, "",
+                "Landmarks that fewer keyframes see are removed after the grace time; 1: none");
+  table.integer("landmark.grace", grace_keyframes, {1, 1000}, "",
+                "Keyframes made after a landmark's own before it is judged by those that see it");
+}
+
+template <typename Landmark>
+LandmarkCuller::Verdict LandmarkCuller::verdict(const Landmark& landmark, int age) const {
+  if (landmark.visible >= options_.min_visible &&
+      landmark.found < options_.min_found_share * landmark.visible) {
+    return Verdict::kGo;
+  }
+  if (age < options_.grace_keyframes) return Verdict::kWait;
+  if (static_cast<int>(landmark.observations.size()) < options_.min_keyframes) return Verdict::kGo;
+  const bool well_known = landmark.visible >= 3 * options_.min_visible;
+  return well_known || age >= kMaxAge ? Verdict::kStay : Verdict::kWait;
+}
+
+int LandmarkCuller::judge(maps::Map& map, core::KeyframeId newest) {
+  int removed = 0;
+  const auto judge_all = [&](auto& watched, const auto& find, const auto& remove) {
+    std::size_t kept = 0;
+    for (const auto& w : watched) {
+      const auto* landmark = find(w.id);
+      if (landmark == nullptr) continue;  // merged, or gone with its keyframes
+      const Verdict v = verdict(*landmark, newest.index - w.born);
+      if (v == Verdict::kWait) watched[kept++] = w;
+      if (v != Verdict::kGo) continue;
+      remove(w.id);
+      ++removed;
+    }
+    watched.resize(kept);
+  };
+  judge_all(
+      points_, [&](core::PointId id) { return map.find_point(id); },
+      [&](core::PointId id) { map.remove_point(id); });
+  judge_all(
+      lines_, [&](core::LineId id) { return map.find_line(id); },
+      [&](core::LineId id) { map.remove_line(id); });
+  return removed;
+}
+
+}  // namespace plumbline::mapping

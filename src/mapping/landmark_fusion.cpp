@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/landmark_fusion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using core::PointId;
+
+constexpr double kPixelGate = 5.99;     // chi-square, 2 degrees of freedom, 95 %
+constexpr double kDepthSigmas = 3.0;    // between a landmark and a measured depth, and between landmarks
+constexpr double kSamePlace_px = 3.0F;  // corners of several octaves at one place are one corner
+
+const features::PointFeature& feature_of(const maps::Map& map, const maps::Observation& o) {
+  return map.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
+}
+
+bool seen_by(const maps::MapPoint& point, KeyframeId keyframe) {
+  return std::any_of(point.observations.begin(), point.observations.end(),
+                     [&](const maps::Observation& o) { return o.keyframe == keyframe; });
+}
+
+/// Landmarks that `from` see and `keyframe` does not; sorted, unique.
+std::vector<PointId> unseen_points(const maps::Map& map, const std::vector<KeyframeId>& from,
+                                   KeyframeId keyframe) {
+  std::vector<PointId> result;
+  for (KeyframeId id : from) {
+    for (PointId p : map.points_of(id)) {
+      if (p.valid()) result.push_back(p);
+    }
+  }
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  const auto seen = [&](PointId p) { return seen_by(map.point(p), keyframe); };
+  result.erase(std::remove_if(result.begin(), result.end(), seen), result.end());
+  return result;
+}
+
+/// Does the landmark lie where the feature saw something?
+bool fits(const maps::MapPoint& point, const features::PointFeature& f,
+          const geometry::Rigid3& camera_from_world, const sensor::Pinhole& camera, double scale_factor) {
+  const Eigen::Vector3d p = camera_from_world * point.position;
+  const double sigma = std::pow(scale_factor, f.octave);
+  if ((camera.project(p) - f.pixel.cast<double>()).squaredNorm() > kPixelGate * sigma * sigma) return false;
+  if (!(f.depth > 0.0F)) return true;
+  // The landmark's own depth is no better than the measurement.
+  const double depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(static_cast<double>(f.depth));
+  return std::abs(p.z() - static_cast<double>(f.depth)) < kDepthSigmas * depth_sigma;
+}
+
+/// No keyframe sees both at different places.
+bool may_be_one(const maps::Map& map, const maps::MapPoint& a, const maps::MapPoint& b) {
+  for (const maps::Observation& oa : a.observations) {
+    for (const maps::Observation& ob : b.observations) {
+      if (oa.keyframe != ob.keyframe) continue;
+      const Eigen::Vector2f apart = feature_of(map, oa).pixel - feature_of(map, ob).pixel;
+      if (static_cast<double>(apart.norm()) > kSamePlace_px) return false;
+    }
+  }
+  return true;
+}
+
+/// Both lie within the depth noise of the camera that sees them.
+bool close_together(const maps::MapPoint& a, const maps::MapPoint& b,
+                    const geometry::Rigid3& camera_from_world) {
+  const double z = (camera_from_world * a.position).z();
+  return (a.position - b.position).norm() < kDepthSigmas * std::sqrt(2.0) * sensor::depth_sigma(z);
+}
+
+void merge(maps::Map& map, PointId a, PointId b) {
+  const std::size_t na = map.point(a).observations.size();
+  const std::size_t nb = map.point(b).observations.size();
+  const bool keep_a = na != nb ? na > nb : a < b;
+  const PointId kept = keep_a ? a : b;
+  const PointId gone = keep_a ? b : a;
+  const auto wk = static_cast<double>(std::max(na, nb));
+  const auto wg = static_cast<double>(std::min(na, nb));
+  map.point(kept).position =
+      (wk * map.point(kept).position + wg * map.point(gone).position) / std::max(1.0, wk + wg);
+  map.merge_points(kept, gone);
+}
+
+void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId keyframe,
+               const sensor::Pinhole& camera, const FusionOptions& options, FusionSummary& summary) {
+  const geometry::Rigid3& pose = map.camera_from_world(keyframe);
+  const features::FrameFeatures& features = *map.keyframe(keyframe).features;
+  const auto matches = tracking::match_points(map, points, features, camera, pose, options.radius_px,
+                                              options.association, nullptr);
+  for (const tracking::PointMatch& m : matches) {
+    const maps::MapPoint* point = map.find_point(m.point);  // an earlier match may have merged it away
+    const features::PointFeature& f = features.points[static_cast<std::size_t>(m.feature)];
+    if (point == nullptr || seen_by(*point, keyframe) ||
+        !fits(*point, f, pose, camera, options.association.scale_factor)) {
+      continue;
+    }
+    const PointId other = map.point_of(keyframe, m.feature);
+    if (!other.valid()) {
+      map.observe(m.point, keyframe, m.feature);
+      map.refresh_point(m.point);
+      ++summary.observed;
+    } else if (close_together(*point, map.point(other), pose) && may_be_one(map, *point, map.point(other))) {
+      merge(map, m.point, other);
+      ++summary.merged;
+    }
+  }
+}
+
+}  // namespace
+
+void FusionOptions::declare(core::OptionTable& table) {
+  table.integer("fuse.keyframes", keyframes, {1, 50}, "",
+                "Neighbours in which a keyframe's landmarks are looked for, and the other way round");
+  table.number("fuse.radius", radius_px, {0.5, 50.0}, "px", "Around a landmark's projection");
+}
+
+FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,
+                          const sensor::Pinhole& camera, const FusionOptions& options) {
+  FusionSummary summary;
+  for (KeyframeId other : neighbours) {
+    fuse_into(map, unseen_points(map, {keyframe}, other), other, camera, options, summary);
+  }
+  fuse_into(map, unseen_points(map, neighbours, keyframe), keyframe, camera, options, summary);
+  return summary;
+}
+
+}  // namespace plumbline::mapping

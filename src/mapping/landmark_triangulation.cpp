@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/landmark_triangulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+
+constexpr double kReprojectionGate = 5.99;  // chi-square, 2 degrees of freedom, 95 %
+constexpr double kEpipolarGate_px = 2.0;    // at octave 0
+constexpr double kSamePlace_px = 3.0;       // corners of several octaves at one place are one corner
+constexpr double kMaxScaleChange = 1.8;     // of a corner's size in space, between its two pictures
+
+/// One keyframe with what the search needs of it.
+struct View {
+  const features::FrameFeatures& features;
+  const Rigid3& camera_from_world;
+  std::vector<int> free;  ///< corners that see no landmark and have no depth
+};
+
+View view_of(const maps::Map& map, KeyframeId id, double max_measured_m) {
+  View view{*map.keyframe(id).features, map.camera_from_world(id), {}};
+  for (std::size_t i = 0; i < view.features.points.size(); ++i) {
+    const auto depth = static_cast<double>(view.features.points[i].depth);
+    const bool measured = depth > 0.0 && depth <= max_measured_m;
+    if (!measured && !map.point_of(id, static_cast<int>(i)).valid()) view.free.push_back(static_cast<int>(i));
+  }
+  return view;
+}
+
+double angle_between(double a, double b) {
+  const double d = std::fmod(std::abs(a - b), 360.0);
+  return std::min(d, 360.0 - d);
+}
+
+class PairSearch {
+ public:
+  PairSearch(const View& first, const View& second, const sensor::Pinhole& camera,
+             const TriangulationOptions& options)
+      : a_(first), b_(second), camera_(camera), options_(options) {
+    b_from_a_ = b_.camera_from_world * a_.camera_from_world.inverse();
+    Eigen::Matrix3d inverse;
+    inverse << 1.0 / camera.fx, 0.0, -camera.cx / camera.fx, 0.0, 1.0 / camera.fy, -camera.cy / camera.fy,
+        0.0, 0.0, 1.0;
+    fundamental_ = inverse.transpose() * geometry::skew(b_from_a_.translation) * b_from_a_.rotation * inverse;
+    roll_deg_ = std::atan2(b_from_a_.rotation(1, 0), b_from_a_.rotation(0, 0)) * 180.0 / M_PI;
+  }
+
+  /// The corner of the second picture that corner `i` of the first is; -1: none that is clearly best.
+  [[nodiscard]] int partner(int i) const {
+    const features::PointFeature& f = a_.features.points[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d line = fundamental_ * f.pixel.cast<double>().homogeneous();
+    const double norm = line.head<2>().norm();
+    if (!(norm > 1e-12)) return -1;
+    int best = -1;
+    int best_distance = 257;
+    int second_distance = 257;
+    for (int j : b_.free) {
+      const features::PointFeature& g = b_.features.points[static_cast<std::size_t>(j)];
+      const double off = std::abs(line.dot(g.pixel.cast<double>().homogeneous())) / norm;
+      if (off > kEpipolarGate_px * sigma(g) || !alike(f, g)) continue;
+      const int distance = features::hamming_distance(a_.features.descriptors[static_cast<std::size_t>(i)],
+                                                      b_.features.descriptors[static_cast<std::size_t>(j)]);
+      const bool rival = best < 0 || (g.pixel - pixel_of(best)).norm() > kSamePlace_px;
+      if (distance < best_distance) {
+        if (rival) second_distance = best_distance;
+        best_distance = distance;
+        best = j;
+      } else if (rival && distance < second_distance) {
+        second_distance = distance;
+      }
+    }
+    // Strictly less: two that both look exactly alike are no clear case.
+    const bool clear =
+        best_distance <= options_.max_hamming && best_distance < options_.ratio * second_distance;
+    return clear ? best : -1;
+  }
+
+  /// Where the rays of both corners meet, in the first camera's frame; none when they do not, or too far away
+  /// to say where.
+  [[nodiscard]] std::optional<Eigen::Vector3d> meet(int i, int j) const {
+    const features::PointFeature& f = a_.features.points[static_cast<std::size_t>(i)];
+    const features::PointFeature& g = b_.features.points[static_cast<std::size_t>(j)];
+    const Eigen::Vector3d ray_a = ray(f);
+    const Eigen::Vector3d ray_b = b_from_a_.rotation.transpose() * ray(g);
+    const Eigen::Vector3d centre_b = b_from_a_.inverse().translation;
+    const double parallax = std::atan2(ray_a.cross(ray_b).norm(), ray_a.dot(ray_b));
+    const double ray_sigma = std::hypot(sigma(f), sigma(g)) / camera_.fx;
+    if (!(ray_sigma < options_.max_relative_sigma * parallax)) return std::nullopt;
+    // Nearest points of the two rays: s along a, t along b.
+    const double c = ray_a.dot(ray_b);
+    const double da = ray_a.dot(centre_b);
+    const double db = ray_b.dot(centre_b);
+    const double s = (da - c * db) / (1.0 - c * c);
+    const double t = (c * da - db) / (1.0 - c * c);
+    if (!(s > 0.1) || !(t > 0.1)) return std::nullopt;
+    const Eigen::Vector3d point = 0.5 * (s * ray_a + centre_b + t * ray_b);
+    if (!(point.z() > 0.1) || point.z() > options_.max_depth_m) return std::nullopt;
+    const Eigen::Vector3d in_b = b_from_a_ * point;
+    if (!(in_b.z() > 0.1) || !fits(point, f) || !fits(in_b, g)) return std::nullopt;
+    const double size_a = point.norm() * std::pow(options_.scale_factor, f.octave);
+    const double size_b = in_b.norm() * std::pow(options_.scale_factor, g.octave);
+    if (std::abs(std::log(size_a / size_b)) > std::log(kMaxScaleChange)) return std::nullopt;
+    return point;
+  }
+
+ private:
+  [[nodiscard]] double sigma(const features::PointFeature& f) const {
+    return std::pow(options_.scale_factor, f.octave);
+  }
+  [[nodiscard]] const Eigen::Vector2f& pixel_of(int j) const {
+    return b_.features.points[static_cast<std::size_t>(j)].pixel;
+  }
+  [[nodiscard]] bool alike(const features::PointFeature& f, const features::PointFeature& g) const {
+    constexpr int kMaxOctaves = 2;
+    return std::abs(f.octave - g.octave) <= kMaxOctaves &&
+           angle_between(static_cast<double>(f.angle) + roll_deg_, static_cast<double>(g.angle)) <=
+               options_.max_angle_rad * 180.0 / M_PI;
+  }
+  [[nodiscard]] Eigen::Vector3d ray(const features::PointFeature& f) const {
+    return camera_.unproject(static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), 1.0)
+        .normalized();
+  }
+  [[nodiscard]] bool fits(const Eigen::Vector3d& in_camera, const features::PointFeature& f) const {
+    const double s = sigma(f);
+    return (camera_.project(in_camera) - f.pixel.cast<double>()).squaredNorm() < kReprojectionGate * s * s;
+  }
+
+  const View& a_;
+  const View& b_;
+  const sensor::Pinhole& camera_;
+  const TriangulationOptions& options_;
+  Rigid3 b_from_a_;
+  Eigen::Matrix3d fundamental_;  ///< line in b = F * homogeneous pixel of a
+  double roll_deg_ = 0.0;
+};
+
+core::PointId add_landmark(maps::Map& map, KeyframeId keyframe, int feature,
+                           const Eigen::Vector3d& in_camera) {
+  const features::FrameFeatures& features = *map.keyframe(keyframe).features;
+  const features::PointFeature& f = features.points[static_cast<std::size_t>(feature)];
+  maps::MapPoint point;
+  point.position = map.camera_from_world(keyframe).inverse() * in_camera;
+  point.descriptor = features.descriptors[static_cast<std::size_t>(feature)];
+  point.angle = f.angle;
+  point.angle_keyframe = keyframe;
+  point.reference_distance = in_camera.norm();
+  point.reference_octave = f.octave;
+  point.visible = 1;
+  point.found = 1;
+  const core::PointId id = map.add_point(keyframe.robot, point);
+  map.observe(id, keyframe, feature);
+  return id;
+}
+
+}  // namespace
+
+void TriangulationOptions::declare(core::OptionTable& table) {
+  table.integer("triangulate.keyframes", keyframes, {1, 50}, "", "Neighbours that are searched");
+  table.integer("triangulate.max_hamming", max_hamming, {1, 256}, "bit",
+                "Point descriptors may differ by so many bits");
+  table.number("triangulate.max_sigma", max_relative_sigma, {0.001, 1.0}, "",
+               "Standard deviation of a triangulated depth over that depth, at most");
+  table.integer("triangulate.line_views", min_line_views, {2, 10}, "",
+                "Keyframes that must agree about a line without depth");
+}
+
+std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyframe,
+                                              const std::vector<KeyframeId>& neighbours,
+                                              double max_measured_m, const sensor::Pinhole& camera,
+                                              const TriangulationOptions& options) {
+  std::vector<core::PointId> made;
+  for (KeyframeId other : neighbours) {
+    const View a = view_of(map, keyframe, max_measured_m);
+    const View b = view_of(map, other, max_measured_m);
+    const PairSearch search(a, b, camera, options);
+    for (int i : a.free) {
+      const int j = search.partner(i);
+      if (j < 0 || map.point_of(other, j).valid()) continue;
+      const auto point = search.meet(i, j);
+      if (!point) continue;
+      const core::PointId id = add_landmark(map, keyframe, i, *point);
+      map.observe(id, other, j);
+      map.refresh_point(id);
+      made.push_back(id);
+    }
+  }
+  return made;
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Landmarks that deserve to stay: triangulated, fused and judged in worlds of known truth.
+#include <gtest/gtest.h>
+
+#include "landmark_world.hpp"
+#include "plumbline/mapping/keyframe_culling.hpp"
+#include "plumbline/mapping/landmark_culling.hpp"
+#include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/landmark_normal.hpp"
+#include "plumbline/mapping/landmark_triangulation.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using tests::LandmarkWorld;
+using tests::looking_from;
+
+TEST(LandmarkNormal, IsThatOfTheSurfaceUnderIt) {
+  LandmarkWorld world(1, 0, 0);
+  world.add_wall(2.0);
+  const KeyframeId id = world.add_keyframe({});
+  const SurfaceNormals normals(world.map.keyframe(id).surface, world.camera);
+  EXPECT_LT((normals.at({0.3, 0.2, 2.004}) + Eigen::Vector3d::UnitZ()).norm(), 1e-6);
+  EXPECT_TRUE(normals.at({0.3, 0.2, 1.7}).isZero()) << "it floats in front of the wall";
+  EXPECT_TRUE(normals.at({0.3, 0.2, -2.0}).isZero()) << "behind the camera";
+  EXPECT_TRUE(normals.at({30.0, 0.2, 2.0}).isZero()) << "out of the picture";
+  const std::vector<maps::SurfaceSample> none;
+  EXPECT_TRUE(SurfaceNormals(none, world.camera).at({0.0, 0.0, 2.0}).isZero());
+}
+
+TEST(LandmarkNormal, AnEdgeHasNone) {
+  LandmarkWorld world(1, 0, 0);
+  for (double a = 0.02; a < 0.3; a += 0.02) {  // two walls that meet at a right angle in x = 0
+    for (double y = -0.3; y < 0.3; y += 0.02) {
+      const auto wall = [&](double side) {
+        world.surface.push_back({Eigen::Vector3d(side * a, y, 2.0 + a).cast<float>(),
+                                 Eigen::Vector3d(side, 0.0, -1.0).normalized().cast<float>(), 0.005F});
+      };
+      wall(1.0);
+      wall(-1.0);
+    }
+  }
+  const KeyframeId id = world.add_keyframe({});
+  const SurfaceNormals normals(world.map.keyframe(id).surface, world.camera);
+  EXPECT_TRUE(normals.at({0.0, 0.0, 2.0}).isZero());
+  EXPECT_LT((normals.at({0.2, 0.0, 2.2}) - Eigen::Vector3d(1.0, 0.0, -1.0).normalized()).norm(), 1e-6);
+}
+
+TEST(Triangulation, FindsPointsWithoutDepth) {
+  LandmarkWorld world(2, 80, 0);
+  world.depth = false;
+  world.pixel_noise = 0.4;
+  const KeyframeId a = world.add_keyframe(looking_from(0.0));
+  const KeyframeId b = world.add_keyframe(looking_from(0.4));
+  const auto made = triangulate_points(world.map, b, {a}, 8.0, world.camera, {});
+  EXPECT_GT(made.size(), 60U);
+  for (core::PointId id : made) {
+    const maps::MapPoint& p = world.map.point(id);
+    ASSERT_EQ(p.observations.size(), 2U);
+    EXPECT_EQ(p.observations[0].feature, p.observations[1].feature) << "a wrong match";
+    const Eigen::Vector3d& truth = world.points[static_cast<std::size_t>(p.observations[0].feature)];
+    EXPECT_LT((p.position - truth).norm(), 0.06 * truth.norm());
+  }
+  EXPECT_TRUE(triangulate_points(world.map, b, {a}, 8.0, world.camera, {}).size() < 10U)
+      << "they are known now";
+}
+
+TEST(Triangulation, LeavesAloneWhatHasDepthAndWhatCannotBeKnown) {
+  LandmarkWorld measured(2, 40, 12);
+  const KeyframeId a = measured.add_keyframe(looking_from(0.0));
+  const KeyframeId b = measured.add_keyframe(looking_from(0.4));
+  const KeyframeId c = measured.add_keyframe(looking_from(0.2, 0.3));
+  EXPECT_TRUE(triangulate_points(measured.map, b, {a}, 8.0, measured.camera, {}).empty());
+  EXPECT_TRUE(triangulate_lines(measured.map, c, {a, b}, 8.0, measured.camera, {}).empty());
+  EXPECT_GT(triangulate_points(measured.map, b, {a}, 1.0, measured.camera, {}).size(), 30U)
+      << "beyond the range that is trusted";
+
+  LandmarkWorld still(3, 40, 12);
+  still.depth = false;
+  const KeyframeId d = still.add_keyframe(looking_from(0.0));
+  const KeyframeId e = still.add_keyframe(looking_from(0.005));
+  const KeyframeId same = still.add_keyframe(looking_from(0.0));
+  EXPECT_TRUE(triangulate_points(still.map, e, {d}, 8.0, still.camera, {}).empty()) << "hardly moved";
+  EXPECT_TRUE(triangulate_points(still.map, same, {d}, 8.0, still.camera, {}).empty()) << "not moved at all";
+  EXPECT_TRUE(triangulate_lines(still.map, same, {d, e}, 8.0, still.camera, {}).empty());
+  EXPECT_TRUE(triangulate_points(still.map, e, {}, 8.0, still.camera, {}).empty());
+}
+
+TEST(Triangulation, DoublesThatLookAlikeAreNotTrusted) {
+  LandmarkWorld world(4, 30, 0);
+  world.depth = false;
+  for (auto& d : world.point_descriptors) d = world.point_descriptors.front();
+  world.points[1] = world.points[0] + Eigen::Vector3d(0.2, 0.0, 0.0);  // on one epipolar line
+  const KeyframeId a = world.add_keyframe(looking_from(0.0));
+  const KeyframeId b = world.add_keyframe(looking_from(0.4));
+  triangulate_points(world.map, b, {a}, 8.0, world.camera, {});
+  EXPECT_FALSE(world.map.point_of(b, 0).valid());
+  EXPECT_FALSE(world.map.point_of(b, 1).valid());
+}
+
+TEST(Triangulation, LinesNeedThreeViewsThatAgree) {
+  LandmarkWorld world(5, 0, 25);
+  world.depth = false;
+  world.pixel_noise = 0.3;
+  const KeyframeId a = world.add_keyframe(looking_from(0.0));
+  const KeyframeId b = world.add_keyframe(looking_from(0.3, 0.25));
+  EXPECT_TRUE(triangulate_lines(world.map, b, {a}, 8.0, world.camera, {}).empty())
+      << "two planes always meet";
+  const KeyframeId c = world.add_keyframe(looking_from(-0.2, 0.3));
+  const auto made = triangulate_lines(world.map, c, {a, b}, 8.0, world.camera, {});
+  EXPECT_GT(made.size(), 10U);
+  for (core::LineId id : made) {
+    const maps::MapLine& l = world.map.line(id);
+    ASSERT_GE(l.observations.size(), 3U);
+    const auto& [start, end] = world.lines[static_cast<std::size_t>(l.observations[0].feature)];
+    const geometry::PluckerLine truth = geometry::line_through(start, end);
+    EXPECT_LT((l.start - geometry::nearest_point(truth, l.start)).norm(), 0.1);
+    EXPECT_LT((l.end - geometry::nearest_point(truth, l.end)).norm(), 0.1);
+    for (const maps::Observation& o : l.observations) EXPECT_EQ(o.feature, l.observations[0].feature);
+  }
+}
+
+TEST(Fusion, AddsObservationsThatWereMissingBothWays) {
+  LandmarkWorld world(6, 60, 15);
+  const KeyframeId a = world.add_keyframe(looking_from(0.0));
+  const KeyframeId b = world.add_keyframe(looking_from(0.1));
+  for (std::size_t i = 0; i < 60; ++i) world.add_point(i, {i < 30 ? a : b});
+  for (std::size_t i = 0; i < 15; ++i) world.add_line(i, {i < 7 ? a : b});
+  const FusionSummary points = fuse_points(world.map, b, {a}, world.camera, {});
+  EXPECT_GT(points.observed, 50);
+  EXPECT_EQ(points.merged, 0);
+  EXPECT_EQ(world.map.shared(a, b), points.observed);
+  const FusionSummary lines = fuse_lines(world.map, b, {a}, world.camera, {});
+  EXPECT_GT(lines.observed, 10);
+  for (core::PointId id : world.map.point_ids()) {
+    for (const maps::Observation& o : world.map.point(id).observations) EXPECT_EQ(o.feature, id.index);
+  }
+}
+
+TEST(Fusion, MergesDoublesIntoTheBetterSeen) {
+  LandmarkWorld world(7, 60, 15);
+  const KeyframeId a = world.add_keyframe(looking_from(0.0));
+  const KeyframeId b = world.add_keyframe(looking_from(0.1));
+  const KeyframeId c = world.add_keyframe(looking_from(0.2));
+  const Eigen::Vector3d error(0.002, 0.0, 0.004);
+  for (std::size_t i = 0; i < 60; ++i) world.add_point(i, {a, b});
+  for (std::size_t i = 0; i < 60; ++i) world.add_point(i, {c}, error);
+  for (std::size_t i = 0; i < 15; ++i) world.add_line(i, {a, b});
+  for (std::size_t i = 0; i < 15; ++i) world.add_line(i, {c}, error);
+  const FusionSummary points = fuse_points(world.map, c, {a, b}, world.camera, {});
+  EXPECT_GT(points.merged, 50);
+  EXPECT_EQ(world.map.point_count(), static_cast<std::size_t>(120 - points.merged));
+  const FusionSummary lines = fuse_lines(world.map, c, {a, b}, world.camera, {});
+  EXPECT_GT(lines.merged, 10);
+  for (core::PointId id : world.map.point_ids()) {
+    if (world.map.point(id).observations.size() < 3) continue;
+    EXPECT_LT(id.index, 60) << "the one that more keyframes see stays";
+    EXPECT_LT((world.map.point(id).position - world.points[static_cast<std::size_t>(id.index)]).norm(),
+              0.002);
+  }
+}
+
+TEST(Fusion, NeighboursInSpaceOrInOnePictureStayTwo) {
+  LandmarkWorld world(8, 2, 0);
+  world.points = {{0.0, 0.0, 2.0}, {0.0, 0.0, 2.0}};
+  world.point_descriptors[1] = world.point_descriptors[0];
+  const KeyframeId a = world.add_keyframe(looking_from(0.0));
+  const KeyframeId b = world.add_keyframe(looking_from(0.05));
+  const core::PointId near = world.add_point(0, {a});
+  const core::PointId far = world.add_point(1, {b}, {0.0, 0.0, 0.6});  // on the same ray of no camera but a's
+  EXPECT_EQ(fuse_points(world.map, b, {a}, world.camera, {}).merged, 0) << "60 cm behind it";
+  EXPECT_NE(world.map.find_point(near), nullptr);
+  EXPECT_NE(world.map.find_point(far), nullptr);
+
+  LandmarkWorld pair(9, 2, 0);  // two corners 1.5 cm (4 px) apart that look the same, both in one picture
+  pair.points = {{0.0, 0.0, 2.0}, {0.015, 0.0, 2.0}};
+  pair.point_descriptors[1] = pair.point_descriptors[0];
+  const KeyframeId c = pair.add_keyframe(looking_from(0.0));
+  const KeyframeId d = pair.add_keyframe(looking_from(0.05));
+  pair.add_point(0, {c, d});
+  pair.add_point(1, {c});
+  EXPECT_EQ(fuse_points(pair.map, d, {c}, pair.camera, {}).merged, 0);
+  EXPECT_EQ(pair.map.point_count(), 2U);
+}
+
+TEST(LandmarkCuller, KeepsWhatIsSeenAndFound) {
+  LandmarkWorld world(10, 10, 4);
+  std::vector<KeyframeId> k;
+  for (int i = 0; i < 8; ++i) k.push_back(world.add_keyframe(looking_from(0.05 * i)));
+  LandmarkCullingOptions options;
+  options.min_keyframes = 3;
+  options.grace_keyframes = 5;
+  LandmarkCuller culler(options);
+  const core::PointId good = world.add_point(0, {k[0], k[1], k[2]});
+  const core::PointId seldom = world.add_point(1, {k[0], k[1], k[2]});
+  const core::PointId few = world.add_point(2, {k[0], k[1]});
+  const core::PointId young = world.add_point(3, {k[4]});
+  const core::LineId good_line = world.add_line(0, {k[0], k[1], k[2]});
+  const core::LineId few_line = world.add_line(1, {k[0]});
+  for (core::PointId id : {good, seldom, few}) culler.watch(id, k[0]);
+  culler.watch(young, k[4]);
+  for (core::LineId id : {good_line, few_line}) culler.watch(id, k[0]);
+  for (core::PointId id : {good, seldom, few}) {
+    world.map.point(id).visible = 20;
+    world.map.point(id).found = id == seldom ? 5 : 6;
+  }
+  EXPECT_EQ(culler.judge(world.map, k[4]), 1) << "found in less than 30 %: at once";
+  EXPECT_EQ(world.map.find_point(seldom), nullptr);
+  EXPECT_NE(world.map.find_point(few), nullptr) << "within the grace time";
+  EXPECT_EQ(culler.judge(world.map, k[5]), 2);
+  EXPECT_EQ(world.map.find_point(few), nullptr);
+  EXPECT_EQ(world.map.find_line(few_line), nullptr);
+  EXPECT_NE(world.map.find_point(good), nullptr);
+  EXPECT_NE(world.map.find_line(good_line), nullptr);
+  EXPECT_NE(world.map.find_point(young), nullptr);
+  world.map.remove_point(young);  // gone by other means
+  EXPECT_EQ(culler.judge(world.map, {0, 140}), 0) << "who passed stays";
+  world.map.point(good).found = 0;
+  EXPECT_EQ(culler.judge(world.map, {0, 141}), 0) << "and is not judged again";
+}
+
+/// Eight keyframes close together, all of which see all points, and a wall.
+LandmarkWorld crowded(std::uint32_t seed) {
+  LandmarkWorld world(seed, 60, 6);
+  world.add_wall(2.5);
+  std::vector<KeyframeId> k;
+  for (int i = 0; i < 12; ++i) k.push_back(world.add_keyframe(looking_from(0.02 * i)));
+  for (std::size_t i = 0; i < 60; ++i) world.add_point(i, k);
+  for (std::size_t i = 0; i < 6; ++i) world.add_line(i, k);
+  return world;
+}
+
+TEST(KeyframeCulling, RedundantOnesGoTheRestStays) {
+  LandmarkWorld world = crowded(11);
+  const auto gone = cull_keyframes(world.map, {0, 11}, {});
+  EXPECT_GE(gone.size(), 3U);
+  EXPECT_TRUE(world.map.has_keyframe({0, 0})) << "it holds the map's place";
+  for (int i = 7; i < 12; ++i) EXPECT_TRUE(world.map.has_keyframe({0, i})) << i;
+  for (core::PointId id : world.map.point_ids()) EXPECT_GE(world.map.point(id).observations.size(), 3U);
+  EXPECT_EQ(world.map.point_count(), 60U);
+  for (KeyframeId id : gone) {
+    EXPECT_LT(tests::distance(world.map.pose_of(id), looking_from(0.02 * id.index)), 1e-12);
+  }
+}
+
+TEST(KeyframeCulling, WhatOthersDoNotSeeKeepsAKeyframe) {
+  LandmarkWorld landmarks = crowded(12);
+  for (std::size_t i = 0; i < 12; ++i) {
+    for (int k = 0; k < 12; ++k) {
+      if (k != 4) landmarks.map.unobserve(core::PointId{0, static_cast<int>(i)}, {0, k});
+    }
+  }
+  EXPECT_LT(redundant_landmarks(landmarks.map, {0, 4}, 3), 0.85);
+  EXPECT_GT(redundant_landmarks(landmarks.map, {0, 5}, 3), 0.99);
+  cull_keyframes(landmarks.map, {0, 11}, {});
+  EXPECT_TRUE(landmarks.map.has_keyframe({0, 4}));
+
+  LandmarkWorld surface(13, 60, 0);
+  std::vector<KeyframeId> k;
+  for (int i = 0; i < 12; ++i) {
+    surface.surface.clear();
+    surface.add_wall(2.5);
+    if (i == 4) surface.add_wall(1.2, 0.4);  // only keyframe 4 measured what is in front
+    k.push_back(surface.add_keyframe(looking_from(0.02 * i)));
+  }
+  for (std::size_t i = 0; i < 60; ++i) surface.add_point(i, k);
+  EXPECT_LT(covered_surface(surface.map, k[4], k, 2), 0.9);
+  EXPECT_GT(covered_surface(surface.map, k[5], k, 2), 0.95);
+  const auto gone = cull_keyframes(surface.map, k.back(), {});
+  EXPECT_FALSE(gone.empty());
+  EXPECT_TRUE(surface.map.has_keyframe(k[4]));
+}
+
+TEST(KeyframeCulling, ALonelyKeyframeStays) {
+  LandmarkWorld world(14, 4, 0);
+  world.add_keyframe(looking_from(0.0));
+  for (int i = 1; i < 10; ++i) world.add_keyframe(looking_from(9.0 * i));
+  EXPECT_TRUE(cull_keyframes(world.map, {0, 9}, {}).empty());
+  EXPECT_EQ(redundant_landmarks(world.map, {0, 1}, 3), 1.0) << "nothing speaks for it";
+}
+
+}  // namespace
+}  // namespace plumbline::mapping

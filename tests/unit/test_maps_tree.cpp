@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Keyframes that leave, landmarks that turn out to be one, and the spanning tree.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/maps/memory.hpp"
+#include "random_world.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using geometry::Rigid3;
+using tests::Random;
+
+KeyframeId add_keyframe(Map& map, const Rigid3& pose, std::int32_t robot = 0) {
+  auto features = std::make_shared<features::FrameFeatures>();
+  features->points.resize(40);
+  features->descriptors.resize(40);
+  features->lines.resize(10);
+  auto keyframe = std::make_shared<Keyframe>();
+  keyframe->id = map.next_keyframe_id(robot);
+  keyframe->stamp = 0.5 * keyframe->id.index;
+  keyframe->features = features;
+  return map.add_keyframe(keyframe, pose);
+}
+
+/// Adds `count` points that all of `keyframes` see, with their first features that are still free.
+std::vector<PointId> share(Map& map, const std::vector<KeyframeId>& keyframes, int count) {
+  std::vector<PointId> result;
+  for (int i = 0; i < count; ++i) {
+    result.push_back(map.add_point(0, {}));
+    for (KeyframeId k : keyframes) {
+      int feature = 0;
+      while (map.point_of(k, feature).valid()) ++feature;
+      map.observe(result.back(), k, feature);
+    }
+  }
+  return result;
+}
+
+/// Every keyframe is reached from exactly one root, and parents and children agree.
+void expect_tree(const Map& map, std::size_t roots) {
+  std::size_t without_parent = 0;
+  std::size_t children = 0;
+  for (KeyframeId id : map.keyframe_ids()) {
+    children += map.children(id).size();
+    for (KeyframeId child : map.children(id)) {
+      ASSERT_TRUE(map.has_keyframe(child));
+      ASSERT_EQ(map.parent(child), id);
+    }
+    std::size_t steps = 0;
+    KeyframeId k = id;
+    for (; map.parent(k).valid(); k = map.parent(k)) {
+      ASSERT_TRUE(map.has_keyframe(map.parent(k)));
+      ASSERT_LE(++steps, map.keyframe_count()) << "a cycle";
+    }
+    without_parent += k == id ? 1U : 0U;
+  }
+  EXPECT_EQ(without_parent, roots);
+  EXPECT_EQ(children + roots, map.keyframe_count());
+}
+
+TEST(MapTree, HangsOnWhoSharesMostOrOnTheLastOne) {
+  Map map;
+  const KeyframeId a = add_keyframe(map, {});
+  map.attach(a);
+  EXPECT_FALSE(map.parent(a).valid()) << "the first is a root";
+  const KeyframeId b = add_keyframe(map, {});
+  map.attach(b);
+  EXPECT_EQ(map.parent(b), a) << "nothing in common: the last one";
+  const KeyframeId c = add_keyframe(map, {});
+  share(map, {a, c}, 5);
+  share(map, {b, c}, 3);
+  map.attach(c);
+  EXPECT_EQ(map.parent(c), a);
+  EXPECT_EQ(map.children(a), (std::vector<KeyframeId>{b, c}));
+  map.attach(a);
+  EXPECT_FALSE(map.parent(a).valid()) << "never on a later one";
+  EXPECT_THROW(map.set_parent(a, c), std::invalid_argument) << "a cycle";
+  EXPECT_THROW(map.set_parent(a, a), std::invalid_argument);
+  EXPECT_THROW(map.set_parent(c, c), std::invalid_argument);
+  map.set_parent(c, b);
+  EXPECT_EQ(map.children(a), (std::vector<KeyframeId>{b}));
+  expect_tree(map, 1);
+}
+
+TEST(MapTree, WhatHungOnItGoesToParentOrSister) {
+  Map map;
+  std::vector<KeyframeId> k;
+  for (int i = 0; i < 5; ++i) k.push_back(add_keyframe(map, {}));
+  map.set_parent(k[1], k[0]);
+  for (int i = 2; i < 5; ++i) map.set_parent(k[static_cast<std::size_t>(i)], k[1]);
+  share(map, {k[0], k[3]}, 8);
+  share(map, {k[3], k[4]}, 4);
+  share(map, {k[0], k[4]}, 2);
+  map.remove_keyframe(k[1]);
+  EXPECT_FALSE(map.has_keyframe(k[1]));
+  EXPECT_EQ(map.parent(k[3]), k[0]);
+  EXPECT_EQ(map.parent(k[4]), k[3]) << "shares more with the sister than with the parent";
+  EXPECT_EQ(map.parent(k[2]), k[0]) << "shares nothing: the parent";
+  expect_tree(map, 1);
+  EXPECT_EQ(map.next_keyframe_id(0), (KeyframeId{0, 5})) << "ids are not given again";
+}
+
+TEST(MapTree, ARemovedRootIsFollowedByItsFirstChild) {
+  Map map;
+  const KeyframeId a = add_keyframe(map, {});
+  EXPECT_THROW(map.remove_keyframe(a), std::invalid_argument) << "the only one";
+  EXPECT_THROW(map.remove_keyframe({0, 7}), std::out_of_range);
+  const KeyframeId b = add_keyframe(map, {});
+  const KeyframeId c = add_keyframe(map, {});
+  map.set_parent(b, a);
+  map.set_parent(c, a);
+  map.remove_keyframe(a);
+  EXPECT_FALSE(map.parent(b).valid());
+  EXPECT_EQ(map.parent(c), b);
+  EXPECT_EQ(map.retired(a).heir, b);
+  expect_tree(map, 1);
+}
+
+TEST(MapTree, WhatIsGoneMovesWithItsHeir) {
+  Random random(4);
+  Map map;
+  std::vector<Rigid3> pose;
+  for (int i = 0; i < 4; ++i) {
+    pose.push_back(random.pose(1.0, 2.0));
+    const KeyframeId id = add_keyframe(map, pose.back());
+    if (i > 0) map.set_parent(id, {0, i - 1});
+  }
+  const Rigid3 frame_from_third = random.pose(0.3, 0.2);
+  const std::vector<FramePose> frames{{1.1, {0, 3}, frame_from_third, true}};
+  const Rigid3 before = frame_from_third * pose[3];
+  map.remove_keyframe({0, 3});
+  map.remove_keyframe({0, 2});  // itself an heir: what hung on it goes on to the next
+  EXPECT_EQ(map.retired({0, 3}).heir, (KeyframeId{0, 1}));
+  ASSERT_EQ(map.retired_ids().size(), 2U);
+  EXPECT_LT(tests::distance(map.pose_of({0, 3}), pose[3]), 1e-12);
+  EXPECT_LT(tests::distance(map.pose_of({0, 2}), pose[2]), 1e-12);
+  ASSERT_EQ(trajectory(frames, map).size(), 1U);
+  EXPECT_LT(tests::distance(trajectory(frames, map)[0].world_from_camera.inverse(), before), 1e-12);
+
+  const Rigid3 correction = random.pose(0.5, 1.0);  // of the world
+  map.set_pose({0, 1}, pose[1] * correction);
+  EXPECT_LT(tests::distance(map.pose_of({0, 3}), pose[3] * correction), 1e-12);
+  EXPECT_LT(tests::angle(map.pose_of({0, 3}), pose[3] * correction), 1e-7);
+  EXPECT_LT(tests::distance(trajectory(frames, map)[0].world_from_camera.inverse(), before * correction),
+            1e-12);
+  const geometry::Trajectory all = keyframe_trajectory(map);
+  ASSERT_EQ(all.size(), 4U) << "clouds hang on those that are gone, too";
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(all[i].stamp, 0.5 * static_cast<double>(i));
+}
+
+TEST(MapTree, ObservationsLandmarksAndEdgesGoWithTheKeyframe) {
+  Map map;
+  const KeyframeId a = add_keyframe(map, {});
+  const KeyframeId b = add_keyframe(map, {});
+  const KeyframeId c = add_keyframe(map, {});
+  const std::vector<PointId> alone = share(map, {b}, 2);
+  const std::vector<PointId> both = share(map, {a, b}, 3);
+  const LineId line = map.add_line(0, {});
+  const LineId lonely = map.add_line(0, {});
+  map.observe(line, b, 0);
+  map.observe(line, c, 0);
+  map.observe(lonely, b, 1);
+  for (const auto& [from, to] : {std::pair{a, b}, {a, c}, {b, c}}) {
+    SurfaceEdge edge;
+    edge.a = from;
+    edge.b = to;
+    map.add_edge(edge);
+  }
+  map.remove_keyframe(b);
+  for (PointId p : alone) EXPECT_EQ(map.find_point(p), nullptr);
+  for (PointId p : both) {
+    ASSERT_NE(map.find_point(p), nullptr);
+    EXPECT_EQ(map.point(p).observations.size(), 1U);
+    EXPECT_EQ(map.point(p).angle_keyframe, a) << "a picture that is gone has no roll to count from";
+  }
+  EXPECT_NE(map.find_line(line), nullptr);
+  EXPECT_EQ(map.find_line(lonely), nullptr);
+  EXPECT_EQ(map.shared(a, c), 0);
+  EXPECT_TRUE(map.covisible(a, 1).empty());
+  ASSERT_EQ(map.edges_of(a).size(), 1U);
+  EXPECT_EQ(map.edges_of(a)[0].b, c);
+  EXPECT_EQ(map.edges_of(c).size(), 1U);
+}
+
+TEST(MapMerge, ObservationsAndCountsMove) {
+  Map map;
+  const KeyframeId a = add_keyframe(map, {});
+  const KeyframeId b = add_keyframe(map, {});
+  const KeyframeId c = add_keyframe(map, {});
+  MapPoint made;
+  made.visible = 4;
+  made.found = 3;
+  const PointId p = map.add_point(0, made);
+  made.normal = Eigen::Vector3d::UnitX();
+  const PointId q = map.add_point(0, made);
+  map.observe(p, a, 0);
+  map.observe(p, b, 0);
+  map.observe(q, b, 1);
+  map.observe(q, c, 1);
+  map.merge_points(p, q);
+  EXPECT_EQ(map.find_point(q), nullptr);
+  EXPECT_EQ(map.point(p).observations.size(), 3U);
+  EXPECT_EQ(map.point(p).visible, 8);
+  EXPECT_EQ(map.point(p).found, 6);
+  EXPECT_EQ(map.point(p).normal, Eigen::Vector3d::UnitX());
+  EXPECT_EQ(map.point_of(c, 1), p);
+  EXPECT_EQ(map.point_of(b, 0), p) << "its own feature stays";
+  EXPECT_FALSE(map.point_of(b, 1).valid()) << "the other is free again";
+  EXPECT_EQ(map.shared(a, c), 1);
+  EXPECT_THROW(map.merge_points(p, p), std::invalid_argument);
+  EXPECT_THROW(map.merge_points(p, q), std::out_of_range);
+  EXPECT_EQ(map.point(p).observations.size(), 3U);
+
+  const LineId l = map.add_line(0, {});
+  const LineId m = map.add_line(0, {});
+  map.observe(l, a, 0);
+  map.observe(m, a, 1);
+  map.observe(m, c, 1);
+  map.merge_lines(l, m);
+  EXPECT_EQ(map.find_line(m), nullptr);
+  EXPECT_EQ(map.line_of(c, 1), l);
+  EXPECT_FALSE(map.line_of(a, 1).valid());
+  EXPECT_THROW(map.merge_lines(l, l), std::invalid_argument);
+}
+
+TEST(MapTree, StaysATreeUnderRandomRemovals) {
+  Random random(11);
+  Map map;
+  std::set<int> alive;
+  for (int i = 0; i < 60; ++i) {
+    const KeyframeId id = add_keyframe(map, random.pose(0.5, 1.0));
+    for (int j : alive) {
+      if (random.integer(0, 3) == 0) share(map, {id, {0, j}}, 1);
+    }
+    map.attach(id);
+    alive.insert(i);
+    if (i % 2 == 1) {
+      auto victim = alive.begin();
+      std::advance(victim, random.integer(0, static_cast<int>(alive.size()) - 1));
+      map.remove_keyframe({0, *victim});
+      alive.erase(victim);
+    }
+  }
+  expect_tree(map, 1);
+  EXPECT_EQ(map.keyframe_count(), 30U);
+  EXPECT_EQ(every_keyframe(map).size(), 60U);
+  for (KeyframeId id : map.retired_ids()) EXPECT_TRUE(map.has_keyframe(map.retired(id).heir));
+}
+
+/// What a real picture gives: 1000 corners, 150 lines with depth, small pictures, 1600 pieces of surface.
+KeyframeId add_full_keyframe(Map& map) {
+  auto features = std::make_shared<features::FrameFeatures>();
+  features->points.resize(1000);
+  features->descriptors.resize(1000);
+  features->lines.resize(150);
+  for (auto& line : features->lines) line.line3.emplace();
+  features->grid = features::PointGrid(features->points, 640, 480);
+  features->thumbnail.create(60, features::kThumbnailWidth, CV_32FC1);
+  features->thumbnail_depth.create(60, features::kThumbnailWidth, CV_32FC1);
+  auto keyframe = std::make_shared<Keyframe>();
+  keyframe->id = map.next_keyframe_id(0);
+  keyframe->features = features;
+  keyframe->surface.resize(1600);
+  return map.add_keyframe(keyframe, {});
+}
+
+TEST(MapMemory, AFullKeyframeWithoutItsLandmarksStaysBelowAQuarterOfAMegabyte) {
+  Map map;
+  std::vector<KeyframeId> keyframes;
+  constexpr int kKeyframes = 12;
+  for (int k = 0; k < kKeyframes; ++k) keyframes.push_back(add_full_keyframe(map));
+  // All corners and lines are landmarks that four keyframes see; neighbours share and are aligned.
+  for (int k = 0; k + 4 <= kKeyframes; k += 4) {
+    for (int i = 0; i < 1000; ++i) {
+      const PointId p = map.add_point(0, {});
+      for (int j = k; j < k + 4; ++j) map.observe(p, {0, j}, i);
+    }
+    for (int i = 0; i < 150; ++i) {
+      const LineId l = map.add_line(0, {});
+      for (int j = k; j < k + 4; ++j) map.observe(l, {0, j}, i);
+    }
+  }
+  for (int k = 1; k < kKeyframes; ++k) {
+    for (int j = std::max(0, k - 5); j < k; ++j) {
+      SurfaceEdge edge;
+      edge.a = {0, j};
+      edge.b = {0, k};
+      map.add_edge(edge);
+    }
+  }
+  for (KeyframeId id : keyframes) {
+    const KeyframeMemory memory = memory_of(map, id);
+    EXPECT_LE(memory.features + memory.surface + memory.links, 250000U);
+    EXPECT_GT(memory.features, 100000U) << "an estimate that forgets the features proves nothing";
+    EXPECT_GT(memory.surface, 40000U);
+    EXPECT_GT(memory.links, 10000U);
+    EXPECT_GT(memory.landmarks, 30000U);
+    EXPECT_EQ(memory.total(), memory.features + memory.surface + memory.links + memory.landmarks);
+  }
+}
+
+}  // namespace
+}  // namespace plumbline::maps
