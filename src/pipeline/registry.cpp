@@ -13,7 +13,14 @@ void register_stages(StageRegistry& registry) {
   registry.add(poses_stage());
   registry.add(cloud_stage());
   registry.add(fuse_stage());
+  registry.add(filter_stage());
   registry.add(output_stage());
+  registry.add_tap(frame_tap());
+  registry.add_tap(features_tap());
+  registry.add_tap(track_tap());
+  registry.add_tap(keyframe_cloud_tap());
+  registry.add_tap(map_tap());
+  registry.add_tap(cloud_tap());
 }
 
 void count_frames(const std::vector<FrameRow>& rows, RunSummary& summary) {

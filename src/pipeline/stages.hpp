@@ -17,7 +17,16 @@ StageType track_stage();
 StageType poses_stage();
 StageType cloud_stage();
 StageType fuse_stage();
+StageType filter_stage();
 StageType output_stage();
+
+/// Taps, one a port type: tap_<name>.cpp.
+StageType frame_tap();
+StageType features_tap();
+StageType track_tap();
+StageType keyframe_cloud_tap();
+StageType map_tap();
+StageType cloud_tap();
 
 /// Counts tracked and lost frames and the longest run of lost ones.
 void count_frames(const std::vector<FrameRow>& rows, RunSummary& summary);
