@@ -14,11 +14,12 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-/// One keyframe after another, by what the tracker has seen in between. Far weaker than landmarks and
-/// surfaces: it keeps those together that have neither, and along a corridor that nothing else measures.
-Matrix6d weak_chain() {
-  constexpr double kSigma_m = 0.03;
-  constexpr double kSigma_rad = 0.02;
+/// One keyframe after another, by what the tracker has seen in between. Weaker than landmarks and surfaces:
+/// it holds keyframes that have neither, those taken while turning, and the length of a corridor that nothing
+/// else measures.
+Matrix6d chain_information() {
+  constexpr double kSigma_m = 0.01;
+  constexpr double kSigma_rad = 0.007;
   geometry::Vector6d diagonal;
   diagonal << Eigen::Vector3d::Constant(1.0 / (kSigma_m * kSigma_m)),
       Eigen::Vector3d::Constant(1.0 / (kSigma_rad * kSigma_rad));
@@ -66,7 +67,9 @@ class GlobalBuilder {
   void add_points() {
     const std::vector<core::PointId> ids = map_.point_ids();
     std::vector<int> sightings;
-    for (const core::PointId id : ids) sightings.push_back(calm_views(map_.point(id).observations));
+    for (const core::PointId id : ids) {
+      sightings.push_back(static_cast<int>(map_.point(id).observations.size()));
+    }
     for (const auto& [order, id] : by_sightings(ids, sightings)) {
       if (wanted(map_.point(id).observations, options_.observations)) add(map_.point(id));
     }
@@ -75,7 +78,9 @@ class GlobalBuilder {
     std::fill(tied_.begin(), tied_.end(), 0);
     const std::vector<core::LineId> ids = map_.line_ids();
     std::vector<int> sightings;
-    for (const core::LineId id : ids) sightings.push_back(calm_views(map_.line(id).observations));
+    for (const core::LineId id : ids) {
+      sightings.push_back(static_cast<int>(map_.line(id).observations.size()));
+    }
     for (const auto& [order, id] : by_sightings(ids, sightings)) {
       if (wanted(map_.line(id).observations, options_.observations)) add(map_.line(id));
     }
@@ -85,7 +90,8 @@ class GlobalBuilder {
     for (const KeyframeId id : bundle_.keyframes) {
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
         if (edge.b != id) continue;  // each edge once, at its newer end
-        add_edge(edge.a, edge.b, edge.b_from_a, edge.information);
+        const double unrest2 = unrest(edge.a) * unrest(edge.b);
+        add_edge(edge.a, edge.b, edge.b_from_a, options_.surface_weight / unrest2 * edge.information);
         ++count;
       }
     }
@@ -96,7 +102,9 @@ class GlobalBuilder {
       const KeyframeId a = bundle_.keyframes[i - 1];
       const KeyframeId b = bundle_.keyframes[i];
       if (a.robot != b.robot) continue;
-      add_edge(a, b, map_.camera_from_world(b) * map_.camera_from_world(a).inverse(), weak_chain());
+      const double unrest2 = unrest(a) * unrest(b);
+      add_edge(a, b, map_.camera_from_world(b) * map_.camera_from_world(a).inverse(),
+               unrest2 * unrest2 * chain_information());
     }
   }
   void add_edge(KeyframeId a, KeyframeId b, const Rigid3& b_from_a, const Matrix6d& information) {
@@ -105,17 +113,15 @@ class GlobalBuilder {
   GlobalBundle take() { return std::move(bundle_); }
 
  private:
-  [[nodiscard]] bool calm(KeyframeId id) const {
-    return map_.keyframe(id).turn_rate <= options_.max_turn_rate;
-  }
-  [[nodiscard]] int calm_views(const std::vector<maps::Observation>& seen) const {
-    return static_cast<int>(std::count_if(seen.begin(), seen.end(),
-                                          [&](const maps::Observation& o) { return calm(o.keyframe); }));
+  /// What standard deviations of a keyframe's measurements are multiplied by.
+  [[nodiscard]] double unrest(KeyframeId id) const {
+    const double ratio = map_.keyframe(id).turn_rate / options_.turn_rate;
+    return std::hypot(1.0, ratio * ratio);
   }
   bool wanted(const std::vector<maps::Observation>& seen, int enough) {
     bool any = false;
     for (const maps::Observation& o : seen) {
-      any = any || (calm(o.keyframe) && tied_[static_cast<std::size_t>(index_.at(o.keyframe))] < enough);
+      any = any || tied_[static_cast<std::size_t>(index_.at(o.keyframe))] < enough;
     }
     if (!any) return false;
     for (const maps::Observation& o : seen) ++tied_[static_cast<std::size_t>(index_.at(o.keyframe))];
@@ -135,16 +141,15 @@ class GlobalBuilder {
     bundle_.points.push_back(point.id);
     bundle_.problem.points.push_back(point.position);
     for (const maps::Observation& o : point.observations) {
-      if (!calm(o.keyframe)) continue;
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
       optimize::BundlePointObservation seen;
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
-      seen.pixel_sigma = std::pow(options_.orb_scale_factor, f.octave);
+      seen.pixel_sigma = unrest(o.keyframe) * std::pow(options_.orb_scale_factor, f.octave);
       seen.pixel = pixel(o.keyframe, f.pixel, seen.pixel_sigma);
       seen.depth = static_cast<double>(f.depth);
-      seen.depth_sigma = f.depth > 0.0F ? sensor::depth_sigma(seen.depth) : 1.0;
+      seen.depth_sigma = f.depth > 0.0F ? unrest(o.keyframe) * sensor::depth_sigma(seen.depth) : 1.0;
       bundle_.problem.point_observations.push_back(seen);
       bundle_.point_seen.push_back(o.keyframe);
     }
@@ -154,13 +159,12 @@ class GlobalBuilder {
     bundle_.lines.push_back(line.id);
     bundle_.problem.lines.push_back(geometry::line_through(line.start, line.end));
     for (const maps::Observation& o : line.observations) {
-      if (!calm(o.keyframe)) continue;
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
       optimize::BundleLineObservation seen;
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
-      seen.pixel_sigma = 0.6;
+      seen.pixel_sigma = 0.6 * unrest(o.keyframe);
       double sigma = seen.pixel_sigma;
       seen.start = pixel(o.keyframe, f.segment.start, seen.pixel_sigma);
       seen.end = pixel(o.keyframe, f.segment.end, sigma);
@@ -168,8 +172,8 @@ class GlobalBuilder {
         seen.has_depth = true;
         seen.start_camera = f.line3->start;
         seen.end_camera = f.line3->end;
-        seen.start_sigma = std::max(0.003, std::sqrt(f.line3->start_covariance.trace()));
-        seen.end_sigma = std::max(0.003, std::sqrt(f.line3->end_covariance.trace()));
+        seen.start_sigma = unrest(o.keyframe) * std::max(0.003, std::sqrt(f.line3->start_covariance.trace()));
+        seen.end_sigma = unrest(o.keyframe) * std::max(0.003, std::sqrt(f.line3->end_covariance.trace()));
       }
       bundle_.problem.line_observations.push_back(seen);
       bundle_.line_seen.push_back(o.keyframe);
@@ -269,6 +273,10 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
                 "Iterations of each round of the adjustment at most");
   table.integer("adjust.rounds", bundle_options.rounds, {1, 10}, "",
                 "Rounds of the adjustment; between them outliers are put aside");
+  table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
+               "Weight of the map's surface edges");
+  table.number("adjust.turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
+               "What a picture says counts for half when the camera turned this fast");
   table.choice<optimize::EdgeRobustness>(
       "adjust.robust", graph.robust,
       {{"none", optimize::EdgeRobustness::kNone}, {"graduated", optimize::EdgeRobustness::kGraduated}},

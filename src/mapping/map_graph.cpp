@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pose graph of a map, and what moves when keyframes do.
 #include <algorithm>
-#include <stdexcept>
+#include <cmath>
 
 #include "plumbline/mapping/global_adjustment.hpp"
 
@@ -12,14 +12,14 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-// How well the map knows a relative pose: of keyframes that share a landmark (falls with the root of their
-// number, down to the floor), and of one keyframe after another, which the tracker has seen through.
-constexpr double kLandmarkSigma_m = 0.03;
-constexpr double kLandmarkSigma_rad = 0.02;
-constexpr double kFloorSigma_m = 0.003;
-constexpr double kFloorSigma_rad = 0.002;
-constexpr double kNextSigma_m = 0.01;
-constexpr double kNextSigma_rad = 0.01;
+// How well the map knows a relative pose: of keyframes that share many landmarks (with fewer it grows with
+// the root), and of one keyframe after another, which the tracker has seen through. Generous: errors of
+// neighbours are alike and add up to drift, which a loop must be allowed to take out.
+constexpr double kSigma_m = 0.015;
+constexpr double kSigma_rad = 0.01;
+constexpr double kMany = 100.0;  // landmarks
+constexpr double kNextSigma_m = 0.02;
+constexpr double kNextSigma_rad = 0.015;
 
 Matrix6d information(double metres, double radians) {
   geometry::Vector6d diagonal;
@@ -29,9 +29,8 @@ Matrix6d information(double metres, double radians) {
 }
 
 Matrix6d information_of_shared(int shared) {
-  const double root = std::sqrt(static_cast<double>(std::max(1, shared)));
-  return information(std::max(kFloorSigma_m, kLandmarkSigma_m / root),
-                     std::max(kFloorSigma_rad, kLandmarkSigma_rad / root));
+  const double grown = std::sqrt(std::max(1.0, kMany / std::max(1, shared)));
+  return information(grown * kSigma_m, grown * kSigma_rad);
 }
 
 /// Collects edges between pairs of keyframes, each pair once, as the map has them now.

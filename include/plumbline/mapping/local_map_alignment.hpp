@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Local maps and how they lie to each other. A local map is the fused surface of a few keyframes that follow
+// one another; local maps that overlap, revisits included, are aligned by point-to-plane ICP, both ways at
+// once, weighted with the depth noise. Directions that the surfaces do not hold (along a corridor, within a
+// wall) are neither moved nor claimed to be known.
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/types.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::mapping {
+
+/// Surface of one keyframe (its camera frame) or of one local map (its anchor's): about one sample per voxel
+/// and direction.
+using CoarseSurface = std::vector<maps::SurfaceSample>;
+
+/// Thins a keyframe's cloud (camera frame, normals towards the camera; points without normal are passed over)
+/// to the mean of each voxel, apart for surfaces that face different ways. In order of voxels.
+CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m);
+
+struct LocalMapOptions {
+  int keyframes = 6;        ///< in one local map at most
+  double distance_m = 0.4;  ///< from a local map's first keyframe; beyond, the next local map begins
+  double angle_rad = 0.6;
+  double voxel_m = 0.03;
+  void declare(core::OptionTable& table);
+};
+
+struct LocalMap {
+  core::KeyframeId anchor;                ///< the middle one of `members`
+  std::vector<core::KeyframeId> members;  ///< by id
+  CoarseSurface surface;                  ///< anchor's camera frame
+};
+
+/// Cuts each robot's keyframes, by id, into local maps. Keyframes without a surface are passed over.
+std::vector<LocalMap> make_local_maps(const maps::Map& map,
+                                      const std::map<core::KeyframeId, CoarseSurface>& surfaces,
+                                      const LocalMapOptions& options);
+
+/// Nearest neighbours among the samples of a surface.
+class SurfaceIndex {
+ public:
+  /// `reach_m`: the largest distance that will be asked for.
+  SurfaceIndex(CoarseSurface surface, double reach_m);
+  [[nodiscard]] const CoarseSurface& samples() const { return samples_; }
+  /// The sample nearest to `point`, within `distance_m`, that faces the same way (cosine of at least
+  /// `min_cosine`); null: none.
+  [[nodiscard]] const maps::SurfaceSample* nearest(const Eigen::Vector3f& point,
+                                                   const Eigen::Vector3f& normal, float distance_m,
+                                                   float min_cosine) const;
+
+ private:
+  struct Cell {
+    std::uint64_t key = 0;
+    std::uint32_t begin = 0;
+    std::uint32_t end = 0;
+  };
+  [[nodiscard]] const Cell* find(std::uint64_t key) const;
+
+  float cell_m_;
+  CoarseSurface samples_;  ///< by cell
+  std::vector<Cell> cells_;
+  std::vector<std::uint32_t> table_;  ///< open addressing: index into cells_ + 1, 0 = free
+};
+
+struct AlignmentOptions {
+  int samples = 900;         ///< of each surface that are matched, spread over the directions they face
+  double distance_m = 0.10;  ///< between matched samples at first; falls to half
+  int max_iterations = 20;
+  double min_cosine = 0.8;   ///< between the normals of matched samples
+  double min_overlap = 0.3;  ///< share of the samples that must fit
+  double max_rms = 5.0;      ///< of these, in standard deviations
+  double max_shift_m = 0.3;  ///< alignments that move further are not believed
+  double max_turn_rad = 0.2;
+  double min_hold = 0.02;     ///< share of the normals, squared, that a direction needs to count as held
+  double correlation = 0.15;  ///< samples count by this much: noise of neighbours is alike
+  double floor_m = 0.0012;    ///< what no alignment of this sensor knows better
+  void declare(core::OptionTable& table);
+};
+
+/// b_from_a as the two surfaces say.
+struct SurfaceAlignment {
+  geometry::Rigid3 b_from_a;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();  ///< of log(estimate * b_from_a^-1)
+  int held = 0;  ///< directions of six that the surfaces hold: the rank of `information`
+  int inliers = 0;
+  double overlap = 0.0;  ///< share of the surface with more of it in the other's reach that fits
+  double rms = 0.0;      ///< of the inliers, in standard deviations
+  double shift_m = 0.0;  ///< how far the middle of the matched samples moved
+  double turn_rad = 0.0;
+  int iterations = 0;
+  std::string refused;  ///< why it must not be used; empty: it may
+};
+
+/// Point-to-plane ICP, symmetric, robust (Tukey, scale by the median), from `b_from_a`. Deterministic.
+SurfaceAlignment align_surfaces(const SurfaceIndex& a, const SurfaceIndex& b,
+                                const geometry::Rigid3& b_from_a, const AlignmentOptions& options);
+
+struct PairOptions {
+  double min_overlap = 0.25;  ///< share of the smaller local map's coarse voxels that both fill
+  int per_map = 8;            ///< pairs of each local map at most, those that overlap most first
+  double voxel_m = 0.2;       ///< coarse, so that local maps that drifted apart are still found
+  void declare(core::OptionTable& table);
+};
+
+struct LocalMapPair {
+  std::size_t a = 0;  ///< index into the local maps, a < b
+  std::size_t b = 0;
+  double overlap = 0.0;
+};
+
+/// Which local maps overlap at their present poses, whenever they were made; by a, then b.
+std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vector<LocalMap>& local_maps,
+                                            const PairOptions& options);
+
+/// Alignments of `pairs`, in their order, from the present poses. Side by side; the same for any number of
+/// threads.
+std::vector<SurfaceAlignment> align_pairs(const maps::Map& map, const std::vector<LocalMap>& local_maps,
+                                          const std::vector<LocalMapPair>& pairs,
+                                          const AlignmentOptions& options, const core::Executor& executor);
+
+/// What may be used of them, between the anchors.
+std::vector<PoseEdge> to_edges(const std::vector<LocalMap>& local_maps,
+                               const std::vector<LocalMapPair>& pairs,
+                               const std::vector<SurfaceAlignment>& alignments);
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// refine: after the last frame, local maps are aligned with each other and the whole map is adjusted.
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class RefineStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.boolean("icp", icp_, "Align the surfaces of local maps that overlap, revisits included");
+    table.boolean("adjust", adjust_, "Adjust all keyframes and landmarks together, with these alignments");
+    local_maps_.declare(table);
+    pairs_.declare(table);
+    alignment_.declare(table);
+    adjustment_.declare(table);
+  }
+  core::Result<void> start(const RunContext& context) override {
+    executor_ = context.executor;
+    log_ = context.log;
+    camera_ = context.source->camera().color;
+    return {};
+  }
+  /// Only a coarse surface of each keyframe stays.
+  core::Result<void> process(StageIo& io) override {
+    if (!icp_ || !adjust_) return {};
+    const auto keyframe = io.input<KeyframeCloud>("cloud");
+    if (!keyframe->id.valid()) return {};
+    surfaces_[keyframe->id] = mapping::coarse_surface(*keyframe->cloud, local_maps_.voxel_m);
+    return {};
+  }
+
+  core::Result<void> finish(StageIo& io) override {
+    const auto before = io.input<MapResult>("map");
+    auto result = std::make_shared<MapResult>(*before);
+    if (adjust_ && before->map != nullptr && before->map->keyframe_count() > 1) {
+      auto map = std::make_shared<maps::Map>(*before->map);
+      refine(*map);
+      result->map = map;
+      take_poses_from_map(*result);
+    }
+    surfaces_.clear();
+    io.output<MapResult>("map", result);
+    return {};
+  }
+
+  void summarise(RunSummary& summary) const override { summary.refine = counts_; }
+
+ private:
+  void refine(maps::Map& map) {
+    std::vector<mapping::PoseEdge> edges;
+    if (icp_) edges = align(map);
+    mapping::Cameras cameras;
+    for (const core::KeyframeId id : map.keyframe_ids()) cameras[id.robot] = camera_;
+    const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras, edges, adjustment_);
+    counts_.rejected = static_cast<std::size_t>(summary.rejected);
+    counts_.mean_shift_m = summary.mean_shift_m;
+    counts_.max_shift_m = summary.max_shift_m;
+    if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
+    log_->debug(
+        fmt::format("refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments; moved "
+                    "by {:.1f} mm on average, {:.1f} mm at most",
+                    summary.keyframes, summary.points, summary.lines, summary.surface_edges, edges.size(),
+                    1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
+  }
+
+  std::vector<mapping::PoseEdge> align(const maps::Map& map) {
+    const auto local_maps = mapping::make_local_maps(map, surfaces_, local_maps_);
+    const auto pairs = mapping::overlapping_pairs(map, local_maps, pairs_);
+    const auto alignments = mapping::align_pairs(map, local_maps, pairs, alignment_, *executor_);
+    auto edges = mapping::to_edges(local_maps, pairs, alignments);
+    counts_.local_maps = local_maps.size();
+    counts_.tried = pairs.size();
+    counts_.accepted = edges.size();
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const mapping::SurfaceAlignment& a = alignments[i];
+      if (a.refused.empty()) counts_.mean_rms += a.rms / static_cast<double>(edges.size());
+      log_->debug(
+          fmt::format("refine: local maps {} and {}: overlap {:.2f}, {} samples, rms {:.2f}, {} "
+                      "directions held, moved by {:.1f} mm{}{}",
+                      pairs[i].a, pairs[i].b, a.overlap, a.inliers, a.rms, a.held, 1e3 * a.shift_m,
+                      a.refused.empty() ? "" : "; not used: ", a.refused));
+    }
+    return edges;
+  }
+
+  const core::Executor* executor_ = nullptr;
+  core::Log* log_ = nullptr;
+  sensor::Pinhole camera_;
+  bool icp_ = true;
+  bool adjust_ = true;
+  mapping::LocalMapOptions local_maps_;
+  mapping::PairOptions pairs_;
+  mapping::AlignmentOptions alignment_;
+  mapping::GlobalAdjustmentOptions adjustment_;
+  std::map<core::KeyframeId, mapping::CoarseSurface> surfaces_;
+  RunSummary::Refine counts_;
+};
+
+}  // namespace
+
+StageType refine_stage() {
+  return {"refine",
+          "Aligns local maps with each other and adjusts the whole map once more",
+          Mode::kSerial,
+          {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
+          {{"map", map_port()}},
+          [] { return std::make_unique<RefineStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Surfaces of known shape, moved against each other by a known step.
+#include <gtest/gtest.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <cstring>
+#include <limits>
+
+#include "plumbline/mapping/local_map_alignment.hpp"
+#include "random_world.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+using geometry::Vector6d;
+using tests::Random;
+
+constexpr float kNoise_m = 0.004F;
+
+/// Samples of the rectangle corner + s u + t v, s and t in [0, 1], each its own draw of noise along the
+/// normal.
+void add_wall(CoarseSurface& surface, const Eigen::Vector3f& corner, const Eigen::Vector3f& u,
+              const Eigen::Vector3f& v, Random& random, int samples = 1500) {
+  const Eigen::Vector3f normal = u.cross(v).normalized();
+  for (int i = 0; i < samples; ++i) {
+    const auto s = static_cast<float>(random.uniform(0.0, 1.0));
+    const auto t = static_cast<float>(random.uniform(0.0, 1.0));
+    const auto noise = static_cast<float>(random.normal(static_cast<double>(kNoise_m)));
+    surface.push_back({corner + s * u + t * v + noise * normal, normal, kNoise_m});
+  }
+}
+
+/// Two walls that face each other and a floor: 3 m long in x, nothing along it.
+CoarseSurface corridor(Random& random) {
+  CoarseSurface surface;
+  add_wall(surface, {-1.5F, -1, 1}, {3, 0, 0}, {0, 0, 2}, random);
+  add_wall(surface, {-1.5F, 1, 1}, {0, 0, 2}, {3, 0, 0}, random);
+  add_wall(surface, {-1.5F, -1, 3}, {3, 0, 0}, {0, 2, 0}, random);
+  return surface;
+}
+CoarseSurface dead_end(Random& random) {
+  CoarseSurface surface = corridor(random);
+  add_wall(surface, {1.5F, -1, 1}, {0, 0, 2}, {0, 2, 0}, random);
+  return surface;
+}
+CoarseSurface moved(const CoarseSurface& surface, const Rigid3& target_from_surface) {
+  CoarseSurface result;
+  for (const maps::SurfaceSample& s : surface) {
+    result.push_back({(target_from_surface * s.point.cast<double>()).cast<float>(),
+                      (target_from_surface.rotation * s.normal.cast<double>()).cast<float>(), s.sigma});
+  }
+  return result;
+}
+
+TEST(AlignSurfaces, FindsTheStepBetweenTwoViewsOfOneCorner) {
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    Random random(seed);
+    const Rigid3 truth = random.pose(0.5, 1.0);
+    const SurfaceIndex a(dead_end(random), 0.1);
+    const SurfaceIndex b(moved(dead_end(random), truth), 0.1);
+    const SurfaceAlignment found = align_surfaces(a, b, random.step(0.04, 0.02) * truth, {});
+    EXPECT_EQ(found.refused, "") << "seed " << seed;
+    EXPECT_EQ(found.held, 6);
+    EXPECT_GT(found.overlap, 0.8);
+    EXPECT_NEAR(found.rms, 1.0, 0.3);
+    EXPECT_LT(tests::angle(found.b_from_a, truth), 0.001);
+    EXPECT_LT((found.b_from_a * Eigen::Vector3d(0, 0, 2) - truth * Eigen::Vector3d(0, 0, 2)).norm(), 0.001);
+    const Vector6d error = geometry::log_se3(truth * found.b_from_a.inverse());
+    EXPECT_LT(error.dot(found.information * error), 22.5);  // chi-square of 6 dimensions, 99.9 %
+  }
+}
+
+TEST(AlignSurfaces, ACorridorDoesNotSlide) {
+  Random random(2);
+  const SurfaceIndex a(corridor(random), 0.1);
+  const SurfaceIndex b(corridor(random), 0.1);
+  const Rigid3 start(geometry::exp_so3({0.01, 0.0, 0.01}), {0.05, 0.03, -0.02});
+  const SurfaceAlignment found = align_surfaces(a, b, start, {});
+  EXPECT_EQ(found.refused, "");
+  EXPECT_EQ(found.held, 5);
+  const Eigen::Vector3d middle(0.0, 0.0, 2.0);
+  EXPECT_NEAR((found.b_from_a * middle).x(), (start * middle).x(), 0.002);
+  EXPECT_NEAR(found.b_from_a.translation.y(), 0.0, 0.001);
+  Vector6d along = Vector6d::Zero();
+  along(0) = 1.0;
+  Vector6d across = Vector6d::Zero();
+  across(1) = 1.0;
+  EXPECT_LT(along.dot(found.information * along), 1e-3 * across.dot(found.information * across));
+}
+
+TEST(AlignSurfaces, OneWallHoldsThreeDirections) {
+  Random random(3);
+  CoarseSurface wall;
+  add_wall(wall, {-1, -1, 2}, {0, 2, 0}, {2, 0, 0}, random, 3000);
+  const SurfaceIndex a(wall, 0.1);
+  const SurfaceAlignment found =
+      align_surfaces(a, a, Rigid3(Eigen::Matrix3d::Identity(), {0.02, 0, 0.03}), {});
+  EXPECT_EQ(found.held, 3);
+  EXPECT_NEAR(found.b_from_a.translation.z(), 0.0, 1e-4);
+  EXPECT_NEAR(found.b_from_a.translation.x(), 0.02, 1e-3);
+}
+
+TEST(AlignSurfaces, WhatDoesNotBelongTogetherIsRefused) {
+  Random random(4);
+  const SurfaceIndex a(dead_end(random), 0.1);
+  const SurfaceIndex nothing({}, 0.1);
+  EXPECT_NE(align_surfaces(a, nothing, {}, {}).refused, "");
+  EXPECT_NE(align_surfaces(nothing, nothing, {}, {}).refused, "");
+  const Rigid3 far(Eigen::Matrix3d::Identity(), {9.0, 0.0, 0.0});
+  EXPECT_NE(align_surfaces(a, a, far, {}).refused, "");
+  // The back of a wall is not its front.
+  CoarseSurface front;
+  add_wall(front, {-1, -1, 2}, {0, 2, 0}, {2, 0, 0}, random);
+  CoarseSurface back;
+  add_wall(back, {-1, -1, 2}, {2, 0, 0}, {0, 2, 0}, random);
+  EXPECT_NE(align_surfaces(SurfaceIndex(front, 0.1), SurfaceIndex(back, 0.1), {}, {}).refused, "");
+  AlignmentOptions careful;
+  careful.max_shift_m = 0.01;
+  const Rigid3 off(Eigen::Matrix3d::Identity(), {0.05, 0.0, 0.0});
+  const SurfaceAlignment moved_too_far = align_surfaces(a, a, off, careful);
+  EXPECT_NE(moved_too_far.refused, "");
+  EXPECT_NEAR(moved_too_far.shift_m, 0.05, 0.005);
+}
+
+TEST(SurfaceIndex, FindsWhatASearchThroughAllFinds) {
+  Random random(5);
+  CoarseSurface cloud;
+  for (int i = 0; i < 3000; ++i) {
+    cloud.push_back({random.vector(1.0).cast<float>(), random.direction().cast<float>(), 0.01F});
+  }
+  const SurfaceIndex index(cloud, 0.1);
+  int found = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3f p = random.vector(1.2).cast<float>();
+    const Eigen::Vector3f n = random.direction().cast<float>();
+    float best = 0.08F;
+    const maps::SurfaceSample* expected = nullptr;
+    for (const maps::SurfaceSample& s : index.samples()) {
+      const float d = (s.point - p).norm();
+      if (d < best && s.normal.dot(n) >= 0.3F) {
+        best = d;
+        expected = &s;
+      }
+    }
+    EXPECT_EQ(index.nearest(p, n, 0.08F, 0.3F), expected);
+    found += expected != nullptr ? 1 : 0;
+  }
+  EXPECT_GT(found, 50);
+}
+
+TEST(CoarseSurface, MeansOfVoxelsWithoutWhatIsNotKnown) {
+  cloud::Cloud cloud;
+  const auto add = [&](float x, float z, float nz) {
+    cloud::Point p;
+    p.x = x;
+    p.y = 0.0F;
+    p.z = z;
+    p.normal_x = p.normal_y = 0.0F;
+    p.normal_z = nz;
+    cloud.points.push_back(p);
+  };
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  add(0.011F, 2.01F, -1.0F);
+  add(0.013F, 2.02F, -1.0F);
+  add(0.012F, 2.015F, 1.0F);  // the other side of the same voxel
+  add(0.31F, 2.01F, kNan);
+  add(kNan, 2.01F, -1.0F);
+  const CoarseSurface surface = coarse_surface(cloud, 0.1);
+  ASSERT_EQ(surface.size(), 2U);
+  const maps::SurfaceSample& front = surface[0].normal.z() < 0.0F ? surface[0] : surface[1];
+  EXPECT_NEAR(front.point.x(), 0.012F, 1e-5F);
+  EXPECT_NEAR(front.point.z(), 2.015F, 1e-3F);
+  EXPECT_GT(front.sigma, 0.001F);
+  EXPECT_TRUE(coarse_surface({}, 0.1).empty());
+}
+
+/// A camera that goes along a corridor with a dead end and comes back.
+struct Walk {
+  maps::Map map;
+  std::map<KeyframeId, CoarseSurface> surfaces;
+  Walk() {
+    Random random(6);
+    const CoarseSurface world = dead_end(random);
+    for (int k = 0; k < 20; ++k) {
+      const double x = 0.3 * (k < 10 ? k : 19 - k);
+      const Rigid3 camera_from_world(Eigen::Matrix3d::Identity(), {x, 0.0, 0.0});
+      auto keyframe = std::make_shared<maps::Keyframe>();
+      keyframe->id = {0, k};
+      map.add_keyframe(keyframe, camera_from_world);
+      surfaces[{0, k}] = moved(world, camera_from_world);
+    }
+  }
+};
+
+TEST(LocalMaps, AreCutByWayAndFindEachOtherAgain) {
+  const Walk walk;
+  LocalMapOptions options;
+  options.distance_m = 0.7;
+  const std::vector<LocalMap> local_maps = make_local_maps(walk.map, walk.surfaces, options);
+  std::size_t members = 0;
+  for (const LocalMap& local : local_maps) {
+    members += local.members.size();
+    EXPECT_LE(local.members.size(), 6U);
+    EXPECT_FALSE(local.surface.empty());
+  }
+  EXPECT_EQ(members, 20U);
+  EXPECT_GT(local_maps.size(), 4U);
+  const auto pairs = overlapping_pairs(walk.map, local_maps, {});
+  const bool revisit = std::any_of(pairs.begin(), pairs.end(), [&](const LocalMapPair& p) {
+    return p.a == 0 && p.b == local_maps.size() - 1;
+  });
+  EXPECT_TRUE(revisit);
+  const core::Executor one(1);
+  const core::Executor two(2);
+  const auto first = align_pairs(walk.map, local_maps, pairs, {}, one);
+  const auto second = align_pairs(walk.map, local_maps, pairs, {}, two);
+  const auto edges = to_edges(local_maps, pairs, first);
+  ASSERT_FALSE(edges.empty());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(std::memcmp(&first[i].b_from_a, &second[i].b_from_a, sizeof(Rigid3)), 0);
+    EXPECT_EQ(first[i].refused, second[i].refused);
+  }
+  for (const PoseEdge& edge : edges) {
+    const Rigid3 truth = walk.map.camera_from_world(edge.b) * walk.map.camera_from_world(edge.a).inverse();
+    EXPECT_LT(tests::distance(edge.b_from_a, truth), 0.002);
+  }
+}
+
+TEST(LocalMaps, OfNothingAreNone) {
+  const maps::Map empty;
+  EXPECT_TRUE(make_local_maps(empty, {}, {}).empty());
+  EXPECT_TRUE(overlapping_pairs(empty, {}, {}).empty());
+}
+
+}  // namespace
+}  // namespace plumbline::mapping

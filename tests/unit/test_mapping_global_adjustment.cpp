@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Maps of known truth, put askew and adjusted as a whole.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "plumbline/mapping/global_adjustment.hpp"
+#include "random_world.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using core::PointId;
+using geometry::Matrix6d;
+using geometry::Rigid3;
+using tests::Random;
+
+const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+const sensor::Pinhole kOther{320, 240, 300.0, 310.0, 150.5, 121.5};
+
+/// A camera that turns once round in the middle of a room of points, and what it measures; `drift` is what
+/// the map thinks each step is off by. Neighbours share points, the first and the last keyframe do not.
+struct RingMap {
+  maps::Map map;
+  std::vector<Rigid3> truth;
+  std::vector<Eigen::Vector3d> points;
+
+  explicit RingMap(double drift_rad, int keyframes = 40, std::int32_t second_robot_from = 1000) {
+    Random random(3);
+    for (int i = 0; i < 1500; ++i) {
+      const double phi = random.uniform(-M_PI, M_PI);
+      points.emplace_back(3.0 * std::sin(phi), random.uniform(-1.0, 1.0), 3.0 * std::cos(phi));
+    }
+    Rigid3 believed;
+    for (int k = 0; k < keyframes; ++k) {
+      const double phi = 2.0 * M_PI * k / keyframes;
+      truth.push_back(Rigid3(geometry::exp_so3({0.0, phi, 0.0}), {0.3 * std::sin(phi), 0.0, 0.0}).inverse());
+      if (k > 0) {
+        const Rigid3 step =
+            truth[static_cast<std::size_t>(k)] * truth[static_cast<std::size_t>(k - 1)].inverse();
+        believed = Rigid3(geometry::exp_so3({0.0, drift_rad, 0.0}), {drift_rad, 0.0, 0.0}) * step * believed;
+      }
+      const bool second = k >= second_robot_from;
+      add_keyframe(second ? KeyframeId{1, k - second_robot_from} : KeyframeId{0, k},
+                   second ? kOther : kCamera, believed);
+    }
+    add_landmarks();
+  }
+  void add_keyframe(KeyframeId id, const sensor::Pinhole& camera, const Rigid3& believed) {
+    auto features = std::make_shared<features::FrameFeatures>();
+    seen.emplace_back();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3d c = truth.back() * points[i];
+      if (c.z() < 0.5 || !camera.contains(camera.project(c))) continue;
+      features::PointFeature f;
+      f.pixel = camera.project(c).cast<float>();
+      f.depth = static_cast<float>(c.z());
+      features->points.push_back(f);
+      seen.back().push_back(i);
+    }
+    features->descriptors.resize(features->points.size());
+    auto keyframe = std::make_shared<maps::Keyframe>();
+    keyframe->id = id;
+    keyframe->features = features;
+    ids.push_back(map.add_keyframe(keyframe, believed));
+  }
+  /// The ring is cut open: what the last third sees of the first keyframes' points are other landmarks to it.
+  void add_landmarks() {
+    std::map<std::pair<std::size_t, bool>, PointId> landmark;
+    for (std::size_t k = 0; k < ids.size(); ++k) {
+      const bool late = k > 2 * ids.size() / 3;
+      for (std::size_t f = 0; f < seen[k].size(); ++f) {
+        const bool early_point = late && first_seen(seen[k][f]) < ids.size() / 3;
+        const auto [found, inserted] = landmark.try_emplace({seen[k][f], early_point});
+        if (inserted) {
+          maps::MapPoint point;
+          point.position = map.camera_from_world(ids[k]).inverse() * (truth[k] * points[seen[k][f]]);
+          found->second = map.add_point(0, point);
+        }
+        map.observe(found->second, ids[k], static_cast<int>(f));
+      }
+    }
+  }
+  [[nodiscard]] std::size_t first_seen(std::size_t point) const {
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      if (std::find(seen[k].begin(), seen[k].end(), point) != seen[k].end()) return k;
+    }
+    return seen.size();
+  }
+  [[nodiscard]] PoseEdge edge(std::size_t a, std::size_t b, double lie_m = 0.0) const {
+    PoseEdge e;
+    e.a = ids[a];
+    e.b = ids[b];
+    e.b_from_a = Rigid3(Eigen::Matrix3d::Identity(), {lie_m, 0.0, lie_m}) * truth[b] * truth[a].inverse();
+    e.information = 1e5 * Matrix6d::Identity();
+    return e;
+  }
+  [[nodiscard]] double rmse() const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < ids.size(); ++k) {
+      const double d = tests::angle(map.camera_from_world(ids[k]), truth[k]) +
+                       tests::distance(map.camera_from_world(ids[k]), truth[k]);
+      sum += d * d;
+    }
+    return std::sqrt(sum / static_cast<double>(ids.size()));
+  }
+  std::vector<KeyframeId> ids;
+  std::vector<std::vector<std::size_t>> seen;
+};
+
+const Cameras kOneCamera{{0, kCamera}};
+const Cameras kTwoCameras{{0, kCamera}, {1, kOther}};
+
+TEST(AdjustMap, ExactMeasurementsTakeTheDriftOutAndTheAnchorStays) {
+  RingMap world(0.002);
+  const double before = world.rmse();
+  ASSERT_GT(before, 0.03);
+  const Rigid3 anchor = world.map.camera_from_world(world.ids[0]);
+  const GlobalAdjustmentSummary summary = adjust_map(world.map, kOneCamera, {}, {});
+  EXPECT_TRUE(summary.changed) << summary.message;
+  EXPECT_LT(world.rmse(), 0.2 * before);
+  EXPECT_EQ(tests::distance(world.map.camera_from_world(world.ids[0]), anchor), 0.0);
+  EXPECT_GT(summary.max_shift_m, 0.0);
+}
+
+TEST(AdjustMap, ALoopBringsTheEndsTogether) {
+  RingMap open(0.0015);
+  RingMap closed(0.0015);
+  GlobalAdjustmentOptions graph_only;
+  graph_only.bundle = false;
+  const double before = closed.rmse();
+  const GlobalAdjustmentSummary summary =
+      adjust_map(closed.map, kOneCamera, {closed.edge(0, 39), closed.edge(1, 38)}, graph_only);
+  ASSERT_TRUE(summary.changed) << summary.message;
+  EXPECT_EQ(summary.rejected, 0);
+  EXPECT_LT(closed.rmse(), 0.5 * before);
+  // Landmarks moved with the keyframes that see them.
+  for (const PointId id : closed.map.point_ids()) {
+    const maps::MapPoint& p = closed.map.point(id);
+    if (p.observations.size() != 1) continue;
+    const KeyframeId k = p.observations[0].keyframe;
+    const Eigen::Vector3d now = closed.map.camera_from_world(k) * p.position;
+    const Eigen::Vector3d then = open.map.camera_from_world(k) * open.map.point(id).position;
+    EXPECT_LT((now - then).norm(), 1e-6);
+  }
+}
+
+TEST(AdjustMap, WrongLoopsAreToldAndLeftOut) {
+  RingMap clean(0.003);
+  RingMap torn(0.003);
+  std::vector<PoseEdge> edges;
+  for (std::size_t i = 0; i < 7; ++i) edges.push_back(clean.edge(i, 39 - i));
+  adjust_map(clean.map, kOneCamera, edges, {});
+  for (std::size_t i = 0; i < 3; ++i)
+    edges.push_back(torn.edge(i, 30 + i, 0.5 + 0.2 * static_cast<double>(i)));
+  const GlobalAdjustmentSummary summary = adjust_map(torn.map, kOneCamera, edges, {});
+  EXPECT_EQ(summary.rejected, 3);
+  ASSERT_EQ(summary.extra.size(), 10U);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(summary.extra[i].rejected, i >= 7) << i;
+  EXPECT_LT(torn.rmse(), 1.1 * clean.rmse() + 1e-4);
+}
+
+TEST(AdjustMap, RobotsMayHaveDifferentCameras) {
+  RingMap world(0.002, 40, 20);
+  const double before = world.rmse();
+  ASSERT_TRUE(adjust_map(world.map, kTwoCameras, {}, {}).changed);
+  EXPECT_LT(world.rmse(), 0.2 * before);
+  EXPECT_THROW(adjust_map(world.map, kOneCamera, {}, {}), std::out_of_range);
+}
+
+TEST(AdjustMap, FewLandmarksDoAsWell) {
+  RingMap world(0.002);
+  const double before = world.rmse();
+  GlobalAdjustmentOptions options;
+  options.observations = 15;
+  const GlobalAdjustmentSummary summary = adjust_map(world.map, kOneCamera, {}, options);
+  EXPECT_LT(summary.points, static_cast<int>(world.map.point_count()) / 2);
+  EXPECT_LT(world.rmse(), 0.5 * before);
+}
+
+TEST(AdjustMap, AWrongObservationIsTakenOutOfTheMap) {
+  RingMap world(0.0);
+  const PointId a = world.map.point_of(world.ids[5], 0);
+  const PointId b = world.map.point_of(world.ids[5], 1);
+  ASSERT_TRUE(a.valid() && b.valid());
+  world.map.unobserve(a, world.ids[5]);
+  world.map.unobserve(b, world.ids[5]);
+  ASSERT_TRUE(world.map.observe(a, world.ids[5], 1));
+  adjust_map(world.map, kOneCamera, {}, {});
+  EXPECT_FALSE(world.map.point_of(world.ids[5], 1).valid());
+}
+
+TEST(AdjustMap, SmallAndEmptyMapsStay) {
+  maps::Map empty;
+  EXPECT_FALSE(adjust_map(empty, kOneCamera, {}, {}).changed);
+  RingMap single(0.0, 1);
+  EXPECT_FALSE(adjust_map(single.map, kOneCamera, {}, {}).changed);
+  EXPECT_FALSE(solve_map_graph(empty, {}, {}).summary.usable);
+}
+
+TEST(AdjustMap, SameInputSameBytes) {
+  RingMap a(0.003);
+  RingMap b(0.003);
+  adjust_map(a.map, kOneCamera, {a.edge(0, 39)}, {});
+  const std::vector<double> elsewhere(4321, 1.0);  // another heap
+  adjust_map(b.map, kOneCamera, {b.edge(0, 39)}, {});
+  for (const KeyframeId id : a.ids) {
+    EXPECT_EQ(std::memcmp(&a.map.camera_from_world(id), &b.map.camera_from_world(id), sizeof(Rigid3)), 0);
+  }
+}
+
+}  // namespace
+}  // namespace plumbline::mapping
