@@ -12,6 +12,7 @@ void register_stages(StageRegistry& registry) {
   registry.add(track_stage());
   registry.add(poses_stage());
   registry.add(cloud_stage());
+  registry.add(refine_stage());
   registry.add(fuse_stage());
   registry.add(filter_stage());
   registry.add(output_stage());

@@ -16,6 +16,7 @@ StageType features_stage();
 StageType track_stage();
 StageType poses_stage();
 StageType cloud_stage();
+StageType refine_stage();
 StageType fuse_stage();
 StageType filter_stage();
 StageType output_stage();
