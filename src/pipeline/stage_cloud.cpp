@@ -38,6 +38,7 @@ class CloudStage : public Stage {
     cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera_, options_);
     cloud::FilterContext context;
     context.viewpoint = Eigen::Vector3f::Zero();
+    context.run = std::to_string(track->keyframe.index);
     auto filtered = filters_.chain().apply(cloud, context);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
     auto result = std::make_shared<KeyframeCloud>();
