@@ -39,6 +39,8 @@ void LoopOptions::declare(core::OptionTable& table) {
                 "Verified keyframes that must agree before a loop is closed");
   table.number("loops.max_apart", max_apart_m, {0.0, 10.0}, "m", "How far apart they may put the camera");
   table.number("loops.max_turned", max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.number("loops.max_drift", max_drift, {0.0, 10.0}, "",
+               "Share of the way since a place was seen that a loop may correct; 10 cm are always allowed");
   table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
   table.boolean("loops.bundle", bundle, "Adjust the whole map after a loop");
   table.text("loops.vocabulary", vocabulary_file,
@@ -71,11 +73,34 @@ std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(keyframe.index);
     loop.evidence =
         verify_place({&map, keyframe, camera_}, {&map, candidate.keyframe, camera_}, options_.verify, seed);
-    if (!loop.evidence.accepted) continue;
+    if (!loop.evidence.accepted || !plausible(map, loop)) continue;
     ++counts_.verified;
     verified.push_back(std::move(loop));
   }
   return verified;
+}
+
+/// Drift grows with the way. A correction far beyond it means another place that looks the same.
+bool LoopCloser::plausible(const maps::Map& map, const Loop& loop) const {
+  constexpr double kAlways_m = 0.1;
+  constexpr double kAlways_rad = 0.05;
+  constexpr double kRadiansPerMetre = 0.5;  // of drift
+  double way = 0.0;
+  Eigen::Vector3d last = map.camera_from_world(loop.match).inverse().translation;
+  const bool same_robot = loop.match.robot == loop.query.robot;
+  if (!same_robot) return true;  // nothing is known of how they lie
+  for (std::int32_t i = loop.match.index + 1; i <= loop.query.index; ++i) {
+    const KeyframeId id{loop.query.robot, i};
+    if (!map.has_keyframe(id)) continue;
+    const Eigen::Vector3d here = map.camera_from_world(id).inverse().translation;
+    way += (here - last).norm();
+    last = here;
+  }
+  const Rigid3 correction = world_from_query(map, loop) * map.camera_from_world(loop.query);
+  const double moved = (correction * last - last).norm();
+  return moved <= kAlways_m + options_.max_drift * way &&
+         geometry::rotation_angle(correction.rotation) <=
+             kAlways_rad + kRadiansPerMetre * options_.max_drift * way;
 }
 
 /// Both say the same about where the world of today lies in that of then, at the place of the second query.
@@ -108,6 +133,10 @@ std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
   };
   waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());
   std::vector<Loop> sure;
+  // A picture that fits two places that exclude each other says nothing about either.
+  for (const Loop& loop : verified) {
+    if (!agree(map, verified.front(), loop)) return sure;
+  }
   for (const Loop& loop : verified) {
     std::vector<Loop> together{loop};
     for (const Loop& w : waiting_) {

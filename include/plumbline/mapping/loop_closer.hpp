@@ -26,8 +26,10 @@ struct LoopOptions {
   int agreeing = 2;           ///< verified keyframes, close to each other, that must say the same
   double max_apart_m = 0.15;  ///< how far apart they may put the camera
   double max_turned_rad = 0.06;
-  bool robust = true;  ///< the pose graph may take loops for wrong
-  bool bundle = true;  ///< adjust the whole map after a loop
+  double max_drift = 0.02;  ///< of the way since the match, that a loop may correct: what looks alike further
+                            ///< off (doors of a corridor) is another place
+  bool robust = true;       ///< the pose graph may take loops for wrong
+  bool bundle = true;       ///< adjust the whole map after a loop
   std::uint64_t seed = 1;
   std::string vocabulary_file;  ///< a trained vocabulary, fixed; empty: one that learns as it goes
   std::shared_ptr<const places::Vocabulary> trained;  ///< what load() read
@@ -87,6 +89,7 @@ class LoopCloser {
  private:
   [[nodiscard]] std::vector<Loop> verify(const maps::Map& map, core::KeyframeId keyframe,
                                          const std::vector<places::Candidate>& candidates);
+  [[nodiscard]] bool plausible(const maps::Map& map, const Loop& loop) const;
   [[nodiscard]] bool agree(const maps::Map& map, const Loop& a, const Loop& b) const;
   void merge_doubles(maps::Map& map, const PoseEdge& edge) const;
 
