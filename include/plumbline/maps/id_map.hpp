@@ -35,6 +35,19 @@ class IdMap {
     const auto found = slots_.find(robot);
     return {robot, found == slots_.end() ? 0 : static_cast<std::int32_t>(found->second.size())};
   }
+  /// The same of every robot that has or had anything here.
+  [[nodiscard]] std::vector<IdType> next_ids() const {
+    std::vector<IdType> result;
+    for (const auto& [robot, slots] : slots_)
+      result.push_back({robot, static_cast<std::int32_t>(slots.size())});
+    return result;
+  }
+  /// Ids of `next`'s robot before `next` count as used.
+  void reserve(IdType next) {
+    auto& slots = slots_[next.robot];
+    if (next.index > 0 && static_cast<std::size_t>(next.index) > slots.size())
+      slots.resize(static_cast<std::size_t>(next.index), kNone);
+  }
   /// Inserts or replaces; the id must be valid. What other ids name stays where it is in memory.
   void insert(IdType id, T value) {
     if (id.index < 0) throw std::invalid_argument("IdMap: no valid id");

@@ -88,8 +88,37 @@ struct RetiredKeyframe {
   geometry::Rigid3 camera_from_heir;
 };
 
+/// The ids that come next, one of each robot that has or had such things.
+struct NextIds {
+  std::vector<KeyframeId> keyframes;
+  std::vector<PointId> points;
+  std::vector<LineId> lines;
+  std::uint64_t edge = 0;
+};
+
+/// What a map consists of; the rest (who shares what, children) follows from it. For stores.
+struct MapParts {
+  struct KeyframePart {
+    std::shared_ptr<const Keyframe> data;
+    geometry::Rigid3 camera_from_world;
+    KeyframeId parent;  ///< invalid: a root
+  };
+  std::vector<KeyframePart> keyframes;
+  std::vector<MapPoint> points;  ///< with ids and observations, as all here
+  std::vector<MapLine> lines;
+  std::vector<std::pair<KeyframeId, RetiredKeyframe>> retired;
+  std::vector<std::pair<std::uint64_t, SurfaceEdge>> edges;  ///< by order of creation
+  NextIds next;
+};
+
 class Map {
  public:
+  Map() = default;
+  /// The map that had these parts, with all its ids and orders. Throws std::invalid_argument when they
+  /// contradict each other: an id twice, something names what is not there, two landmarks of one feature.
+  explicit Map(MapParts parts);
+  [[nodiscard]] NextIds next_ids() const;
+
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
   KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe,
                           const geometry::Rigid3& camera_from_world);
@@ -171,6 +200,9 @@ class Map {
   /// Edges that have `keyframe` at one end, in order of creation.
   [[nodiscard]] std::vector<SurfaceEdge> edges_of(KeyframeId keyframe) const;
 
+  /// All edges by order of creation.
+  [[nodiscard]] const std::map<std::uint64_t, SurfaceEdge>& edges() const { return edges_; }
+
   /// Recomputes view direction and the most typical descriptor from the observations.
   void refresh_point(PointId id);
 
@@ -191,6 +223,7 @@ class Map {
   void forget_edges(KeyframeId id);
   void detach(KeyframeId child);
   KeyframeId leave_tree(KeyframeId id);
+  void restore_tree(const MapParts& parts);
 
   IdMap<KeyframeId, KeyframeEntry> keyframes_;
   IdMap<PointId, MapPoint> points_;

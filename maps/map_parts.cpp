@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A map from its parts, as stores keep them.
+#include <stdexcept>
+#include <string>
+
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+[[noreturn]] void contradiction(const char* what) {
+  throw std::invalid_argument(std::string("parts of a map: ") + what);
+}
+
+void require(bool holds, const char* otherwise) {
+  if (!holds) contradiction(otherwise);
+}
+
+/// Inserts without observations, which are then made one by one so that covisibility follows.
+template <typename IdType, typename Landmark>
+void restore_landmarks(Map& map, IdMap<IdType, Landmark>& landmarks, std::vector<Landmark>& parts) {
+  for (Landmark& part : parts) {
+    const IdType id = part.id;
+    require(id.valid() && !landmarks.contains(id), "a landmark's id is invalid or there twice");
+    const std::vector<Observation> observations = std::move(part.observations);
+    part.observations.clear();
+    landmarks.insert(id, std::move(part));
+    landmarks.at(id).observations.reserve(observations.size());
+    for (const Observation& o : observations) {
+      require(o.feature >= 0 && map.has_keyframe(o.keyframe), "a landmark is seen by no keyframe");
+      require(map.observe(id, o.keyframe, o.feature), "two landmarks are one feature");
+    }
+  }
+}
+
+}  // namespace
+
+NextIds Map::next_ids() const {
+  return {keyframes_.next_ids(), points_.next_ids(), lines_.next_ids(), next_edge_};
+}
+
+void Map::restore_tree(const MapParts& parts) {
+  for (const MapParts::KeyframePart& part : parts.keyframes) {
+    if (!part.parent.valid()) continue;
+    require(has_keyframe(part.parent), "a parent is not there");
+    set_parent(part.data->id, part.parent);
+  }
+  for (const auto& [id, retired] : parts.retired) {
+    require(id.valid() && !has_keyframe(id) && !retired_.contains(id), "a keyframe that left is still there");
+    require(has_keyframe(retired.heir), "an heir is not there");
+    retired_.insert(id, retired);
+    keyframes_.at(retired.heir).retired.push_back(id);
+  }
+}
+
+Map::Map(MapParts parts) {
+  try {
+    for (const MapParts::KeyframePart& part : parts.keyframes) {
+      require(part.data != nullptr && part.data->id.valid() && !has_keyframe(part.data->id),
+              "a keyframe's id is invalid or there twice");
+      add_keyframe(part.data, part.camera_from_world);
+    }
+    restore_landmarks(*this, points_, parts.points);
+    restore_landmarks(*this, lines_, parts.lines);
+    restore_tree(parts);
+    for (const auto& [number, edge] : parts.edges) {
+      require(number >= next_edge_, "edges are out of order");
+      next_edge_ = number;
+      add_edge(edge);
+    }
+    require(parts.next.edge >= next_edge_, "an edge's number is too large");
+    next_edge_ = parts.next.edge;
+    for (const KeyframeId next : parts.next.keyframes) keyframes_.reserve(next);
+    for (const PointId next : parts.next.points) points_.reserve(next);
+    for (const LineId next : parts.next.lines) lines_.reserve(next);
+  } catch (const std::out_of_range&) {  // a feature or an end of an edge
+    contradiction("something names what is not there");
+  }
+}
+
+}  // namespace plumbline::maps
