@@ -5,6 +5,7 @@
 Links to files of the tree must lead somewhere, every page of docs/ is in its index, and every `plumbline` command in
 a page is one that the program has, with the flags it is shown with.
 """
+import functools
 import re
 import subprocess
 import sys
@@ -12,7 +13,6 @@ from pathlib import Path
 
 LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
 BLOCK = re.compile(r"^```[a-z]*\n(.*?)^```", re.S | re.M)
-GROUPS = {"evaluate", "pipelines", "filters"}
 
 
 def pages(root):
@@ -46,14 +46,27 @@ def commands(text):
                 yield number, words[1:]
 
 
+def find_command(words, help_of):
+    """(words that name the command, its help); a group's help lists the commands that may follow."""
+    command = words[:1]
+    text = help_of(command)
+    while text is not None and "Subcommands:" in text:
+        following = words[len(command):len(command) + 1]
+        if not following or following[0].startswith("-"):
+            break
+        command = command + following
+        listed = re.search(rf"^ +{re.escape(following[0])}(?![\w-])", text.split("Subcommands:")[1], re.M)
+        text = help_of(command) if listed else None
+    return command, text
+
+
 def check_commands(root, help_of):
     """`help_of(words)` gives the help of a command, None when there is no such command."""
     problems = []
     for page in pages(root):
         for number, words in commands(page.read_text()):
-            command = words[:2] if words[:1] and words[0] in GROUPS else words[:1]
             where = f"{page.relative_to(root)}:{number}"
-            text = help_of(command)
+            command, text = find_command(words, help_of)
             if text is None:
                 problems.append(f"{where}: there is no command 'plumbline {' '.join(command)}'")
                 continue
@@ -68,9 +81,13 @@ def check(root, help_of):
 
 
 def main(root, program):
-    def help_of(command):
+    @functools.lru_cache(maxsize=None)
+    def help_of_words(*command):
         run = subprocess.run([program, *command, "--help"], capture_output=True, text=True)
         return run.stdout if run.returncode == 0 else None
+
+    def help_of(command):
+        return help_of_words(*command)
 
     problems = check(root, help_of)
     print("\n".join(problems + [f"{len(pages(root))} pages, {len(problems)} problems"]))

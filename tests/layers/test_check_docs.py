@@ -7,7 +7,13 @@ from pathlib import Path
 
 import check_docs
 
-HELP = {("map",): "map INPUT -o,--output OUT --every N", ("evaluate", "cloud"): "--align none|se3"}
+HELP = {
+    ("map",): "map INPUT -o,--output OUT --every N",
+    ("evaluate",): "Usage: evaluate SUBCOMMAND\n\nSubcommands:\n  cloud       Accuracy of a cloud\n",
+    ("evaluate", "cloud"): "--align none|se3",
+    # A program may show the group's help when it does not know the word.
+    ("evaluate", "smell"): "Usage: evaluate SUBCOMMAND\n",
+}
 
 
 class CheckDocs(unittest.TestCase):
@@ -48,6 +54,10 @@ class CheckDocs(unittest.TestCase):
         self.write("docs/a.md", "```\nplumbline map IN --ever 2\nplumbline evaluate cloud --every=3\n```\n")
         self.assertEqual(self.problems(), ["docs/a.md:2: plumbline map has no --ever",
                                            "docs/a.md:3: plumbline evaluate cloud has no --every"])
+
+    def test_group_without_command(self):
+        self.write("docs/a.md", "```\nplumbline evaluate\nplumbline evaluate --align se3\n```\n")
+        self.assertEqual(self.problems(), ["docs/a.md:3: plumbline evaluate has no --align"])
 
 
 if __name__ == "__main__":
