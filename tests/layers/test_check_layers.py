@@ -140,7 +140,10 @@ class CheckLayers(unittest.TestCase):
             self.assertEqual([p.split(":")[0] for p in self.problems()], [path])
             (self.root / path).unlink()
         self.write("build/release/x.cpp", "made by a tool\n")
+        self.write("tests/fuzz/corpus/yaml/x.yaml", "{\n")
         self.assertEqual(self.problems(), [])
+        self.write("tests/fuzz/x.yaml", "nothing\n")
+        self.assertEqual([p.split(":")[0] for p in self.problems()], ["tests/fuzz/x.yaml"])
 
 
 if __name__ == "__main__":
