@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <vector>
 
 #include "inverse_depth.hpp"
 
@@ -21,6 +22,32 @@ int base_cells(float w, float sigma, float at_2m, int stride, int longest) {
   const float at = inverse_depth_sigma(0.5F) / 0.5F;
   const float pixels = at_2m * std::clamp(sigma / (w * at), 0.4F, 1.75F);
   return std::clamp(static_cast<int>(std::lround(pixels / static_cast<float>(stride))), 2, longest);
+}
+
+/// How far this picture's depth may be smoothed, 0 to 1: its noise over that of the sensor model, from bends
+/// of the inverse depth, which is straight on planes. 1 from half the model's noise on; below, details of the
+/// surface soon outweigh it. Exact depth stays as it is.
+float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
+  constexpr int kStep = 4;  // px
+  constexpr float kMedianOfNormal = 0.6745F;
+  constexpr std::size_t kFew = 200;
+  std::vector<float> bends;
+  for (int v = 0; v < depth.rows; v += kStep) {
+    const float* row = depth.ptr<float>(v);
+    for (int u = kStep; u + kStep < depth.cols; u += kStep) {
+      const float least = std::min({row[u - kStep], row[u], row[u + kStep]});
+      const float most = std::max({row[u - kStep], row[u], row[u + kStep]});
+      if (!(least >= min_depth && most <= max_depth)) continue;
+      const float w = 1.0F / row[u];
+      const float bend = std::abs(1.0F / row[u - kStep] + 1.0F / row[u + kStep] - 2.0F * w);
+      bends.push_back(bend / (2.45F * inverse_depth_sigma(w)));
+    }
+  }
+  if (bends.size() < kFew) return 1.0F;
+  const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
+  std::nth_element(bends.begin(), middle, bends.end());
+  const float share = *middle / (0.5F * kMedianOfNormal);
+  return std::min(1.0F, share * share);
 }
 
 /// Makes the points of one grid, row after row.
@@ -42,7 +69,7 @@ class PointMaker {
                                    static_cast<float>(options.min_depth_m),
                                    static_cast<float>(options.max_depth_m), fx_)),
         reach_(surface_reach(grid_, stride_, fx_, longest_)),
-        position_(options.smooth_position ? positions() : Grid()) {}
+        position_(options.smooth_position ? positions(options) : Grid()) {}
 
   [[nodiscard]] int width() const { return grid_.width; }
   [[nodiscard]] int height() const { return grid_.height; }
@@ -76,13 +103,25 @@ class PointMaker {
 
  private:
   /// The inverse depth that gives the points' positions: means over what a plane explains, the wider the
-  /// noisier the depth.
-  [[nodiscard]] Grid positions() const {
+  /// noisier the depth. No point moves further than the noise that the picture shows.
+  [[nodiscard]] Grid positions(const KeyframeCloudOptions& options) const {
     constexpr float kWanted_m = 0.0015F;
     Grid means = grid_;
     const int step = std::max(2, static_cast<int>(std::lround(8.0 / stride_)));
     widen_means(means, step, noise_ * 1.75F, kWanted_m);
     widen_means(means, 2 * step, noise_ * 0.7F, kWanted_m);
+    const float most = 3.0F * smoothing_share(frame_.depth, static_cast<float>(options.min_depth_m),
+                                              static_cast<float>(options.max_depth_m));
+    for (int j = 0; j < means.height; ++j) {
+      const float* depth = frame_.depth.ptr<float>(j * stride_);
+      float* row = means.row(j);
+      for (int i = 0; i < means.width; ++i) {
+        if (row[i] == 0.0F) continue;
+        const float raw = 1.0F / depth[i * stride_];
+        const float limit = most * inverse_depth_sigma(raw);
+        row[i] = std::clamp(row[i], raw - limit, raw + limit);
+      }
+    }
     return means;
   }
   void set_normal(const float* w, int j, int i, float x, float y, Point& p) const {

@@ -118,18 +118,35 @@ void Sheets::visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& no
   }
 }
 
-bool Sheets::fit(const Sheet& sums, Sheet& sheet) {
+bool Sheets::set_plane(const Sheet& sums, Sheet& sheet) {
   const float length = sums.normal_sum.norm();
   if (sums.points < kFewest || !(length > 0.0F)) return false;
   const Eigen::Vector3f mean = sums.first / sums.weight;
   const Eigen::Matrix3f covariance = sums.second / sums.weight - mean * mean.transpose();
-  const Eigen::Vector3f normal = sums.normal_sum / length;
-  const float noise2 = sums.variance / sums.weight;
-  const float residual2 = std::max(0.0F, normal.dot(covariance * normal)) + sums.scatter / sums.weight;
-  if (residual2 > kExplained * kExplained * noise2 + kModel_m * kModel_m) return false;
   sheet.origin = mean;
-  sheet.normal = normal;
+  sheet.normal = sums.normal_sum / length;
+  sheet.residual2 = std::max(0.0F, sheet.normal.dot(covariance * sheet.normal)) + sums.scatter / sums.weight;
+  sheet.noise2 = sums.variance / sums.weight;
   return true;
+}
+
+bool Sheets::explained(const Sheet& sheet) const {
+  const float share2 = noise_share_ * noise_share_;
+  return sheet.residual2 <= share2 * (kExplained * kExplained * sheet.noise2 + kModel_m * kModel_m);
+}
+
+void Sheets::measure_noise() {
+  constexpr std::size_t kFewSheets = 50;
+  constexpr float kGenerous = 6.0F;
+  std::vector<float> shares;
+  for (const Sheet& sheet : sheets_) {
+    if (sheet.flat && sheet.noise2 > 0.0F) shares.push_back(sheet.residual2 / sheet.noise2);
+  }
+  noise_share_ = 1.0F;
+  if (shares.size() < kFewSheets) return;
+  const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
+  std::nth_element(shares.begin(), middle, shares.end());
+  noise_share_ = std::min(1.0F, kGenerous * std::sqrt(*middle));
 }
 
 void Sheets::fit_planes() {
@@ -147,7 +164,12 @@ void Sheets::fit_planes() {
     }
     sheet.support = sums.points;
     sheet.noise_m = std::sqrt(sheet.variance / sheet.weight);
-    sheet.flat = fit(sums, sheet) || fit(Sheet(sheet), sheet);
+    sheet.flat = set_plane(sums, sheet);
+  }
+  measure_noise();
+  for (Sheet& sheet : sheets_) {
+    sheet.flat = sheet.flat && explained(sheet);
+    if (!sheet.flat) sheet.flat = set_plane(Sheet(sheet), sheet) && explained(sheet);
   }
 }
 
@@ -181,7 +203,7 @@ void Sheets::settle(FusedCloud& points) const {
       });
     }
     if (!(total > 0.0F)) continue;
-    const float most = kMostSigmas * sheets_[sheet_of_[i]].noise_m;
+    const float most = kMostSigmas * noise_share_ * sheets_[sheet_of_[i]].noise_m;
     p.getVector3fMap() += std::clamp(shift / total, -most, most) * own;
     p.getNormalVector3fMap() = normal.normalized();
   }

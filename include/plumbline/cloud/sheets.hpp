@@ -32,6 +32,8 @@ struct Sheet {
   Eigen::Vector3f origin{0, 0, 0};  ///< metres from the block's centre
   Eigen::Vector3f normal{0, 0, 0};  ///< unit
   float noise_m = 0.0F;             ///< standard deviation of one measurement
+  float residual2 = 0.0F;           ///< mean squared distance from the plane, m^2
+  float noise2 = 0.0F;              ///< what the sensor model lets expect of it, m^2
   std::uint32_t support = 0;        ///< points of the surroundings that face the same way, its own included
   bool flat = false;                ///< the plane explains the points within the noise
 
@@ -71,10 +73,15 @@ class Sheets {
   void add(const FusedCloud& points, std::size_t i);
   template <typename Visit>
   void visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal, const Visit& visit) const;
-  /// Plane of a weighted set of points; false when it does not explain them.
-  static bool fit(const Sheet& sums, Sheet& sheet);
+  /// Plane of a weighted set of points; false when there are too few.
+  static bool set_plane(const Sheet& sums, Sheet& sheet);
+  [[nodiscard]] bool explained(const Sheet& sheet) const;
+  /// How noisy the points really are: residuals of the surroundings, the middle one, over what the sensor
+  /// model lets expect; a generous upper limit, 0 to 1. Exact depth must not be flattened.
+  void measure_noise();
 
   double block_m_;
+  float noise_share_ = 1.0F;
   std::vector<Sheet> sheets_;
   std::vector<std::uint32_t> next_;      ///< next sheet of the same block
   std::vector<std::uint32_t> sheet_of_;  ///< by point
