@@ -2,6 +2,8 @@
 // One frame as a cloud with colour and normals, through a chain of filters, into a file.
 //
 //   03_filter_cloud INPUT PIPELINES CHAIN.yaml CLOUD.ply|CLOUD.pcd
+//
+// 03_filter_cloud.yaml beside this file is such a chain.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
