@@ -49,6 +49,8 @@ void ChainOption::check(const CheckContext& context, const std::string& path,
     if (tree) chain_ = cloud::FilterChain::parse(*tree, "", *context.filters, problems);
   }
   if (problems.size() != before) return;
+  if (auto fit = chain_.ready(); !fit)
+    problems.push_back({value_.mark, path + ".filters", fit.error().message});
   const core::ConfigMark mark = value_.mark;
   auto spelt_out = core::parse_yaml(chain_.to_yaml(), "");
   const ConfigNode* list = spelt_out ? spelt_out->find("filters") : nullptr;
