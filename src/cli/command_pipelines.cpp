@@ -177,17 +177,24 @@ void add_pipelines(CLI::App& app, Session& session) {
     return add_command(*group, session, name, help,
                        [&session, request, run] { return run(session, *request); });
   };
-  add_command(*group, session, "list", "The shipped pipelines, and the stages that pipelines are made of",
-              [&session] { return list(session); });
+  add_plugin_option(*add_command(*group, session, "list",
+                                 "The shipped pipelines, and the stages that pipelines are made of",
+                                 [&session] { return list(session); }),
+                    session);
   CLI::App* described =
       command("describe", "A stage: ports and options; without STAGE the whole reference", describe);
   described->add_option("STAGE", request->name, "Type of a stage");
   described->add_flag("--markdown", request->markdown, "As a section of the reference page");
-  add_pipeline_arguments(*command("check", "Check a pipeline without running it", check), request);
-  command("schema", "JSON Schema of pipeline files, or of one stage, for editors", schema)
-      ->add_option("STAGE", request->name, "Type of a stage");
+  CLI::App* checked = command("check", "Check a pipeline without running it", check);
+  add_pipeline_arguments(*checked, request);
+  add_plugin_option(*checked, session);
+  CLI::App* schemed =
+      command("schema", "JSON Schema of pipeline files, or of one stage, for editors", schema);
+  schemed->add_option("STAGE", request->name, "Type of a stage");
+  add_plugin_option(*schemed, session);
   CLI::App* drawn = command("graph", "Draw a pipeline; without -o print it in Graphviz's language", graph);
   add_pipeline_arguments(*drawn, request);
+  add_plugin_option(*drawn, session);
   drawn->add_option("-o,--output", request->output, "Picture to write: .png, .svg, .pdf or .dot")
       ->type_name("FILE");
   add_chain_schema(*app.get_subcommand("filters"), session);

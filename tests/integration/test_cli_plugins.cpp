@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Filters from shared objects.
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
 #include <map>
 
+#include "plumbline/cloud/cloud_io.hpp"
 #include "program.hpp"
 
 namespace plumbline::integration {
@@ -84,7 +88,29 @@ TEST_F(Plugins, APipelineUsesThem) {
   EXPECT_TRUE(without.told("'grey' is not a filter")) << without;
   const auto mapped = run(command + plugin("grey"));
   EXPECT_TRUE(mapped.code == 0 || mapped.code == 4) << mapped;  // six frames are few
-  EXPECT_TRUE(fs::exists(path("out/cloud.ply"))) << mapped;
+  const auto map = cloud::read_cloud(path("out/map.ply"));
+  ASSERT_TRUE(map) << map.error().message << mapped;
+  EXPECT_GT(map->cloud->size(), 1000U);
+  for (const cloud::Point& p : *map->cloud) ASSERT_TRUE(p.r == p.g && p.g == p.b);
+}
+
+TEST_F(Plugins, APipelineWithThemIsChecked) {
+  write("mine.yaml",
+        "include: rgbd.yaml\nstages:\n  cloud:\n    filters:\n      - {type: grey, share: 2}\n      - type: "
+        "grey\n");
+  const auto without = run("pipelines check mine.yaml");
+  EXPECT_EQ(without.code, 2);
+  EXPECT_TRUE(without.told("mine.yaml:6:15: stages.cloud.filters[1].type: 'grey' is not a filter"))
+      << without;
+  const auto wrong = run("pipelines check mine.yaml" + plugin("grey"));
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_TRUE(wrong.told("mine.yaml:5:29: stages.cloud.filters[0].share")) << wrong;
+  EXPECT_FALSE(wrong.told("filters[1]")) << wrong;
+  write("mine.yaml", "include: rgbd.yaml\nstages:\n  cloud:\n    filters:\n      - type: grey\n");
+  EXPECT_EQ(run("pipelines check mine.yaml" + plugin("grey")).code, 0);
+  EXPECT_EQ(run("pipelines graph mine.yaml" + plugin("grey")).code, 0);
+  EXPECT_NE(run("pipelines schema" + plugin("grey")).out.find("\"grey\""), std::string::npos);
+  EXPECT_EQ(run("pipelines schema").out.find("\"grey\""), std::string::npos);
 }
 
 }  // namespace
