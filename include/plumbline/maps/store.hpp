@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The map store, map.db: an SQLite file that holds a map exactly, written as the run goes (docs/store.md).
+// A process that is killed leaves a file that opens and holds every keyframe that was added.
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/types.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::maps {
+
+/// Stores of this and of lower formats are read.
+constexpr int kStoreFormat = 1;
+
+/// What is written once, when a store is made.
+struct StoreHeader {
+  sensor::Camera camera;
+  std::string configuration;    ///< the effective one, YAML
+  std::string robot;            ///< its name
+  std::string program_version;  ///< core::version() of the program that made the file
+  int format = kStoreFormat;    ///< set by the reader; the writer always writes kStoreFormat
+};
+
+/// Everything of a store but clouds.
+struct StoredMap {
+  StoreHeader header;
+  bool complete = false;  ///< save_final was the last thing that happened
+  Map map;
+  std::vector<FramePose> frames;
+};
+
+/// One writer per file at a time; not thread-safe. A call that fails leaves the file as it was before the
+/// call, and may be tried again.
+class StoreWriter {
+ public:
+  /// Makes a new file. Errors (kOutput): it is there already, its folder is not there, disk full.
+  static core::Result<StoreWriter> create(const std::filesystem::path& file, const StoreHeader& header);
+  /// Goes on in a file that a run left. Errors (kInput) as StoreReader::open; (kOutput): it is in use.
+  static core::Result<StoreWriter> resume(const std::filesystem::path& file);
+  StoreWriter(StoreWriter&& other) noexcept;
+  StoreWriter& operator=(StoreWriter&&) = delete;
+  /// Leaves one file, without a log beside it, unless somebody is reading it.
+  ~StoreWriter();
+
+  /// One transaction: brings the file up to `map` and `frames`, in which `keyframe` is new, and adds the
+  /// keyframe's cloud (bytes of cloud::encode_cloud; may be empty). Only what changed since the last call is
+  /// written, but all landmarks are looked at: about 20 ms for 100 000. Errors (kOutput): disk full, I/O.
+  core::Result<void> add_keyframe(const Map& map, KeyframeId keyframe, const std::vector<std::uint8_t>& cloud,
+                                  const std::vector<FramePose>& frames = {});
+  /// A cloud that comes later than its keyframe, or replaces its cloud. One transaction.
+  core::Result<void> add_cloud(KeyframeId keyframe, const std::vector<std::uint8_t>& cloud);
+  /// Bytes of others under a name, such as a vocabulary; replaces what had the name. One transaction.
+  core::Result<void> attach(const std::string& name, const std::vector<std::uint8_t>& bytes);
+  /// The finished map, in one transaction: poses, landmarks and edges after all optimisation, all frames.
+  /// Marks the store as complete and leaves one file, as the destructor does.
+  core::Result<void> save_final(const Map& map, const std::vector<FramePose>& frames);
+
+ private:
+  struct Impl;
+  explicit StoreWriter(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Reads a store, also one that is being written: then each call sees the keyframes committed by then. Not
+/// thread-safe; several readers may read one file.
+class StoreReader {
+ public:
+  /// Errors (kInput): not there, no map store, damaged, written in a newer format.
+  static core::Result<StoreReader> open(const std::filesystem::path& file);
+  StoreReader(StoreReader&& other) noexcept;
+  StoreReader& operator=(StoreReader&&) = delete;
+  ~StoreReader();
+
+  [[nodiscard]] const StoreHeader& header() const;
+  /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
+  /// pictures of the camera's size. Errors (kInput): damaged.
+  [[nodiscard]] core::Result<StoredMap> load() const;
+  /// Keyframes that have a cloud, by id; also such as left the map.
+  [[nodiscard]] core::Result<std::vector<KeyframeId>> cloud_ids() const;
+  /// A keyframe's cloud, in its camera frame. Errors (kInput): it has none, damaged.
+  [[nodiscard]] core::Result<cloud::CloudPtr> cloud(KeyframeId keyframe) const;
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(KeyframeId keyframe) const;
+  /// None: nothing has this name. Errors (kInput): damaged.
+  [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
+      const std::string& name) const;
+
+ private:
+  struct Impl;
+  explicit StoreReader(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// StoreReader::open and load.
+core::Result<StoredMap> load_map(const std::filesystem::path& file);
+
+}  // namespace plumbline::maps

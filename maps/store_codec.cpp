@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "store_codec.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+constexpr std::size_t kObservationBytes = 12;
+constexpr std::size_t kIdBytes = 8;
+
+void write(const std::vector<Observation>& observations, ByteWriter& to) {
+  to.count(observations.size());
+  for (const Observation& o : observations) {
+    to.put(o.keyframe);
+    to.put(static_cast<std::int32_t>(o.feature));
+  }
+}
+void read(ByteReader& from, std::vector<Observation>& observations) {
+  observations.resize(from.count(kObservationBytes));
+  for (Observation& o : observations) {
+    from.get(o.keyframe);
+    o.feature = from.get<std::int32_t>();
+  }
+}
+
+template <typename IdType>
+void write(const std::vector<IdType>& ids, ByteWriter& to) {
+  to.count(ids.size());
+  for (const IdType& id : ids) to.put(id);
+}
+template <typename IdType>
+void read(ByteReader& from, std::vector<IdType>& ids) {
+  ids.resize(from.count(kIdBytes));
+  for (IdType& id : ids) {
+    from.get(id);
+    // Every id that was ever given takes four bytes of a map.
+    if (id.index < 0 || id.index > 1 << 28) throw BadBytes("a next id is out of range");
+  }
+}
+
+void write(const sensor::Pinhole& pinhole, ByteWriter& to) {
+  to.put(static_cast<std::int32_t>(pinhole.width));
+  to.put(static_cast<std::int32_t>(pinhole.height));
+  for (const double value : {pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy}) to.put(value);
+}
+void read(ByteReader& from, sensor::Pinhole& pinhole) {
+  pinhole.width = from.get<std::int32_t>();
+  pinhole.height = from.get<std::int32_t>();
+  constexpr int kMost = 1 << 16;
+  if (pinhole.width < 0 || pinhole.height < 0 || pinhole.width > kMost || pinhole.height > kMost) {
+    throw BadBytes("a picture's size is wrong");
+  }
+  for (double* value : {&pinhole.fx, &pinhole.fy, &pinhole.cx, &pinhole.cy}) from.get(*value);
+}
+
+}  // namespace
+
+void encode(const KeyframeState& state, ByteWriter& to) {
+  to.put(state.camera_from_world);
+  to.put(state.parent);
+}
+KeyframeState decode_state(const Bytes& bytes) {
+  ByteReader from(bytes);
+  KeyframeState state;
+  from.get(state.camera_from_world);
+  from.get(state.parent);
+  from.expect_end();
+  return state;
+}
+
+void encode(const MapPoint& p, ByteWriter& to) {
+  to.put(p.id);
+  to.put(p.position);
+  to.put(p.descriptor);
+  to.put(p.angle);
+  to.put(p.angle_keyframe);
+  to.put(p.view_direction);
+  to.put(p.normal);
+  to.put(p.reference_distance);
+  to.put(static_cast<std::int32_t>(p.reference_octave));
+  to.put(static_cast<std::int32_t>(p.visible));
+  to.put(static_cast<std::int32_t>(p.found));
+  write(p.observations, to);
+}
+void decode_page(const Bytes& bytes, std::vector<MapPoint>& points) {
+  for (ByteReader from(bytes); !from.at_end();) {
+    MapPoint p;
+    from.get(p.id);
+    from.get(p.position);
+    from.get(p.descriptor);
+    from.get(p.angle);
+    from.get(p.angle_keyframe);
+    from.get(p.view_direction);
+    from.get(p.normal);
+    from.get(p.reference_distance);
+    p.reference_octave = from.get<std::int32_t>();
+    p.visible = from.get<std::int32_t>();
+    p.found = from.get<std::int32_t>();
+    read(from, p.observations);
+    points.push_back(std::move(p));
+  }
+}
+
+void encode(const MapLine& l, ByteWriter& to) {
+  to.put(l.id);
+  to.put(l.start);
+  to.put(l.end);
+  to.put(l.descriptor);
+  to.put(static_cast<std::int32_t>(l.visible));
+  to.put(static_cast<std::int32_t>(l.found));
+  write(l.observations, to);
+}
+void decode_page(const Bytes& bytes, std::vector<MapLine>& lines) {
+  for (ByteReader from(bytes); !from.at_end();) {
+    MapLine l;
+    from.get(l.id);
+    from.get(l.start);
+    from.get(l.end);
+    from.get(l.descriptor);
+    l.visible = from.get<std::int32_t>();
+    l.found = from.get<std::int32_t>();
+    read(from, l.observations);
+    lines.push_back(std::move(l));
+  }
+}
+
+void encode(const SurfaceEdge& edge, ByteWriter& to) {
+  to.put(edge.a);
+  to.put(edge.b);
+  to.put(edge.b_from_a);
+  to.put(edge.information);
+  to.put(edge.overlap);
+  to.put(edge.rms);
+}
+SurfaceEdge decode_edge(const Bytes& bytes) {
+  ByteReader from(bytes);
+  SurfaceEdge edge;
+  from.get(edge.a);
+  from.get(edge.b);
+  from.get(edge.b_from_a);
+  from.get(edge.information);
+  from.get(edge.overlap);
+  from.get(edge.rms);
+  from.expect_end();
+  return edge;
+}
+
+void encode(const RetiredKeyframe& retired, ByteWriter& to) {
+  to.put(retired.stamp);
+  to.put(retired.heir);
+  to.put(retired.camera_from_heir);
+}
+RetiredKeyframe decode_retired(const Bytes& bytes) {
+  ByteReader from(bytes);
+  RetiredKeyframe retired;
+  from.get(retired.stamp);
+  from.get(retired.heir);
+  from.get(retired.camera_from_heir);
+  from.expect_end();
+  return retired;
+}
+
+void encode(const FramePose& frame, ByteWriter& to) {
+  to.put(frame.stamp);
+  to.put(frame.reference);
+  to.put(frame.camera_from_reference);
+  to.flag(frame.tracked);
+}
+void decode_page(const Bytes& bytes, std::vector<FramePose>& frames) {
+  for (ByteReader from(bytes); !from.at_end();) {
+    FramePose frame;
+    from.get(frame.stamp);
+    from.get(frame.reference);
+    from.get(frame.camera_from_reference);
+    frame.tracked = from.flag();
+    frames.push_back(frame);
+  }
+}
+
+void encode(const sensor::Camera& camera, ByteWriter& to) {
+  to.put(std::string_view(camera.name));
+  write(camera.color, to);
+  for (const double k : camera.distortion) to.put(k);
+  to.put(camera.depth_scale);
+  to.put(camera.fps);
+  to.flag(camera.color_from_depth.has_value());
+  if (camera.color_from_depth) to.put(*camera.color_from_depth);
+  to.flag(camera.depth.has_value());
+  if (camera.depth) write(*camera.depth, to);
+}
+sensor::Camera decode_camera(const Bytes& bytes) {
+  ByteReader from(bytes);
+  sensor::Camera camera;
+  from.get(camera.name);
+  read(from, camera.color);
+  for (double& k : camera.distortion) from.get(k);
+  from.get(camera.depth_scale);
+  from.get(camera.fps);
+  if (from.flag()) from.get(camera.color_from_depth.emplace());
+  if (from.flag()) read(from, camera.depth.emplace());
+  from.expect_end();
+  return camera;
+}
+
+void encode(const Totals& totals, ByteWriter& to) {
+  for (const std::uint64_t value : {totals.keyframes, totals.retired, totals.points, totals.lines,
+                                    totals.edges, totals.frames, totals.next.edge}) {
+    to.put(value);
+  }
+  write(totals.next.keyframes, to);
+  write(totals.next.points, to);
+  write(totals.next.lines, to);
+}
+Totals decode_totals(const Bytes& bytes) {
+  ByteReader from(bytes);
+  Totals totals;
+  for (std::uint64_t* value : {&totals.keyframes, &totals.retired, &totals.points, &totals.lines,
+                               &totals.edges, &totals.frames, &totals.next.edge}) {
+    from.get(*value);
+  }
+  read(from, totals.next.keyframes);
+  read(from, totals.next.points);
+  read(from, totals.next.lines);
+  from.expect_end();
+  return totals;
+}
+
+}  // namespace plumbline::maps

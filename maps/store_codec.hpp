@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a map consists of as bytes (docs/store.md), before packing. Decoders throw BadBytes.
+#include <memory>
+#include <vector>
+
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "store_bytes.hpp"
+
+namespace plumbline::maps {
+
+/// Landmarks and frame poses of neighbouring numbers share a row.
+constexpr std::int32_t kLandmarksPerPage = 64;
+constexpr std::size_t kFramesPerPage = 256;
+
+void encode(const Keyframe& keyframe, ByteWriter& to);
+/// `picture` is what the look-up grid of the points is made for.
+std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& picture);
+
+/// Pose and parent, which change as the map is refined.
+struct KeyframeState {
+  geometry::Rigid3 camera_from_world;
+  KeyframeId parent;
+};
+void encode(const KeyframeState& state, ByteWriter& to);
+KeyframeState decode_state(const Bytes& bytes);
+
+void encode(const MapPoint& point, ByteWriter& to);
+void encode(const MapLine& line, ByteWriter& to);
+/// Appends a page's landmarks.
+void decode_page(const Bytes& bytes, std::vector<MapPoint>& points);
+void decode_page(const Bytes& bytes, std::vector<MapLine>& lines);
+
+void encode(const SurfaceEdge& edge, ByteWriter& to);
+SurfaceEdge decode_edge(const Bytes& bytes);
+void encode(const RetiredKeyframe& retired, ByteWriter& to);
+RetiredKeyframe decode_retired(const Bytes& bytes);
+
+void encode(const FramePose& frame, ByteWriter& to);
+void decode_page(const Bytes& bytes, std::vector<FramePose>& frames);
+
+void encode(const sensor::Camera& camera, ByteWriter& to);
+sensor::Camera decode_camera(const Bytes& bytes);
+
+/// How much of everything there must be: tells when rows were lost.
+struct Totals {
+  std::uint64_t keyframes = 0;
+  std::uint64_t retired = 0;
+  std::uint64_t points = 0;
+  std::uint64_t lines = 0;
+  std::uint64_t edges = 0;
+  std::uint64_t frames = 0;
+  NextIds next;
+};
+void encode(const Totals& totals, ByteWriter& to);
+Totals decode_totals(const Bytes& bytes);
+
+}  // namespace plumbline::maps

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A table that is kept equal to what the program holds, at the cost of what changed.
+#include <map>
+#include <string>
+#include <utility>
+
+#include "store_sqlite.hpp"
+
+namespace plumbline::maps {
+
+/// Rows are named by two numbers and hold packed bytes. A round: begin, put or keep every row there is, end:
+/// rows whose bytes changed are written, rows that were not named are deleted.
+class Mirror {
+ public:
+  using Key = std::pair<std::int32_t, std::int64_t>;
+
+  Mirror(Database& database, const std::string& table)
+      : database_(database),
+        put_(database, ("REPLACE INTO " + table + " VALUES (?, ?, ?)").c_str()),
+        erase_(database, ("DELETE FROM " + table + " WHERE robot = ? AND number = ?").c_str()),
+        get_(database, ("SELECT data FROM " + table + " WHERE robot = ? AND number = ?").c_str()),
+        keys_("SELECT robot, number FROM " + table) {
+    reread();
+  }
+
+  /// After a round that was rolled back: knows again which rows there are, but not what they hold.
+  void reread() {
+    rows_.clear();
+    Statement keys(database_, keys_.c_str());
+    while (keys.step()) {
+      rows_[{static_cast<std::int32_t>(keys.integer(0)), keys.integer(1)}] = Row{};
+    }
+  }
+  void begin() {
+    ++round_;
+    count_ = 0;
+  }
+  /// Of rows that never change: whether this one is there for certain, and need not be put.
+  bool keep(Key key) {
+    const auto found = rows_.find(key);
+    if (found == rows_.end() || !found->second.known) return false;
+    found->second.round = round_;
+    ++count_;
+    return true;
+  }
+  void put(Key key, const Bytes& bytes) {
+    const std::uint64_t print = fingerprint(bytes);
+    const auto [row, is_new] = rows_.try_emplace(key);
+    ++count_;
+    row->second.round = round_;
+    if (!is_new && row->second.known && row->second.print == print) return;
+    const Bytes packed = pack(bytes);
+    const bool is_there = !is_new && !row->second.known && holds(key, packed);
+    row->second.known = true;
+    row->second.print = print;
+    if (!is_there) put_.bind(1, key.first).bind(2, key.second).bind(3, packed).run();
+  }
+  void end() {
+    for (auto row = rows_.begin(); row != rows_.end();) {
+      if (row->second.round == round_) {
+        ++row;
+        continue;
+      }
+      erase_.bind(1, row->first.first).bind(2, row->first.second).run();
+      row = rows_.erase(row);
+    }
+  }
+  [[nodiscard]] std::uint64_t count() const { return count_; }  ///< rows named in this round
+
+ private:
+  struct Row {
+    std::uint64_t print = 0;
+    bool known = false;  ///< whether `print` is that of the row in the file
+    std::uint64_t round = 0;
+  };
+  bool holds(Key key, const Bytes& packed) {
+    const bool found = get_.bind(1, key.first).bind(2, key.second).step();
+    const bool equal = found && get_.blob(0) == packed;
+    get_.rewind();
+    return equal;
+  }
+
+  Database& database_;
+  Statement put_;
+  Statement erase_;
+  Statement get_;
+  std::string keys_;
+  std::map<Key, Row> rows_;
+  std::uint64_t round_ = 0;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace plumbline::maps

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "store_schema.hpp"
+
+#include <utility>
+
+#include "store_codec.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line", "edge", "frame", "cloud"};
+
+void put_text(Database& database, const char* key, const std::string& text) {
+  Statement(database, "INSERT INTO header VALUES (?, ?)").bind(1, std::string(key)).bind(2, text).run();
+}
+
+std::string get_text(Database& database, const char* key) {
+  Statement statement(database, "SELECT value FROM header WHERE key = ?");
+  if (!statement.bind(1, std::string(key)).step()) throw BadBytes(std::string("its header has no ") + key);
+  return statement.text(0);
+}
+
+}  // namespace
+
+void create_tables(Database& database, const StoreHeader& header) {
+  database.run(("PRAGMA application_id = " + std::to_string(kStoreApplication)).c_str());
+  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
+  database.run("CREATE TABLE header (key TEXT PRIMARY KEY, value NOT NULL)");
+  database.run("CREATE TABLE attachment (name TEXT PRIMARY KEY, data BLOB NOT NULL)");
+  for (const char* table : kTables) {
+    database.run((std::string("CREATE TABLE ") + table +
+                  " (robot INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL,"
+                  " PRIMARY KEY (robot, number))")
+                     .c_str());
+  }
+  put_text(database, "robot", header.robot);
+  put_text(database, "program", header.program_version);
+  put_text(database, "configuration", header.configuration);
+  ByteWriter camera;
+  encode(header.camera, camera);
+  const Bytes packed = pack(camera.bytes());
+  Statement(database, "INSERT INTO header VALUES ('camera', ?)").bind(1, packed).run();
+}
+
+void check_store(Database& database) {
+  const std::int64_t application = database.number("PRAGMA application_id");
+  if (application == 0 && database.number("SELECT count(*) FROM sqlite_master") == 0) {
+    throw StoreFailure(core::ErrorKind::kInput,
+                       "holds nothing: the run that made it ended before it began; map the recording again");
+  }
+  if (application != kStoreApplication) {
+    throw StoreFailure(core::ErrorKind::kInput,
+                       "is an SQLite file, but no map store; give the map.db of a result folder");
+  }
+  const std::int64_t format = database.number("PRAGMA user_version");
+  if (format > kStoreFormat) {
+    throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
+                                                    ", this program reads up to " +
+                                                    std::to_string(kStoreFormat) + "; use a newer Plumbline");
+  }
+  if (format < 1) throw BadBytes("its format number is wrong");
+}
+
+StoreHeader read_header(Database& database) {
+  StoreHeader header;
+  header.robot = get_text(database, "robot");
+  header.program_version = get_text(database, "program");
+  header.configuration = get_text(database, "configuration");
+  header.format = static_cast<int>(database.number("PRAGMA user_version"));
+  Statement camera(database, "SELECT value FROM header WHERE key = 'camera'");
+  if (!camera.step()) throw BadBytes("its header has no camera");
+  header.camera = decode_camera(camera.unpacked(0));
+  return header;
+}
+
+void check_file(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) {
+    throw StoreFailure(core::ErrorKind::kInput, "no such file; give the map.db of a result folder");
+  }
+  if (!std::filesystem::is_regular_file(file, ignored)) {
+    throw StoreFailure(core::ErrorKind::kInput, "is no file; give the map.db of a result folder");
+  }
+}
+
+}  // namespace plumbline::maps

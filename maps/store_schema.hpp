@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Tables of the map store; docs/store.md describes them.
+#include <filesystem>
+
+#include "plumbline/maps/store.hpp"
+#include "store_sqlite.hpp"
+
+namespace plumbline::maps {
+
+constexpr std::int64_t kStoreApplication = 0x504c4d53;  ///< "PLMS", in the head of the SQLite file
+
+void create_tables(Database& database, const StoreHeader& header);
+/// Throws a StoreFailure for a foreign, unfinished or newer file.
+void check_store(Database& database);
+StoreHeader read_header(Database& database);
+/// Refuses what is no file before SQLite does with fewer words.
+void check_file(const std::filesystem::path& file);
+
+}  // namespace plumbline::maps
