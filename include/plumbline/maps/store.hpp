@@ -53,7 +53,7 @@ class StoreWriter {
 
   /// One transaction: brings the file up to `map` and `frames`, in which `keyframe` is new, and adds the
   /// keyframe's cloud (bytes of cloud::encode_cloud; may be empty). Only what changed since the last call is
-  /// written, but all landmarks are looked at: about 20 ms for 100 000. Errors (kOutput): disk full, I/O.
+  /// written, but all landmarks are looked at: 20 to 40 ms for 100 000. Errors (kOutput): disk full, I/O.
   core::Result<void> add_keyframe(const Map& map, KeyframeId keyframe, const std::vector<std::uint8_t>& cloud,
                                   const std::vector<FramePose>& frames = {});
   /// A cloud that comes later than its keyframe, or replaces its cloud. One transaction.
