@@ -6,7 +6,8 @@ add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off>)
 # -Wmaybe-uninitialized: g++ 12 with -O3 reports it inside Eigen where nothing is uninitialised.
 add_library(plumbline_warnings INTERFACE)
 target_compile_options(plumbline_warnings INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow;-Wno-maybe-uninitialized>
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow>
+  $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-maybe-uninitialized>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PLUMBLINE_WERROR}>>:-Werror>)
 
 if(PLUMBLINE_SANITIZE)
