@@ -108,7 +108,9 @@ TEST(PoseGraph, ThirtyPercentWrongLoopsChangeNothing) {
     EXPECT_LT(rmse(torn, torn.graph), 1.1 * rmse(clean, clean.graph)) << "seed " << seed;
     int right_rejected = 0;  // of 30: the gate itself takes one right measurement in a thousand for wrong
     for (std::size_t i = 0; i < torn.wrong.size(); ++i) {
-      if (torn.wrong[i]) EXPECT_TRUE(summary.edges[i].rejected) << "seed " << seed << " edge " << i;
+      if (torn.wrong[i]) {
+        EXPECT_TRUE(summary.edges[i].rejected) << "seed " << seed << " edge " << i;
+      }
       if (!torn.wrong[i] && summary.edges[i].rejected) ++right_rejected;
     }
     EXPECT_LE(right_rejected, 1) << "seed " << seed;
