@@ -33,6 +33,7 @@ CONFINED = [
     ("Ceres", "optimize", r"ceres/", r"Ceres::|ceres\b"),
     ("yaml-cpp", "core", r"yaml-cpp/", r"yaml-cpp"),
     ("CycloneDDS", "net", r"dds/|ddsc/|org/eclipse/cyclonedds", r"CycloneDDS"),
+    ("SQLite", "maps", r"sqlite3", r"SQLite3?::|sqlite3\b"),
     ("CLI11", "cli", r"CLI/", r"CLI11"),
 ]
 
