@@ -16,8 +16,9 @@ class CloudStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.integer("between", between_, {0, 100000}, "",
-                  "Every so many frames one that is no keyframe gives a cloud as well; 0: none");
+    table.integer(
+        "between", between_, {0, 100000}, "",
+        "Every so many frames, and at the end, one that is no keyframe gives a cloud as well; 0: none");
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
@@ -27,12 +28,15 @@ class CloudStage : public Stage {
   [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
   core::Result<void> start(const RunContext& context) override {
     camera_ = context.source->camera().color;
+    frames_ = context.source->size();
     return {};
   }
 
   core::Result<void> process(StageIo& io) override {
     const auto track = io.input<TrackedFrame>("track");
-    const bool between = between_ > 0 && io.frame() % static_cast<std::size_t>(between_) == 0;
+    // The last frame shows what no other does when the camera was on its way somewhere.
+    const bool between =
+        between_ > 0 && (io.frame() % static_cast<std::size_t>(between_) == 0 || io.frame() + 1 == frames_);
     if (!track->keyframe.valid() && !between) return {};
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera_, options_);
@@ -52,6 +56,7 @@ class CloudStage : public Stage {
  private:
   cloud::KeyframeCloudOptions options_;
   int between_ = 10;
+  std::size_t frames_ = 0;
   ChainOption filters_{"filters/keyframe.yaml"};
   sensor::Pinhole camera_;
 };
