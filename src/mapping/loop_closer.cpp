@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/mapping/loop_closer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -69,38 +71,54 @@ std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
   for (const places::Candidate& candidate : candidates) {
     if (candidate.in_a_row < options_.places.consistent) continue;
     ++counts_.candidates;
-    Loop loop{keyframe, candidate.keyframe, {}};
+    LoopTrial trial;
+    trial.loop = {keyframe, candidate.keyframe, {}};
+    trial.score = candidate.score;
     const std::uint64_t seed = options_.seed + static_cast<std::uint64_t>(keyframe.index);
-    loop.evidence =
+    trial.loop.evidence =
         verify_place({&map, keyframe, camera_}, {&map, candidate.keyframe, camera_}, options_.verify, seed);
-    if (!loop.evidence.accepted || !plausible(map, loop)) continue;
+    trial.refused = judge(map, trial);
+    trials_.push_back(trial);
+    if (!trial.refused.empty()) continue;
     ++counts_.verified;
-    verified.push_back(std::move(loop));
+    verified.push_back(std::move(trial.loop));
   }
   return verified;
 }
 
-/// Drift grows with the way. A correction far beyond it means another place that looks the same.
-bool LoopCloser::plausible(const maps::Map& map, const Loop& loop) const {
-  constexpr double kAlways_m = 0.1;
-  constexpr double kAlways_rad = 0.05;
-  constexpr double kRadiansPerMetre = 0.5;  // of drift
-  double way = 0.0;
+/// How far closing the loop would move the query, and the way in which drift may have grown that far.
+void LoopCloser::measure_correction(const maps::Map& map, LoopTrial& trial) const {
+  const Loop& loop = trial.loop;
   Eigen::Vector3d last = map.camera_from_world(loop.match).inverse().translation;
-  const bool same_robot = loop.match.robot == loop.query.robot;
-  if (!same_robot) return true;  // nothing is known of how they lie
   for (std::int32_t i = loop.match.index + 1; i <= loop.query.index; ++i) {
     const KeyframeId id{loop.query.robot, i};
     if (!map.has_keyframe(id)) continue;
     const Eigen::Vector3d here = map.camera_from_world(id).inverse().translation;
-    way += (here - last).norm();
+    trial.way_m += (here - last).norm();
     last = here;
   }
   const Rigid3 correction = world_from_query(map, loop) * map.camera_from_world(loop.query);
-  const double moved = (correction * last - last).norm();
-  return moved <= kAlways_m + options_.max_drift * way &&
-         geometry::rotation_angle(correction.rotation) <=
-             kAlways_rad + kRadiansPerMetre * options_.max_drift * way;
+  trial.correction_m = (correction * last - last).norm();
+  trial.correction_rad = geometry::rotation_angle(correction.rotation);
+}
+
+/// Drift grows with the way. A correction far beyond it means another place that looks the same.
+std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
+  constexpr double kAlways_m = 0.1;
+  constexpr double kAlways_rad = 0.05;
+  constexpr double kRadiansPerMetre = 0.5;  // of drift
+  const PlaceVerification& evidence = trial.loop.evidence;
+  if (evidence.ransac_inliers == 0) return evidence.refused;
+  const bool same_robot = trial.loop.match.robot == trial.loop.query.robot;
+  if (same_robot) measure_correction(map, trial);  // else nothing is known of how they lie
+  if (!evidence.accepted) return evidence.refused;
+  const double allowed_m = options_.max_drift * trial.way_m;
+  if (trial.correction_m > kAlways_m + allowed_m ||
+      trial.correction_rad > kAlways_rad + kRadiansPerMetre * allowed_m) {
+    return fmt::format("{:.2f} m and {:.2f} rad are more than drift explains on {:.1f} m", trial.correction_m,
+                       trial.correction_rad, trial.way_m);
+  }
+  return {};
 }
 
 /// Both say the same about where the world of today lies in that of then, at the place of the second query.

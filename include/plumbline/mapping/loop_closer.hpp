@@ -56,6 +56,16 @@ struct Loop {
   PlaceVerification evidence;
 };
 
+/// One candidate that was verified, and what became of it.
+struct LoopTrial {
+  Loop loop;
+  double score = 0.0;         ///< of the pictures
+  double correction_m = 0.0;  ///< how far closing it would move the query; 0 when there is no pose
+  double correction_rad = 0.0;
+  double way_m = 0.0;   ///< from the match to the query, along the keyframes
+  std::string refused;  ///< why it is no loop; empty: it passed
+};
+
 class LoopCloser {
  public:
   LoopCloser(const LoopOptions& options, const sensor::Pinhole& camera)
@@ -82,6 +92,8 @@ class LoopCloser {
                                                           std::size_t count) const;
 
   [[nodiscard]] const LoopCounts& counts() const { return counts_; }
+  /// Every candidate that was verified so far.
+  [[nodiscard]] const std::vector<LoopTrial>& trials() const { return trials_; }
   /// Edges that closed a loop and are still believed.
   [[nodiscard]] const std::vector<PoseEdge>& edges() const { return edges_; }
   [[nodiscard]] const places::Database& database() const { return database_; }
@@ -89,7 +101,8 @@ class LoopCloser {
  private:
   [[nodiscard]] std::vector<Loop> verify(const maps::Map& map, core::KeyframeId keyframe,
                                          const std::vector<places::Candidate>& candidates);
-  [[nodiscard]] bool plausible(const maps::Map& map, const Loop& loop) const;
+  void measure_correction(const maps::Map& map, LoopTrial& trial) const;
+  [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] bool agree(const maps::Map& map, const Loop& a, const Loop& b) const;
   void merge_doubles(maps::Map& map, const PoseEdge& edge) const;
 
@@ -101,6 +114,7 @@ class LoopCloser {
   std::vector<Loop> waiting_;  ///< verified lately, not yet confirmed by others
   std::vector<PoseEdge> edges_;
   LoopCounts counts_;
+  std::vector<LoopTrial> trials_;
 };
 
 }  // namespace plumbline::mapping

@@ -66,6 +66,8 @@ class Slam {
 
   [[nodiscard]] const maps::Map& map() const { return map_; }
   [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
+  /// Every place that was verified, with its evidence.
+  [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
   /// What the tracker said about the last frame; for pictures of it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which of many relative poses between pictures tell the same story. Each says how a keyframe of one map lies
+// to a keyframe of another (or of the same map, much later). Two agree when going round through both ends
+// nowhere near; the largest set of which every two agree is taken for true (pairwise consistency
+// maximisation: Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018; METHOD section 6). Places that repeat give
+// several such sets: a set is worth believing when no other one comes near its size.
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::mapping {
+
+/// Keyframe `a` of map A and keyframe `b` of map B show the same place: b_from_a takes a's camera frame to
+/// b's, metres.
+struct PlacePair {
+  core::KeyframeId a;
+  core::KeyframeId b;
+  geometry::Rigid3 b_from_a;
+};
+
+struct ConsistencyOptions {
+  double max_apart_m = 0.15;       ///< how far two pairs may put a camera apart ...
+  double max_turned_rad = 0.06;    ///< ... and turn it
+  double apart_per_metre = 0.02;   ///< more for every metre between them: the maps themselves drift
+  double turned_per_metre = 0.01;  ///< rad
+  std::size_t max_sets = 5;        ///< that are looked for
+  int budget = 200000;             ///< steps of the search for each set; then the best so far is taken
+};
+
+/// Pairs of which every two agree.
+struct ConsistentSet {
+  std::vector<std::size_t> members;  ///< indices of the pairs, ascending
+  std::size_t keyframes_a = 0;       ///< different keyframes of A among them
+  std::size_t keyframes_b = 0;
+  double span_m = 0.0;  ///< largest distance between two members' cameras, in the map where it is smaller
+};
+
+/// Whether two pairs tell the same story: the pose of the other one's keyframes, found by way of each, is the
+/// same within the limits. Keyframes may have been retired since. The map says how A's keyframes lie to each
+/// other, and B's.
+bool agree(const maps::Map& map_a, const maps::Map& map_b, const PlacePair& one, const PlacePair& two,
+           const ConsistencyOptions& options);
+
+/// Sets that tell different stories, the largest first. What agrees with half of a set belongs to its story
+/// and founds no set of its own, so that sets[1] is the strongest rival of sets[0]. Empty for no pairs; a
+/// pair that agrees with no other is a set of one. The same input in the same order gives the same answer.
+std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::Map& map_b,
+                                           const std::vector<PlacePair>& pairs,
+                                           const ConsistencyOptions& options);
+
+/// The largest set of 0 ... n-1 of which every two are joined; `joined` is symmetric, n x n. Exact within the
+/// budget (steps of branch and bound), else the largest that was found. Ascending.
+std::vector<std::size_t> maximum_clique(const std::vector<std::vector<bool>>& joined, int budget);
+
+}  // namespace plumbline::mapping
