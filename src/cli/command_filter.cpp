@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "app.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/filter_chain.hpp"
 
 namespace plumbline::cli {
@@ -64,18 +64,16 @@ core::Result<void> check_output(const fs::path& output, const cloud::FilterChain
 }
 
 /// The inputs one after the other.
-core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, Session& session) {
+core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::CloudColumns& columns) {
   cloud::CloudPtr all;
   for (std::size_t i = 0; i + 1 < request.files.size(); ++i) {
     auto file = cloud::read_cloud(request.files[i]);
     if (!file) return tl::unexpected<core::Error>(file.error());
-    const cloud::CloudColumns& columns = file->columns;
-    if (!columns.confidence.empty() || !columns.observations.empty() || !columns.robot.empty()) {
-      session.console().info(request.files[i].string() + ": confidence, observations and robot are not kept");
-    }
     if (all == nullptr) {
       all = std::move(file->cloud);
+      columns = std::move(file->columns);
     } else {
+      cloud::append_columns(columns, all->size(), file->columns, file->cloud->size());
       *all += *file->cloud;
     }
   }
@@ -90,8 +88,11 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   context.executor = &session.executor();
   if (auto fit = check_output(output, *chain); !fit) return fit;
   if (auto fit = chain->ready(context); !fit) return fit;
-  auto input = read_inputs(request, session);
+  cloud::CloudColumns columns;
+  auto input = read_inputs(request, columns);
   if (!input) return tl::unexpected<core::Error>(input.error());
+  context.columns = &columns;
+  context.made_columns = &columns;
   Console& console = session.console();
   std::vector<cloud::FilterReport> reports;
   const auto filtered =
@@ -102,7 +103,7 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   console.end_progress();
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (!session.quiet) fmt::print("{}", cloud::to_table(reports));
-  return cloud::write_cloud(output, **filtered);
+  return cloud::write_cloud(output, **filtered, columns);
 }
 
 int list_filters(Session& session) {

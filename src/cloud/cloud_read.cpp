@@ -14,8 +14,12 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file) {
   auto ply = read_ply(file);
   if (!ply) return tl::unexpected<core::Error>(ply.error());
   std::vector<Meaning> meanings;
-  for (const auto& column : ply->columns) meanings.push_back(meaning_of(column.name));
-  CloudBuilder builder(meanings, ply->vertex_count);
+  std::vector<std::string> names;
+  for (const auto& column : ply->columns) {
+    meanings.push_back(meaning_of(column.name));
+    names.push_back(column.name);
+  }
+  CloudBuilder builder(meanings, names, ply->vertex_count);
   if (!builder.has_position())
     return core::input_error(file.string() + ": has no x, y and z; it is not a point cloud");
   for (std::size_t c = 0; c < meanings.size(); ++c) {
@@ -24,13 +28,13 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file) {
         meanings[c] == Meaning::kRed || meanings[c] == Meaning::kGreen || meanings[c] == Meaning::kBlue;
     auto& values = ply->columns[c].values;
     if (auto* bytes = std::get_if<std::vector<std::uint8_t>>(&values)) {
-      for (std::size_t i = 0; i < bytes->size(); ++i) builder.set(i, meanings[c], (*bytes)[i]);
+      for (std::size_t i = 0; i < bytes->size(); ++i) builder.set(i, meanings[c], c, (*bytes)[i]);
     } else if (auto* floats = std::get_if<std::vector<float>>(&values)) {
       // Colours written as floats go from 0 to 1 in most programs.
       const bool share =
           color && std::all_of(floats->begin(), floats->end(), [](float v) { return !(v > 1.0F); });
       for (std::size_t i = 0; i < floats->size(); ++i) {
-        builder.set(i, meanings[c], static_cast<double>((*floats)[i]) * (share ? 255.0 : 1.0));
+        builder.set(i, meanings[c], c, static_cast<double>((*floats)[i]) * (share ? 255.0 : 1.0));
       }
     }
     values = std::vector<float>();  // the column is in the cloud now

@@ -73,10 +73,16 @@ Meaning meaning_of(const std::string& name) {
   for (const auto& [known, meaning] : kNames) {
     if (lower == known) return meaning;
   }
-  return Meaning::kNone;
+  const bool writable = !lower.empty() && lower.size() <= 64 && lower != "_" && lower != "alpha" &&
+                        lower != "a" && std::all_of(lower.begin(), lower.end(), [](unsigned char c) {
+                          return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
+                        });
+  return writable ? Meaning::kOther : Meaning::kNone;
 }
 
-CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, std::size_t points) {
+CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, const std::vector<std::string>& names,
+                           std::size_t points)
+    : others_(meanings.size(), nullptr) {
   position_ = holds(meanings, {Meaning::kX, Meaning::kY, Meaning::kZ});
   file_.has_normals = holds(meanings, {Meaning::kNormalX, Meaning::kNormalY, Meaning::kNormalZ});
   file_.has_color = holds(meanings, {Meaning::kPackedColor}) ||
@@ -87,10 +93,19 @@ CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, std::size_t poi
   if (holds(meanings, {Meaning::kConfidence})) file_.columns.confidence.resize(points);
   if (holds(meanings, {Meaning::kObservations})) file_.columns.observations.resize(points);
   if (holds(meanings, {Meaning::kRobot})) file_.columns.robot.resize(points);
+  for (std::size_t c = 0; c < meanings.size(); ++c) {
+    if (meanings[c] != Meaning::kOther) continue;
+    auto& others = file_.columns.others;
+    const bool twice =
+        std::any_of(others.begin(), others.end(), [&](const auto& o) { return o.name == names[c]; });
+    if (twice) continue;
+    others.push_back({names[c], std::vector<float>(points)});
+    others_[c] = others.back().values.data();  // moving the vector leaves its memory in place
+  }
   shape(static_cast<std::uint32_t>(points), 1);
 }
 
-void CloudBuilder::set(std::size_t row, Meaning meaning, double value) {
+void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, double value) {
   Point& p = file_.cloud->points[row];
   const auto number = static_cast<float>(value);
   switch (meaning) {
@@ -133,6 +148,9 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, double value) {
       break;
     case Meaning::kRobot:
       file_.columns.robot[row] = to_byte(value);
+      break;
+    case Meaning::kOther:
+      if (others_[column] != nullptr) others_[column][row] = number;
       break;
     case Meaning::kPackedColor:
     case Meaning::kNone:

@@ -26,26 +26,31 @@ enum class Meaning {
   kCurvature,
   kConfidence,
   kObservations,
-  kRobot
+  kRobot,
+  kOther  ///< a number that is carried along
 };
 
 /// By the names in use: x y z, nx/normal_x, r/red/diffuse_red, rgb/rgba (packed), ...; case is ignored.
+/// kNone: not kept, because alpha, padding or a name that could not be written again.
 Meaning meaning_of(const std::string& name);
 
 /// Takes values point by point.
 class CloudBuilder {
  public:
-  /// `meanings`: of the columns; prepares the columns that the file has.
-  CloudBuilder(const std::vector<Meaning>& meanings, std::size_t points);
+  /// Meanings and names of the file's columns; prepares those that the cloud gets.
+  CloudBuilder(const std::vector<Meaning>& meanings, const std::vector<std::string>& names,
+               std::size_t points);
   /// False when x, y or z is missing.
   [[nodiscard]] bool has_position() const { return position_; }
-  void set(std::size_t row, Meaning meaning, double value);
+  /// `column`: of the file, needed for kOther.
+  void set(std::size_t row, Meaning meaning, std::size_t column, double value);
   void set_packed_color(std::size_t row, std::uint32_t bits);
   void shape(std::uint32_t width, std::uint32_t height);
   [[nodiscard]] CloudFile finish();
 
  private:
   CloudFile file_;
+  std::vector<float*> others_;  ///< of each column of the file that is kOther, else null
   bool position_ = false;
 };
 

@@ -3,6 +3,7 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -16,7 +17,9 @@ bool finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) &&
 
 void check_columns(const Cloud& cloud, const CloudColumns& columns) {
   const auto fits = [&cloud](std::size_t n) { return n == 0 || n == cloud.size(); };
-  if (!fits(columns.confidence.size()) || !fits(columns.observations.size()) || !fits(columns.robot.size())) {
+  if (!fits(columns.confidence.size()) || !fits(columns.observations.size()) || !fits(columns.robot.size()) ||
+      !std::all_of(columns.others.begin(), columns.others.end(),
+                   [&](const auto& other) { return other.values.size() == cloud.size(); })) {
     throw std::invalid_argument("cloud columns have another length than the cloud");
   }
 }
@@ -43,6 +46,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
   if (!columns.confidence.empty()) out.write("property float confidence\n");
   if (!columns.observations.empty()) out.write("property int observations\n");
   if (!columns.robot.empty()) out.write("property uchar robot\n");
+  for (const auto& other : columns.others) out.write("property float " + other.name + "\n");
   out.write("end_header\n");
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
@@ -55,6 +59,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
     if (!columns.confidence.empty()) out.put(columns.confidence[i]);
     if (!columns.observations.empty()) out.put(columns.observations[i]);
     if (!columns.robot.empty()) out.put(columns.robot[i]);
+    for (const auto& other : columns.others) out.put(other.values[i]);
   }
   return out.commit();
 }
@@ -68,9 +73,9 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   std::string sizes = "4 4 4 4 4 4 4 4";
   std::string types = "F F F F F F F F";
   std::string counts = "1 1 1 1 1 1 1 1";
-  const auto field = [&](bool present, const char* name, const char* size, const char* type) {
+  const auto field = [&](bool present, const std::string& name, const char* size, const char* type) {
     if (!present) return;
-    fields += std::string(" ") + name;
+    fields += " " + name;
     sizes += std::string(" ") + size;
     types += std::string(" ") + type;
     counts += " 1";
@@ -78,6 +83,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   field(!columns.confidence.empty(), "confidence", "4", "F");
   field(!columns.observations.empty(), "observations", "4", "U");
   field(!columns.robot.empty(), "robot", "1", "U");
+  for (const auto& other : columns.others) field(true, other.name, "4", "F");
 
   core::OutputFile out(file);
   const auto& t = cloud.sensor_origin_;
@@ -97,6 +103,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
     if (!columns.confidence.empty()) out.put(columns.confidence[i]);
     if (!columns.observations.empty()) out.put(columns.observations[i]);
     if (!columns.robot.empty()) out.put(columns.robot[i]);
+    for (const auto& other : columns.others) out.put(other.values[i]);
   }
   return out.commit();
 }

@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "filter_tools.hpp"
+#include "plumbline/cloud/columns.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -166,7 +167,9 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
                                           std::vector<FilterReport>* reports,
                                           const ChainProgress& progress) const {
   if (auto fit = ready(context); !fit) return tl::unexpected<core::Error>(fit.error());
-  if (filters_.empty()) return std::make_shared<Cloud>(*input);
+  const bool columned = context.columns != nullptr && context.made_columns != nullptr;
+  CloudColumns columns = columned ? *context.columns : CloudColumns();
+  FilterContext mine = context;
   CloudConstPtr current = std::move(input);
   CloudPtr output;
   std::size_t points = count_finite(*current);
@@ -174,17 +177,23 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
     const Step& step = filters_[i];
     if (progress) progress(i, filters_.size(), step.type);
     output.reset();  // `current` alone holds the input
+    CloudColumns made;
+    mine.columns = &columns;
+    mine.made_columns = &made;
     const auto start = std::chrono::steady_clock::now();
-    auto result = step.filter->apply(current, context);
+    auto result = step.filter->apply(current, mine);
     const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
     if (!result) return tl::unexpected<core::Error>(at(i, result.error()));
     output = std::move(*result);
+    columns = made.empty() ? carry_columns(*current, columns, *output) : std::move(made);
     current = output;
     const std::size_t left = count_finite(*current);
     if (reports != nullptr) reports->push_back({step.type, points, left, elapsed.count()});
     points = left;
   }
   if (progress) progress(filters_.size(), filters_.size(), "");
+  if (columned) *context.made_columns = std::move(columns);
+  if (output == nullptr) return std::make_shared<Cloud>(*current);  // an empty chain
   return output;
 }
 

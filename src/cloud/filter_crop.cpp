@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pcl/filters/crop_box.h>
 #include <pcl/filters/passthrough.h>
 
+#include <functional>
+#include <string>
+#include <vector>
+
 #include "filter_tools.hpp"
+#include "plumbline/cloud/cloud_io.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -47,6 +53,10 @@ class PassThroughFilter : public Filter {
   void declare(core::OptionTable& table) override {
     table.choice("field", field_, {"x", "y", "z", "normal_x", "normal_y", "normal_z", "curvature"},
                  "The number of a point that is looked at");
+    table.text(
+        "column", column_,
+        "Instead of field: a further column of the file by its name, such as confidence, observations, robot "
+        "or intensity; empty: field");
     table.number("min", min_, {-1e9, 1e9}, "",
                  "Smallest value that passes, in the field's own unit (metres for x, y, z)");
     table.number("max", max_, {-1e9, 1e9}, "", "Largest value that passes");
@@ -55,7 +65,8 @@ class PassThroughFilter : public Filter {
   std::string check() const override {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
   }
-  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
+    if (!column_.empty()) return by_column(*input, context);
     pcl::PassThrough<Point> pass(true);
     pass.setFilterFieldName(field_);
     pass.setFilterLimits(static_cast<float>(min_), static_cast<float>(max_));
@@ -68,7 +79,33 @@ class PassThroughFilter : public Filter {
   }
 
  private:
+  [[nodiscard]] core::Result<CloudPtr> by_column(const Cloud& input, const FilterContext& context) const {
+    const CloudColumns none;
+    const CloudColumns& columns = context.columns != nullptr ? *context.columns : none;
+    std::vector<std::string> names;
+    std::function<double(std::size_t)> value;
+    const auto offer = [&](const std::string& name, const auto& values) {
+      if (values.empty()) return;
+      names.push_back(name);
+      if (name == column_) value = [&values](std::size_t i) { return static_cast<double>(values[i]); };
+    };
+    offer("confidence", columns.confidence);
+    offer("observations", columns.observations);
+    offer("robot", columns.robot);
+    for (const auto& other : columns.others) offer(other.name, other.values);
+    if (!value && !input.empty()) {
+      return core::usage_error(
+          fmt::format("column: the cloud has no '{}' (it has: {})", column_,
+                      names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+    }
+    return select(input, [&](std::size_t i, const Point&) {
+      const double v = value(i);
+      return std::isfinite(v) && (v >= min_ && v <= max_) == inside_;
+    });
+  }
+
   std::string field_ = "z";
+  std::string column_;
   double min_ = -1e9;
   double max_ = 1e9;
   bool inside_ = true;
@@ -84,10 +121,12 @@ FilterInfo crop_box_filter() {
 }
 
 FilterInfo pass_through_filter() {
-  return {"pass_through", "Keeps points one of whose numbers lies within limits.",
-          "PCL's PassThrough. Points whose field is not a number go.",
-          "- type: pass_through\n  field: normal_y\n  min: -1\n  max: -0.9\n",
-          [] { return std::make_unique<PassThroughFilter>(); }};
+  return {
+      "pass_through", "Keeps points one of whose numbers lies within limits.",
+      "PCL's PassThrough. Points whose field is not a number go. `column` looks at what a file has beside "
+      "positions, normals and curvature: `column: confidence, min: 0.5` keeps what is well seen.",
+      "- type: pass_through\n  field: normal_y\n  min: -1\n  max: -0.9\n",
+      [] { return std::make_unique<PassThroughFilter>(); }};
 }
 
 }  // namespace plumbline::cloud

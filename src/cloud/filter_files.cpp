@@ -6,7 +6,7 @@
 #include <system_error>
 
 #include "filter_tools.hpp"
-#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/columns.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -24,17 +24,26 @@ class MergeFilter : public Filter {
     if (fs::is_regular_file(file_, error)) return {};
     return core::input_error(file_ + ": no such file");
   }
-  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const auto other = read_cloud(file_);
     if (!other) return tl::unexpected<core::Error>(other.error());
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());
-    for (const Cloud* part : {input.get(), static_cast<const Cloud*>(other->cloud.get())}) {
-      for (const Point& p : part->points) {
-        if (finite(p)) output->points.push_back(p);
+    std::vector<std::size_t> chosen[2];
+    const Cloud* parts[2] = {input.get(), other->cloud.get()};
+    for (std::size_t side = 0; side < 2; ++side) {
+      for (std::size_t i = 0; i < parts[side]->size(); ++i) {
+        if (!finite((*parts[side])[i])) continue;
+        output->points.push_back((*parts[side])[i]);
+        chosen[side].push_back(i);
       }
     }
     make_list(*output);
+    if (context.columns != nullptr && context.made_columns != nullptr) {
+      *context.made_columns = pick_columns(*context.columns, chosen[0]);
+      append_columns(*context.made_columns, chosen[0].size(), pick_columns(other->columns, chosen[1]),
+                     chosen[1].size());
+    }
     return output;
   }
 
@@ -63,7 +72,9 @@ class TeeFilter : public Filter {
     if (!context.run.empty()) {
       file.replace_filename(file.stem().string() + "_" + context.run + file.extension().string());
     }
-    if (auto written = write_cloud(file, *input); !written)
+    const CloudColumns none;
+    if (auto written = write_cloud(file, *input, context.columns != nullptr ? *context.columns : none);
+        !written)
       return tl::unexpected<core::Error>(written.error());
     return std::make_shared<Cloud>(*input);
   }
@@ -78,7 +89,8 @@ FilterInfo merge_filter() {
   return {
       "merge", "Adds the points of another file.",
       "The points of the file follow those of the chain, as they are: both clouds must be in one frame (put "
-      "transform before it otherwise). Whole inputs are merged by naming several: `plumbline filter CHAIN "
+      "transform before it otherwise). Columns that only one of the two has are 0 for the other's points. "
+      "Whole inputs are merged by naming several: `plumbline filter CHAIN "
       "IN... OUT`. The result is a list, not organised.",
       "- type: merge\n  file: other.ply\n", [] { return std::make_unique<MergeFilter>(); }};
 }

@@ -5,8 +5,15 @@
 #include <pcl/filters/voxel_grid.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 #include "filter_tools.hpp"
+#include "plumbline/cloud/columns.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -64,12 +71,70 @@ void restore_normals(Cloud& cloud) {
   }
 }
 
+/// Number of the cell of every point as PCL's VoxelGrid has it: its output is sorted by that.
+std::vector<std::int64_t> cells_of(const Cloud& points, float leaf) {
+  const float inverse = 1.0F / leaf;
+  const auto cell = [inverse](float v) { return static_cast<std::int64_t>(std::floor(v * inverse)); };
+  std::array<std::int64_t, 3> least{};
+  std::array<std::int64_t, 3> most{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [min, max] =
+        std::minmax_element(points.begin(), points.end(),
+                            [axis](const auto& a, const auto& b) { return a.data[axis] < b.data[axis]; });
+    least[axis] = cell(min->data[axis]);
+    most[axis] = cell(max->data[axis]);
+  }
+  const std::int64_t across = most[0] - least[0] + 1;
+  const std::int64_t layer = across * (most[1] - least[1] + 1);
+  std::vector<std::int64_t> cells;
+  cells.reserve(points.size());
+  for (const Point& p : points.points) {
+    cells.push_back(cell(p.x) - least[0] + (cell(p.y) - least[1]) * across + (cell(p.z) - least[2]) * layer);
+  }
+  return cells;
+}
+
+/// One row for every cell of at least `least` points, in the order of the cells: the means, the most
+/// observations, the first robot.
+CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::int64_t>& cells,
+                          std::size_t least) {
+  std::vector<std::size_t> order(cells.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return cells[a] < cells[b]; });
+  std::vector<std::size_t> firsts;
+  std::vector<std::pair<std::size_t, std::size_t>> runs;  // of `order`
+  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+    while (end < order.size() && cells[order[end]] == cells[order[begin]]) ++end;
+    if (end - begin < least) continue;
+    firsts.push_back(order[begin]);
+    runs.emplace_back(begin, end);
+  }
+  CloudColumns result = pick_columns(columns, firsts);
+  const auto mean = [&](const std::vector<float>& from, std::vector<float>& to) {
+    for (std::size_t r = 0; r < to.size(); ++r) {
+      double sum = 0.0;
+      for (std::size_t k = runs[r].first; k < runs[r].second; ++k) sum += static_cast<double>(from[order[k]]);
+      to[r] = static_cast<float>(sum / static_cast<double>(runs[r].second - runs[r].first));
+    }
+  };
+  mean(columns.confidence, result.confidence);
+  for (std::size_t o = 0; o < result.others.size(); ++o)
+    mean(columns.others[o].values, result.others[o].values);
+  for (std::size_t r = 0; r < result.observations.size(); ++r) {
+    for (std::size_t k = runs[r].first; k < runs[r].second; ++k) {
+      result.observations[r] = std::max(result.observations[r], columns.observations[order[k]]);
+    }
+  }
+  return result;
+}
+
 class GridFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
     table.number("leaf", leaf_m_, {1e-4, 1000.0}, "m", "Edge length of a cell");
   }
-  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);
     const std::string problem = check_extent(*points, leaf_m_);
     if (!problem.empty()) return core::usage_error(problem);
@@ -78,10 +143,18 @@ class GridFilter : public Filter {
     output->sensor_origin_ = input->sensor_origin_;
     output->sensor_orientation_ = input->sensor_orientation_;
     make_list(*output);
+    if (context.columns != nullptr && context.made_columns != nullptr && !context.columns->empty()) {
+      *context.made_columns = columns(*points, carry_columns(*input, *context.columns, *points));
+    }
     return output;
   }
 
  protected:
+  /// Those of the resampled points when they are not simply some of the input's.
+  [[nodiscard]] virtual CloudColumns columns(const Cloud& /*points*/, const CloudColumns& /*all*/) const {
+    return {};
+  }
+
   /// `points`: finite, not empty.
   virtual CloudPtr resample(const CloudConstPtr& points) const = 0;
   [[nodiscard]] float leaf() const { return static_cast<float>(leaf_m_); }
@@ -105,6 +178,9 @@ class VoxelGridFilter : public GridFilter {
     grid.filter(*output);
     restore_normals(*output);
     return output;
+  }
+  [[nodiscard]] CloudColumns columns(const Cloud& points, const CloudColumns& all) const override {
+    return mean_columns(all, cells_of(points, leaf()), static_cast<std::size_t>(min_points_));
   }
 
  private:
@@ -148,7 +224,9 @@ class UniformSamplingFilter : public GridFilter {
 FilterInfo voxel_grid_filter() {
   return {
       "voxel_grid", "Replaces the points of every grid cell by their mean.",
-      "PCL's VoxelGrid: positions, normals and colours are averaged. Where PCL would warn and hand the cloud "
+      "PCL's VoxelGrid: positions, normals and colours are averaged; so are the other columns, but a cell "
+      "has the "
+      "most observations of its points and the robot of the first. Where PCL would warn and hand the cloud "
       "back "
       "unfiltered because the cells cannot be numbered, this is an error that names a leaf size which fits.",
       "- type: voxel_grid\n  leaf: 1 cm\n", [] { return std::make_unique<VoxelGridFilter>(); }};

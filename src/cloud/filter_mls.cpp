@@ -3,6 +3,7 @@
 #include <pcl/surface/mls.h>
 
 #include "filter_tools.hpp"
+#include "plumbline/cloud/columns.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -28,9 +29,14 @@ class MlsFilter : public Filter {
     mls.process(*output);
     const auto indices = mls.getCorrespondingIndices();
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
+    std::vector<std::size_t> sources;  // of the points that stay
     for (std::size_t i = 0; i < output->size(); ++i) {
-      const Point& before = (*points)[static_cast<std::size_t>(indices->indices[i])];
-      turn((*output)[i], before, viewpoint);
+      const auto source = static_cast<std::size_t>(indices->indices[i]);
+      turn((*output)[i], (*points)[source], viewpoint);
+      if (finite((*output)[i])) sources.push_back(source);
+    }
+    if (context.columns != nullptr && context.made_columns != nullptr) {
+      *context.made_columns = pick_columns(carry_columns(*input, *context.columns, *points), sources);
     }
     output->header = input->header;
     output->sensor_origin_ = input->sensor_origin_;

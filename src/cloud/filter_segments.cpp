@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pcl/common/centroid.h>
 #include <pcl/common/colors.h>
+#include <pcl/sample_consensus/ransac.h>
+#include <pcl/sample_consensus/sac_model_plane.h>
 #include <pcl/search/kdtree.h>
 #include <pcl/segmentation/extract_clusters.h>
 #include <pcl/segmentation/sac_segmentation.h>
@@ -48,6 +50,8 @@ bool spans_a_plane(const Cloud& points, const pcl::Indices& indices) {
   return size[1] > 1e-10 * size[2] && size[1] > 1e-14;
 }
 
+enum class Refine { kNever, kOnce, kSpread };
+
 class PlaneFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
@@ -55,7 +59,10 @@ class PlaneFilter : public Filter {
     table.integer("planes", planes_, {1, 100}, "", "How many planes are looked for, the largest first");
     table.integer("min_points", min_points_, {3, 100000000}, "", "Planes with fewer points are none");
     table.integer("iterations", iterations_, {1, 1000000}, "", "Tries of RANSAC, at most");
-    table.boolean("refine", refine_, "Fit each plane to all of its points, then choose its points again");
+    table.choice<Refine>(
+        "refine", refine_, {{"on", Refine::kOnce}, {"off", Refine::kNever}, {"spread", Refine::kSpread}},
+        "Fit each plane to all of its points, then choose its points again; spread: again and again, "
+        "in the end those within twice the standard deviation of its own points");
     table.choice<Mode>("mode", mode_,
                        {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},
                        "Keep the planes, remove them, or colour each (and grey the rest)");
@@ -78,12 +85,22 @@ class PlaneFilter : public Filter {
 
  private:
   pcl::Indices largest_plane(const CloudConstPtr& points, const pcl::IndicesPtr& among) const {
+    if (refine_ == Refine::kSpread) {
+      const auto model = std::make_shared<pcl::SampleConsensusModelPlane<Point>>(points, *among);
+      pcl::RandomSampleConsensus<Point> ransac(model, distance_m_);
+      ransac.setMaxIterations(iterations_);
+      pcl::Indices inliers;
+      if (!ransac.computeModel()) return inliers;
+      ransac.refineModel(2.0, 50);
+      ransac.getInliers(inliers);
+      return inliers;
+    }
     pcl::SACSegmentation<Point> segmentation;  // always the same random numbers
     segmentation.setModelType(pcl::SACMODEL_PLANE);
     segmentation.setMethodType(pcl::SAC_RANSAC);
     segmentation.setDistanceThreshold(distance_m_);
     segmentation.setMaxIterations(iterations_);
-    segmentation.setOptimizeCoefficients(refine_);
+    segmentation.setOptimizeCoefficients(refine_ == Refine::kOnce);
     segmentation.setInputCloud(points);
     segmentation.setIndices(among);
     pcl::PointIndices inliers;
@@ -96,7 +113,7 @@ class PlaneFilter : public Filter {
   int planes_ = 1;
   int min_points_ = 100;
   int iterations_ = 1000;
-  bool refine_ = true;
+  Refine refine_ = Refine::kOnce;
   Mode mode_ = Mode::kKeep;
 };
 
@@ -151,8 +168,10 @@ class ClustersFilter : public Filter {
 
 FilterInfo plane_filter() {
   return {"plane", "Finds the largest planes and keeps, removes or colours their points.",
-          "PCL's SACSegmentation, one plane after the other in what is left. The same cloud gives the same "
-          "planes. Only the points themselves count: a plane goes through everything near it, also through "
+          "PCL's SACSegmentation, one plane after the other in what is left; `refine: spread` is the rule of "
+          "PCL's "
+          "program pcl_sac_segmentation_plane. The same cloud gives the same planes. Only the points "
+          "themselves count: a plane goes through everything near it, also through "
           "furniture that it cuts.",
           "- type: plane\n  distance: 2 cm\n  planes: 2\n  mode: remove\n",
           [] { return std::make_unique<PlaneFilter>(); }};

@@ -32,7 +32,14 @@ constexpr const char* kIntroduction =
     "memory are measured in [benchmarks.md](benchmarks.md#filters).\n\n"
     "Filters that only choose points keep an organised cloud (one that still has the rows and columns of the "
     "depth\n"
-    "picture) organised: rejected points become NaN. The others give a list of points without NaN.\n";
+    "picture) organised: rejected points become NaN. The others give a list of points without NaN.\n\n"
+    "What a file knows of its points beside position, normal, colour and curvature goes with them: "
+    "`confidence`,\n"
+    "`observations`, `robot` and columns of other names (`intensity`, `label`; kept as 32 bit floats). "
+    "Points that\n"
+    "filters choose or move keep theirs; voxel_grid averages; other new points have those of the nearest "
+    "point of\n"
+    "the filter's input.\n";
 
 std::string allowed(const core::OptionSpec& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));

@@ -139,13 +139,15 @@ core::Result<PcdHeader> read_header(ByteReader& reader) {
   return core::input_error("PCD header has no DATA line; the file is truncated or not PCD");
 }
 
-void set_binary(CloudBuilder& builder, std::size_t row, const PcdField& field, const std::uint8_t* bytes) {
+void set_binary(CloudBuilder& builder, std::size_t row, const PcdHeader& header, std::size_t f,
+                const std::uint8_t* bytes) {
+  const PcdField& field = header.fields[f];
   if (field.meaning == Meaning::kPackedColor) {
     std::uint32_t bits = 0;
     std::memcpy(&bits, bytes, 4);
     builder.set_packed_color(row, bits);
   } else if (field.meaning != Meaning::kNone) {
-    builder.set(row, field.meaning, load(field.scalar, bytes, false));
+    builder.set(row, field.meaning, f, load(field.scalar, bytes, false));
   }
 }
 
@@ -157,7 +159,9 @@ std::string read_binary(ByteReader& reader, const PcdHeader& header, CloudBuilde
   for (std::uint64_t row = 0; row < header.points; ++row) {
     const std::uint8_t* record = reader.take(static_cast<std::size_t>(header.record));
     if (record == nullptr) return truncated(row, header.points);
-    for (const auto& field : header.fields) set_binary(builder, row, field, record + field.offset);
+    for (std::size_t f = 0; f < header.fields.size(); ++f) {
+      set_binary(builder, row, header, f, record + header.fields[f].offset);
+    }
   }
   return "";
 }
@@ -171,13 +175,14 @@ std::uint32_t packed_color(double value) {
 std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder& builder) {
   std::string word;
   for (std::uint64_t row = 0; row < header.points; ++row) {
-    for (const auto& field : header.fields) {
+    for (std::size_t f = 0; f < header.fields.size(); ++f) {
+      const PcdField& field = header.fields[f];
       for (std::uint64_t k = 0; k < field.count; ++k) {
         if (!reader.word(word) && word.empty()) return truncated(row, header.points);
         const auto value = parse_number(word);
         if (!value) return fmt::format("point {}: '{}' is not a number", row + 1, word);
         if (field.meaning != Meaning::kPackedColor) {
-          builder.set(row, field.meaning, *value);
+          builder.set(row, field.meaning, f, *value);
         } else if (field.scalar == ScalarType::kFloat32) {
           const auto number = static_cast<float>(*value);
           std::uint32_t bits = 0;
@@ -211,10 +216,11 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
   if (size > 0 && pcl::lzfDecompress(packed, packed_size, bytes.data(), size) != size) {
     return "compressed data are damaged";
   }
-  for (const auto& field : header.fields) {
+  for (std::size_t f = 0; f < header.fields.size(); ++f) {
+    const PcdField& field = header.fields[f];
     const std::uint8_t* column = bytes.data() + field.offset * header.points;
     for (std::uint64_t row = 0; row < header.points; ++row) {
-      set_binary(builder, row, field, column + row * field.size * field.count);
+      set_binary(builder, row, header, f, column + row * field.size * field.count);
     }
   }
   return "";
@@ -250,8 +256,12 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file) {
   if (!problem.empty()) return error(problem);
 
   std::vector<Meaning> meanings;
-  for (const auto& field : header->fields) meanings.push_back(field.meaning);
-  CloudBuilder builder(meanings, static_cast<std::size_t>(header->points));
+  std::vector<std::string> names;
+  for (const auto& field : header->fields) {
+    meanings.push_back(field.meaning);
+    names.push_back(field.name);
+  }
+  CloudBuilder builder(meanings, names, static_cast<std::size_t>(header->points));
   if (!builder.has_position()) return error("has no x, y and z; it is not a point cloud");
   if (header->data == "ascii") {
     problem = read_ascii(reader, *header, builder);

@@ -104,11 +104,12 @@ core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file) {
   const std::string problem = read_table(reader, table);
   if (!problem.empty()) return error(problem);
   const auto meanings = meanings_of(table);
-  CloudBuilder builder(meanings, table.values.size() / table.columns);
+  table.names.resize(table.columns);
+  CloudBuilder builder(meanings, table.names, table.values.size() / table.columns);
   if (!builder.has_position()) return error("has no x, y and z; three columns at least are needed");
   for (std::size_t i = 0; i < table.values.size(); ++i) {
     const std::size_t c = i % table.columns;
-    builder.set(i / table.columns, meanings[c], static_cast<double>(table.values[i]));
+    builder.set(i / table.columns, meanings[c], c, static_cast<double>(table.values[i]));
   }
   return builder.finish();
 }

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "chain_option.hpp"
-#include "plumbline/cloud/columns.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "stages.hpp"
 
@@ -35,13 +34,14 @@ class FilterStage : public Stage {
     const auto input = io.input<DenseCloud>("cloud");
     cloud::FilterContext context;
     context.executor = context_->executor;
+    auto dense = std::make_shared<DenseCloud>();
+    context.columns = &input->columns;
+    context.made_columns = &dense->columns;
     std::vector<cloud::FilterReport> reports;
     auto filtered = filters_.chain().apply(input->cloud, context, &reports);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
     if (!reports.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
-    auto dense = std::make_shared<DenseCloud>();
     dense->cloud = std::move(*filtered);
-    dense->columns = cloud::carry_columns(*input->cloud, input->columns, *dense->cloud);
     dense->voxel_m = input->voxel_m;
     dense->output_from_map = input->output_from_map;
     dense->upright = input->upright;

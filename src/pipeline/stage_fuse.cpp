@@ -16,7 +16,6 @@
 #include "chain_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/cloud_spool.hpp"
-#include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -69,7 +68,7 @@ class FuseStage : public Stage {
     } else {
       between_.emplace_back(keyframe->stamp, spool_->size());
     }
-    return spool_->append(*keyframe->cloud);
+    return spool_->append(*keyframe->compact);
   }
 
   /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
@@ -91,10 +90,11 @@ class FuseStage : public Stage {
     std::vector<cloud::FilterReport> reports;
     cloud::FilterContext context;
     context.executor = context_->executor;
+    context.columns = &fused->columns;
+    context.made_columns = &dense->columns;
     auto filtered = filters_.chain().apply(fused->cloud, context, &reports);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
     if (!reports.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
-    dense->columns = cloud::carry_columns(*fused->cloud, fused->columns, **filtered);
     dense->cloud = std::move(*filtered);
     points_ = dense->cloud->size();
     io.output<DenseCloud>("cloud", dense);

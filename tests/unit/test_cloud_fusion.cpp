@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plumbline/cloud/columns.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
@@ -237,21 +236,6 @@ TEST(FreeSpace, EvidenceOfAView) {
   EXPECT_EQ(at(162, 240, 1.5), Evidence::kSurface);  // at the box's border: not sure
   EXPECT_EQ(at(-50, 240, 1.0), Evidence::kNone);
   EXPECT_EQ(at(400, 240, -1.0), Evidence::kNone);
-}
-
-TEST(Columns, FollowThePointsThatWereChosen) {
-  Cloud before;
-  for (int i = 0; i < 10; ++i) before.push_back(point(static_cast<float>(i), 0, 1));
-  CloudColumns columns;
-  for (std::uint32_t i = 0; i < 10; ++i) columns.observations.push_back(100 + i);
-  Cloud after;
-  for (const std::size_t i : {2U, 3U, 7U}) after.push_back(before[i]);
-  EXPECT_EQ(carry_columns(before, columns, after).observations, (std::vector<std::uint32_t>{102, 103, 107}));
-  std::swap(after[0], after[2]);
-  EXPECT_EQ(carry_columns(before, columns, after).observations, (std::vector<std::uint32_t>{107, 103, 102}));
-  after[1].x += 0.1F;  // moved
-  EXPECT_TRUE(carry_columns(before, columns, after).observations.empty());
-  EXPECT_TRUE(carry_columns(before, columns, Cloud()).observations.empty());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "plumbline/cloud/types.hpp"
@@ -17,16 +18,28 @@ struct CloudColumns {
   std::vector<float> confidence;            ///< 0-1, see VoxelMap
   std::vector<std::uint32_t> observations;  ///< views that saw the point
   std::vector<std::uint8_t> robot;          ///< who saw it
+
+  /// What other programs have written, by its name in the file ("intensity").
+  struct Other {
+    std::string name;
+    std::vector<float> values;
+  };
+  std::vector<Other> others;  ///< names unique, of letters, digits, '_', '-' and '.'
+
+  [[nodiscard]] bool empty() const {
+    return confidence.empty() && observations.empty() && robot.empty() && others.empty();
+  }
 };
 
 /// Binary PLY: float x y z nx ny nz, uchar red green blue [, float confidence, int observations, uchar
-/// robot]; opens with colours and normals in PCL, Open3D, MeshLab and CloudCompare. Points with a NaN
-/// coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. Errors (kOutput) name
-/// the file; it appears whole or not at all.
+/// robot, float others...]; opens with colours and normals in PCL, Open3D, MeshLab and CloudCompare. Points
+/// with a NaN coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. Errors
+/// (kOutput) name the file; it appears whole or not at all.
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns = {});
 
-/// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot]. An
+/// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot,
+/// others]. An
 /// organised cloud stays organised and keeps its NaN points; an unorganised one loses them.
 core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns = {});
@@ -46,8 +59,9 @@ struct CloudFile {
 
 /// Reads PLY (ascii, binary), PCD (ascii, binary, binary_compressed) and text (.xyz .txt .csv .asc .pts: x y
 /// z, then 0-255 red green blue and/or nx ny nz; separated by blanks, commas or semicolons; a CSV header line
-/// names columns). Errors (kInput): missing, empty, not this format, without x y z, truncated, header
-/// promising more points than the file holds (found before memory is taken).
+/// names columns). Columns with other names are kept as 32 bit floats (lists, arrays and alpha are not).
+/// Errors (kInput): missing, empty, not this format, without x y z, truncated, header promising more points
+/// than the file holds (found before memory is taken).
 core::Result<CloudFile> read_cloud(const std::filesystem::path& file);
 
 }  // namespace plumbline::cloud

@@ -18,6 +18,8 @@
 
 namespace plumbline::cloud {
 
+struct CloudColumns;
+
 /// What a filter may know beside the cloud.
 struct FilterContext {
   /// Where the sensor stood, in the cloud's frame; without it the cloud's own sensor_origin_.
@@ -27,6 +29,11 @@ struct FilterContext {
   const core::Executor* executor = nullptr;
   /// Which run of many this is ("12"): part of the names of files that filters write. Empty: the only one.
   std::string run;
+  /// What is known of the input's points beside the Point (confidence ...); null: nothing.
+  const CloudColumns* columns = nullptr;
+  /// Where, if not null, a filter that makes points of several, or takes some from elsewhere, puts what is
+  /// known of its output's. Others leave it alone: the chain follows the points by itself (carry_columns).
+  CloudColumns* made_columns = nullptr;
 };
 
 class Filter {

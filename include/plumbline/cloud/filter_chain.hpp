@@ -53,6 +53,7 @@ class FilterChain {
 
   /// Runs the chain when it is ready; an empty chain gives a copy. Errors name chain, place and filter. Every
   /// filter's input is let go once it is used: who moves `input` in never pays for more than two clouds.
+  /// Columns: `context.columns` are those of the input, `context.made_columns` gets those of the result.
   /// `reports` (may be null) gets one entry per filter run; `progress` is called before each filter and at
   /// the end.
   core::Result<CloudPtr> apply(CloudConstPtr input, const FilterContext& context = {},

@@ -2,6 +2,9 @@
 #pragma once
 
 // What flows between the stages of this library.
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,21 +19,26 @@
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/pipeline/stage.hpp"
+#include "plumbline/places/vocabulary.hpp"
 #include "plumbline/sensor/frame.hpp"
 
 namespace plumbline::pipeline {
-
-/// What tracking decided about one frame.
-struct TrackedFrame {
-  core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
-  double stamp = 0.0;         ///< seconds
-};
 
 /// One line of frames.csv.
 struct FrameRow {
   std::size_t frame = 0;  ///< number within the run
   std::string state;      ///< tracked, lost, initialising; unreadable is added by the writer
   std::string columns;    ///< the rest, comma-separated, as MapResult::frame_columns names it
+};
+
+/// What tracking decided about one frame.
+struct TrackedFrame {
+  core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
+  double stamp = 0.0;         ///< seconds
+  FrameRow row;
+  std::optional<maps::FramePose> pose;              ///< none before the map began, or where there is no map
+  std::shared_ptr<const maps::MapChanges> changes;  ///< of the map since the last keyframe, with each
+                                                    ///< keyframe, when somebody keeps the map
 };
 
 struct KeyframePose {
@@ -43,11 +51,12 @@ struct KeyframePose {
 struct MapResult {
   std::shared_ptr<const maps::Map> map;      ///< null when the poses come from a file
   std::vector<maps::FramePose> frame_poses;  ///< empty when `map` is null
-  geometry::Trajectory trajectory;      ///< tracked frames only
-  std::vector<KeyframePose> keyframes;  ///< by id
+  geometry::Trajectory trajectory;           ///< tracked frames only
+  std::vector<KeyframePose> keyframes;       ///< by id
   std::vector<maps::LineSegment3> lines;
-  std::string frame_columns;     ///< header of FrameRow::columns
-  std::vector<FrameRow> frames;  ///< by frame
+  std::string frame_columns;                             ///< header of FrameRow::columns
+  std::vector<FrameRow> frames;                          ///< by frame
+  std::shared_ptr<const places::Vocabulary> vocabulary;  ///< of the places; null: none was needed
 };
 
 /// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame.
@@ -55,12 +64,13 @@ struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes
   double stamp = 0.0;   ///< seconds
   cloud::CloudPtr cloud;
+  std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it
 };
 
 /// The merged cloud in the output's frame, which output_from_map leads to: all results are written in it.
 struct DenseCloud {
   cloud::CloudPtr cloud;
-  cloud::CloudColumns columns;  ///< of the cloud's points; empty when a filter moved points
+  cloud::CloudColumns columns;  ///< of the cloud's points
   double voxel_m = 0.0;
   geometry::Rigid3 output_from_map;
   bool upright = false;  ///< z is up in the output's frame
