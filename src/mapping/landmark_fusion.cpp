@@ -119,13 +119,22 @@ void FusionOptions::declare(core::OptionTable& table) {
 }
 
 FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,
-                          const sensor::Pinhole& camera, const FusionOptions& options) {
+                          const std::map<std::int32_t, sensor::Pinhole>& cameras,
+                          const FusionOptions& options) {
   FusionSummary summary;
   for (KeyframeId other : neighbours) {
-    fuse_into(map, unseen_points(map, {keyframe}, other), other, camera, options, summary);
+    fuse_into(map, unseen_points(map, {keyframe}, other), other, cameras.at(other.robot), options, summary);
   }
-  fuse_into(map, unseen_points(map, neighbours, keyframe), keyframe, camera, options, summary);
+  fuse_into(map, unseen_points(map, neighbours, keyframe), keyframe, cameras.at(keyframe.robot), options,
+            summary);
   return summary;
+}
+
+FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,
+                          const sensor::Pinhole& camera, const FusionOptions& options) {
+  std::map<std::int32_t, sensor::Pinhole> cameras{{keyframe.robot, camera}};
+  for (const KeyframeId other : neighbours) cameras[other.robot] = camera;
+  return fuse_points(map, keyframe, neighbours, cameras, options);
 }
 
 }  // namespace plumbline::mapping

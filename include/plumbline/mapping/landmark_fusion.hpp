@@ -3,6 +3,8 @@
 
 // One thing in the world, one landmark: landmarks are looked for in the pictures of keyframes that should see
 // them and did not (METHOD section 3).
+#include <cstdint>
+#include <map>
 #include <vector>
 
 #include "plumbline/core/options.hpp"
@@ -37,6 +39,17 @@ FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
 /// The same for lines. A merged line spans what both spanned.
 FusionSummary fuse_lines(maps::Map& map, core::KeyframeId keyframe,
                          const std::vector<core::KeyframeId>& neighbours, const sensor::Pinhole& camera,
+                         const FusionOptions& options);
+
+/// Both for keyframes of several robots, each with its camera; every robot must have one (throws
+/// std::out_of_range).
+FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
+                          const std::vector<core::KeyframeId>& neighbours,
+                          const std::map<std::int32_t, sensor::Pinhole>& cameras,
+                          const FusionOptions& options);
+FusionSummary fuse_lines(maps::Map& map, core::KeyframeId keyframe,
+                         const std::vector<core::KeyframeId>& neighbours,
+                         const std::map<std::int32_t, sensor::Pinhole>& cameras,
                          const FusionOptions& options);
 
 }  // namespace plumbline::mapping

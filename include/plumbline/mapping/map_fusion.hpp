@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Maps of several robots become one (METHOD section 6, Algorithm 2). Each map has a world frame of its own.
+// Places that two maps share are looked for by what keyframes look like, verified one by one, and believed
+// only when enough of them say the same of how the two worlds lie; two answers that exclude each other are no
+// answer.
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/options.hpp"
+#include "plumbline/mapping/consistent_pairs.hpp"
+#include "plumbline/mapping/global_adjustment.hpp"
+#include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/place_verification.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/places/recogniser.hpp"
+
+namespace plumbline::mapping {
+
+struct MapFusionOptions {
+  int min_pairs = 5;          ///< keyframes of each map that must agree
+  double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
+  double min_span_rad = 0.5;  ///< how far turned
+  ConsistencyOptions consistency;
+  double rival = 0.3;          ///< a second answer with so many pairs, as share of the best one's, is a doubt
+  double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
+  int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
+  bool robust = true;          ///< the pose graph may take pairs for wrong
+  std::uint64_t seed = 1;
+  places::VocabularyOptions vocabulary;
+  places::RecogniserOptions places;
+  VerificationOptions verify;
+  FusionOptions doubles;
+  GlobalAdjustmentOptions adjustment;
+  MapFusionOptions();
+  void declare(core::OptionTable& table);
+};
+
+/// A map in a world frame of its own; its robots' numbers are no other part's. Outlives what is given it.
+struct MapPart {
+  const maps::Map* map = nullptr;
+  Cameras cameras;  ///< of its robots
+};
+
+/// Two keyframes of different parts that show the same place.
+struct VerifiedPair {
+  core::KeyframeId query;
+  core::KeyframeId match;
+  PlaceVerification evidence;
+};
+
+/// All that was found out about two parts.
+struct MergeEvidence {
+  std::size_t a = 0;  ///< parts, a < b
+  std::size_t b = 0;
+  int candidates = 0;  ///< pairs of keyframes that look alike
+  int tried = 0;       ///< of these, verified or refused
+  int verified = 0;
+  int agreeing = 0;      ///< of the verified, in the largest set that says the same
+  int rival = 0;         ///< in the largest set that says something else
+  int expected = 0;      ///< keyframes of b that should see what a saw, if the set is right
+  int confirmed = 0;     ///< of these, that do
+  int matches = 0;       ///< of the agreeing pairs, sums: by descriptor,
+  int inliers = 0;       ///< points and lines that fit in the end
+  double rms_px = 0.0;   ///< mean over the agreeing pairs, standard deviations
+  double overlap = 0.0;  ///< of the surfaces, mean
+  double span_m = 0.0;   ///< how far apart the agreeing keyframes lie
+  double span_rad = 0.0;
+  double spread_m = 0.0;      ///< RMS of what the agreeing pairs say of b's cameras, about the mean
+  geometry::Rigid3 a_from_b;  ///< worlds
+  /// Of log(a_from_b_true * a_from_b^-1), at the middle of the agreeing keyframes.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
+  std::vector<VerifiedPair> pairs;           ///< that agree
+  int rejected = 0;                          ///< of these, taken for wrong by the pose graph of the whole
+  std::map<std::string, int> refused_pairs;  ///< why pairs were refused, and how many
+  bool accepted = false;
+  std::string refused;  ///< why not; empty when accepted
+};
+
+/// Looks for shared places among the keyframes of several parts.
+class OverlapFinder {
+ public:
+  explicit OverlapFinder(const MapFusionOptions& options)
+      : options_(options), database_(places::Vocabulary(options.vocabulary)), recogniser_(options.places) {}
+
+  struct Candidate {
+    core::KeyframeId query;
+    core::KeyframeId match;
+    std::size_t query_part = 0;
+    std::size_t match_part = 0;
+    double score = 0.0;
+  };
+
+  void add(const maps::Map& map, core::KeyframeId keyframe);
+  /// Keyframes of other parts that look like this one, best first. `before`: the keyframe before it of its
+  /// robot, or an invalid id.
+  std::vector<Candidate> look(const std::vector<MapPart>& parts, std::size_t part, core::KeyframeId keyframe,
+                              core::KeyframeId before);
+  [[nodiscard]] const MapFusionOptions& options() const { return options_; }
+
+ private:
+  MapFusionOptions options_;
+  places::Database database_;
+  places::Recogniser recogniser_;
+};
+
+/// One candidate, verified.
+VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFinder::Candidate& candidate,
+                              const MapFusionOptions& options);
+
+/// Do these pairs, all between parts a and b, show that the maps overlap, and how do they lie? Fills all but
+/// candidates, tried and refused_pairs. When the pairs agree, more views that should show both maps are
+/// asked.
+MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
+                             const std::vector<VerifiedPair>& pairs, const MapFusionOptions& options,
+                             const core::Executor& executor);
+
+/// All pairs of parts, by a, then b. The same for any number of threads.
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                                         const core::Executor& executor);
+
+/// Which parts hang together: for each part the lowest number of its group.
+std::vector<std::size_t> connected_parts(std::size_t parts, const std::vector<MergeEvidence>& merges);
+
+struct FusedMap {
+  maps::Map map;  ///< of all parts of the anchor's group, in the anchor's world frame
+  Cameras cameras;
+  std::vector<std::size_t> parts;                  ///< that are in it, ascending
+  std::vector<geometry::Rigid3> anchor_from_part;  ///< of these, before adjustment
+  int merged_points = 0;                           ///< landmarks that were doubles
+  int merged_lines = 0;
+  int edges = 0;     ///< pairs of keyframes given to the pose graph
+  int rejected = 0;  ///< of these, taken for wrong
+};
+
+/// Lays all parts that hang together with `anchor` into its world, merges what is there twice and adjusts
+/// poses and landmarks of all together. Merges that the pose graph finds to contradict the rest are no longer
+/// accepted, and then the fusion is done without them.
+FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
+                   const MapFusionOptions& options);
+
+/// Depends on what the keyframes measured and on their poses, not on names and robots' numbers.
+std::uint64_t content_hash(const maps::Map& map);
+
+/// The same map with other numbers for its robots; robots that are not named in `to` keep theirs.
+maps::Map renumbered(const maps::Map& map, const std::map<std::int32_t, std::int32_t>& to);
+
+/// One map of several, whose robots' numbers differ, each moved by its world_from_map.
+maps::Map joined(const std::vector<const maps::Map*>& maps,
+                 const std::vector<geometry::Rigid3>& world_from_map);
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/map_fusion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+
+constexpr int kRelated = 15;        // landmarks that keyframes share which see the same
+constexpr std::size_t kAround = 4;  // keyframes around each end of a pair whose landmarks are compared
+
+/// Where each part of the anchor's group lies: along the merges with most pairs first (a spanning tree).
+std::map<std::size_t, Rigid3> lay_out(const std::vector<MergeEvidence>& merges, std::size_t anchor) {
+  std::vector<const MergeEvidence*> order;
+  for (const MergeEvidence& merge : merges) {
+    if (merge.accepted) order.push_back(&merge);
+  }
+  std::stable_sort(order.begin(), order.end(), [](const MergeEvidence* x, const MergeEvidence* y) {
+    return x->pairs.size() > y->pairs.size();
+  });
+  std::map<std::size_t, Rigid3> anchor_from_part{{anchor, Rigid3{}}};
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const MergeEvidence* merge : order) {
+      const bool has_a = anchor_from_part.count(merge->a) != 0;
+      const bool has_b = anchor_from_part.count(merge->b) != 0;
+      if (has_a == has_b) continue;
+      if (has_a) {
+        anchor_from_part[merge->b] = anchor_from_part[merge->a] * merge->a_from_b;
+      } else {
+        anchor_from_part[merge->a] = anchor_from_part[merge->b] * merge->a_from_b.inverse();
+      }
+      grown = true;
+      break;  // the best merge that is left, again
+    }
+  }
+  return anchor_from_part;
+}
+
+/// The pairs of one merge as edges of the pose graph.
+std::vector<PoseEdge> edges_of(const MergeEvidence& merge) {
+  std::vector<PoseEdge> edges;
+  for (const VerifiedPair& pair : merge.pairs) {
+    edges.push_back(
+        {pair.match, pair.query, pair.evidence.query_from_match, pair.evidence.information, false});
+  }
+  return edges;
+}
+
+std::vector<KeyframeId> surroundings(const maps::Map& map, KeyframeId id) {
+  std::vector<KeyframeId> result{id};
+  for (const auto& [other, shared] : map.covisible(id, kRelated)) {
+    if (result.size() > kAround) break;
+    if (other.robot == id.robot) result.push_back(other);
+  }
+  return result;
+}
+
+/// Landmarks that both ends of an edge have.
+void merge_doubles(const PoseEdge& edge, const MapFusionOptions& options,
+                   std::set<std::pair<KeyframeId, KeyframeId>>& done, FusedMap& fused) {
+  const std::vector<KeyframeId> ours = surroundings(fused.map, edge.a);
+  for (const KeyframeId id : surroundings(fused.map, edge.b)) {
+    std::vector<KeyframeId> others;
+    for (const KeyframeId other : ours) {
+      if (other != id && done.emplace(std::min(id, other), std::max(id, other)).second)
+        others.push_back(other);
+    }
+    if (others.empty()) continue;
+    fused.merged_points += fuse_points(fused.map, id, others, fused.cameras, options.doubles).merged;
+    fused.merged_lines += fuse_lines(fused.map, id, others, fused.cameras, options.doubles).merged;
+  }
+}
+
+/// Merges most of whose pairs the pose graph takes for wrong; true: there were some.
+bool take_back(const std::vector<optimize::EdgeVerdict>& verdicts, const std::vector<MergeEvidence*>& used,
+               FusedMap& fused) {
+  bool any = false;
+  std::size_t at = 0;
+  for (MergeEvidence* merge : used) {
+    merge->rejected = 0;
+    for (std::size_t i = 0; i < merge->pairs.size() && at < verdicts.size(); ++i, ++at) {
+      merge->rejected += verdicts[at].rejected ? 1 : 0;
+    }
+    fused.rejected += merge->rejected;
+    if (2 * merge->rejected <= static_cast<int>(merge->pairs.size())) continue;
+    merge->accepted = false;
+    merge->refused =
+        fmt::format("{} of its {} pairs contradict the other merges", merge->rejected, merge->pairs.size());
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+MapFusionOptions::MapFusionOptions() {
+  places.consistent = 1;  // pairs need not come in a row: they must agree
+  adjustment.bundle_options.max_iterations = 10;
+}
+
+void MapFusionOptions::declare(core::OptionTable& table) {
+  table.integer("min_pairs", min_pairs, {2, 1000}, "",
+                "Keyframes of each of two maps that must agree on how the maps lie");
+  table.number("min_span", min_span_m, {0.0, 100.0}, "m",
+               "How far apart the keyframes that agree lie, at least");
+  table.number("min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
+  table.number("max_apart", consistency.max_apart_m, {0.0, 10.0}, "m",
+               "How far apart pairs that agree may put the maps");
+  table.number("max_turned", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.number("drift", consistency.apart_per_metre, {0.0, 1.0}, "",
+               "Metres more for every metre between the pairs: maps drift");
+  table.number("rival", rival, {0.0, 1.0}, "",
+               "A second answer with this share of the best one's keyframes makes both doubtful");
+  table.number("min_confirmed", min_confirmed, {0.0, 1.0}, "",
+               "Share of the keyframes with a view of the other map that must see what it holds");
+  table.integer("verifications", verifications, {1, 100000}, "",
+                "Pairs of keyframes that are verified for each two maps, at most");
+  table.boolean("robust", robust, "The pose graph may take pairs of keyframes for wrong");
+  vocabulary.declare(table);
+  places.declare(table);
+  verify.declare(table);
+}
+
+std::vector<std::size_t> connected_parts(std::size_t parts, const std::vector<MergeEvidence>& merges) {
+  std::vector<std::size_t> group(parts);
+  for (std::size_t p = 0; p < parts; ++p) group[p] = p;
+  for (const MergeEvidence& merge : merges) {
+    if (!merge.accepted) continue;
+    const std::size_t low = std::min(group[merge.a], group[merge.b]);
+    const std::size_t high = std::max(group[merge.a], group[merge.b]);
+    std::replace(group.begin(), group.end(), high, low);
+  }
+  return group;
+}
+
+FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
+                   const MapFusionOptions& options) {
+  FusedMap fused;
+  std::vector<const maps::Map*> maps;
+  for (const auto& [part, anchor_from_part] : lay_out(merges, anchor)) {
+    fused.parts.push_back(part);
+    fused.anchor_from_part.push_back(anchor_from_part);
+    maps.push_back(parts[part].map);
+    fused.cameras.insert(parts[part].cameras.begin(), parts[part].cameras.end());
+  }
+  fused.map = joined(maps, fused.anchor_from_part);
+  std::vector<PoseEdge> edges;
+  std::vector<MergeEvidence*> used;
+  for (MergeEvidence& merge : merges) {
+    if (!merge.accepted || !std::binary_search(fused.parts.begin(), fused.parts.end(), merge.a)) continue;
+    const std::vector<PoseEdge> more = edges_of(merge);
+    edges.insert(edges.end(), more.begin(), more.end());
+    used.push_back(&merge);
+  }
+  fused.edges = static_cast<int>(edges.size());
+  if (edges.empty()) return fused;
+  const std::vector<KeyframeId> ids = parts[anchor].map->keyframe_ids();
+  GlobalAdjustmentOptions adjustment = options.adjustment;
+  adjustment.graph.robust =
+      options.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
+  adjustment.orb_scale_factor = options.verify.orb_scale_factor;
+  adjustment.bundle = false;
+  const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
+  if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
+  std::vector<PoseEdge> believed;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (i >= graph.extra.size() || !graph.extra[i].rejected) believed.push_back(edges[i]);
+  }
+  std::set<std::pair<KeyframeId, KeyframeId>> done;
+  for (const PoseEdge& edge : believed) merge_doubles(edge, options, done, fused);
+  adjustment.bundle = true;
+  adjustment.pose_graph = false;
+  adjust_map(fused.map, fused.cameras, believed, adjustment, ids.front());
+  return fused;
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Do two maps show the same place, and how do they lie to each other?
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "map_fusion_sets.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+
+constexpr std::size_t kAround = 8;  // keyframes that belong to the surroundings of one
+
+std::size_t part_of(const std::vector<MapPart>& parts, KeyframeId id) {
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (parts[p].map->has_keyframe(id)) return p;
+  }
+  return parts.size();
+}
+
+/// The keyframe of `parts[a]` that should see most nearly what keyframe `id` of b sees; invalid: none does.
+KeyframeId nearest_view(const maps::Map& a, const Rigid3& a_from_b, const Rigid3& b_from_camera) {
+  constexpr double kNear_m = 0.7;
+  constexpr double kTurned_rad = 0.45;
+  constexpr double kMetresPerRadian = 1.0;
+  KeyframeId best;
+  double least = kNear_m + kTurned_rad;
+  const Rigid3 here = a_from_b * b_from_camera;
+  for (const KeyframeId id : a.keyframe_ids()) {
+    const Rigid3 camera_from_here = a.camera_from_world(id) * here;
+    const double turned = geometry::rotation_angle(camera_from_here.rotation);
+    const double apart = camera_from_here.translation.norm();
+    if (apart > kNear_m || turned > kTurned_rad) continue;
+    if (const double cost = apart + kMetresPerRadian * turned; cost < least) {
+      least = cost;
+      best = id;
+    }
+  }
+  return best;
+}
+
+/// Keyframes of b with a view of a, as `a_from_b` has it: those that were not asked yet are verified now.
+void ask_others(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                const core::Executor& executor, MergeEvidence& merge) {
+  constexpr std::size_t kMost = 60;
+  const maps::Map& a = *parts[merge.a].map;
+  const maps::Map& b = *parts[merge.b].map;
+  std::set<KeyframeId> agreed;
+  for (const VerifiedPair& pair : merge.pairs)
+    agreed.insert(b.has_keyframe(pair.query) ? pair.query : pair.match);
+  std::vector<OverlapFinder::Candidate> open;
+  for (const KeyframeId id : b.keyframe_ids()) {
+    const KeyframeId near = nearest_view(a, merge.a_from_b, b.camera_from_world(id).inverse());
+    if (!near.valid()) continue;
+    ++merge.expected;
+    if (agreed.count(id) != 0) {
+      ++merge.confirmed;
+    } else {
+      open.push_back({id, near, merge.b, merge.a, 0.0});
+    }
+  }
+  std::vector<OverlapFinder::Candidate> asked;
+  const std::size_t step = (open.size() + kMost - 1) / std::max<std::size_t>(kMost, 1);
+  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(step, 1)) asked.push_back(open[i]);
+  merge.expected -= static_cast<int>(open.size() - asked.size());
+  std::vector<VerifiedPair> verified(asked.size());
+  executor.parallel_for(asked.size(),
+                        [&](std::size_t i) { verified[i] = verify_candidate(parts, asked[i], options); });
+  const SortedPairs known = sort_pairs(a, b, merge.pairs);
+  const SortedPairs fresh = sort_pairs(a, b, verified);
+  for (std::size_t i = 0; i < fresh.places.size(); ++i) {
+    const auto agrees = [&](const PlacePair& other) {
+      return agree(a, b, fresh.places[i], other, options.consistency);
+    };
+    if (!std::all_of(known.places.begin(), known.places.end(), agrees)) continue;
+    ++merge.confirmed;
+    merge.pairs.push_back(verified[fresh.indices[i]]);
+  }
+}
+
+double turn_between(const maps::Map& map, const std::vector<PlacePair>& pairs) {
+  double most = 0.0;
+  for (const PlacePair& x : pairs) {
+    for (const PlacePair& y : pairs) {
+      most = std::max(most, geometry::rotation_angle(map.camera_from_world(x.b).rotation *
+                                                     map.camera_from_world(y.b).rotation.transpose()));
+    }
+  }
+  return most;
+}
+
+/// Different keyframes on the side that has fewer: one keyframe seen from ten others is one witness.
+int witnesses(const ConsistentSet& set) {
+  return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b));
+}
+
+void sum_up(MergeEvidence& merge) {
+  const auto n = static_cast<double>(merge.pairs.size());
+  for (const VerifiedPair& pair : merge.pairs) {
+    const PlaceVerification& e = pair.evidence;
+    merge.matches += e.matched_points + e.matched_lines;
+    merge.inliers += e.points + e.lines;
+    merge.rms_px += e.rms_px / n;
+    merge.overlap += e.overlap / n;
+  }
+}
+
+std::string judge(const MergeEvidence& merge, const MapFusionOptions& options) {
+  if (merge.verified == 0) return "no two keyframes were verified to show the same place";
+  if (merge.agreeing < options.min_pairs) {
+    return fmt::format("only {} keyframes agree on how the maps lie ({} are needed)", merge.agreeing,
+                       options.min_pairs);
+  }
+  if (merge.span_m < options.min_span_m && merge.span_rad < options.min_span_rad) {
+    return fmt::format(
+        "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike "
+        "is not enough",
+        merge.span_m, merge.span_rad);
+  }
+  if (merge.rival >= 2 && merge.rival >= options.rival * merge.agreeing) {
+    return fmt::format(
+        "two answers exclude each other: {} keyframes say one thing, {} another; places look "
+        "alike here",
+        merge.agreeing, merge.rival);
+  }
+  return {};
+}
+
+}  // namespace
+
+void OverlapFinder::add(const maps::Map& map, KeyframeId keyframe) {
+  const auto& features = map.keyframe(keyframe).features;
+  if (features != nullptr) database_.add(keyframe, features);
+}
+
+std::vector<OverlapFinder::Candidate> OverlapFinder::look(const std::vector<MapPart>& parts, std::size_t part,
+                                                          KeyframeId keyframe, KeyframeId before) {
+  const maps::Map& map = *parts[part].map;
+  const auto& features = map.keyframe(keyframe).features;
+  if (features == nullptr) return {};
+  std::vector<Candidate> result;
+  const auto neighbours = [&](KeyframeId id) {
+    std::vector<KeyframeId> around;
+    const std::size_t where = part_of(parts, id);
+    if (where == parts.size()) return around;
+    for (const auto& [other, shared] : parts[where].map->covisible(id, 15)) {
+      if (around.size() >= kAround) break;
+      around.push_back(other);
+    }
+    return around;
+  };
+  const auto allowed = [&](KeyframeId id) {
+    const std::size_t where = part_of(parts, id);
+    return where != part && where != parts.size();
+  };
+  const KeyframeId usual = before.valid() && database_.contains(before) ? before : KeyframeId{};
+  for (const places::Candidate& c :
+       recogniser_.look(database_, keyframe, *features, usual, allowed, neighbours)) {
+    result.push_back({keyframe, c.keyframe, part, part_of(parts, c.keyframe), c.score});
+  }
+  return result;
+}
+
+VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFinder::Candidate& candidate,
+                              const MapFusionOptions& options) {
+  const MapPart& query = parts[candidate.query_part];
+  const MapPart& match = parts[candidate.match_part];
+  const std::uint64_t seed = options.seed + 7919U * static_cast<std::uint64_t>(candidate.query.index) +
+                             static_cast<std::uint64_t>(candidate.match.index);
+  return {candidate.query, candidate.match,
+          verify_place({query.map, candidate.query, query.cameras.at(candidate.query.robot)},
+                       {match.map, candidate.match, match.cameras.at(candidate.match.robot)}, options.verify,
+                       seed)};
+}
+
+MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
+                             const std::vector<VerifiedPair>& pairs, const MapFusionOptions& options,
+                             const core::Executor& executor) {
+  MergeEvidence merge;
+  merge.a = a;
+  merge.b = b;
+  const maps::Map& map_a = *parts[a].map;
+  const maps::Map& map_b = *parts[b].map;
+  const SortedPairs all = sort_pairs(map_a, map_b, pairs);
+  merge.verified = static_cast<int>(all.places.size());
+  const std::vector<ConsistentSet> sets = consistent_sets(map_a, map_b, all.places, options.consistency);
+  if (!sets.empty()) {
+    merge.agreeing = witnesses(sets.front());
+    merge.span_m = sets.front().span_m;
+    for (std::size_t i = 1; i < sets.size(); ++i) merge.rival = std::max(merge.rival, witnesses(sets[i]));
+    std::vector<PlacePair> best;
+    for (const std::size_t i : sets.front().members) {
+      best.push_back(all.places[i]);
+      merge.pairs.push_back(pairs[all.indices[i]]);
+    }
+    merge.span_rad = turn_between(map_b, best);
+    const MeanTransform mean = mean_transform(map_a, map_b, best);
+    merge.a_from_b = mean.a_from_b;
+    merge.covariance = mean.covariance;
+    merge.spread_m = mean.spread_m;
+  }
+  merge.refused = judge(merge, options);
+  if (merge.refused.empty()) {
+    ask_others(parts, options, executor, merge);
+    if (merge.confirmed < options.min_confirmed * merge.expected) {
+      merge.refused = fmt::format("of {} keyframes that should see what the other map holds, only {} do",
+                                  merge.expected, merge.confirmed);
+    }
+  }
+  sum_up(merge);
+  merge.accepted = merge.refused.empty();
+  return merge;
+}
+
+namespace {
+
+/// Why a pair was refused, without its numbers, so that reasons can be counted.
+std::string reason(const PlaceVerification& v, const VerificationOptions& options) {
+  if (v.ransac_inliers == 0) return "no pose";
+  if (v.points + 2 * v.lines < options.min_inliers) return "too few points and lines fit";
+  if (v.contradiction > options.max_contradiction) return "surface seen through";
+  if (v.overlap < options.min_overlap) return "surface not confirmed";
+  if (v.cells < options.min_cells) return "matches in one corner of the picture";
+  return "too few of the landmarks found";
+}
+
+/// The best candidates of each two parts, in the order of keyframes.
+std::vector<OverlapFinder::Candidate> chosen(std::vector<OverlapFinder::Candidate> candidates, int most) {
+  const auto key = [](const OverlapFinder::Candidate& c) {
+    return std::make_tuple(std::min(c.query_part, c.match_part), std::max(c.query_part, c.match_part));
+  };
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [&](const auto& x, const auto& y) { return x.score > y.score; });
+  std::map<std::tuple<std::size_t, std::size_t>, int> counts;
+  std::set<std::pair<KeyframeId, KeyframeId>> seen;
+  std::vector<OverlapFinder::Candidate> result;
+  for (const OverlapFinder::Candidate& c : candidates) {
+    if (!seen.emplace(std::min(c.query, c.match), std::max(c.query, c.match)).second) continue;
+    if (counts[key(c)]++ < most) result.push_back(c);
+  }
+  std::sort(result.begin(), result.end(), [](const auto& x, const auto& y) {
+    return std::tie(x.query, x.match) < std::tie(y.query, y.match);
+  });
+  return result;
+}
+
+}  // namespace
+
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                                         const core::Executor& executor) {
+  OverlapFinder finder(options);
+  for (const MapPart& part : parts) {
+    for (const KeyframeId id : part.map->keyframe_ids()) finder.add(*part.map, id);
+  }
+  std::vector<OverlapFinder::Candidate> candidates;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    KeyframeId before;
+    for (const KeyframeId id : parts[p].map->keyframe_ids()) {
+      const auto found = finder.look(parts, p, id, before.robot == id.robot ? before : KeyframeId{});
+      candidates.insert(candidates.end(), found.begin(), found.end());
+      before = id;
+    }
+  }
+  const std::vector<OverlapFinder::Candidate> tried = chosen(candidates, options.verifications);
+  std::vector<VerifiedPair> verified(tried.size());
+  executor.parallel_for(tried.size(),
+                        [&](std::size_t i) { verified[i] = verify_candidate(parts, tried[i], options); });
+  std::vector<MergeEvidence> merges;
+  for (std::size_t a = 0; a < parts.size(); ++a) {
+    for (std::size_t b = a + 1; b < parts.size(); ++b) {
+      const auto between = [&](const OverlapFinder::Candidate& c) {
+        return std::min(c.query_part, c.match_part) == a && std::max(c.query_part, c.match_part) == b;
+      };
+      std::vector<VerifiedPair> pairs;
+      std::map<std::string, int> refused;
+      for (std::size_t i = 0; i < tried.size(); ++i) {
+        if (!between(tried[i])) continue;
+        pairs.push_back(verified[i]);
+        if (!verified[i].evidence.accepted) ++refused[reason(verified[i].evidence, options.verify)];
+      }
+      MergeEvidence merge = decide_overlap(parts, a, b, pairs, options, executor);
+      merge.candidates = static_cast<int>(std::count_if(candidates.begin(), candidates.end(), between));
+      merge.tried = static_cast<int>(pairs.size());
+      merge.refused_pairs = std::move(refused);
+      if (merge.candidates == 0) merge.refused = "no two keyframes look alike";
+      merges.push_back(std::move(merge));
+    }
+  }
+  return merges;
+}
+
+}  // namespace plumbline::mapping
