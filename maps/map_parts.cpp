@@ -39,6 +39,42 @@ NextIds Map::next_ids() const {
   return {keyframes_.next_ids(), points_.next_ids(), lines_.next_ids(), next_edge_};
 }
 
+namespace {
+
+template <typename IdType, typename Landmark>
+std::vector<LandmarkPage<Landmark>> touched(const IdMap<IdType, Landmark>& all, std::uint64_t since) {
+  constexpr std::int32_t kPage = IdMap<IdType, Landmark>::kIdsPerPage;
+  std::vector<LandmarkPage<Landmark>> pages;
+  for (const auto& [robot, number] : all.touched_pages(since)) {
+    LandmarkPage<Landmark> page{robot, number, {}};
+    for (std::int32_t i = number * kPage; i < (number + 1) * kPage; ++i) {
+      if (const Landmark* landmark = all.find({robot, i})) page.landmarks.push_back(*landmark);
+    }
+    pages.push_back(std::move(page));
+  }
+  return pages;
+}
+
+}  // namespace
+
+MapChanges Map::changes_since(const MapMoment& moment) const {
+  MapChanges changes;
+  changes.whole = moment.points == 0 && moment.lines == 0 && moment.edges == 0;
+  for (const KeyframeId id : keyframes_.ids()) {
+    const KeyframeEntry& entry = keyframes_.at(id);
+    changes.keyframes.push_back({entry.data, entry.pose, entry.parent});
+  }
+  for (const KeyframeId id : retired_.ids()) changes.retired.emplace_back(id, retired_.at(id));
+  changes.points = touched(points_, moment.points);
+  changes.lines = touched(lines_, moment.lines);
+  for (const auto& [number, edge] : edges_) changes.edge_names.emplace_back(number, edge.a.robot);
+  changes.edges.assign(edges_.lower_bound(moment.edges), edges_.end());
+  changes.point_count = points_.size();
+  changes.line_count = lines_.size();
+  changes.next = next_ids();
+  return changes;
+}
+
 void Map::restore_tree(const MapParts& parts) {
   for (const MapParts::KeyframePart& part : parts.keyframes) {
     if (!part.parent.valid()) continue;

@@ -203,7 +203,7 @@ sensor::Camera decode_camera(const Bytes& bytes) {
 
 void encode(const Totals& totals, ByteWriter& to) {
   for (const std::uint64_t value : {totals.keyframes, totals.retired, totals.points, totals.lines,
-                                    totals.edges, totals.frames, totals.next.edge}) {
+                                    totals.edges, totals.frames, totals.log, totals.next.edge}) {
     to.put(value);
   }
   write(totals.next.keyframes, to);
@@ -214,7 +214,7 @@ Totals decode_totals(const Bytes& bytes) {
   ByteReader from(bytes);
   Totals totals;
   for (std::uint64_t* value : {&totals.keyframes, &totals.retired, &totals.points, &totals.lines,
-                               &totals.edges, &totals.frames, &totals.next.edge}) {
+                               &totals.edges, &totals.frames, &totals.log, &totals.next.edge}) {
     from.get(*value);
   }
   read(from, totals.next.keyframes);

@@ -13,7 +13,8 @@
 namespace plumbline::maps {
 
 /// Landmarks and frame poses of neighbouring numbers share a row.
-constexpr std::int32_t kLandmarksPerPage = 64;
+constexpr std::int32_t kLandmarksPerPage = IdMap<PointId, MapPoint>::kIdsPerPage;
+static_assert(kLandmarksPerPage == 64, "the store's format");
 constexpr std::size_t kFramesPerPage = 256;
 
 void encode(const Keyframe& keyframe, ByteWriter& to);
@@ -53,6 +54,7 @@ struct Totals {
   std::uint64_t lines = 0;
   std::uint64_t edges = 0;
   std::uint64_t frames = 0;
+  std::uint64_t log = 0;
   NextIds next;
 };
 void encode(const Totals& totals, ByteWriter& to);

@@ -33,22 +33,26 @@ class Mirror {
       rows_[{static_cast<std::int32_t>(keys.integer(0)), keys.integer(1)}] = Row{};
     }
   }
-  void begin() {
-    ++round_;
-    count_ = 0;
-  }
+  void begin() { ++round_; }
   /// Of rows that never change: whether this one is there for certain, and need not be put.
   bool keep(Key key) {
     const auto found = rows_.find(key);
     if (found == rows_.end() || !found->second.known) return false;
     found->second.round = round_;
-    ++count_;
     return true;
+  }
+  /// Of rows that never change and need not be known: this one stays.
+  void stay(Key key) {
+    const auto found = rows_.find(key);
+    if (found != rows_.end()) found->second.round = round_;
+  }
+  /// A row that is there no longer, if it ever was.
+  void erase(Key key) {
+    if (rows_.erase(key) != 0) erase_.bind(1, key.first).bind(2, key.second).run();
   }
   void put(Key key, const Bytes& bytes) {
     const std::uint64_t print = fingerprint(bytes);
     const auto [row, is_new] = rows_.try_emplace(key);
-    ++count_;
     row->second.round = round_;
     if (!is_new && row->second.known && row->second.print == print) return;
     const Bytes packed = pack(bytes);
@@ -67,7 +71,6 @@ class Mirror {
       row = rows_.erase(row);
     }
   }
-  [[nodiscard]] std::uint64_t count() const { return count_; }  ///< rows named in this round
 
  private:
   struct Row {
@@ -89,7 +92,6 @@ class Mirror {
   std::string keys_;
   std::map<Key, Row> rows_;
   std::uint64_t round_ = 0;
-  std::uint64_t count_ = 0;
 };
 
 }  // namespace plumbline::maps

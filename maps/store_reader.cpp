@@ -47,6 +47,10 @@ Totals read_totals(Database& database) {
   return decode_totals(statement.unpacked(0));
 }
 
+bool is_complete(Database& database) {
+  return database.number("SELECT value FROM header WHERE key = 'complete'") == 1;
+}
+
 void read_keyframes(Database& database, const sensor::Pinhole& picture, MapParts& parts) {
   read_table(database, "keyframe", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
     parts.keyframes.push_back({decode_keyframe(bytes, picture), {}, {}});
@@ -65,7 +69,7 @@ void read_keyframes(Database& database, const sensor::Pinhole& picture, MapParts
 }
 
 /// Rows that were lost with a page of the file leave no other trace.
-void check_totals(const Totals& totals, const MapParts& parts, const std::vector<FramePose>& frames) {
+void check_totals(const Totals& totals, const MapParts& parts, const StoredMap& stored) {
   const auto expect = [](std::uint64_t expected, std::size_t found, const char* what) {
     if (expected == found) return;
     throw BadBytes("it holds " + std::to_string(found) + " of " + std::to_string(expected) + " " + what);
@@ -75,7 +79,8 @@ void check_totals(const Totals& totals, const MapParts& parts, const std::vector
   expect(totals.points, parts.points.size(), "points");
   expect(totals.lines, parts.lines.size(), "lines");
   expect(totals.edges, parts.edges.size(), "edges");
-  expect(totals.frames, frames.size(), "frames");
+  expect(totals.frames, stored.frames.size(), "frames");
+  expect(totals.log, stored.log.size(), "lines of its log");
 }
 
 void check_frames(const std::vector<FramePose>& frames, const Map& map) {
@@ -102,7 +107,7 @@ StoredMap read_map(Database& database, const StoreHeader& header) {
   StoredMap stored;
   stored.header = header;
   const Totals totals = read_totals(database);
-  stored.complete = database.number("SELECT value FROM header WHERE key = 'complete'") == 1;
+  stored.complete = is_complete(database);
   read_keyframes(database, header.camera.color, parts);
   read_table(database, "retired", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
     parts.retired.emplace_back(id, decode_retired(bytes));
@@ -116,7 +121,9 @@ StoredMap read_map(Database& database, const StoreHeader& header) {
             [](const auto& a, const auto& b) { return a.first < b.first; });
   read_table(database, "frame",
              [&](KeyframeId, std::int64_t, const Bytes& bytes) { decode_page(bytes, stored.frames); });
-  check_totals(totals, parts, stored.frames);
+  stored.log = read_log(database);
+  check_totals(totals, parts, stored);
+  if (stored.complete) stored.result = read_result_frame(database);
   parts.next = totals.next;
   stored.map = map_of(std::move(parts));
   check_frames(stored.frames, stored.map);
@@ -131,6 +138,13 @@ struct StoreReader::Impl {
   std::filesystem::path file;
   std::unique_ptr<Database> database;
   StoreHeader header;
+
+  /// A cloud's bytes; `what` names it.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> blob(const char* sql, std::int64_t robot,
+                                                             std::int64_t number,
+                                                             const std::string& what) const;
+  [[nodiscard]] core::Result<cloud::CloudPtr> decode(const core::Result<std::vector<std::uint8_t>>& bytes,
+                                                     const std::string& what) const;
 };
 
 StoreReader::StoreReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -166,23 +180,76 @@ core::Result<std::vector<KeyframeId>> StoreReader::cloud_ids() const {
   });
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::cloud_bytes(KeyframeId keyframe) const {
+core::Result<std::vector<std::size_t>> StoreReader::frame_cloud_ids() const {
   return guarded(impl_->file, ErrorKind::kInput, [&] {
-    Statement row(*impl_->database, "SELECT data FROM cloud WHERE robot = ? AND number = ?");
-    if (!row.bind(1, keyframe.robot).bind(2, keyframe.index).step()) {
-      throw StoreFailure(ErrorKind::kInput, "has no cloud of keyframe " + name_of(keyframe));
+    std::vector<std::size_t> ids;
+    Statement rows(*impl_->database, "SELECT number FROM frame_cloud ORDER BY robot, number");
+    while (rows.step()) ids.push_back(static_cast<std::size_t>(rows.integer(0)));
+    return ids;
+  });
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::Impl::blob(const char* sql, std::int64_t robot,
+                                                                std::int64_t number,
+                                                                const std::string& what) const {
+  return guarded(file, ErrorKind::kInput, [&] {
+    Statement row(*database, sql);
+    if (!row.bind(1, robot).bind(2, number).step()) {
+      throw StoreFailure(ErrorKind::kInput, "has no cloud of " + what);
     }
     return row.blob(0);
   });
 }
 
-core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
-  const core::Result<std::vector<std::uint8_t>> bytes = cloud_bytes(keyframe);
+core::Result<cloud::CloudPtr> StoreReader::Impl::decode(const core::Result<std::vector<std::uint8_t>>& bytes,
+                                                        const std::string& what) const {
   if (!bytes) return tl::unexpected<core::Error>(bytes.error());
   core::Result<cloud::CloudPtr> cloud = cloud::decode_cloud(bytes->data(), bytes->size());
   if (cloud) return cloud;
-  return core::input_error(impl_->file.string() + ": keyframe " + name_of(keyframe) + ": " +
-                           cloud.error().message);
+  return core::input_error(file.string() + ": " + what + ": " + cloud.error().message);
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::cloud_bytes(KeyframeId keyframe) const {
+  return impl_->blob("SELECT data FROM cloud WHERE robot = ? AND number = ?", keyframe.robot, keyframe.index,
+                     "keyframe " + name_of(keyframe));
+}
+
+core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
+  return impl_->decode(cloud_bytes(keyframe), "keyframe " + name_of(keyframe));
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::frame_cloud_bytes(std::size_t frame) const {
+  return impl_->blob("SELECT data FROM frame_cloud WHERE robot = ? AND number = ?", 0,
+                     static_cast<std::int64_t>(frame), "frame " + std::to_string(frame));
+}
+
+core::Result<cloud::CloudPtr> StoreReader::frame_cloud(std::size_t frame) const {
+  return impl_->decode(frame_cloud_bytes(frame), "frame " + std::to_string(frame));
+}
+
+core::Result<StoreContents> StoreReader::contents() const {
+  return guarded(impl_->file, ErrorKind::kInput, [&] {
+    Database& database = *impl_->database;
+    const Transaction moment(database, false);
+    const Totals totals = read_totals(database);
+    const auto count = [&](const char* sql) { return static_cast<std::size_t>(database.number(sql)); };
+    StoreContents contents;
+    contents.complete = is_complete(database);
+    contents.keyframes = totals.keyframes;
+    contents.retired = totals.retired;
+    contents.points = totals.points;
+    contents.lines = totals.lines;
+    contents.edges = totals.edges;
+    contents.frames = totals.frames;
+    contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
+    contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
+    contents.cloud_bytes = count(
+        "SELECT (SELECT total(length(data)) FROM cloud)"
+        " + (SELECT total(length(data)) FROM frame_cloud)");
+    Statement names(database, "SELECT name FROM attachment ORDER BY name");
+    while (names.step()) contents.attachments.push_back(names.text(0));
+    return contents;
+  });
 }
 
 core::Result<std::optional<std::vector<std::uint8_t>>> StoreReader::attachment(

@@ -8,7 +8,8 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line", "edge", "frame", "cloud"};
+constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line",
+                                   "edge",     "frame", "log",     "cloud", "frame_cloud"};
 
 void put_text(Database& database, const char* key, const std::string& text) {
   Statement(database, "INSERT INTO header VALUES (?, ?)").bind(1, std::string(key)).bind(2, text).run();
@@ -34,6 +35,7 @@ void create_tables(Database& database, const StoreHeader& header) {
                      .c_str());
   }
   put_text(database, "robot", header.robot);
+  put_text(database, "input", header.input);
   put_text(database, "program", header.program_version);
   put_text(database, "configuration", header.configuration);
   ByteWriter camera;
@@ -64,6 +66,7 @@ void check_store(Database& database) {
 StoreHeader read_header(Database& database) {
   StoreHeader header;
   header.robot = get_text(database, "robot");
+  header.input = get_text(database, "input");
   header.program_version = get_text(database, "program");
   header.configuration = get_text(database, "configuration");
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
@@ -71,6 +74,36 @@ StoreHeader read_header(Database& database) {
   if (!camera.step()) throw BadBytes("its header has no camera");
   header.camera = decode_camera(camera.unpacked(0));
   return header;
+}
+
+void put_result_frame(Database& database, const ResultFrame& frame) {
+  ByteWriter bytes;
+  bytes.put(frame.output_from_map);
+  bytes.flag(frame.upright);
+  const Bytes packed = pack(bytes.bytes());
+  Statement(database, "REPLACE INTO header VALUES ('result', ?)").bind(1, packed).run();
+}
+
+ResultFrame read_result_frame(Database& database) {
+  ResultFrame frame;
+  Statement statement(database, "SELECT value FROM header WHERE key = 'result'");
+  if (!statement.step()) return frame;
+  const Bytes bytes = statement.unpacked(0);
+  ByteReader from(bytes);
+  from.get(frame.output_from_map);
+  frame.upright = from.flag();
+  from.expect_end();
+  return frame;
+}
+
+std::vector<std::string> read_log(Database& database) {
+  std::vector<std::string> lines;
+  Statement rows(database, "SELECT data FROM log ORDER BY robot, number");
+  while (rows.step()) {
+    const Bytes bytes = rows.unpacked(0);
+    for (ByteReader from(bytes); !from.at_end();) from.get(lines.emplace_back());
+  }
+  return lines;
 }
 
 void check_file(const std::filesystem::path& file) {

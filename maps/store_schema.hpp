@@ -15,6 +15,11 @@ void create_tables(Database& database, const StoreHeader& header);
 /// Throws a StoreFailure for a foreign, unfinished or newer file.
 void check_store(Database& database);
 StoreHeader read_header(Database& database);
+void put_result_frame(Database& database, const ResultFrame& frame);
+/// The map's own frame when none was put.
+ResultFrame read_result_frame(Database& database);
+/// The lines of the table log.
+std::vector<std::string> read_log(Database& database);
 /// Refuses what is no file before SQLite does with fewer words.
 void check_file(const std::filesystem::path& file);
 

@@ -35,20 +35,49 @@ Mirror::Key key_of(IdType id) {
   return {id.robot, id.index};
 }
 
-/// Pages of landmarks; `ids` are in order.
-template <typename IdType, typename Find>
-void mirror_landmarks(const std::vector<IdType>& ids, const Find& find, Mirror& mirror) {
+/// Pages of landmarks; `whole`: there are no others.
+template <typename Landmark>
+void mirror_landmarks(const std::vector<LandmarkPage<Landmark>>& pages, bool whole, Mirror& mirror) {
+  ByteWriter bytes;
+  mirror.begin();
+  for (const LandmarkPage<Landmark>& page : pages) {
+    const Mirror::Key key{page.robot, page.page};
+    if (page.landmarks.empty()) {
+      mirror.erase(key);
+      continue;
+    }
+    bytes.clear();
+    for (const Landmark& landmark : page.landmarks) encode(landmark, bytes);
+    mirror.put(key, bytes.bytes());
+  }
+  if (whole) mirror.end();
+}
+
+/// Rows of kFramesPerPage things each; those before `from` are in the file.
+template <typename Thing, typename Encode>
+void mirror_list(const std::vector<Thing>& things, std::size_t from, const Encode& encode_one,
+                 Mirror& mirror) {
   ByteWriter page;
   mirror.begin();
-  for (std::size_t i = 0; i < ids.size();) {
-    const Mirror::Key key{ids[i].robot, ids[i].index / kLandmarksPerPage};
+  for (std::size_t begin = from / kFramesPerPage * kFramesPerPage; begin < things.size();
+       begin += kFramesPerPage) {
     page.clear();
-    for (; i < ids.size() && Mirror::Key{ids[i].robot, ids[i].index / kLandmarksPerPage} == key; ++i) {
-      encode(find(ids[i]), page);
+    for (std::size_t i = begin; i < std::min(things.size(), begin + kFramesPerPage); ++i) {
+      encode_one(things[i], page);
     }
-    mirror.put(key, page.bytes());
+    mirror.put({0, static_cast<std::int64_t>(begin / kFramesPerPage)}, page.bytes());
   }
-  mirror.end();
+  if (from == 0) mirror.end();
+}
+
+void encode_frame(const FramePose& frame, ByteWriter& to) { encode(frame, to); }
+void encode_line(const std::string& line, ByteWriter& to) { to.put(std::string_view(line)); }
+
+std::vector<FramePose> read_frames(Database& database) {
+  std::vector<FramePose> frames;
+  Statement rows(database, "SELECT data FROM frame ORDER BY robot, number");
+  while (rows.step()) decode_page(rows.unpacked(0), frames);
+  return frames;
 }
 
 void put_summary(Database& database, const Totals& totals, bool complete) {
@@ -71,12 +100,17 @@ struct StoreWriter::Impl {
         points(*database, "point"),
         lines(*database, "line"),
         edges(*database, "edge"),
-        frames(*database, "frame") {}
+        frames(*database, "frame"),
+        log(*database, "log"),
+        frame_list(read_frames(*database)),
+        log_lines(read_log(*database)) {}
 
-  void mirror_keyframes(const Map& map);
-  void mirror_rest(const Map& map);
-  void mirror_frames(const std::vector<FramePose>& poses);
-  void put_cloud(KeyframeId keyframe, const Bytes& cloud);
+  void mirror_keyframes(const MapChanges& map);
+  void mirror_rest(const MapChanges& map);
+  void put_cloud(const StoreCloud& cloud);
+  void put_log_and_clouds(const StoreStep& step);
+  void put_totals(const MapChanges& map, bool complete);
+  /// All there is of the map and its frames.
   void write(const Map& map, const std::vector<FramePose>& poses, bool complete);
   /// `change` in a transaction; when it fails the mirrors learn what the file holds.
   template <typename Change>
@@ -84,84 +118,90 @@ struct StoreWriter::Impl {
 
   std::filesystem::path file;
   std::unique_ptr<Database> database;
-  Mirror keyframes, states, retired, points, lines, edges, frames;
+  Mirror keyframes, states, retired, points, lines, edges, frames, log;
+  std::vector<FramePose> frame_list;   ///< as in the file
+  std::vector<std::string> log_lines;  ///< as in the file
 };
 
-void StoreWriter::Impl::mirror_keyframes(const Map& map) {
+void StoreWriter::Impl::mirror_keyframes(const MapChanges& map) {
   ByteWriter bytes;
   keyframes.begin();
   states.begin();
-  for (const KeyframeId id : map.keyframe_ids()) {
-    if (!keyframes.keep(key_of(id))) {
+  for (const MapParts::KeyframePart& part : map.keyframes) {
+    const Mirror::Key key = key_of(part.data->id);
+    if (!keyframes.keep(key)) {
       bytes.clear();
-      encode(map.keyframe(id), bytes);
-      keyframes.put(key_of(id), bytes.bytes());
+      encode(*part.data, bytes);
+      keyframes.put(key, bytes.bytes());
     }
     bytes.clear();
-    encode(KeyframeState{map.camera_from_world(id), map.parent(id)}, bytes);
-    states.put(key_of(id), bytes.bytes());
+    encode(KeyframeState{part.camera_from_world, part.parent}, bytes);
+    states.put(key, bytes.bytes());
   }
   keyframes.end();
   states.end();
 }
 
-void StoreWriter::Impl::mirror_rest(const Map& map) {
+void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
   ByteWriter bytes;
   retired.begin();
-  for (const KeyframeId id : map.retired_ids()) {
+  for (const auto& [id, keyframe] : map.retired) {
     bytes.clear();
-    encode(map.retired(id), bytes);
+    encode(keyframe, bytes);
     retired.put(key_of(id), bytes.bytes());
   }
   retired.end();
-  mirror_landmarks(
-      map.point_ids(), [&](PointId id) -> const MapPoint& { return map.point(id); }, points);
-  mirror_landmarks(
-      map.line_ids(), [&](LineId id) -> const MapLine& { return map.line(id); }, lines);
+  mirror_landmarks(map.points, map.whole, points);
+  mirror_landmarks(map.lines, map.whole, lines);
   edges.begin();
-  for (const auto& [number, edge] : map.edges()) {
+  for (const auto& [number, edge] : map.edges) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
     if (edges.keep(key)) continue;
     bytes.clear();
     encode(edge, bytes);
     edges.put(key, bytes.bytes());
   }
+  for (const auto& [number, robot] : map.edge_names) edges.stay({robot, static_cast<std::int64_t>(number)});
   edges.end();
 }
 
-void StoreWriter::Impl::mirror_frames(const std::vector<FramePose>& poses) {
-  ByteWriter page;
-  frames.begin();
-  for (std::size_t begin = 0; begin < poses.size(); begin += kFramesPerPage) {
-    page.clear();
-    for (std::size_t i = begin; i < std::min(poses.size(), begin + kFramesPerPage); ++i)
-      encode(poses[i], page);
-    frames.put({0, static_cast<std::int64_t>(begin / kFramesPerPage)}, page.bytes());
-  }
-  frames.end();
-}
-
-void StoreWriter::Impl::put_cloud(KeyframeId keyframe, const Bytes& cloud) {
-  Statement(*database, "REPLACE INTO cloud VALUES (?, ?, ?)")
-      .bind(1, keyframe.robot)
-      .bind(2, keyframe.index)
-      .bind(3, cloud)
+void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
+  const bool of_keyframe = cloud.keyframe.valid();
+  Statement(*database,
+            of_keyframe ? "REPLACE INTO cloud VALUES (?, ?, ?)" : "REPLACE INTO frame_cloud VALUES (?, ?, ?)")
+      .bind(1, of_keyframe ? cloud.keyframe.robot : 0)
+      .bind(2, of_keyframe ? cloud.keyframe.index : static_cast<std::int64_t>(cloud.frame))
+      .bind(3, *cloud.bytes)
       .run();
 }
 
-void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses, bool complete) {
-  mirror_keyframes(map);
-  mirror_rest(map);
-  mirror_frames(poses);
+void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
+  for (const StoreCloud& cloud : step.clouds) put_cloud(cloud);
+  const std::size_t before = log_lines.size();
+  log_lines.insert(log_lines.end(), step.log.begin(), step.log.end());
+  if (!step.log.empty()) mirror_list(log_lines, before, encode_line, log);
+}
+
+void StoreWriter::Impl::put_totals(const MapChanges& map, bool complete) {
   Totals totals;
-  totals.keyframes = map.keyframe_count();
-  totals.retired = retired.count();
-  totals.points = map.point_count();
-  totals.lines = map.line_count();
-  totals.edges = map.edges().size();
-  totals.frames = poses.size();
-  totals.next = map.next_ids();
+  totals.keyframes = map.keyframes.size();
+  totals.retired = map.retired.size();
+  totals.points = map.point_count;
+  totals.lines = map.line_count;
+  totals.edges = map.edge_names.size();
+  totals.frames = frame_list.size();
+  totals.log = log_lines.size();
+  totals.next = map.next;
   put_summary(*database, totals, complete);
+}
+
+void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses, bool complete) {
+  const MapChanges all = map.changes_since({});
+  mirror_keyframes(all);
+  mirror_rest(all);
+  frame_list = poses;
+  mirror_list(frame_list, 0, encode_frame, frames);
+  put_totals(all, complete);
 }
 
 template <typename Change>
@@ -173,7 +213,10 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
   });
   if (done) return done;
   const core::Result<void> reread = guarded(file, ErrorKind::kOutput, [&] {
-    for (Mirror* mirror : {&keyframes, &states, &retired, &points, &lines, &edges, &frames}) mirror->reread();
+    for (Mirror* mirror : {&keyframes, &states, &retired, &points, &lines, &edges, &frames, &log})
+      mirror->reread();
+    frame_list = read_frames(*database);
+    log_lines = read_log(*database);
   });
   return reread ? done : reread;
 }
@@ -220,13 +263,25 @@ core::Result<void> StoreWriter::add_keyframe(const Map& map, KeyframeId keyframe
                                              const std::vector<FramePose>& frames) {
   if (!map.has_keyframe(keyframe)) throw std::invalid_argument("add_keyframe: it is not in the map");
   return impl_->transact([&] {
-    if (!cloud.empty()) impl_->put_cloud(keyframe, cloud);
+    if (!cloud.empty()) impl_->put_cloud({keyframe, 0, std::make_shared<Bytes>(cloud)});
     impl_->write(map, frames, false);
   });
 }
 
+core::Result<void> StoreWriter::add(const StoreStep& step) {
+  return impl_->transact([&] {
+    impl_->mirror_keyframes(*step.map);
+    impl_->mirror_rest(*step.map);
+    const std::size_t frames = impl_->frame_list.size();
+    impl_->frame_list.insert(impl_->frame_list.end(), step.frames.begin(), step.frames.end());
+    mirror_list(impl_->frame_list, frames, encode_frame, impl_->frames);
+    impl_->put_log_and_clouds(step);
+    impl_->put_totals(*step.map, false);
+  });
+}
+
 core::Result<void> StoreWriter::add_cloud(KeyframeId keyframe, const std::vector<std::uint8_t>& cloud) {
-  return impl_->transact([&] { impl_->put_cloud(keyframe, cloud); });
+  return impl_->transact([&] { impl_->put_cloud({keyframe, 0, std::make_shared<Bytes>(cloud)}); });
 }
 
 core::Result<void> StoreWriter::attach(const std::string& name, const std::vector<std::uint8_t>& bytes) {
@@ -236,8 +291,13 @@ core::Result<void> StoreWriter::attach(const std::string& name, const std::vecto
   });
 }
 
-core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<FramePose>& frames) {
-  core::Result<void> done = impl_->transact([&] { impl_->write(map, frames, true); });
+core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<FramePose>& frames,
+                                           const ResultFrame& result, const StoreStep& rest) {
+  core::Result<void> done = impl_->transact([&] {
+    impl_->put_log_and_clouds(rest);
+    impl_->write(map, frames, true);
+    put_result_frame(*impl_->database, result);
+  });
   if (done) leave_one_file(*impl_->database);
   return done;
 }

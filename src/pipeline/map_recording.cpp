@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdint>
+#include <cstring>
 #include <optional>
 #include <utility>
 
@@ -27,23 +30,45 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-/// The effective configuration: a pipeline file that gives the same result again, and how it was run.
-core::Result<void> write_config(const std::filesystem::path& file, const MapRequest& request,
-                                const Graph& graph, int threads) {
-  core::OutputFile out(file);
-  out.write(fmt::format(
+/// The effective configuration: a pipeline file that gives the same result again, and how it was run;
+/// `threads` 0: left out.
+std::string config_text(const MapRequest& request, const Graph& graph, int threads) {
+  std::string text = fmt::format(
       "# What plumbline {} ran with. A pipeline file itself: plumbline map INPUT -p config.yaml\n",
-      core::version()));
-  out.write("run:\n");
-  out.write(fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline)));
-  out.write(
-      fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format)));
-  out.write(fmt::format("  from: {} s\n", request.open.from_s));
+      core::version());
+  text += "run:\n";
+  text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
+  text +=
+      fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format));
+  text += fmt::format("  from: {} s\n", request.open.from_s);
   constexpr double kNoEnd_s = 1e299;
-  if (request.open.to_s < kNoEnd_s) out.write(fmt::format("  to: {} s\n", request.open.to_s));
-  out.write(fmt::format("  every: {}\n  threads: {}\n", request.open.every, threads));
-  out.write(to_yaml(graph));
+  if (request.open.to_s < kNoEnd_s) text += fmt::format("  to: {} s\n", request.open.to_s);
+  text += fmt::format("  every: {}\n", request.open.every);
+  if (threads > 0) text += fmt::format("  threads: {}\n", threads);
+  return text + to_yaml(graph);
+}
+
+core::Result<void> write_config(const std::filesystem::path& file, const std::string& text) {
+  core::OutputFile out(file);
+  out.write(text);
   return out.commit();
+}
+
+/// Tells recordings apart without reading their pictures.
+std::string input_text(const dataset::FrameSource& source) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a, 64 bits
+  const auto mix = [&](double value) {
+    std::array<unsigned char, sizeof(double)> bytes{};
+    std::memcpy(bytes.data(), &value, sizeof(double));
+    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3ULL;
+  };
+  for (std::size_t i = 0; i < source.size(); ++i) mix(source.info(i).stamp);
+  std::string text = fmt::format("frames: {}\n", source.size());
+  if (source.size() > 0) {
+    text += fmt::format("first: {:.6f} s\nlast: {:.6f} s\n", source.info(0).stamp,
+                        source.info(source.size() - 1).stamp);
+  }
+  return text + fmt::format("stamps: {:016x}\n", hash);
 }
 
 }  // namespace
@@ -73,7 +98,8 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   if (!source) return fail(source.error());
   auto output = OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
-  if (auto written = write_config(output->path() / "config.yaml", request, *graph, executor.threads());
+  if (auto written =
+          write_config(output->path() / "config.yaml", config_text(request, *graph, executor.threads()));
       !written) {
     return fail(written.error());
   }
@@ -93,6 +119,10 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   context.stop = stop;
   context.output_folder = output->path();
   if (debug) context.debug_folder = debug->path();
+  context.configuration = config_text(request, *graph, 0);
+  context.input = input_text(**source);
+  context.keep_changes = std::any_of(graph->nodes.begin(), graph->nodes.end(),
+                                     [](const Node& node) { return node.stage->wants_map_changes(); });
   const auto report = run_graph(*graph, context, progress);
   if (!report) return fail(report.error());
 

@@ -15,6 +15,7 @@ void register_stages(StageRegistry& registry) {
   registry.add(refine_stage());
   registry.add(fuse_stage());
   registry.add(filter_stage());
+  registry.add(store_stage());
   registry.add(output_stage());
   registry.add_tap(frame_tap());
   registry.add_tap(features_tap());

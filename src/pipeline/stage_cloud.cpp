@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "chain_option.hpp"
+#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "stages.hpp"
@@ -48,6 +49,7 @@ class CloudStage : public Stage {
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
     result->stamp = track->stamp;
+    result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**filtered));
     result->cloud = std::move(*filtered);
     io.output<KeyframeCloud>("cloud", result);
     return {};

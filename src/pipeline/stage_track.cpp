@@ -55,6 +55,7 @@ class TrackStage : public Stage {
     constexpr std::int32_t kRobot = 0;
     camera_ = context.source->camera().color;
     debug_folder_ = context.debug_folder;
+    keep_changes_ = context.keep_changes;
     if (auto loaded = options_.loops.load(); !loaded) return loaded;
     slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
     return {};
@@ -63,12 +64,19 @@ class TrackStage : public Stage {
   core::Result<void> process(StageIo& io) override {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     const auto features = io.input<features::FrameFeatures>("features");
+    const std::size_t poses = slam_->frame_poses().size();
     const mapping::FrameReport report = slam_->process(*frame, features);
     rows_.push_back({io.frame(), tracking::to_string(report.state), columns(report)});
     note_times(io.frame(), report.bundle);
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->keyframe = report.keyframe;
     tracked->stamp = report.stamp;
+    tracked->row = rows_.back();
+    if (slam_->frame_poses().size() > poses) tracked->pose = slam_->frame_poses().back();
+    if (keep_changes_ && report.keyframe.valid()) {
+      tracked->changes = std::make_shared<maps::MapChanges>(slam_->map().changes_since(moment_));
+      moment_ = slam_->map().now();
+    }
     io.output<TrackedFrame>("track", tracked);
     if (debug_folder_.empty()) return {};
     return write_debug_picture(debug_folder_, io.frame(), *frame, *features, *slam_, report, camera_);
@@ -83,6 +91,9 @@ class TrackStage : public Stage {
     result->frame_columns = kColumns;
     result->frames = rows_;
     lines_ = result->lines.size();
+    if (options_.loops.enabled) {
+      result->vocabulary = std::make_shared<places::Vocabulary>(slam_->places().vocabulary());
+    }
     io.output<MapResult>("map", result);
     return {};
   }
@@ -116,6 +127,8 @@ class TrackStage : public Stage {
   std::vector<float> bundle_wait_ms_;  ///< by frame; NaN: no bundle was put back
   std::vector<float> bundle_ms_;
   std::size_t lines_ = 0;
+  bool keep_changes_ = false;
+  maps::MapMoment moment_;  ///< of the map, up to which changes were told
 };
 
 }  // namespace

@@ -19,6 +19,7 @@ StageType cloud_stage();
 StageType refine_stage();
 StageType fuse_stage();
 StageType filter_stage();
+StageType store_stage();
 StageType output_stage();
 
 /// Taps, one a port type: tap_<name>.cpp.

@@ -68,6 +68,8 @@ class Slam {
   [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
   /// Every place that was verified, with its evidence.
   [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
+  /// Keyframes by what they look like; empty without loops.
+  [[nodiscard]] const places::Database& places() const { return closer_.database(); }
   /// What the tracker said about the last frame; for pictures of it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.

@@ -3,7 +3,8 @@
 
 // Container of things named by core::Id: constant-time look-up, iteration in order of id. What is erased
 // leaves four bytes behind, so that a map in which landmarks come and go does not grow with the length of a
-// run.
+// run. It knows which pages of ids were touched lately, so that stores can follow at the cost of what
+// changed.
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -21,13 +22,21 @@ class IdMap {
     const std::int32_t entry = entry_of(id);
     return entry < 0 ? nullptr : &pool_[static_cast<std::size_t>(entry)];
   }
-  [[nodiscard]] T* find(IdType id) { return const_cast<T*>(std::as_const(*this).find(id)); }
+  [[nodiscard]] T* find(IdType id) {
+    T* found = const_cast<T*>(std::as_const(*this).find(id));
+    if (found != nullptr) touch(id);
+    return found;
+  }
   [[nodiscard]] const T& at(IdType id) const {
     const T* found = find(id);
     if (found == nullptr) throw std::out_of_range("IdMap: no such id");
     return *found;
   }
-  [[nodiscard]] T& at(IdType id) { return const_cast<T&>(std::as_const(*this).at(id)); }
+  [[nodiscard]] T& at(IdType id) {
+    T& found = const_cast<T&>(std::as_const(*this).at(id));
+    touch(id);
+    return found;
+  }
   [[nodiscard]] std::size_t size() const { return pool_.size() - free_.size(); }
 
   /// The next unused id of a robot.
@@ -67,12 +76,14 @@ class IdMap {
       free_.pop_back();
       pool_[static_cast<std::size_t>(slot)] = std::move(value);
     }
+    touch(id);
   }
   void erase(IdType id) {
     const std::int32_t entry = entry_of(id);
     if (entry < 0) return;
     pool_[static_cast<std::size_t>(entry)] = T{};  // gives its memory back
     free_.push_back(entry);
+    touch(id);
     slots_[id.robot][static_cast<std::size_t>(id.index)] = kNone;
   }
   [[nodiscard]] std::vector<IdType> ids() const {
@@ -86,8 +97,30 @@ class IdMap {
     return result;
   }
 
+  static constexpr std::int32_t kIdsPerPage = 64;
+  /// (robot, index / kIdsPerPage)
+  using Page = std::pair<std::int32_t, std::int32_t>;
+  /// How often anything was inserted, erased or handed out to be changed.
+  [[nodiscard]] std::uint64_t touches() const { return touches_; }
+  /// Pages in which that happened after touches() was `since`, in order.
+  [[nodiscard]] std::vector<Page> touched_pages(std::uint64_t since) const {
+    std::vector<Page> pages;
+    for (const auto& [robot, touched] : touched_) {
+      for (std::size_t page = 0; page < touched.size(); ++page) {
+        if (touched[page] > since) pages.emplace_back(robot, static_cast<std::int32_t>(page));
+      }
+    }
+    return pages;
+  }
+
  private:
   static constexpr std::int32_t kNone = -1;
+  void touch(IdType id) {
+    auto& pages = touched_[id.robot];
+    const auto page = static_cast<std::size_t>(id.index / kIdsPerPage);
+    if (page >= pages.size()) pages.resize(page + 1, 0);
+    pages[page] = ++touches_;
+  }
   [[nodiscard]] std::int32_t entry_of(IdType id) const {
     const auto robot = slots_.find(id.robot);
     if (robot == slots_.end() || id.index < 0 || static_cast<std::size_t>(id.index) >= robot->second.size()) {
@@ -99,6 +132,9 @@ class IdMap {
   std::map<std::int32_t, std::vector<std::int32_t>> slots_;  ///< by id: entry of the pool
   std::deque<T> pool_;
   std::vector<std::int32_t> free_;  ///< entries of the pool
+  std::map<std::int32_t, std::vector<std::uint64_t>>
+      touched_;  ///< by page: touches_ when it was last touched
+  std::uint64_t touches_ = 0;
 };
 
 }  // namespace plumbline::maps

@@ -96,6 +96,21 @@ struct NextIds {
   std::uint64_t edge = 0;
 };
 
+/// A moment in the life of a map, to ask later what changed since. The default: before anything was there.
+struct MapMoment {
+  std::uint64_t points = 0;
+  std::uint64_t lines = 0;
+  std::uint64_t edges = 0;
+};
+
+/// Landmarks whose ids share a page of IdMap; all that are there, maybe none.
+template <typename Landmark>
+struct LandmarkPage {
+  std::int32_t robot = 0;
+  std::int32_t page = 0;
+  std::vector<Landmark> landmarks;  ///< by id
+};
+
 /// What a map consists of; the rest (who shares what, children) follows from it. For stores.
 struct MapParts {
   struct KeyframePart {
@@ -111,6 +126,21 @@ struct MapParts {
   NextIds next;
 };
 
+/// What a map holds beyond what it held at an earlier moment: a copy that goes on living while the map
+/// changes, at the cost of what was touched.
+struct MapChanges {
+  bool whole = false;                                           ///< since before anything was there
+  std::vector<MapParts::KeyframePart> keyframes;                ///< all of them: poses move
+  std::vector<std::pair<KeyframeId, RetiredKeyframe>> retired;  ///< all
+  std::vector<LandmarkPage<MapPoint>> points;                   ///< pages that were touched
+  std::vector<LandmarkPage<MapLine>> lines;
+  std::vector<std::pair<std::uint64_t, std::int32_t>> edge_names;  ///< all: number and robot of a
+  std::vector<std::pair<std::uint64_t, SurfaceEdge>> edges;        ///< new ones
+  std::size_t point_count = 0;
+  std::size_t line_count = 0;
+  NextIds next;
+};
+
 class Map {
  public:
   Map() = default;
@@ -118,6 +148,8 @@ class Map {
   /// contradict each other: an id twice, something names what is not there, two landmarks of one feature.
   explicit Map(MapParts parts);
   [[nodiscard]] NextIds next_ids() const;
+  [[nodiscard]] MapMoment now() const { return {points_.touches(), lines_.touches(), next_edge_}; }
+  [[nodiscard]] MapChanges changes_since(const MapMoment& moment) const;
 
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
   KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe,

@@ -25,9 +25,16 @@ constexpr int kStoreFormat = 1;
 struct StoreHeader {
   sensor::Camera camera;
   std::string configuration;    ///< the effective one, YAML
+  std::string input;            ///< what was mapped, text: tells whether a run that goes on is given the same
   std::string robot;            ///< its name
   std::string program_version;  ///< core::version() of the program that made the file
   int format = kStoreFormat;    ///< set by the reader; the writer always writes kStoreFormat
+};
+
+/// The frame that results are written in, as far as it is known.
+struct ResultFrame {
+  geometry::Rigid3 output_from_map;
+  bool upright = false;  ///< z is up in it
 };
 
 /// Everything of a store but clouds.
@@ -36,6 +43,38 @@ struct StoredMap {
   bool complete = false;  ///< save_final was the last thing that happened
   Map map;
   std::vector<FramePose> frames;
+  std::vector<std::string> log;  ///< a line a frame of the run, as frames.csv has it
+  ResultFrame result;            ///< of a store that is not complete: the map's own frame
+};
+
+/// What a store holds, without reading it all.
+struct StoreContents {
+  bool complete = false;
+  std::size_t keyframes = 0;  ///< in the map
+  std::size_t retired = 0;    ///< keyframes that left it
+  std::size_t points = 0;     ///< landmarks
+  std::size_t lines = 0;
+  std::size_t edges = 0;
+  std::size_t frames = 0;
+  std::size_t keyframe_clouds = 0;
+  std::size_t frame_clouds = 0;
+  std::uint64_t cloud_bytes = 0;  ///< of both
+  std::vector<std::string> attachments;
+};
+
+/// A cloud on its way into a store: bytes of cloud::encode_cloud.
+struct StoreCloud {
+  KeyframeId keyframe;    ///< whose cloud it is; invalid: a frame's
+  std::size_t frame = 0;  ///< of a frame between keyframes: its place among the store's frames
+  std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+};
+
+/// What a run adds in one go.
+struct StoreStep {
+  std::shared_ptr<const MapChanges> map;  ///< since the last step's
+  std::vector<FramePose> frames;          ///< that came since the last step
+  std::vector<std::string> log;           ///< lines that came since
+  std::vector<StoreCloud> clouds;
 };
 
 /// One writer per file at a time; not thread-safe. A call that fails leaves the file as it was before the
@@ -56,13 +95,18 @@ class StoreWriter {
   /// written, but all landmarks are looked at: 20 to 40 ms for 100 000. Errors (kOutput): disk full, I/O.
   core::Result<void> add_keyframe(const Map& map, KeyframeId keyframe, const std::vector<std::uint8_t>& cloud,
                                   const std::vector<FramePose>& frames = {});
+  /// The same at a bounded cost: one transaction that adds what came since the last step. What the map had
+  /// before must be in the file. Errors (kOutput): disk full, I/O; the next step must be of a whole map then.
+  core::Result<void> add(const StoreStep& step);
   /// A cloud that comes later than its keyframe, or replaces its cloud. One transaction.
   core::Result<void> add_cloud(KeyframeId keyframe, const std::vector<std::uint8_t>& cloud);
   /// Bytes of others under a name, such as a vocabulary; replaces what had the name. One transaction.
   core::Result<void> attach(const std::string& name, const std::vector<std::uint8_t>& bytes);
   /// The finished map, in one transaction: poses, landmarks and edges after all optimisation, all frames.
-  /// Marks the store as complete and leaves one file, as the destructor does.
-  core::Result<void> save_final(const Map& map, const std::vector<FramePose>& frames);
+  /// Marks the store as complete and leaves one file, as the destructor does. Of `rest`, log and clouds are
+  /// added.
+  core::Result<void> save_final(const Map& map, const std::vector<FramePose>& frames,
+                                const ResultFrame& result = {}, const StoreStep& rest = {});
 
  private:
   struct Impl;
@@ -84,11 +128,17 @@ class StoreReader {
   /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
   /// pictures of the camera's size. Errors (kInput): damaged.
   [[nodiscard]] core::Result<StoredMap> load() const;
+  /// Errors (kInput): damaged.
+  [[nodiscard]] core::Result<StoreContents> contents() const;
   /// Keyframes that have a cloud, by id; also such as left the map.
   [[nodiscard]] core::Result<std::vector<KeyframeId>> cloud_ids() const;
   /// A keyframe's cloud, in its camera frame. Errors (kInput): it has none, damaged.
   [[nodiscard]] core::Result<cloud::CloudPtr> cloud(KeyframeId keyframe) const;
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(KeyframeId keyframe) const;
+  /// Frames between keyframes that have a cloud: their places among StoredMap::frames, ascending.
+  [[nodiscard]] core::Result<std::vector<std::size_t>> frame_cloud_ids() const;
+  [[nodiscard]] core::Result<cloud::CloudPtr> frame_cloud(std::size_t frame) const;
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> frame_cloud_bytes(std::size_t frame) const;
   /// None: nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
       const std::string& name) const;

@@ -111,6 +111,9 @@ struct RunContext {
   core::StopToken stop;
   std::filesystem::path output_folder;  ///< where sinks write
   std::filesystem::path debug_folder;   ///< where the tracker's pictures go; empty: nowhere
+  std::string configuration;            ///< the effective one, YAML; the same for any number of threads
+  std::string input;                    ///< what is mapped, as text that another recording does not give
+  bool keep_changes = false;            ///< some stage wants_map_changes
 };
 
 /// What a stage may look at while the graph is checked.
@@ -139,6 +142,8 @@ class Stage {
   /// Asked after check: the files that will be written, relative to the result folder ('*' = a number); no
   /// two stages may write the same.
   [[nodiscard]] virtual std::vector<std::string> files() const { return {}; }
+  /// Asked after check: TrackedFrame::changes are wanted, which cost something.
+  [[nodiscard]] virtual bool wants_map_changes() const { return false; }
   virtual core::Result<void> start(const RunContext& /*context*/) { return {}; }
   /// Of sources: how many frames there are; asked after start.
   [[nodiscard]] virtual std::size_t frames() const { return 0; }
