@@ -62,7 +62,7 @@ core::Result<void> CloudSpool::append(const std::vector<std::uint8_t>& compact) 
   return {};
 }
 
-core::Result<CloudPtr> CloudSpool::read(std::size_t index) const {
+core::Result<std::vector<std::uint8_t>> CloudSpool::read_compact(std::size_t index) const {
   const Place& place = places_.at(index);
   std::vector<std::uint8_t> bytes(place.size);
   std::size_t done = 0;
@@ -76,7 +76,13 @@ core::Result<CloudPtr> CloudSpool::read(std::size_t index) const {
     }
     done += static_cast<std::size_t>(got);
   }
-  auto cloud = decode_cloud(bytes.data(), bytes.size());
+  return bytes;
+}
+
+core::Result<CloudPtr> CloudSpool::read(std::size_t index) const {
+  const auto bytes = read_compact(index);
+  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  auto cloud = decode_cloud(bytes->data(), bytes->size());
   if (cloud) return cloud;
   return core::output_error(fmt::format("{}: {}", folder_.string(), cloud.error().message));
 }

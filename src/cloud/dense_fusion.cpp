@@ -75,8 +75,9 @@ void append(FusedCloud&& from, FusedCloud& to) {
 class Fusion {
  public:
   Fusion(const std::vector<geometry::Rigid3>& world_from_camera, const ReadView& read,
-         const sensor::Pinhole& camera, const DenseFusionOptions& options, const core::Executor& executor)
-      : poses_(world_from_camera), read_(read), camera_(camera), options_(options), executor_(executor) {}
+         const std::vector<sensor::Pinhole>& cameras, const DenseFusionOptions& options,
+         const core::Executor& executor)
+      : poses_(world_from_camera), read_(read), cameras_(cameras), options_(options), executor_(executor) {}
 
   core::Result<FusedCloud> run(FusionReport& report) {
     if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
@@ -117,7 +118,7 @@ class Fusion {
         return;
       }
       cells[v] = color_cells(**cloud, poses_[v], kCell_m);
-      if (options_.free_space) rasters_[v] = depth_raster(**cloud, camera_);
+      if (options_.free_space) rasters_[v] = depth_raster(**cloud, cameras_[v]);
     });
     if (const auto error = first_error(done)) return tl::unexpected<core::Error>(*error);
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
@@ -189,7 +190,7 @@ class Fusion {
   [[nodiscard]] FusedCloud cleaned(FusedCloud& points, FusionReport& report) const {
     Sheets sheets(points, block_m(options_.voxels.voxel_m));
     std::vector<std::uint8_t> goes(sheets.all().size(), 0);
-    if (options_.free_space) goes = seen_through(sheets, rasters_, poses_, camera_);
+    if (options_.free_space) goes = seen_through(sheets, rasters_, poses_);
     sheets.fit_planes();
     if (options_.settle) sheets.settle(points);
     const auto least = static_cast<std::uint32_t>(options_.min_support);
@@ -208,7 +209,7 @@ class Fusion {
 
   const std::vector<geometry::Rigid3>& poses_;
   const ReadView& read_;
-  const sensor::Pinhole& camera_;
+  const std::vector<sensor::Pinhole>& cameras_;
   const DenseFusionOptions& options_;
   const core::Executor& executor_;
   std::vector<FusionTile> tiles_;
@@ -235,8 +236,17 @@ core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_f
                                     const ReadView& read, const sensor::Pinhole& camera,
                                     const DenseFusionOptions& options, const core::Executor& executor,
                                     FusionReport* report) {
+  const std::vector<sensor::Pinhole> cameras(world_from_camera.size(), camera);
+  return fuse_views(world_from_camera, read, cameras, options, executor, report);
+}
+
+core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
+                                    const ReadView& read, const std::vector<sensor::Pinhole>& cameras,
+                                    const DenseFusionOptions& options, const core::Executor& executor,
+                                    FusionReport* report) {
   FusionReport unused;
-  return Fusion(world_from_camera, read, camera, options, executor).run(report == nullptr ? unused : *report);
+  return Fusion(world_from_camera, read, cameras, options, executor)
+      .run(report == nullptr ? unused : *report);
 }
 
 FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m) {

@@ -43,6 +43,7 @@ std::vector<NearView> views_near(const Eigen::AlignedBox3d& box, const std::vect
 
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
   DepthRaster raster;
+  raster.camera = camera;
   raster.width = (camera.width + DepthRaster::kCell_px - 1) / DepthRaster::kCell_px;
   raster.height = (camera.height + DepthRaster::kCell_px - 1) / DepthRaster::kCell_px;
   raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
@@ -96,8 +97,7 @@ Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, cons
 }
 
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
-                                       const std::vector<geometry::Rigid3>& world_from_camera,
-                                       const sensor::Pinhole& camera) {
+                                       const std::vector<geometry::Rigid3>& world_from_camera) {
   std::vector<std::uint8_t> goes(sheets.all().size(), 0);
   Eigen::AlignedBox3d box;
   for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
@@ -108,8 +108,8 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
     int free = 0;
     int surface = 0;
     for (const NearView& view : views) {
-      const Evidence found =
-          evidence(*view.raster, camera, Eigen::Vector3f(view.rotation * position + view.translation));
+      const Evidence found = evidence(*view.raster, view.raster->camera,
+                                      Eigen::Vector3f(view.rotation * position + view.translation));
       free += found == Evidence::kFree ? 1 : 0;
       surface += found == Evidence::kSurface ? 1 : 0;
     }

@@ -30,6 +30,8 @@ class CloudSpool {
   core::Result<void> append(const std::vector<std::uint8_t>& compact);
   /// Cloud `index` as encode_cloud() left it. Errors (kOutput): the file cannot be read back.
   [[nodiscard]] core::Result<CloudPtr> read(std::size_t index) const;
+  /// The bytes of cloud `index`. Errors (kOutput).
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> read_compact(std::size_t index) const;
 
   [[nodiscard]] std::size_t size() const { return places_.size(); }
   [[nodiscard]] std::uint64_t bytes() const { return end_; }  ///< on disk

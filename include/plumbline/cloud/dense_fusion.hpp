@@ -51,6 +51,12 @@ core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_f
                                     const DenseFusionOptions& options, const core::Executor& executor,
                                     FusionReport* report = nullptr);
 
+/// The same for views of several cameras: one camera a view.
+core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
+                                    const ReadView& read, const std::vector<sensor::Pinhole>& cameras,
+                                    const DenseFusionOptions& options, const core::Executor& executor,
+                                    FusionReport* report = nullptr);
+
 /// A cloud and its columns again in larger voxels, weighted by confidence when that is known.
 FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m);
 

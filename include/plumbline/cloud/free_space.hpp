@@ -20,6 +20,7 @@ struct DepthRaster {
   int height = 0;
   std::vector<std::uint16_t> nearest;  ///< millimetres, 0: none
   float furthest_m = 0.0F;             ///< of all cells
+  sensor::Pinhole camera;              ///< that took the view
 };
 
 /// From a view's cloud, camera frame.
@@ -28,14 +29,14 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
 /// What one view says about a place.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
 
-/// `point`: metres, camera frame. Free: all cells around (3 x 3, at least 7 measured) lie further away than
-/// the sensor's noise and 3 cm explain. kNone outside of the picture or where too little was measured.
+/// `point`: metres, frame of `camera`, which took the view. Free: all cells around (3 x 3, at least 7
+/// measured) lie further away than the sensor's noise and 3 cm explain. kNone outside of the picture or where
+/// too little was measured.
 Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
 
-/// For every sheet whether it is to go: at least half as many views look through it as see a surface there, two
-/// at least unless no more than one view sees it.
+/// For every sheet whether it is to go: at least half as many views look through it as see a surface there,
+/// two at least unless no more than one view sees it.
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
-                                       const std::vector<geometry::Rigid3>& world_from_camera,
-                                       const sensor::Pinhole& camera);
+                                       const std::vector<geometry::Rigid3>& world_from_camera);
 
 }  // namespace plumbline::cloud
