@@ -39,8 +39,11 @@ void LoopOptions::declare(core::OptionTable& table) {
                "Keyframes made within this time of each other never make a loop");
   table.integer("loops.agreeing", agreeing, {1, 20}, "",
                 "Verified keyframes that must agree before a loop is closed");
-  table.number("loops.max_apart", max_apart_m, {0.0, 10.0}, "m", "How far apart they may put the camera");
-  table.number("loops.max_turned", max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.number("loops.max_rival", max_rival, {0.0, 1.0}, "",
+               "Share of these that may agree on another place at most");
+  table.number("loops.max_apart", consistency.max_apart_m, {0.0, 10.0}, "m",
+               "How far apart loops that agree may put the camera; 2 cm more for every metre between them");
+  table.number("loops.max_turned", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
   table.number("loops.max_drift", max_drift, {0.0, 10.0}, "",
                "Share of the way since a place was seen that a loop may correct; 10 cm are always allowed");
   table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
@@ -121,13 +124,22 @@ std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
   return {};
 }
 
-/// Both say the same about where the world of today lies in that of then, at the place of the second query.
-bool LoopCloser::agree(const maps::Map& map, const Loop& a, const Loop& b) const {
-  const Rigid3 then_from_now_a = world_from_query(map, a) * map.camera_from_world(a.query);
-  const Rigid3 by_a = then_from_now_a * map.camera_from_world(b.query).inverse();
-  const Rigid3 difference = by_a.inverse() * world_from_query(map, b);
-  return difference.translation.norm() <= options_.max_apart_m &&
-         geometry::rotation_angle(difference.rotation) <= options_.max_turned_rad;
+/// The story that most of the loops found lately tell, with the new keyframe among them: when enough
+/// keyframes tell it and no other story comes near.
+std::vector<Loop> LoopCloser::confirmed(const maps::Map& map, KeyframeId keyframe) const {
+  std::vector<PlacePair> pairs;
+  for (const Loop& loop : waiting_) pairs.push_back({loop.match, loop.query, loop.evidence.query_from_match});
+  const std::vector<ConsistentSet> sets = consistent_sets(map, map, pairs, options_.consistency);
+  if (sets.empty() || static_cast<int>(sets[0].keyframes_b) < options_.agreeing) return {};
+  if (sets.size() > 1 && static_cast<double>(sets[1].keyframes_b) >
+                             options_.max_rival * static_cast<double>(sets[0].keyframes_b)) {
+    return {};
+  }
+  std::vector<Loop> result;
+  for (const std::size_t i : sets[0].members) result.push_back(waiting_[i]);
+  const bool fresh =
+      std::any_of(result.begin(), result.end(), [&](const Loop& l) { return l.query == keyframe; });
+  return fresh ? result : std::vector<Loop>{};
 }
 
 std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
@@ -150,21 +162,19 @@ std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
            !map.has_keyframe(l.match);
   };
   waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());
-  std::vector<Loop> sure;
-  // A picture that fits two places that exclude each other says nothing about either.
-  for (const Loop& loop : verified) {
-    if (!agree(map, verified.front(), loop)) return sure;
-  }
-  for (const Loop& loop : verified) {
-    std::vector<Loop> together{loop};
-    for (const Loop& w : waiting_) {
-      if (w.query != loop.query && agree(map, w, loop)) together.push_back(w);
-    }
-    if (static_cast<int>(together.size()) >= options_.agreeing && sure.empty()) sure = std::move(together);
-  }
+  if (verified.empty()) return {};
   waiting_.insert(waiting_.end(), verified.begin(), verified.end());
+  std::vector<Loop> sure = confirmed(map, keyframe);
   if (!sure.empty()) waiting_.clear();
   return sure;
+}
+
+void LoopCloser::restore(const maps::Map& map, KeyframeId newest) {
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const auto& features = map.keyframe(id).features;
+    if (features != nullptr && !database_.contains(id)) database_.add(id, features);
+  }
+  last_ = newest;
 }
 
 void LoopCloser::merge_doubles(maps::Map& map, const PoseEdge& edge) const {

@@ -57,6 +57,61 @@ class EdgeCollector {
   std::map<std::pair<KeyframeId, KeyframeId>, PoseEdge> edges_;
 };
 
+Matrix6d adjoint(const Rigid3& t) {
+  Matrix6d result = Matrix6d::Zero();
+  result.topLeftCorner<3, 3>() = t.rotation;
+  result.bottomRightCorner<3, 3>() = t.rotation;
+  result.topRightCorner<3, 3>() = geometry::skew(t.translation) * t.rotation;
+  return result;
+}
+
+/// Errors of one keyframe after another along the way from `a` to `b`, were they independent: covariance of
+/// b_from_a. `steps` counts them.
+Matrix6d covariance_of_way(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
+                           KeyframeId b, int& steps) {
+  const Matrix6d step = information(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();  // several edges hold each
+  Matrix6d sum = Matrix6d::Zero();
+  steps = 0;
+  const Rigid3& b_from_world = map.camera_from_world(b);
+  for (auto id = std::upper_bound(ids.begin(), ids.end(), a); id != ids.end() && !(b < *id); ++id) {
+    if (id->robot != a.robot) continue;
+    const Matrix6d carry = adjoint(b_from_world * map.camera_from_world(*id).inverse());
+    sum += carry * step * carry.transpose();
+    ++steps;
+  }
+  return sum;
+}
+
+/// Errors of neighbours are alike, so that drift grows with the way rather than with its root: with all alike
+/// the variance after n steps is n times what independent ones would have. By how much the covariance of the
+/// map's own edges must grow for the measured edges to be explained: the median over these, so that wrong
+/// ones do not decide it.
+double drift_factor(const maps::Map& map, const std::vector<KeyframeId>& ids,
+                    const std::vector<PoseEdge>& measured) {
+  std::vector<double> factors;
+  for (const PoseEdge& e : measured) {
+    if (e.trusted || e.a.robot != e.b.robot) continue;
+    int steps = 0;
+    const Matrix6d way = e.a < e.b ? covariance_of_way(map, ids, e.a, e.b, steps)
+                                   : covariance_of_way(map, ids, e.b, e.a, steps);
+    const Rigid3 b_from_a = map.camera_from_world(e.b) * map.camera_from_world(e.a).inverse();
+    Rigid3 error = b_from_a * e.b_from_a.inverse();
+    Matrix6d own = (e.information + 1e-6 * Matrix6d::Identity()).inverse();
+    if (e.b < e.a) {  // as seen from the later one
+      error = b_from_a.inverse() * e.b_from_a;
+      const Matrix6d carry = adjoint(b_from_a.inverse());
+      own = carry * own * carry.transpose();
+    }
+    const geometry::Vector6d xi = geometry::log_se3(error);
+    const double ratio = xi.dot((own + way).ldlt().solve(xi)) / 6.0;
+    factors.push_back(std::clamp(ratio, 1.0, std::max(1.0, static_cast<double>(steps))));
+  }
+  if (factors.empty()) return 1.0;
+  const auto middle = factors.begin() + static_cast<std::ptrdiff_t>((factors.size() - 1) / 2);
+  std::nth_element(factors.begin(), middle, factors.end());
+  return *middle;
+}
+
 /// Mean of the places where a landmark's keyframes would take it.
 Eigen::Vector3d carried(const Eigen::Vector3d& p, const std::vector<maps::Observation>& seen,
                         const std::map<KeyframeId, Rigid3>& new_from_old) {
@@ -108,8 +163,9 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
   for (const PoseEdge& e : extra) {
     graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information, e.trusted});
   }
+  const double factor = drift_factor(map, ids, extra);
   for (const PoseEdge& e : map_edges(map)) {
-    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information, true});
+    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information / factor, true});
   }
   result.summary = optimize::solve_pose_graph(graph, options);
   result.summary.edges.resize(extra.size());

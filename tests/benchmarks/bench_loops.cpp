@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What closing loops is worth: recordings are tracked without and with loops; ATE of both, and every place
 // that was verified with its evidence and, since the truth is known, its error.
-//   bench_loops [--tell] [--set key=value]... INPUT...
+//   bench_loops [--tell] [--save FILE] [--set key=value]... INPUT
+//   bench_loops --replay [--wrong SHARE] FILE       loops of a finished map that --save wrote, without
+//   tracking
 // INPUT: a recording's folder with truth, or synth:SCENE?... A loop is false when its relative pose is off by
-// more than 0.2 m or 6 degrees. Milliseconds are processor time of one thread.
+// more than 0.2 m or 6 degrees. --wrong: such a share of wrong loops is forced upon the pose graph, with and
+// without its robustness. Milliseconds are processor time of one thread.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <memory>
 #include <opencv2/core/utility.hpp>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -17,6 +22,7 @@
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/mapping/slam.hpp"
+#include "plumbline/maps/store.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace {
@@ -38,6 +44,57 @@ struct Prepared {
   std::shared_ptr<const features::FrameFeatures> features;
 };
 
+struct PoseError {
+  double metres = -1.0;
+  double degrees = -1.0;
+  double apart_m = 0.0;  ///< the two cameras, in truth
+  double apart_degrees = 0.0;
+  [[nodiscard]] bool right() const { return metres < 0.2 && degrees < 6.0; }
+};
+
+PoseError error_of(const mapping::Loop& loop, const maps::Map& map, const geometry::Trajectory& truth) {
+  const auto query = geometry::pose_at(truth, map.stamp_of(loop.query));
+  const auto match = geometry::pose_at(truth, map.stamp_of(loop.match));
+  if (!query || !match) return {};
+  const geometry::Rigid3 truly = query->inverse() * *match;
+  const geometry::Rigid3 error = loop.evidence.query_from_match * truly.inverse();
+  return {error.translation.norm(), kDegrees * geometry::rotation_angle(error.rotation),
+          truly.translation.norm(), kDegrees * geometry::rotation_angle(truly.rotation)};
+}
+
+void describe(const mapping::LoopTrial& t, const PoseError& error) {
+  const mapping::PlaceVerification& v = t.loop.evidence;
+  std::fprintf(
+      stderr,
+      "%d-%d score %.3f: apart %.2f m %.0f deg, error %.3f m %.2f deg; matched %d+%d, agree %d, in the end "
+      "%d+%d of %d+%d, cells %d, rms %.2f, overlap %.2f, contradiction %.3f, aligned %d %.3f m; moves %.3f "
+      "m %.3f rad on %.1f m; %s\n",
+      t.loop.query.index, t.loop.match.index, t.score, error.apart_m, error.apart_degrees, error.metres,
+      error.degrees, v.matched_points, v.matched_lines, v.ransac_inliers, v.points, v.lines, v.visible_points,
+      v.visible_lines, v.cells, v.rms_px, v.overlap, v.contradiction, v.surface_aligned ? 1 : 0,
+      v.surface_shift_m, t.correction_m, t.correction_rad, t.way_m,
+      t.refused.empty() ? "VERIFIED" : t.refused.c_str());
+}
+
+/// One row of the table.
+void print_row(const std::string& input, const std::string& name, double tracked_percent,
+               const geometry::Trajectory& trajectory, const geometry::Trajectory& truth,
+               const maps::Map& map, const std::vector<mapping::LoopTrial>& trials,
+               const mapping::LoopCounts& counts, double ms, bool tell) {
+  const auto report = evaluate::evaluate_trajectory(trajectory, truth);
+  int wrong = 0;
+  for (const mapping::LoopTrial& trial : trials) {
+    const PoseError error = error_of(trial.loop, map, truth);
+    if (trial.refused.empty() && !error.right()) ++wrong;
+    if (tell) describe(trial, error);
+  }
+  std::printf("| %s | %s | %.1f | %.4f | %.4f | %zu | %d | %d | %d | %d | %d | %.1f |\n", input.c_str(),
+              name.c_str(), tracked_percent, report ? report->ate_m.rmse : 0.0,
+              report ? report->ate_m.max : 0.0, map.keyframe_count(), counts.candidates, counts.verified,
+              counts.accepted, counts.rejected, wrong, ms);
+  std::fflush(stdout);
+}
+
 /// One set of options on its way through a recording.
 class Run {
  public:
@@ -55,52 +112,12 @@ class Run {
   }
   void print(const std::string& input, const geometry::Trajectory& truth, bool tell) {
     slam_->finish();
-    const auto report = evaluate::evaluate_trajectory(slam_->trajectory(), truth);
-    int wrong = 0;
-    for (const mapping::LoopTrial& trial : slam_->loop_trials()) {
-      const auto error = error_of(trial, truth);
-      if (trial.refused.empty() && !right(error)) ++wrong;
-      if (tell) describe(trial, error);
-    }
-    const mapping::LoopCounts& counts = slam_->loop_counts();
-    std::printf("| %s | %s | %.1f | %.4f | %.4f | %zu | %d | %d | %d | %d | %d | %.1f |\n", input.c_str(),
-                name_.c_str(), 100.0 * tracked_ / std::max(1, frames_), report ? report->ate_m.rmse : 0.0,
-                report ? report->ate_m.max : 0.0, slam_->map().keyframe_count(), counts.candidates,
-                counts.verified, counts.accepted, counts.rejected, wrong, ms_ / std::max(1, frames_));
-    std::fflush(stdout);
+    print_row(input, name_, 100.0 * tracked_ / std::max(1, frames_), slam_->trajectory(), truth, slam_->map(),
+              slam_->loop_trials(), slam_->loop_counts(), ms_ / std::max(1, frames_), tell);
   }
+  [[nodiscard]] const mapping::Slam& slam() const { return *slam_; }
 
  private:
-  struct PoseError {
-    double metres = -1.0;
-    double degrees = -1.0;
-    double apart_m = 0.0;
-    double apart_degrees = 0.0;
-  };
-  static bool right(const PoseError& e) { return e.metres < 0.2 && e.degrees < 6.0; }
-  [[nodiscard]] PoseError error_of(const mapping::LoopTrial& trial, const geometry::Trajectory& truth) const {
-    const auto query = geometry::pose_at(truth, slam_->map().stamp_of(trial.loop.query));
-    const auto match = geometry::pose_at(truth, slam_->map().stamp_of(trial.loop.match));
-    if (!query || !match) return {};
-    const geometry::Rigid3 truly = query->inverse() * *match;
-    const geometry::Rigid3 error = trial.loop.evidence.query_from_match * truly.inverse();
-    return {error.translation.norm(), kDegrees * geometry::rotation_angle(error.rotation),
-            truly.translation.norm(), kDegrees * geometry::rotation_angle(truly.rotation)};
-  }
-  static void describe(const mapping::LoopTrial& t, const PoseError& error) {
-    const mapping::PlaceVerification& v = t.loop.evidence;
-    std::fprintf(
-        stderr,
-        "%d-%d score %.3f: apart %.2f m %.0f deg, error %.3f m %.2f deg; matched %d+%d, agree %d, in the end "
-        "%d+%d of %d+%d, cells %d, rms %.2f, overlap %.2f, contradiction %.3f, aligned %d %.3f m; moves %.3f "
-        "m %.3f rad on %.1f m; %s\n",
-        t.loop.query.index, t.loop.match.index, t.score, error.apart_m, error.apart_degrees, error.metres,
-        error.degrees, v.matched_points, v.matched_lines, v.ransac_inliers, v.points, v.lines,
-        v.visible_points, v.visible_lines, v.cells, v.rms_px, v.overlap, v.contradiction,
-        v.surface_aligned ? 1 : 0, v.surface_shift_m, t.correction_m, t.correction_rad, t.way_m,
-        t.refused.empty() ? "VERIFIED" : t.refused.c_str());
-  }
-
   std::string name_;
   core::Executor executor_{1};
   std::shared_ptr<core::Log> log_;
@@ -122,7 +139,10 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open(const std::string& inpu
 struct Settings {
   std::string pipelines = PLUMBLINE_SOURCE_DIR "/pipelines";
   std::vector<std::string> overrides;
+  std::string save;
+  double wrong = 0.0;      ///< share of the edges
   std::size_t frames = 0;  ///< at most; 0: all
+  bool replay = false;
   bool tell = false;
   bool on_only = false;
 };
@@ -141,6 +161,18 @@ core::Result<mapping::SlamOptions> options_of(const std::vector<std::string>& ov
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
   options.loops.enabled = loops;
   return options;
+}
+
+std::string short_name(const std::string& input) { return input.substr(input.find_last_of("/:") + 1); }
+
+core::Result<void> save(const mapping::Slam& slam, const std::string& input, const sensor::Camera& camera,
+                        const std::string& file) {
+  maps::StoreHeader header;
+  header.camera = camera;
+  header.input = input;
+  auto writer = maps::StoreWriter::create(file, header);
+  if (!writer) return tl::unexpected<core::Error>(writer.error());
+  return writer->save_final(slam.map(), slam.frame_poses());
 }
 
 core::Result<void> measure(const std::string& input, const Settings& settings,
@@ -174,7 +206,83 @@ core::Result<void> measure(const std::string& input, const Settings& settings,
       for (const Prepared& prepared : chunk) runs[r]->process(prepared);
     });
   }
-  for (const auto& run : runs) run->print(input.substr(input.find_last_of("/:") + 1), *truth, settings.tell);
+  for (const auto& run : runs) run->print(short_name(input), *truth, settings.tell);
+  if (settings.save.empty()) return {};
+  return save(runs.front()->slam(), input, (*source)->camera(), settings.save);
+}
+
+/// Loops between places that are not the same, as look-alikes would give them.
+std::vector<mapping::PoseEdge> wrong_edges(const maps::Map& map, std::size_t count,
+                                           const geometry::Matrix6d& information) {
+  const std::vector<core::KeyframeId> ids = map.keyframe_ids();
+  std::mt19937 engine(7);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine()) / 4294967295.0);
+  };
+  std::vector<mapping::PoseEdge> edges;
+  for (int tried = 0; edges.size() < count && tried < 100000; ++tried) {
+    const core::KeyframeId a = ids[engine() % ids.size()];
+    const core::KeyframeId b = ids[engine() % ids.size()];
+    const Eigen::Vector3d apart =
+        map.camera_from_world(a).inverse().translation - map.camera_from_world(b).inverse().translation;
+    if (!(a < b) || apart.norm() < 2.0) continue;
+    const Eigen::Vector3d turn(uniform(-0.1, 0.1), uniform(-0.5, 0.5), uniform(-0.1, 0.1));
+    const Eigen::Vector3d shift(uniform(-0.6, 0.6), uniform(-0.1, 0.1), uniform(-0.6, 0.6));
+    edges.push_back({a, b, {geometry::exp_so3(turn), shift}, information, false});
+  }
+  return edges;
+}
+
+void force_wrong(const maps::StoredMap& stored, const geometry::Trajectory& truth, const std::string& name,
+                 const mapping::LoopOptions& options, std::vector<mapping::PoseEdge> right, double share) {
+  const auto count =
+      static_cast<std::size_t>(std::lround(share / (1.0 - share) * static_cast<double>(right.size())));
+  std::vector<mapping::PoseEdge> torn = right;
+  for (const auto& edge : wrong_edges(stored.map, count, right.front().information)) torn.push_back(edge);
+  for (const auto& [label, robust, edges] :
+       {std::tuple{"right edges at once", true, &right}, std::tuple{"with wrong ones, robust", true, &torn},
+        std::tuple{"with wrong ones, believing", false, &torn}}) {
+    maps::Map map = stored.map;
+    mapping::LoopOptions chosen = options;
+    chosen.robust = robust;
+    mapping::LoopCloser closer(chosen, stored.header.camera.color);
+    closer.close(map, *edges);
+    print_row(name, std::string(label) + " (" + std::to_string(edges->size()) + ")", 0.0,
+              maps::trajectory(stored.frames, map), truth, map, {}, closer.counts(), 0.0, false);
+  }
+}
+
+/// Closes the loops of a finished map, keyframe by keyframe.
+core::Result<void> replay(const std::string& file, const Settings& settings, const core::Executor& executor) {
+  const auto log = core::stderr_log(core::LogLevel::kWarning);
+  auto reader = maps::StoreReader::open(file);
+  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  const auto stored = reader->load();
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  const auto source = open(stored->header.input, settings.pipelines, executor, *log);
+  if (!source) return tl::unexpected<core::Error>(source.error());
+  const auto truth = (*source)->truth();
+  if (!truth) return core::input_error(stored->header.input + ": comes without truth");
+  const auto options = options_of(settings.overrides, true);
+  if (!options) return tl::unexpected<core::Error>(options.error());
+  maps::Map map = stored->map;
+  const std::string name = short_name(file);
+  print_row(name, "off", 100.0, maps::trajectory(stored->frames, map), *truth, map, {}, {}, 0.0, false);
+  mapping::LoopCloser closer(options->loops, stored->header.camera.color);
+  const double start = thread_ms();
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    std::vector<mapping::PoseEdge> edges;
+    for (const mapping::Loop& loop : closer.look(map, id))
+      edges.push_back(mapping::LoopCloser::to_edge(loop));
+    if (!edges.empty()) closer.close(map, edges);
+  }
+  const double ms =
+      (thread_ms() - start) / static_cast<double>(std::max<std::size_t>(1, map.keyframe_count()));
+  print_row(name, "replayed, ms a keyframe", 100.0, maps::trajectory(stored->frames, map), *truth, map,
+            closer.trials(), closer.counts(), ms, settings.tell);
+  if (settings.wrong > 0.0 && !closer.edges().empty()) {
+    force_wrong(*stored, *truth, name, options->loops, closer.edges(), settings.wrong);
+  }
   return {};
 }
 
@@ -187,6 +295,10 @@ int main(int argc, char** argv) {
   int threads = 1;
   app.add_option("INPUT", inputs, "Recordings with truth, or synth:SCENE?...")->required();
   app.add_flag("--tell", settings.tell, "Every verified place, on stderr");
+  app.add_option("--save", settings.save, "Write the map of the first run: loops off, unless --on-only");
+  app.add_flag("--replay", settings.replay, "INPUT is a map that --save wrote");
+  app.add_option("--wrong", settings.wrong, "With --replay: share of wrong loops")
+      ->check(CLI::Range(0.0, 0.9));
   app.add_flag("--on-only", settings.on_only, "Not the run without loops");
   app.add_option("--frames", settings.frames, "At most");
   app.add_option("--threads", threads, "Frames and runs side by side")->check(CLI::Range(1, 256));
@@ -201,7 +313,9 @@ int main(int argc, char** argv) {
       "| recording | loops | tracked %% | ATE m | worst m | keyframes | candidates | verified | closed | "
       "rejected | false | ms a frame |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const std::string& input : inputs) {
-    if (auto done = measure(input, settings, executor); !done) {
+    const auto done =
+        settings.replay ? replay(input, settings, executor) : measure(input, settings, executor);
+    if (!done) {
       std::fprintf(stderr, "bench_loops: %s\n", done.error().message.c_str());
       return static_cast<int>(done.error().kind);
     }

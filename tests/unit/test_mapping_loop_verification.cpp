@@ -3,47 +3,15 @@
 #include <gtest/gtest.h>
 
 #include "plumbline/mapping/loop_closer.hpp"
-#include "plumbline/tracking/surface_sampler.hpp"
-#include "tracking_world.hpp"
+#include "poster_view.hpp"
 
 namespace plumbline::mapping {
 namespace {
 
 using core::KeyframeId;
 using geometry::Rigid3;
+using tests::add_view;
 using tests::kTestCamera;
-
-/// A wall with a poster, seen straight from 2 m.
-KeyframeId add_view(maps::Map& map, const cv::Mat& poster, const Rigid3& pose, const Rigid3& believed,
-                    double stamp) {
-  sensor::RgbdFrame frame;
-  frame.gray = tests::render_wall(poster, 300.0, 2.0, pose);
-  frame.depth = tests::render_depth({{{0.0, 0.0, 2.0}, {0.0, 0.0, -1.0}, 0.0}}, pose);
-  auto features =
-      std::make_shared<features::FrameFeatures>(features::FeatureExtractor({}, kTestCamera).extract(frame));
-  auto keyframe = std::make_shared<maps::Keyframe>();
-  keyframe->id = map.next_keyframe_id(0);
-  keyframe->stamp = stamp;
-  keyframe->features = features;
-  keyframe->surface = tracking::sample_surface(frame.depth, kTestCamera, {});
-  const KeyframeId id = map.add_keyframe(keyframe, believed);
-  for (std::size_t i = 0; i < features->points.size(); ++i) {
-    const features::PointFeature& f = features->points[i];
-    if (!(f.depth > 0.0F)) continue;
-    const Eigen::Vector3d in_camera = kTestCamera.unproject(
-        static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), static_cast<double>(f.depth));
-    maps::MapPoint point;
-    point.position = believed.inverse() * in_camera;
-    point.descriptor = features->descriptors[i];
-    point.angle = f.angle;
-    point.angle_keyframe = id;
-    point.view_direction = (believed.rotation.transpose() * in_camera).normalized();
-    point.reference_distance = in_camera.norm();
-    point.reference_octave = f.octave;
-    map.observe(map.add_point(0, point), id, static_cast<int>(i));
-  }
-  return id;
-}
 
 const Rigid3 kLeft{geometry::exp_so3({0.0, 0.05, 0.0}), {0.15, 0.0, 0.0}};
 const Rigid3 kRight{geometry::exp_so3({0.02, -0.05, 0.1}), {-0.1, 0.05, 0.1}};
@@ -93,9 +61,11 @@ struct Ring {
   maps::Map map;
   std::vector<Rigid3> truth;
 
-  Ring() {
-    const Rigid3 step(geometry::exp_so3({0.0, 6.283185307 / (kCount - 1), 0.0}), {0.3, 0.0, 0.0});
-    const Rigid3 wrong_step(geometry::exp_so3({0.001, 0.166, 0.0005}), {0.303, 0.002, 0.001});
+  /// `turn`: rad that the estimate turns too far at each keyframe.
+  explicit Ring(double turn = 0.005, int features = 0) {
+    constexpr double kTurn = 6.283185307 / (kCount - 1);
+    const Rigid3 step(geometry::exp_so3({0.0, kTurn, 0.0}), {0.3, 0.0, 0.0});
+    const Rigid3 wrong_step(geometry::exp_so3({0.001, kTurn + turn, 0.0005}), {0.303, 0.002, 0.001});
     Rigid3 pose;
     Rigid3 believed;
     for (int i = 0; i < kCount; ++i) {
@@ -103,7 +73,10 @@ struct Ring {
       auto keyframe = std::make_shared<maps::Keyframe>();
       keyframe->id = {0, i};
       keyframe->stamp = i;
-      keyframe->features = std::make_shared<features::FrameFeatures>();
+      auto picture = std::make_shared<features::FrameFeatures>();
+      picture->points.resize(static_cast<std::size_t>(features));
+      picture->descriptors.resize(static_cast<std::size_t>(features));
+      keyframe->features = picture;
       map.add_keyframe(keyframe, believed);
       pose = step * pose;
       believed = wrong_step * believed;
@@ -165,6 +138,33 @@ TEST(LoopCloser, WrongLoopsAmongRightOnesDoNoHarm) {
   LoopCloser gullible(believing, kTestCamera);
   gullible.close(harmed.map, all);
   EXPECT_GT(harmed.worst(), 1.5 * forced.worst()) << "the test's wrong edges must be harmful";
+}
+
+/// Keyframes that share landmarks with the six before them, as the map of a real camera does.
+void tie_neighbours(maps::Map& map, int count) {
+  constexpr int kShared = 40;
+  for (int i = 0; i < count; ++i) {
+    for (int k = 0; k < kShared; ++k) {
+      const core::PointId point = map.add_point(0, {});
+      for (int j = i; j < std::min(count, i + 6); ++j) map.observe(point, {0, j}, kShared * (i % 6) + k);
+    }
+  }
+}
+
+TEST(LoopCloser, DriftThatGoesOneWayIsNoReasonToRefuseALoop) {
+  for (const double turn : {0.0, 0.004, 0.008}) {  // rad a keyframe, always the same way
+    Ring ring(turn, 240);
+    tie_neighbours(ring.map, Ring::kCount);
+    const double before = ring.worst();
+    LoopCloser closer(without_bundle(), kTestCamera);
+    EXPECT_TRUE(closer.close(ring.map, {ring.edge(0, 39), ring.edge(1, 38)})) << turn;
+    EXPECT_EQ(closer.counts().rejected, 0) << turn;
+    EXPECT_LT(ring.worst(), 0.5 * before) << turn;
+    // A wrong one is told from right ones all the same.
+    PoseEdge wrong = ring.edge(2, 37);
+    wrong.b_from_a = Rigid3(Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.3}) * wrong.b_from_a;
+    EXPECT_FALSE(closer.close(ring.map, {wrong})) << turn;
+  }
 }
 
 TEST(LoopCloser, OnlyWrongLoopsChangeNothing) {

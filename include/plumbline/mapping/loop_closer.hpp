@@ -11,6 +11,7 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/options.hpp"
+#include "plumbline/mapping/consistent_pairs.hpp"
 #include "plumbline/mapping/global_adjustment.hpp"
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/place_verification.hpp"
@@ -22,10 +23,10 @@ namespace plumbline::mapping {
 
 struct LoopOptions {
   bool enabled = false;
-  double min_gap_s = 3.0;     ///< keyframes made within this time are the present, not a loop
-  int agreeing = 2;           ///< verified keyframes, close to each other, that must say the same
-  double max_apart_m = 0.15;  ///< how far apart they may put the camera
-  double max_turned_rad = 0.06;
+  double min_gap_s = 3.0;  ///< keyframes made within this time are the present, not a loop
+  int agreeing = 2;        ///< verified keyframes, following one another, that must tell the same story
+  double max_rival = 0.5;  ///< another story may have this share of them at most
+  ConsistencyOptions consistency;
   double max_drift = 0.02;  ///< of the way since the match, that a loop may correct: what looks alike further
                             ///< off (doors of a corridor) is another place
   bool robust = true;       ///< the pose graph may take loops for wrong
@@ -78,6 +79,10 @@ class LoopCloser {
   /// to be closed; mostly none.
   std::vector<Loop> look(const maps::Map& map, core::KeyframeId keyframe);
 
+  /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are part of
+  /// the map by then.
+  void restore(const maps::Map& map, core::KeyframeId newest);
+
   /// Pose graph with these edges and those of earlier loops. When it believes one of the new edges: moves the
   /// map, merges doubles around these, adjusts all. Returns whether the map was moved. Edges may come from
   /// elsewhere too. Nothing must be under way that was taken from the map before.
@@ -103,7 +108,7 @@ class LoopCloser {
                                          const std::vector<places::Candidate>& candidates);
   void measure_correction(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
-  [[nodiscard]] bool agree(const maps::Map& map, const Loop& a, const Loop& b) const;
+  [[nodiscard]] std::vector<Loop> confirmed(const maps::Map& map, core::KeyframeId keyframe) const;
   void merge_doubles(maps::Map& map, const PoseEdge& edge) const;
 
   LoopOptions options_;
