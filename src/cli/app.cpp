@@ -89,6 +89,7 @@ int run(int argc, char** argv) {
   app.footer(kFooter);
   Session session;
   add_map(app, session);
+  add_fuse(app, session);
   add_info(app, session);
   add_render(app, session);
   add_export(app, session);

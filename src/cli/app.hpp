@@ -50,6 +50,7 @@ void add_plugin_option(CLI::App& command, Session& session);
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);
 
 void add_map(CLI::App& app, Session& session);
+void add_fuse(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);

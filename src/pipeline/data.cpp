@@ -3,6 +3,15 @@
 
 namespace plumbline::pipeline {
 
+geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot) {
+  if (map.robots.empty()) return map.trajectory;
+  std::vector<maps::FramePose> frames;
+  for (const maps::FramePose& frame : map.frame_poses) {
+    if (frame.reference.robot == robot) frames.push_back(frame);
+  }
+  return maps::trajectory(frames, *map.map);
+}
+
 void take_poses_from_map(MapResult& result) {
   const maps::Map& map = *result.map;
   result.trajectory = maps::trajectory(result.frame_poses, map);

@@ -19,6 +19,8 @@
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "robot_columns.hpp"
+#include "resumed_run.hpp"
 #include "stages.hpp"
 #include "up_frame.hpp"
 
@@ -59,14 +61,14 @@ class FuseStage : public Stage {
     auto spool = cloud::CloudSpool::create(context.output_folder);
     if (!spool) return tl::unexpected<core::Error>(spool.error());
     spool_.emplace(std::move(*spool));
-    return {};
+    return context.resumed != nullptr ? read_clouds(*context.resumed) : core::Result<void>();
   }
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("cloud");
     if (keyframe->id.valid()) {
       places_[keyframe->id] = spool_->size();
     } else {
-      between_.emplace_back(keyframe->stamp, spool_->size());
+      between_.push_back({keyframe->robot, keyframe->stamp, spool_->size()});
     }
     return spool_->append(*keyframe->compact);
   }
@@ -109,28 +111,71 @@ class FuseStage : public Stage {
   }
 
  private:
+  /// Those of the run that this one goes on from.
+  core::Result<void> read_clouds(const ResumedRun& run) {
+    const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+    const auto store = maps::StoreReader::open(run.store);
+    if (!store) return fail(store.error());
+    const auto keyframes = store->cloud_ids();
+    if (!keyframes) return fail(keyframes.error());
+    for (const core::KeyframeId id : *keyframes) {
+      const auto bytes = store->cloud_bytes(id);
+      if (!bytes) return fail(bytes.error());
+      places_[id] = spool_->size();
+      if (auto kept = spool_->append(*bytes); !kept) return kept;
+    }
+    const auto frames = store->frame_cloud_ids();
+    if (!frames) return fail(frames.error());
+    for (const std::size_t frame : *frames) {
+      const auto bytes = store->frame_cloud_bytes(frame);
+      if (!bytes) return fail(bytes.error());
+      if (frame >= run.map.frames.size()) continue;
+      const maps::FramePose& pose = run.map.frames[frame];
+      between_.push_back({pose.reference.robot, pose.stamp, spool_->size()});
+      if (auto kept = spool_->append(*bytes); !kept) return kept;
+    }
+    return {};
+  }
+
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
     std::vector<geometry::Rigid3> poses;
     std::vector<std::size_t> places;
+    std::vector<std::int32_t> robots;
     for (const KeyframePose& keyframe : map.keyframes) {
       const auto found = places_.find(keyframe.id);
       if (found == places_.end()) continue;
       poses.push_back(keyframe.world_from_camera);
       places.push_back(found->second);
+      robots.push_back(keyframe.id.robot);
     }
-    for (const auto& [stamp, place] : between_) {
-      const double at = stamp;
+    std::map<std::int32_t, geometry::Trajectory> ways;
+    for (const Between& between : between_) {
+      const auto way = ways.find(between.robot);
+      const geometry::Trajectory& poses_of_robot =
+          way != ways.end() ? way->second
+                            : ways.emplace(between.robot, trajectory_of(map, between.robot)).first->second;
       const auto found =
-          std::lower_bound(map.trajectory.begin(), map.trajectory.end(), at,
+          std::lower_bound(poses_of_robot.begin(), poses_of_robot.end(), between.stamp,
                            [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
-      if (found == map.trajectory.end() || found->stamp != at) continue;  // a frame that was lost
+      if (found == poses_of_robot.end() || found->stamp != between.stamp) continue;  // a frame that was lost
       poses.push_back(found->world_from_camera);
-      places.push_back(place);
+      places.push_back(between.place);
+      robots.push_back(between.robot);
+    }
+    std::vector<sensor::Pinhole> cameras(poses.size(), context_->source->camera().color);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      for (const RobotInfo& robot : map.robots) {
+        if (robot.number == robots[i]) cameras[i] = robot.camera.color;
+      }
     }
     cloud::FusionReport report;
-    auto fused = cloud::fuse_views(
-        poses, [&](std::size_t i) { return spool_->read(places[i]); }, context_->source->camera().color,
-        options_, *context_->executor, &report);
+    const cloud::ReadView read = [&](std::size_t i) { return spool_->read(places[i]); };
+    auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report);
+    if (fused && map.robots.size() > 1) {
+      auto seen_by = robots_of_points(*fused->cloud, poses, robots, read, options_.voxels.voxel_m);
+      if (!seen_by) return tl::unexpected<core::Error>(seen_by.error());
+      fused->columns.robot = std::move(*seen_by);
+    }
     context_->log->debug(
         fmt::format("{} clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
                     "dust; colour "
@@ -165,9 +210,15 @@ class FuseStage : public Stage {
   Up up_ = Up::kFloor;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<cloud::CloudSpool> spool_;               ///< the keyframes' clouds, camera frame
-  std::map<core::KeyframeId, std::size_t> places_;       ///< in the spool
-  std::vector<std::pair<double, std::size_t>> between_;  ///< stamp and place of clouds between keyframes
+  std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
+  std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
+  /// A cloud of a frame between keyframes.
+  struct Between {
+    std::int32_t robot = 0;
+    double stamp = 0.0;
+    std::size_t place = 0;  ///< in the spool
+  };
+  std::vector<Between> between_;
   UpFrame frame_;
   std::size_t points_ = 0;
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <system_error>
 #include <vector>
@@ -82,9 +83,8 @@ class OutputStage : public Stage {
         [&] { return pcd_ ? cloud::write_pcd(folder / "map.pcd", *dense->cloud, columns) : nothing; },
         [&] { return write_levels(folder / "levels", *dense); },
         [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
-        [&] { return dataset::write_trajectory(folder / "trajectory.txt", map.trajectory); },
-        [&] { return dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(map)); },
-        [&] { return write_frames(folder / "frames.csv", map, io.frame()); },
+        [&] { return write_trajectories(folder, map, dense->output_from_map); },
+        [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
         [&] { return write_snapshots(folder / "snapshots", map, *dense); },
     };
     for (const auto& step : steps) {
@@ -130,11 +130,35 @@ class OutputStage : public Stage {
     return {};
   }
 
-  static geometry::Trajectory keyframe_trajectory(const MapResult& map) {
+  static geometry::Trajectory keyframe_trajectory(const MapResult& map, std::optional<std::int32_t> robot) {
     geometry::Trajectory poses;
-    for (const KeyframePose& keyframe : map.keyframes)
-      poses.push_back({keyframe.stamp, keyframe.world_from_camera});
+    for (const KeyframePose& keyframe : map.keyframes) {
+      if (!robot || keyframe.id.robot == *robot)
+        poses.push_back({keyframe.stamp, keyframe.world_from_camera});
+    }
     return poses;
+  }
+
+  /// Several robots: each in its own folder.
+  static core::Result<void> write_trajectories(const std::filesystem::path& folder, const MapResult& map,
+                                               const geometry::Rigid3& output_from_map) {
+    if (map.robots.size() < 2) {
+      auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory);
+      return written ? dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(map, {}))
+                     : written;
+    }
+    for (const RobotInfo& robot : map.robots) {
+      const std::filesystem::path own = folder / "robots" / robot.name;
+      if (auto made = make_folder(own); !made) return made;
+      geometry::Trajectory poses = trajectory_of(map, robot.number);
+      for (geometry::StampedPose& pose : poses)
+        pose.world_from_camera = output_from_map * pose.world_from_camera;
+      auto written = dataset::write_trajectory(own / "trajectory.txt", poses);
+      if (!written) return written;
+      written = dataset::write_trajectory(own / "keyframes.txt", keyframe_trajectory(map, robot.number));
+      if (!written) return written;
+    }
+    return {};
   }
 
   /// One line for every frame of the run, the unreadable ones too.
@@ -163,19 +187,54 @@ class OutputStage : public Stage {
     viz::Scene scene;
     scene.cloud = dense.cloud;
     scene.title = context_->source->name();
-    viz::CameraPath path;
-    path.trajectory = map.trajectory;
-    scene.paths.push_back(std::move(path));
+    if (map.robots.size() < 2) {
+      viz::CameraPath path;
+      path.trajectory = map.trajectory;
+      scene.paths.push_back(std::move(path));
+    }
+    add_robots(map, dense, scene);
     for (const viz::View view : chosen_) {
-      viz::SnapshotOptions options;
-      options.view = view;
-      if (dense.upright) options.up = Eigen::Vector3d::UnitZ();
-      options.width_px = width_px_;
-      options.height_px = height_px_;
-      auto drawn = viz::render_snapshot(scene, options, folder / (viz::view_name(view) + ".png"));
+      if (map.robots.size() > 1 && !dense.columns.robot.empty()) {
+        if (auto drawn = draw(folder / ("robots_" + viz::view_name(view) + ".png"), view,
+                              viz::ColorMode::kRobot, scene, dense);
+            !drawn) {
+          return drawn;
+        }
+      }
+      auto drawn = draw(folder / (viz::view_name(view) + ".png"), view, viz::ColorMode::kRgb, scene, dense);
       if (!drawn) return drawn;
     }
     return {};
+  }
+
+  /// Paths of several robots, and who saw which point.
+  static void add_robots(const MapResult& map, const DenseCloud& dense, viz::Scene& scene) {
+    if (map.robots.size() < 2) return;
+    for (const RobotInfo& robot : map.robots) {
+      const auto number = static_cast<std::size_t>(robot.number);
+      viz::CameraPath path;
+      path.name = robot.name;
+      path.color = viz::category_color(number);
+      path.trajectory = trajectory_of(map, robot.number);
+      for (geometry::StampedPose& pose : path.trajectory) {
+        pose.world_from_camera = dense.output_from_map * pose.world_from_camera;
+      }
+      scene.paths.push_back(std::move(path));
+      if (scene.robot_names.size() <= number) scene.robot_names.resize(number + 1);
+      scene.robot_names[number] = robot.name;
+    }
+    scene.scalars.assign(dense.columns.robot.begin(), dense.columns.robot.end());
+  }
+
+  core::Result<void> draw(const std::filesystem::path& file, viz::View view, viz::ColorMode color,
+                          const viz::Scene& scene, const DenseCloud& dense) const {
+    viz::SnapshotOptions options;
+    options.view = view;
+    options.color = color;
+    if (dense.upright) options.up = Eigen::Vector3d::UnitZ();
+    options.width_px = width_px_;
+    options.height_px = height_px_;
+    return viz::render_snapshot(scene, options, file);
   }
 
   bool ply_ = true;

@@ -5,10 +5,12 @@
 #include <map>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "resumed_run.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
@@ -28,7 +30,7 @@ class RefineStage : public Stage {
     executor_ = context.executor;
     log_ = context.log;
     camera_ = context.source->camera().color;
-    return {};
+    return context.resumed != nullptr ? read_surfaces(*context.resumed) : core::Result<void>();
   }
   /// Only a coarse surface of each keyframe stays.
   core::Result<void> process(StageIo& io) override {
@@ -44,7 +46,7 @@ class RefineStage : public Stage {
     auto result = std::make_shared<MapResult>(*before);
     if (adjust_ && before->map != nullptr && before->map->keyframe_count() > 1) {
       auto map = std::make_shared<maps::Map>(*before->map);
-      refine(*map);
+      refine(*map, before->robots);
       result->map = map;
       take_poses_from_map(*result);
     }
@@ -56,11 +58,26 @@ class RefineStage : public Stage {
   void summarise(RunSummary& summary) const override { summary.refine = counts_; }
 
  private:
-  void refine(maps::Map& map) {
+  /// Of the keyframes of the run that this one goes on from.
+  core::Result<void> read_surfaces(const ResumedRun& run) {
+    if (!icp_ || !adjust_) return {};
+    const auto store = maps::StoreReader::open(run.store);
+    if (!store) return tl::unexpected<core::Error>(store.error());
+    const auto ids = store->cloud_ids();
+    if (!ids) return tl::unexpected<core::Error>(ids.error());
+    for (const core::KeyframeId id : *ids) {
+      const auto cloud = store->cloud(id);
+      if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+      surfaces_[id] = mapping::coarse_surface(**cloud, local_maps_.voxel_m);
+    }
+    return {};
+  }
+  void refine(maps::Map& map, const std::vector<RobotInfo>& robots) {
     std::vector<mapping::PoseEdge> edges;
     if (icp_) edges = align(map);
     mapping::Cameras cameras;
     for (const core::KeyframeId id : map.keyframe_ids()) cameras[id.robot] = camera_;
+    for (const RobotInfo& robot : robots) cameras[robot.number] = robot.camera.color;
     const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras, edges, adjustment_);
     counts_.rejected = static_cast<std::size_t>(summary.rejected);
     counts_.mean_shift_m = summary.mean_shift_m;

@@ -20,6 +20,8 @@ StageType refine_stage();
 StageType fuse_stage();
 StageType filter_stage();
 StageType store_stage();
+StageType maps_stage();
+StageType keep_stage();
 StageType output_stage();
 
 /// Taps, one a port type: tap_<name>.cpp.

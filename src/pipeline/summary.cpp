@@ -35,6 +35,52 @@ nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
   return matrix;
 }
 
+nlohmann::ordered_json merges_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::Merge& merge : summary.merges) {
+    const mapping::MergeEvidence& e = merge.evidence;
+    nlohmann::ordered_json refused = nlohmann::ordered_json::object();
+    for (const auto& [why, count] : e.refused_pairs) refused[why] = count;
+    nlohmann::ordered_json sigma = nlohmann::ordered_json::array();
+    nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
+    for (int row = 0; row < 6; ++row) {
+      sigma.push_back(rounded(std::sqrt(e.covariance(row, row))));
+      nlohmann::ordered_json line = nlohmann::ordered_json::array();
+      for (int column = 0; column < 6; ++column) line.push_back(e.covariance(row, column));
+      covariance.push_back(line);
+    }
+    nlohmann::ordered_json entry = {{"a", merge.a},
+                                    {"b", merge.b},
+                                    {"accepted", e.accepted},
+                                    {"reason", e.refused},
+                                    {"candidates", e.candidates},
+                                    {"tried", e.tried},
+                                    {"verified", e.verified},
+                                    {"refused", refused},
+                                    {"agreeing", e.agreeing},
+                                    {"rival", e.rival},
+                                    {"expected", e.expected},
+                                    {"confirmed", e.confirmed},
+                                    {"pairs", e.pairs.size()},
+                                    {"rejected", e.rejected},
+                                    {"matches", e.matches},
+                                    {"inliers", e.inliers},
+                                    {"rms", rounded(e.rms_px)},
+                                    {"overlap", rounded(e.overlap)},
+                                    {"span_m", rounded(e.span_m)},
+                                    {"span_rad", rounded(e.span_rad)},
+                                    {"spread_m", rounded(e.spread_m)}};
+    if (e.accepted) {
+      entry["sigma"] = sigma;
+      entry["covariance"] = covariance;
+      entry["a_from_b"] = rows(e.a_from_b);
+    }
+    if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
+    list.push_back(entry);
+  }
+  return list;
+}
+
 }  // namespace
 
 double RunSummary::Frames::tracked_percent() const {
@@ -42,7 +88,9 @@ double RunSummary::Frames::tracked_percent() const {
   return all == 0 ? 0.0 : 100.0 * static_cast<double>(tracked) / static_cast<double>(all);
 }
 
-double RunSummary::fps() const { return map_s > 0.0 ? static_cast<double>(frames.read) / map_s : 0.0; }
+double RunSummary::fps() const {
+  return map_s > 0.0 ? static_cast<double>(frames.read - frames.resumed) / map_s : 0.0;
+}
 
 void add_report(const RunReport& report, RunSummary& summary) {
   summary.stopped = report.stopped;
@@ -69,6 +117,8 @@ void judge(RunSummary& summary) {
         frames.longest_loss);
   } else if (all > 0 && summary.cloud_points == 0) {
     summary.reason = "the cloud is empty: no keyframe had usable depth";
+  } else {
+    summary.reason = summary.unconnected;
   }
 }
 
@@ -96,6 +146,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"frames",
        {{"available", s.frames.available},
         {"read", s.frames.read},
+        {"resumed", s.frames.resumed},
         {"unreadable", s.frames.unreadable},
         {"tracked", s.frames.tracked},
         {"lost", s.frames.lost},
@@ -113,7 +164,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"mean_rms", rounded(s.refine.mean_rms)},
         {"mean_shift_m", rounded(s.refine.mean_shift_m)},
         {"max_shift_m", rounded(s.refine.max_shift_m)}}},
-      {"merges", nlohmann::ordered_json::array()},
+      {"merges", merges_of(s)},
       {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},
       {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
       {"timing",

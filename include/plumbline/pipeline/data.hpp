@@ -47,6 +47,13 @@ struct KeyframePose {
   geometry::Rigid3 world_from_camera;
 };
 
+/// A robot of a map of several.
+struct RobotInfo {
+  std::int32_t number = 0;  ///< in the map's ids
+  std::string name;
+  sensor::Camera camera;
+};
+
 /// The finished map but for its dense cloud; poses after all optimisation.
 struct MapResult {
   std::shared_ptr<const maps::Map> map;      ///< null when the poses come from a file
@@ -54,8 +61,9 @@ struct MapResult {
   geometry::Trajectory trajectory;           ///< tracked frames only
   std::vector<KeyframePose> keyframes;       ///< by id
   std::vector<maps::LineSegment3> lines;
-  std::string frame_columns;                             ///< header of FrameRow::columns
-  std::vector<FrameRow> frames;                          ///< by frame
+  std::vector<RobotInfo> robots;  ///< by number; empty: one robot with the recording's camera
+  std::string frame_columns;      ///< header of FrameRow::columns
+  std::vector<FrameRow> frames;   ///< by frame
   std::shared_ptr<const places::Vocabulary> vocabulary;  ///< of the places; null: none was needed
 };
 
@@ -63,6 +71,7 @@ struct MapResult {
 struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes
   double stamp = 0.0;   ///< seconds
+  std::int32_t robot = 0;
   cloud::CloudPtr cloud;
   std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it
 };
@@ -75,6 +84,9 @@ struct DenseCloud {
   geometry::Rigid3 output_from_map;
   bool upright = false;  ///< z is up in the output's frame
 };
+
+/// Tracked frames of one robot.
+geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot);
 
 /// Trajectory, keyframe poses and lines of `result` as its map says now.
 void take_poses_from_map(MapResult& result);

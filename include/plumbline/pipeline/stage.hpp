@@ -33,7 +33,9 @@ class FrameSource;
 
 namespace plumbline::pipeline {
 
+struct ResumedRun;
 struct RunSummary;
+class StoredMaps;
 
 /// How often a port carries a value.
 enum class Rate {
@@ -106,6 +108,8 @@ class StageIo {
 /// What a run lends to its stages; outlives them.
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
+  const StoredMaps* stored_maps = nullptr;  ///< what a maps stage reads; null: there is none
+  std::string anchor;                             ///< robot whose frame finished maps are laid into; empty: any
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;
   core::StopToken stop;
@@ -114,6 +118,7 @@ struct RunContext {
   std::string configuration;            ///< the effective one, YAML; the same for any number of threads
   std::string input;                    ///< what is mapped, as text that another recording does not give
   bool keep_changes = false;            ///< some stage wants_map_changes
+  const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
 };
 
 /// What a stage may look at while the graph is checked.

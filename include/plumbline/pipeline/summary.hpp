@@ -10,6 +10,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/mapping/map_fusion.hpp"
 #include "plumbline/pipeline/run.hpp"
 
 namespace plumbline::pipeline {
@@ -22,6 +23,7 @@ struct RunSummary {
   struct Frames {
     std::size_t available = 0;   ///< in the recording, after --from --to --every
     std::size_t read = 0;        ///< decoded
+    std::size_t resumed = 0;     ///< of these, by the run that this one went on from
     std::size_t unreadable = 0;  ///< skipped
     std::size_t tracked = 0;
     std::size_t lost = 0;  ///< read but not tracked
@@ -45,6 +47,15 @@ struct RunSummary {
     double mean_shift_m = 0.0;  ///< how far keyframes moved
     double max_shift_m = 0.0;
   } refine;
+  /// Two maps that were held against each other.
+  struct Merge {
+    std::string a;
+    std::string b;
+    double time_s = -1.0;  ///< of the recordings, when it happened while mapping; negative: afterwards
+    mapping::MergeEvidence evidence;
+  };
+  std::vector<Merge> merges;
+  std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;
   std::string up = "none";           ///< what the output's frame stands on: floor, camera or none

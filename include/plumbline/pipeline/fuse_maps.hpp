@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// `plumbline fuse` as a call: finished maps in, one result folder out.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/filter.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/core/stop.hpp"
+#include "plumbline/pipeline/run.hpp"
+#include "plumbline/pipeline/summary.hpp"
+
+namespace plumbline::pipeline {
+
+struct FuseRequest {
+  std::vector<std::filesystem::path> maps;  ///< result folders, or files map.db
+  std::filesystem::path output;             ///< the result folder
+  std::string pipeline = "fuse";            ///< shipped name or file
+  std::string anchor;                       ///< robot or map whose frame all are laid into; empty: by content
+  std::vector<std::string> overrides;       ///< stage.key=value
+  std::filesystem::path pipelines_folder;
+  cloud::FilterRegistry filters = cloud::builtin_filters();
+  bool replace = false;  ///< replace an earlier result
+};
+
+/// The order of `maps` changes nothing. Errors as map_recording; when maps do not connect, those that do are
+/// in the result, and the summary's `reason` names the others.
+core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
+                                          core::Log& log, const core::StopToken& stop,
+                                          const Progress& progress);
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Finished maps as the source of a run: their clouds come one after another, as frames of a recording would.
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/pipeline/data.hpp"
+
+namespace plumbline::pipeline {
+
+/// Name of the attachment of a store in which the robots of a map of several stand.
+inline const char* const kRobotsAttachment = "robots";
+std::vector<std::uint8_t> robots_to_bytes(const std::vector<RobotInfo>& robots);
+/// Errors (kInput): not such bytes.
+core::Result<std::vector<RobotInfo>> robots_from_bytes(const std::vector<std::uint8_t>& bytes);
+
+/// One store. Its robots have been given numbers that no other one's have.
+struct StoredPart {
+  std::string name;  ///< of its folder
+  std::filesystem::path file;
+  std::unique_ptr<maps::StoreReader> reader;
+  maps::Map map;
+  std::vector<maps::FramePose> frames;
+  std::vector<RobotInfo> robots;
+  std::map<std::int32_t, std::int32_t> numbers;  ///< of robots: from the store's to this run's
+  mapping::Cameras cameras;
+};
+
+/// A cloud that waits in a store.
+struct StoredCloud {
+  std::size_t part = 0;
+  core::KeyframeId stored_id;  ///< as its store names it; invalid: of a frame between keyframes
+  std::size_t frame = 0;       ///< its place among the part's frames, for these
+  core::KeyframeId id;         ///< as this run names it
+  std::int32_t robot = 0;
+  double stamp = 0.0;
+};
+
+/// Parts stand in an order that their contents decide: the one with most keyframes first. Robots are numbered
+/// in this order; of several with one name, later ones get a number behind it.
+class StoredMaps : public dataset::FrameSource {
+ public:
+  /// `maps`: result folders, or files map.db. Errors (kInput): not there, no map.db, damaged, not finished,
+  /// without keyframes; (kUsage) the same map twice.
+  static core::Result<std::unique_ptr<StoredMaps>> open(const std::vector<std::filesystem::path>& maps);
+
+  [[nodiscard]] const std::vector<StoredPart>& parts() const { return parts_; }
+  [[nodiscard]] std::vector<mapping::MapPart> map_parts() const;
+  [[nodiscard]] const std::vector<StoredCloud>& clouds() const { return clouds_; }
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(std::size_t index) const;
+  /// The part of that name, or that has a robot of that name. Errors (kUsage): none has.
+  [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;
+
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] const std::string& format() const override { return format_; }
+  [[nodiscard]] const sensor::Camera& camera() const override { return parts_.front().robots.front().camera; }
+  [[nodiscard]] std::size_t size() const override { return clouds_.size(); }
+  [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
+  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
+
+ private:
+  StoredMaps() = default;
+  core::Result<void> add(const std::filesystem::path& map);
+  core::Result<void> arrange();
+  core::Result<void> list_clouds(std::size_t part);
+
+  std::string name_ = "fused maps";
+  std::string format_ = "map";
+  std::vector<StoredPart> parts_;
+  std::vector<StoredCloud> clouds_;
+};
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline fuse MAP MAP... -o OUT
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app.hpp"
+#include "plumbline/pipeline/fuse_maps.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+int fuse(Session& session, pipeline::FuseRequest request) {
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return session.fail(pipelines.error());
+  request.pipelines_folder = *pipelines;
+  const auto filters = session.filters();
+  if (!filters) return session.fail(filters.error());
+  request.filters = *filters;
+  const core::StopToken stop;
+  stop_on_signals(stop);
+  Console& console = session.console();
+  const auto summary = pipeline::fuse_stored_maps(
+      request, session.executor(), console, stop,
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
+  console.end_progress();
+  if (!summary) return session.fail(summary.error());
+  if (!session.quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), request.output.string());
+  if (summary->reason.empty()) return 0;
+  console.warning("the result is not trustworthy: " + summary->reason);
+  return static_cast<int>(core::ErrorKind::kUntrustworthy);
+}
+
+}  // namespace
+
+void add_fuse(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<pipeline::FuseRequest>();
+  CLI::App* command =
+      add_command(app, session, "fuse", "Merge finished maps of several robots into one frame",
+                  [&session, request] { return fuse(session, *request); });
+  command
+      ->add_option("MAP", request->maps,
+                   "Result folders of plumbline map or fuse; their order does not matter")
+      ->required()
+      ->expected(2, 255);
+  command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
+  command->add_option("-p,--pipeline", request->pipeline, "Shipped pipeline or file (default: fuse)")
+      ->type_name("PIPELINE");
+  command
+      ->add_option("--anchor", request->anchor,
+                   "Robot whose frame the maps are laid into (default: that of the largest map)")
+      ->type_name("NAME");
+  command->add_option("--set", request->overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+  add_plugin_option(*command, session);
+  command->add_flag("--force", request->replace, "Replace an earlier result in OUT");
+}
+
+}  // namespace plumbline::cli

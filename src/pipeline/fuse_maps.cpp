@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/fuse_maps.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/core/version.hpp"
+#include "plumbline/pipeline/graph.hpp"
+#include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/pipeline/stored_maps.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+/// The same whatever the order in which the maps were named.
+std::string config_text(const FuseRequest& request, const StoredMaps& maps, const Graph& graph) {
+  std::string text =
+      fmt::format("# What plumbline {} fused with: plumbline fuse MAP... -p config.yaml\n", core::version());
+  text += "run:\n  maps: [";
+  for (std::size_t p = 0; p < maps.parts().size(); ++p) {
+    text += fmt::format("{}\"{}\"", p == 0 ? "" : ", ", maps.parts()[p].name);
+  }
+  text += fmt::format("]\n  anchor: \"{}\"\n", request.anchor);
+  return text + to_yaml(graph);
+}
+
+core::Result<void> write_text(const std::filesystem::path& file, const std::string& text) {
+  core::OutputFile out(file);
+  out.write(text);
+  return out.commit();
+}
+
+std::string names_of(const StoredMaps& maps) {
+  std::string names;
+  for (const StoredPart& part : maps.parts()) names += (names.empty() ? "" : " ") + part.name;
+  return names;
+}
+
+}  // namespace
+
+core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
+                                          core::Log& log, const core::StopToken& stop,
+                                          const Progress& progress) {
+  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+  const auto start = std::chrono::steady_clock::now();
+  const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
+  if (!pipeline_file) return fail(pipeline_file.error());
+  StageRegistry registry;
+  register_stages(registry);
+  registry.filters() = request.filters;
+  auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
+  if (!graph) return fail(graph.error());
+  if (graph->source().type->name != "maps") {
+    return core::usage_error(
+        fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "
+                    "begins with a maps stage",
+                    pipeline_file->string(), graph->source().type->name));
+  }
+  if (request.maps.size() < 2) return core::usage_error("name two maps at least");
+  const auto maps = StoredMaps::open(request.maps);
+  if (!maps) return fail(maps.error());
+  if (!request.anchor.empty()) {
+    if (const auto part = (*maps)->find_part(request.anchor); !part) return fail(part.error());
+  }
+  auto output = OutputFolder::prepare(request.output, request.replace);
+  if (!output) return fail(output.error());
+
+  RunContext context;
+  context.source = maps->get();
+  context.stored_maps = maps->get();
+  context.anchor = request.anchor;
+  context.executor = &executor;
+  context.log = &log;
+  context.stop = stop;
+  context.output_folder = output->path();
+  context.configuration = config_text(request, **maps, *graph);
+  context.input = names_of(**maps);
+  if (auto written = write_text(output->path() / "config.yaml", context.configuration); !written) {
+    return fail(written.error());
+  }
+  const auto report = run_graph(*graph, context, progress);
+  if (!report) return fail(report.error());
+
+  RunSummary summary;
+  summary.input = context.input;
+  summary.pipeline = request.pipeline;
+  summary.threads = executor.threads();
+  add_report(*report, summary);
+  for (const Node& node : graph->nodes) node.stage->summarise(summary);
+  judge(summary);
+  summary.peak_rss_mb = peak_rss_mb();
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (auto written = write_summary(output->path() / "summary.json", summary); !written)
+    return fail(written.error());
+  if (auto committed = output->commit(); !committed) return fail(committed.error());
+  return summary;
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// maps: finished maps of several robots, laid into one frame; their clouds come one after another.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/pipeline/stored_maps.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "robot_merge.hpp"
+#include "stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class MapsStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override { options_.declare(table); }
+  core::Result<void> start(const RunContext& context) override {
+    context_ = &context;
+    maps_ = context.stored_maps;
+    if (maps_ != nullptr) return {};
+    return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
+  }
+  [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
+
+  core::Result<void> process(StageIo& io) override {
+    const StoredCloud& stored = maps_->clouds()[io.frame()];
+    auto bytes = maps_->cloud_bytes(io.frame());
+    if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+    auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
+    if (!cloud) {
+      const std::string file = maps_->parts()[stored.part].file.string();
+      return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, cloud.error().message));
+    }
+    auto result = std::make_shared<KeyframeCloud>();
+    result->id = stored.id;
+    result->stamp = stored.stamp;
+    result->robot = stored.robot;
+    result->cloud = std::move(*cloud);
+    result->compact = std::make_shared<std::vector<std::uint8_t>>(std::move(*bytes));
+    io.output<KeyframeCloud>("cloud", result);
+    return {};
+  }
+
+  core::Result<void> finish(StageIo& io) override {
+    std::vector<RobotPart> parts;
+    for (const StoredPart& part : maps_->parts()) {
+      parts.push_back({part.name, {&part.map, part.cameras}, part.robots, &part.frames});
+    }
+    std::size_t anchor = parts.size();
+    if (!context_->anchor.empty()) {
+      const auto found = maps_->find_part(context_->anchor);
+      if (!found) return tl::unexpected<core::Error>(found.error());
+      anchor = *found;
+    }
+    merged_ = merge_robots(parts, anchor, options_, *context_->executor, *context_->log);
+    io.output<MapResult>("map", merged_.map);
+    return {};
+  }
+
+  void summarise(RunSummary& summary) const override {
+    const maps::Map& map = *merged_.map->map;
+    summary.keyframes = map.keyframe_count();
+    summary.points = map.point_count();
+    summary.lines = merged_.map->lines.size();
+    summary.merges = merged_.merges;
+    summary.unconnected = merged_.unconnected;
+    for (const maps::FramePose& frame : merged_.map->frame_poses) {
+      ++summary.frames.read;
+      ++(frame.tracked ? summary.frames.tracked : summary.frames.lost);
+    }
+    summary.frames.available = summary.frames.read;
+  }
+
+ private:
+  const RunContext* context_ = nullptr;
+  const StoredMaps* maps_ = nullptr;
+  mapping::MapFusionOptions options_;
+  MergedRobots merged_;
+};
+
+}  // namespace
+
+StageType maps_stage() {
+  return {"maps",
+          "Finds where finished maps of several robots overlap, lays them into one frame and adjusts them "
+          "together",
+          Mode::kSerial,
+          {},
+          {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
+          [] { return std::make_unique<MapsStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/stored_maps.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <set>
+#include <system_error>
+#include <utility>
+
+namespace plumbline::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using core::KeyframeId;
+
+std::string name_of(const fs::path& file) {
+  std::error_code ec;
+  const fs::path whole = fs::weakly_canonical(file, ec);
+  const std::string name = (ec ? file : whole).parent_path().filename().string();
+  return name.empty() ? "robot" : name;
+}
+
+/// `name`, or `name-2`, `name-3` ... when it is taken.
+std::string free_name(const std::string& name, std::set<std::string>& taken) {
+  std::string result = name;
+  for (int i = 2; !taken.insert(result).second; ++i) result = fmt::format("{}-{}", name, i);
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> robots_to_bytes(const std::vector<RobotInfo>& robots) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const RobotInfo& robot : robots) {
+    const sensor::Pinhole& c = robot.camera.color;
+    list.push_back({{"number", robot.number},
+                    {"name", robot.name},
+                    {"camera", robot.camera.name},
+                    {"size", {c.width, c.height}},
+                    {"focal", {c.fx, c.fy}},
+                    {"centre", {c.cx, c.cy}},
+                    {"fps", robot.camera.fps}});
+  }
+  const std::string text = list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return {text.begin(), text.end()};
+}
+
+core::Result<std::vector<RobotInfo>> robots_from_bytes(const std::vector<std::uint8_t>& bytes) {
+  std::vector<RobotInfo> robots;
+  try {
+    for (const nlohmann::json& entry : nlohmann::json::parse(bytes.begin(), bytes.end())) {
+      RobotInfo robot;
+      robot.number = entry.at("number");
+      robot.name = entry.at("name");
+      robot.camera.name = entry.at("camera");
+      sensor::Pinhole& c = robot.camera.color;
+      c = {entry.at("size").at(0),  entry.at("size").at(1),   entry.at("focal").at(0),
+           entry.at("focal").at(1), entry.at("centre").at(0), entry.at("centre").at(1)};
+      robot.camera.fps = entry.at("fps");
+      robots.push_back(robot);
+    }
+  } catch (const nlohmann::json::exception&) {
+    return core::input_error("the list of its robots is damaged; map or fuse it again");
+  }
+  if (robots.empty()) return core::input_error("the list of its robots is empty; map or fuse it again");
+  return robots;
+}
+
+core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs::path>& maps) {
+  std::unique_ptr<StoredMaps> result(new StoredMaps);
+  for (const fs::path& map : maps) {
+    if (auto added = result->add(map); !added) return tl::unexpected<core::Error>(added.error());
+  }
+  if (auto arranged = result->arrange(); !arranged) return tl::unexpected<core::Error>(arranged.error());
+  for (std::size_t p = 0; p < result->parts_.size(); ++p) {
+    if (auto listed = result->list_clouds(p); !listed) return tl::unexpected<core::Error>(listed.error());
+  }
+  return result;
+}
+
+core::Result<void> StoredMaps::add(const fs::path& map) {
+  std::error_code ec;
+  const fs::path file = fs::is_directory(map, ec) ? map / "map.db" : map;
+  if (!fs::exists(file, ec)) {
+    return core::input_error(
+        fmt::format("{}: no such map; give result folders of plumbline map", file.string()));
+  }
+  auto reader = maps::StoreReader::open(file);
+  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  auto stored = reader->load();
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (stored->map.keyframe_count() == 0) {
+    return core::input_error(fmt::format("{}: the map has no keyframes; leave it out", file.string()));
+  }
+  StoredPart part;
+  part.name = name_of(file);
+  part.file = file;
+  const auto list = reader->attachment(kRobotsAttachment);
+  if (!list) return tl::unexpected<core::Error>(list.error());
+  if (*list) {
+    auto robots = robots_from_bytes(**list);
+    if (!robots) return core::input_error(fmt::format("{}: {}", file.string(), robots.error().message));
+    part.robots = std::move(*robots);
+  } else {
+    part.robots.push_back({stored->map.keyframe_ids().front().robot, part.name, stored->header.camera});
+  }
+  part.reader = std::make_unique<maps::StoreReader>(std::move(*reader));
+  part.map = std::move(stored->map);
+  part.frames = std::move(stored->frames);
+  parts_.push_back(std::move(part));
+  return {};
+}
+
+/// The order of parts, the numbers and names of robots: by content.
+core::Result<void> StoredMaps::arrange() {
+  std::vector<std::uint64_t> hashes;
+  std::set<std::string> files;
+  for (const StoredPart& part : parts_) {
+    hashes.push_back(mapping::content_hash(part.map));
+    std::error_code ec;
+    if (!files.insert(fs::weakly_canonical(part.file, ec).string()).second) {
+      return core::usage_error(fmt::format("{}: is given twice", part.file.string()));
+    }
+  }
+  std::vector<std::size_t> order(parts_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) {
+    return std::make_tuple(parts_[y].map.keyframe_count(), hashes[x], parts_[x].name) <
+           std::make_tuple(parts_[x].map.keyframe_count(), hashes[y], parts_[y].name);
+  });
+  std::vector<StoredPart> sorted;
+  for (const std::size_t i : order) sorted.push_back(std::move(parts_[i]));
+  parts_ = std::move(sorted);
+  std::set<std::string> part_names;
+  std::set<std::string> robot_names;
+  std::int32_t number = 0;
+  for (StoredPart& part : parts_) {
+    std::map<std::int32_t, std::int32_t>& to = part.numbers;
+    part.name = free_name(part.name, part_names);
+    for (RobotInfo& robot : part.robots) {
+      to[robot.number] = number;
+      robot.number = number++;
+      robot.name = free_name(robot.name, robot_names);
+      part.cameras[robot.number] = robot.camera.color;
+    }
+    for (const KeyframeId id : part.map.keyframe_ids()) {
+      if (to.count(id.robot) == 0) {
+        return core::input_error(fmt::format("{}: robot {} is not in its list of robots; map it again",
+                                             part.file.string(), id.robot));
+      }
+    }
+    part.map = mapping::renumbered(part.map, to);
+    for (maps::FramePose& frame : part.frames) {
+      const auto found = to.find(frame.reference.robot);
+      if (frame.reference.valid() && found != to.end()) frame.reference.robot = found->second;
+    }
+  }
+  constexpr std::int32_t kMostRobots = 255;  // a cloud file has a byte for it
+  if (number > kMostRobots) {
+    return core::usage_error(fmt::format("{} robots are too many; {} can be fused", number, kMostRobots));
+  }
+  return {};
+}
+
+core::Result<void> StoredMaps::list_clouds(std::size_t p) {
+  const StoredPart& part = parts_[p];
+  const auto ids = part.reader->cloud_ids();
+  if (!ids) return tl::unexpected<core::Error>(ids.error());
+  const std::vector<KeyframeId> retired = part.map.retired_ids();
+  for (const KeyframeId stored : *ids) {
+    StoredCloud cloud;
+    cloud.part = p;
+    cloud.stored_id = stored;
+    const auto found = part.numbers.find(stored.robot);
+    if (found == part.numbers.end()) continue;
+    cloud.robot = found->second;
+    cloud.id = {cloud.robot, stored.index};
+    if (!part.map.has_keyframe(cloud.id) && !std::binary_search(retired.begin(), retired.end(), cloud.id))
+      continue;
+    cloud.stamp = part.map.stamp_of(cloud.id);
+    clouds_.push_back(cloud);
+  }
+  const auto frames = part.reader->frame_cloud_ids();
+  if (!frames) return tl::unexpected<core::Error>(frames.error());
+  for (const std::size_t frame : *frames) {
+    if (frame >= part.frames.size()) continue;
+    const maps::FramePose& pose = part.frames[frame];
+    clouds_.push_back({p, {}, frame, {}, pose.reference.robot, pose.stamp});
+  }
+  return {};
+}
+
+std::vector<mapping::MapPart> StoredMaps::map_parts() const {
+  std::vector<mapping::MapPart> result;
+  for (const StoredPart& part : parts_) result.push_back({&part.map, part.cameras});
+  return result;
+}
+
+core::Result<std::vector<std::uint8_t>> StoredMaps::cloud_bytes(std::size_t index) const {
+  const StoredCloud& cloud = clouds_.at(index);
+  const maps::StoreReader& reader = *parts_[cloud.part].reader;
+  return cloud.stored_id.valid() ? reader.cloud_bytes(cloud.stored_id)
+                                 : reader.frame_cloud_bytes(cloud.frame);
+}
+
+core::Result<std::size_t> StoredMaps::find_part(const std::string& name) const {
+  std::string names;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    if (parts_[p].name == name) return p;
+    for (const RobotInfo& robot : parts_[p].robots) {
+      if (robot.name == name) return p;
+      names += (names.empty() ? "" : ", ") + robot.name;
+    }
+  }
+  return core::usage_error(fmt::format("--anchor: there is no robot '{}'; there are {}", name, names));
+}
+
+dataset::PairInfo StoredMaps::info(std::size_t index) const {
+  dataset::PairInfo info;
+  info.stamp = info.depth_stamp = clouds_.at(index).stamp;
+  return info;
+}
+
+core::Result<sensor::RgbdFrame> StoredMaps::read(std::size_t /*index*/) const {
+  return core::usage_error("finished maps have no frames; use a pipeline that begins with a maps stage");
+}
+
+}  // namespace plumbline::pipeline
