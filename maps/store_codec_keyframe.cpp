@@ -34,14 +34,15 @@ void line3_columns(const Visitor& column) {
     column([i](auto& l) -> auto& { return l.start(i); });
     column([i](auto& l) -> auto& { return l.end(i); });
   }
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      column([ r, c ](auto& l) -> auto& { return l.start_covariance(r, c); });
-      column([ r, c ](auto& l) -> auto& { return l.end_covariance(r, c); });
-    }
-  }
+}
+template <typename Visitor>
+void line3_quality_columns(const Visitor& column) {
   column([](auto& l) -> auto& { return l.inlier_share; });
   column([](auto& l) -> auto& { return l.coverage; });
+  column([](auto& l) -> auto& { return l.start_noise.depth; });
+  column([](auto& l) -> auto& { return l.start_noise.across; });
+  column([](auto& l) -> auto& { return l.end_noise.depth; });
+  column([](auto& l) -> auto& { return l.end_noise.across; });
 }
 template <typename Visitor>
 void surface_columns(const Visitor& column) {
@@ -105,6 +106,7 @@ void write_lines(const std::vector<LineFeature>& lines, ByteWriter& to) {
     if (l.line3.has_value()) in_space.push_back(*l.line3);
   }
   line3_columns(column_writer<double>(in_space, to));
+  line3_quality_columns(column_writer<float>(in_space, to));
 }
 
 std::vector<LineFeature> read_lines(ByteReader& from) {
@@ -119,6 +121,7 @@ std::vector<LineFeature> read_lines(ByteReader& from) {
   }
   std::vector<features::Line3> values(in_space);
   line3_columns(column_reader<double>(values, from));
+  line3_quality_columns(column_reader<float>(values, from));
   auto next = values.begin();
   for (LineFeature& l : lines) {
     if (l.line3.has_value()) *l.line3 = *next++;

@@ -172,18 +172,24 @@ Eigen::Vector3d ray_of(const Eigen::Vector2f& pixel, const sensor::Pinhole& came
   return camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), 1.0);
 }
 
-// Depth noise along the ray, pixel noise in both directions across it.
-Eigen::Matrix3d point_covariance(const Eigen::Vector3d& ray, double inverse, double variance,
-                                 const sensor::Pinhole& camera, double pixel_sigma) {
+EndpointNoise endpoint_noise(double inverse, double variance, const sensor::Pinhole& camera,
+                             double pixel_sigma) {
   const double z = 1.0 / inverse;
-  const double depth_variance = variance * z * z * z * z;
-  Eigen::Matrix3d covariance = depth_variance * ray * ray.transpose();
-  covariance(0, 0) += std::pow(z * pixel_sigma / camera.fx, 2);
-  covariance(1, 1) += std::pow(z * pixel_sigma / camera.fy, 2);
-  return covariance;
+  return {static_cast<float>(std::sqrt(variance) * z * z),
+          static_cast<float>(z * pixel_sigma / std::sqrt(camera.fx * camera.fy))};
 }
 
 }  // namespace
+
+Eigen::Matrix3d endpoint_covariance(const Eigen::Vector3d& end, const EndpointNoise& noise) {
+  const Eigen::Vector3d along = static_cast<double>(noise.depth) * end / end.z();
+  const double across = static_cast<double>(noise.across) * static_cast<double>(noise.across);
+  return along * along.transpose() + Eigen::Vector3d(across, across, 0.0).asDiagonal().toDenseMatrix();
+}
+
+double endpoint_sigma(const Eigen::Vector3d& end, const EndpointNoise& noise) {
+  return std::sqrt(endpoint_covariance(end, noise).trace());
+}
 
 void LineDepthOptions::declare(core::OptionTable& table) {
   table.integer("depth_samples", samples, {8, 400}, "", "Depth samples along a line, at most");
@@ -216,20 +222,20 @@ std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& d
   if (!fit || !plausible(fit->line, options)) return std::nullopt;
 
   Line3 line;
-  line.inlier_share = static_cast<double>(fit->inliers) / static_cast<double>(samples.size());
-  line.coverage = static_cast<double>(fit->bins) / std::min(kCoverageBins, places);
-  if (fit->inliers < options.min_inliers || line.inlier_share < options.min_inlier_share ||
-      line.coverage < options.min_coverage) {
+  const double inlier_share = static_cast<double>(fit->inliers) / static_cast<double>(samples.size());
+  const double coverage = static_cast<double>(fit->bins) / std::min(kCoverageBins, places);
+  if (fit->inliers < options.min_inliers || inlier_share < options.min_inlier_share ||
+      coverage < options.min_coverage) {
     return std::nullopt;
   }
+  line.inlier_share = static_cast<float>(inlier_share);
+  line.coverage = static_cast<float>(coverage);
   const Eigen::Vector3d start_ray = ray_of(segment.start, camera);
   const Eigen::Vector3d end_ray = ray_of(segment.end, camera);
   line.start = start_ray / fit->line.start;
   line.end = end_ray / fit->line.end;
-  line.start_covariance =
-      point_covariance(start_ray, fit->line.start, fit->covariance(0, 0), camera, options.pixel_sigma);
-  line.end_covariance =
-      point_covariance(end_ray, fit->line.end, fit->covariance(1, 1), camera, options.pixel_sigma);
+  line.start_noise = endpoint_noise(fit->line.start, fit->covariance(0, 0), camera, options.pixel_sigma);
+  line.end_noise = endpoint_noise(fit->line.end, fit->covariance(1, 1), camera, options.pixel_sigma);
   return line;
 }
 

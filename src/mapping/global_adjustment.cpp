@@ -172,8 +172,10 @@ class GlobalBuilder {
         seen.has_depth = true;
         seen.start_camera = f.line3->start;
         seen.end_camera = f.line3->end;
-        seen.start_sigma = unrest(o.keyframe) * std::max(0.003, std::sqrt(f.line3->start_covariance.trace()));
-        seen.end_sigma = unrest(o.keyframe) * std::max(0.003, std::sqrt(f.line3->end_covariance.trace()));
+        seen.start_sigma = unrest(o.keyframe) *
+                           std::max(0.003, features::endpoint_sigma(f.line3->start, f.line3->start_noise));
+        seen.end_sigma =
+            unrest(o.keyframe) * std::max(0.003, features::endpoint_sigma(f.line3->end, f.line3->end_noise));
       }
       bundle_.problem.line_observations.push_back(seen);
       bundle_.line_seen.push_back(o.keyframe);

@@ -89,10 +89,10 @@ struct StoreWorld {
     l.line3.emplace();
     l.line3->start = random_.vector(3);
     l.line3->end = random_.vector(3);
-    l.line3->start_covariance = random_.pose(3.0, 1.0).rotation;  // nine different numbers
-    l.line3->end_covariance = random_.uniform(0, 1) * Eigen::Matrix3d::Identity();
-    l.line3->inlier_share = random_.uniform(0, 1);
-    l.line3->coverage = random_.uniform(0, 1);
+    l.line3->start_noise = {number(0, 1), number(0, 1)};
+    l.line3->end_noise = {number(0, 1), number(0, 1)};
+    l.line3->inlier_share = number(0, 1);
+    l.line3->coverage = number(0, 1);
     return l;
   }
 
@@ -197,8 +197,10 @@ inline bool same(const features::LineFeature& a, const features::LineFeature& b)
   }
   return !a.line3.has_value() ||
          (a.line3->start == b.line3->start && a.line3->end == b.line3->end &&
-          a.line3->start_covariance == b.line3->start_covariance &&
-          a.line3->end_covariance == b.line3->end_covariance &&
+          a.line3->start_noise.depth == b.line3->start_noise.depth &&
+          a.line3->start_noise.across == b.line3->start_noise.across &&
+          a.line3->end_noise.depth == b.line3->end_noise.depth &&
+          a.line3->end_noise.across == b.line3->end_noise.across &&
           a.line3->inlier_share == b.line3->inlier_share && a.line3->coverage == b.line3->coverage);
 }
 inline bool same(const maps::SurfaceSample& a, const maps::SurfaceSample& b) {

@@ -92,10 +92,11 @@ TEST(LineDepth, CovarianceFitsTheErrorsOverManyNoisyLines) {
       ASSERT_TRUE(line);
       const Eigen::Vector3d truth = on_plane(a, kSlanted, 2.0);
       const Eigen::Vector3d error = line->start - truth;
-      chi2 += error.dot(line->start_covariance.inverse() * error);
+      const Eigen::Matrix3d covariance = endpoint_covariance(line->start, line->start_noise);
+      chi2 += error.dot(covariance.inverse() * error);
       // Depth alone, against the truth on the ray that was seen.
       const double dz = line->start.z() - on_plane(a_seen, kSlanted, 2.0).z();
-      depth_chi2 += dz * dz / line->start_covariance(2, 2);
+      depth_chi2 += dz * dz / covariance(2, 2);
       ++count;
     }
   }

@@ -13,15 +13,26 @@
 
 namespace plumbline::features {
 
+/// Of an end of a segment in space: small, since every keyframe keeps two of them for each line.
+struct EndpointNoise {
+  float depth = 0.0F;   ///< standard deviation along z, metres
+  float across = 0.0F;  ///< in x and in y, metres, from pixel noise
+};
+
 /// 3D segment in the camera frame, metres. Its image is the measured segment.
 struct Line3 {
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
   Eigen::Vector3d end = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d start_covariance = Eigen::Matrix3d::Zero();  ///< m^2, from depth noise and pixel noise
-  Eigen::Matrix3d end_covariance = Eigen::Matrix3d::Zero();
-  double inlier_share = 0.0;  ///< of the depth samples along the segment
-  double coverage = 0.0;      ///< share of the segment's length that has supporting depth
+  EndpointNoise start_noise;
+  EndpointNoise end_noise;
+  float inlier_share = 0.0F;  ///< of the depth samples along the segment
+  float coverage = 0.0F;      ///< share of the segment's length that has supporting depth
 };
+
+/// Covariance in m^2 of an end at `end` (camera frame): depth noise along its ray, pixel noise across.
+Eigen::Matrix3d endpoint_covariance(const Eigen::Vector3d& end, const EndpointNoise& noise);
+/// Root of that covariance's trace, metres.
+double endpoint_sigma(const Eigen::Vector3d& end, const EndpointNoise& noise);
 
 struct LineDepthOptions {
   int samples = 40;  ///< places along the segment, at most
@@ -32,7 +43,7 @@ struct LineDepthOptions {
   double min_coverage = 0.5;
   int min_inliers = 8;
   int ransac_rounds = 24;
-  double pixel_sigma = 0.7;  ///< px, across the segment, for the endpoints' covariance
+  double pixel_sigma = 0.7;  ///< px, across the segment, for the endpoints' noise
 
   void declare(core::OptionTable& table);
 };
