@@ -261,6 +261,14 @@ core::Result<std::optional<std::vector<std::uint8_t>>> StoreReader::attachment(
   });
 }
 
+core::Result<bool> is_blank_store(const std::filesystem::path& file) {
+  return guarded(file, ErrorKind::kInput, [&] {
+    check_file(file);
+    Database database(file, Database::Access::kRead);
+    return is_blank(database);
+  });
+}
+
 core::Result<StoredMap> load_map(const std::filesystem::path& file) {
   const core::Result<StoreReader> reader = StoreReader::open(file);
   if (!reader) return tl::unexpected<core::Error>(reader.error());

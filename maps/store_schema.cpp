@@ -44,9 +44,14 @@ void create_tables(Database& database, const StoreHeader& header) {
   Statement(database, "INSERT INTO header VALUES ('camera', ?)").bind(1, packed).run();
 }
 
+bool is_blank(Database& database) {
+  return database.number("PRAGMA application_id") == 0 &&
+         database.number("SELECT count(*) FROM sqlite_master") == 0;
+}
+
 void check_store(Database& database) {
   const std::int64_t application = database.number("PRAGMA application_id");
-  if (application == 0 && database.number("SELECT count(*) FROM sqlite_master") == 0) {
+  if (is_blank(database)) {
     throw StoreFailure(core::ErrorKind::kInput,
                        "holds nothing: the run that made it ended before it began; map the recording again");
   }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// plumbline export MAP -o FILE
+// plumbline export MAP -o FILE|--keyframes DIR
 #include <fmt/format.h>
 
 #include <memory>
+#include <system_error>
 
 #include "app.hpp"
 #include "option_flags.hpp"
@@ -10,7 +11,7 @@
 #include "plumbline/cloud/mesh.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/line_export.hpp"
-#include "plumbline/pipeline/result_folder.hpp"
+#include "plumbline/pipeline/stored_result.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -19,53 +20,134 @@ struct ExportRequest {
   std::filesystem::path input;
   std::filesystem::path output;
   std::string what = "cloud";
+  bool trajectory = false;
+  bool lines = false;
+  std::filesystem::path keyframes;  ///< folder for the clouds of keyframes; empty: none
+  std::string voxel;                ///< of a cloud that is laid down anew; empty: as it was mapped
   bool mesh = false;
   cloud::MeshOptions mesh_options;
   core::OptionTable table;
   std::unique_ptr<OptionFlags> flags;
 };
 
-core::Result<void> export_path(const std::filesystem::path& from, const std::filesystem::path& to) {
-  const auto trajectory = dataset::read_trajectory(from);
-  if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
-  if (to.extension() == ".txt") return dataset::write_trajectory(to, *trajectory);
-  if (to.extension() == ".ply") return pipeline::write_trajectory_ply(to, *trajectory);
-  return core::usage_error(fmt::format("{}: paths are written as .txt (TUM format) or .ply", to.string()));
+/// Whether the run wrote this file, so that the store need not be asked.
+bool written(const pipeline::MapPlace& place, const std::filesystem::path& file) {
+  std::error_code ec;
+  return place.store.empty() || (place.result && std::filesystem::exists(file, ec));
 }
 
-core::Result<void> export_lines(const std::filesystem::path& from, const std::filesystem::path& to) {
+core::Result<geometry::Trajectory> path_of(const pipeline::MapPlace& place, bool keyframes) {
+  const pipeline::ResultFolder folder = place.result.value_or(pipeline::ResultFolder{});
+  const std::filesystem::path file = keyframes ? folder.keyframes() : folder.trajectory();
+  if (written(place, file)) return dataset::read_trajectory(file);
+  const auto stored = pipeline::StoredResult::open(place.store);
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  return keyframes ? stored->keyframe_trajectory() : stored->trajectory();
+}
+
+core::Result<void> export_path(const pipeline::MapPlace& place, bool keyframes,
+                               const std::filesystem::path& to) {
+  if (to.extension() != ".txt" && to.extension() != ".ply") {
+    return core::usage_error(fmt::format("{}: paths are written as .txt (TUM format) or .ply", to.string()));
+  }
+  const auto trajectory = path_of(place, keyframes);
+  if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
+  if (to.extension() == ".txt") return dataset::write_trajectory(to, *trajectory);
+  return pipeline::write_trajectory_ply(to, *trajectory);
+}
+
+core::Result<void> export_lines(const pipeline::MapPlace& place, const std::filesystem::path& to) {
   if (to.extension() != ".ply") {
     return core::usage_error(fmt::format("{}: lines are written as .ply", to.string()));
   }
-  const auto lines = pipeline::read_lines_ply(from);
-  if (!lines) return tl::unexpected<core::Error>(lines.error());
-  return maps::write_lines_ply(to, *lines);
+  const pipeline::ResultFolder folder = place.result.value_or(pipeline::ResultFolder{});
+  if (written(place, folder.lines())) {
+    const auto lines = pipeline::read_lines_ply(folder.lines());
+    if (!lines) return tl::unexpected<core::Error>(lines.error());
+    return maps::write_lines_ply(to, *lines);
+  }
+  const auto stored = pipeline::StoredResult::open(place.store);
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  return maps::write_lines_ply(to, stored->lines());
 }
 
-core::Result<void> export_mesh(const pipeline::ResultFolder& result, const ExportRequest& request) {
+/// The cloud as the run wrote it, or with other voxels from the store.
+core::Result<cloud::CloudFile> cloud_of(const pipeline::MapPlace& place, const ExportRequest& request,
+                                        const core::Executor& executor) {
+  if (request.voxel.empty()) return pipeline::read_map_cloud(place, executor);
+  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+  cloud::DenseFusionOptions options;
+  core::OptionTable table;
+  options.declare(table);
+  core::ConfigNode value;
+  value.kind = core::ConfigNode::Kind::kScalar;
+  value.scalar = request.voxel;
+  core::ConfigProblems problems;
+  table.set("voxel", value, "--voxel", problems);
+  if (!problems.empty()) return core::usage_error("--voxel: " + problems.front().what);
+  if (place.store.empty()) {
+    return core::usage_error(fmt::format(
+        "--voxel: {} has no map.db to lay the cloud down from; map again without store.enabled=off",
+        request.input.string()));
+  }
+  const auto stored = pipeline::StoredResult::open(place.store);
+  if (!stored) return fail(stored.error());
+  const double voxel_m = options.voxels.voxel_m;
+  options = stored->fusion_options();
+  options.voxels.voxel_m = voxel_m;
+  auto fused = stored->lay_down(options, executor);
+  if (!fused) return fail(fused.error());
+  cloud::CloudFile file;
+  file.cloud = std::move(fused->cloud);
+  file.columns = std::move(fused->columns);
+  return file;
+}
+
+core::Result<void> export_keyframes(const pipeline::MapPlace& place, const ExportRequest& request) {
+  if (place.store.empty()) {
+    return core::usage_error(fmt::format(
+        "--keyframes: {} has no map.db with the clouds of keyframes; map again without store.enabled=off",
+        request.input.string()));
+  }
+  const auto stored = pipeline::StoredResult::open(place.store);
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  const auto count = stored->write_keyframe_clouds(request.keyframes);
+  if (!count) return tl::unexpected<core::Error>(count.error());
+  return {};
+}
+
+core::Result<void> export_mesh(const pipeline::MapPlace& place, const ExportRequest& request,
+                               const core::Executor& executor) {
   if (request.output.extension() != ".ply" && request.output.extension() != ".obj") {
     return core::usage_error(fmt::format("{}: meshes are written as .ply or .obj", request.output.string()));
   }
-  const auto file = pipeline::read_result_cloud(result);
+  const auto file = cloud_of(place, request, executor);
   if (!file) return tl::unexpected<core::Error>(file.error());
   const auto mesh = cloud::make_mesh(*file->cloud, request.mesh_options);
   if (!mesh) return tl::unexpected<core::Error>(mesh.error());
   return cloud::write_mesh(request.output, *mesh);
 }
 
-core::Result<void> run_export(const ExportRequest& request) {
+core::Result<void> run_export(const ExportRequest& request, const core::Executor& executor) {
   if (auto applied = request.flags->apply(); !applied) return applied;
-  const auto result = pipeline::open_result(request.input);
-  if (!result) return tl::unexpected<core::Error>(result.error());
-  if (request.mesh) return export_mesh(*result, request);
-  if (request.what == "trajectory") return export_path(result->trajectory(), request.output);
-  if (request.what == "keyframes") return export_path(result->keyframes(), request.output);
-  if (request.what == "lines") return export_lines(result->lines(), request.output);
+  if (request.output.empty() && request.keyframes.empty()) {
+    return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
+  }
+  const auto place = pipeline::find_map(request.input);
+  if (!place) return tl::unexpected<core::Error>(place.error());
+  if (!request.keyframes.empty()) {
+    auto done = export_keyframes(*place, request);
+    if (!done || request.output.empty()) return done;
+  }
+  if (request.mesh) return export_mesh(*place, request, executor);
+  if (request.trajectory || request.what == "trajectory") return export_path(*place, false, request.output);
+  if (request.what == "keyframes") return export_path(*place, true, request.output);
+  if (request.lines || request.what == "lines") return export_lines(*place, request.output);
   const auto extension = request.output.extension();
   if (extension != ".ply" && extension != ".pcd") {
     return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", request.output.string()));
   }
-  const auto file = pipeline::read_result_cloud(*result);
+  const auto file = cloud_of(*place, request, executor);
   if (!file) return tl::unexpected<core::Error>(file.error());
   return cloud::write_cloud(request.output, *file->cloud, file->columns);
 }
@@ -76,15 +158,26 @@ void add_export(CLI::App& app, Session& session) {
   const auto request = std::make_shared<ExportRequest>();
   CLI::App* command =
       add_command(app, session, "export", "Write parts of a map in other formats", [&session, request] {
-        const auto done = run_export(*request);
+        const auto done = run_export(*request, session.executor());
         return done ? 0 : session.fail(done.error());
       });
-  command->add_option("MAP", request->input, "A result folder")->required();
-  command->add_option("-o,--output", request->output, "File to write")
-      ->required()
-      ->type_name("FILE.ply|.pcd|.obj|.txt");
+  command->add_option("MAP", request->input, "A result folder, also of a run that was interrupted, or map.db")
+      ->required();
+  command->add_option("-o,--output", request->output, "File to write")->type_name("FILE.ply|.pcd|.obj|.txt");
+  command
+      ->add_option("--keyframes", request->keyframes,
+                   "Write the cloud of every keyframe as DIR/<number>.ply, from map.db")
+      ->type_name("DIR");
+  command
+      ->add_option("--voxel", request->voxel, "Lay the cloud down anew from map.db, with voxels of this size")
+      ->type_name("LENGTH");
   CLI::Option* what = command->add_option("--what", request->what, "What to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));
+  CLI::Option* trajectory =
+      command->add_flag("--trajectory", request->trajectory, "The same as --what trajectory")->excludes(what);
+  command->add_flag("--lines", request->lines, "The same as --what lines")
+      ->excludes(what)
+      ->excludes(trajectory);
   command->add_flag("--mesh", request->mesh, "Write the cloud as a mesh, .ply or .obj")->excludes(what);
   request->mesh_options.declare(request->table);
   request->flags = std::make_unique<OptionFlags>(*command, request->table);

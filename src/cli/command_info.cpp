@@ -18,7 +18,7 @@
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/input.hpp"
-#include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/pipeline/stored_result.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::cli {
@@ -37,6 +37,29 @@ void print_json(const nlohmann::ordered_json& json, const std::string& prefix) {
       fmt::print("{}{}: {}\n", prefix, key, value.is_string() ? value.get<std::string>() : value.dump());
     }
   }
+}
+
+core::Result<void> describe_store(const std::filesystem::path& file) {
+  const auto reader = maps::StoreReader::open(file);
+  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  const auto contents = reader->contents();
+  if (!contents) return tl::unexpected<core::Error>(contents.error());
+  const maps::StoreHeader& header = reader->header();
+  std::error_code ec;
+  const double file_mb = static_cast<double>(std::filesystem::file_size(file, ec)) / 1e6;
+  fmt::print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
+             header.format, header.program_version, header.robot);
+  fmt::print("store.complete: {}\n",
+             contents->complete ? "yes" : "no; map --resume goes on from it, export and render read it");
+  fmt::print("store.keyframes: {}\nstore.keyframes_retired: {}\nstore.points: {}\nstore.lines: {}\n",
+             contents->keyframes, contents->retired, contents->points, contents->lines);
+  fmt::print("store.surface_edges: {}\nstore.frames: {}\n", contents->edges, contents->frames);
+  fmt::print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,
+             contents->frame_clouds);
+  for (const std::string& name : contents->attachments) fmt::print("store.attachment: {}\n", name);
+  fmt::print("store.size_mb: {:.1f}\nstore.clouds_mb: {:.1f}\n", file_mb,
+             static_cast<double>(contents->cloud_bytes) / 1e6);
+  return {};
 }
 
 core::Result<void> describe_result(const std::filesystem::path& folder) {
@@ -70,6 +93,13 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
                high.x(), high.y(), high.z());
   }
   return {};
+}
+
+core::Result<void> describe_map(const pipeline::MapPlace& place) {
+  if (place.result) {
+    if (auto told = describe_result(place.result->folder); !told) return told;
+  }
+  return place.store.empty() ? core::Result<void>() : describe_store(place.store);
 }
 
 /// Whether a text's first line of numbers is a pose: eight of them, the last four a unit quaternion.
@@ -108,6 +138,8 @@ core::Result<void> info(Session& session, InfoRequest& request) {
   if (synth::is_synth_url(request.input)) return describe_recording(session, request);
   std::error_code ec;
   const std::filesystem::path path = request.input;
+  const auto map = pipeline::find_map(path);  // also of a run that was interrupted and has left no `path`
+  if (map) return describe_map(*map);
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
@@ -118,7 +150,6 @@ core::Result<void> info(Session& session, InfoRequest& request) {
     describe_path(*poses);
     return {};
   }
-  if (pipeline::is_result_folder(path)) return describe_result(path);
   return describe_recording(session, request);
 }
 
@@ -131,7 +162,9 @@ void add_info(CLI::App& app, Session& session) {
         const auto done = info(session, *request);
         return done ? 0 : session.fail(done.error());
       });
-  command->add_option("INPUT", request->input, "A recording, a result folder, a cloud file or synth:SCENE")
+  command
+      ->add_option("INPUT", request->input,
+                   "A recording, a result folder, map.db, a cloud file or synth:SCENE")
       ->required();
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");

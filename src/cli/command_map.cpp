@@ -19,6 +19,11 @@ int map(Session& session, pipeline::MapRequest request) {
   const auto filters = session.filters();
   if (!filters) return session.fail(filters.error());
   request.filters = *filters;
+  if (request.resume && pipeline::is_finished(request.output)) {
+    if (!session.quiet)
+      fmt::print("{}: is finished; there is nothing to go on with\n", request.output.string());
+    return 0;
+  }
   const core::StopToken stop;
   stop_on_signals(stop);
   Console& console = session.console();
@@ -66,6 +71,9 @@ void add_map(CLI::App& app, Session& session) {
       ->add_option("--debug-video", request->debug_video,
                    "Also write a picture of every frame with what the tracker sees")
       ->type_name("DIR");
+  command->add_flag("--resume", request->resume,
+                    "Go on from what a run that was interrupted left in OUT.partial; input and settings must "
+                    "be those of that run");
   add_plugin_option(*command, session);
   command->add_flag("--force", request->replace, "Replace an earlier result in OUT, and in DIR");
 }

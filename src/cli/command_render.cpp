@@ -15,7 +15,7 @@
 #include "plumbline/cloud/ply.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
-#include "plumbline/pipeline/result_folder.hpp"
+#include "plumbline/pipeline/stored_result.hpp"
 #include "plumbline/viz/snapshot.hpp"
 #include "plumbline/viz/turntable.hpp"
 #include "video.hpp"
@@ -50,26 +50,43 @@ core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& opt
   return {};
 }
 
-/// The result folder that `input` is, or is map.ply or map.pcd of.
-std::optional<pipeline::ResultFolder> result_of(const fs::path& input) {
+/// The map that `input` is, or is map.ply or map.pcd of; none: a cloud by itself.
+core::Result<std::optional<pipeline::MapPlace>> map_of(const fs::path& input) {
   std::error_code ec;
-  const fs::path folder = fs::is_directory(input, ec) ? input : fs::absolute(input).parent_path();
   const std::string name = input.filename().string();
-  if (!fs::is_directory(input, ec) && name != "map.ply" && name != "map.pcd") return std::nullopt;
-  if (!pipeline::is_result_folder(folder)) return std::nullopt;
-  return pipeline::ResultFolder{folder};
+  if (fs::is_regular_file(input, ec) && input.extension() != ".db") {
+    const fs::path folder = fs::absolute(input).parent_path();
+    if ((name != "map.ply" && name != "map.pcd") || !pipeline::is_result_folder(folder)) return std::nullopt;
+    return pipeline::MapPlace{pipeline::ResultFolder{folder}, {}};
+  }
+  auto place = pipeline::find_map(input);
+  if (!place) return tl::unexpected<core::Error>(place.error());
+  return std::move(*place);
 }
 
-core::Result<void> add_paths(const pipeline::ResultFolder& result, bool lines, viz::Scene& scene) {
-  auto trajectory = dataset::read_trajectory(result.trajectory());
-  if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
+core::Result<void> add_paths(const pipeline::MapPlace& place, bool lines, viz::Scene& scene) {
   viz::CameraPath path;
-  path.trajectory = std::move(*trajectory);
+  std::vector<maps::LineSegment3> segments;
+  if (place.result) {
+    auto trajectory = dataset::read_trajectory(place.result->trajectory());
+    if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
+    path.trajectory = std::move(*trajectory);
+  }
+  std::error_code ec;
+  const bool has_lines = place.result && (fs::exists(place.result->lines(), ec) || place.store.empty());
+  if (lines && has_lines) {
+    auto read = pipeline::read_lines_ply(place.result->lines());
+    if (!read) return tl::unexpected<core::Error>(read.error());
+    segments = std::move(*read);
+  }
+  if (!place.result || (lines && !has_lines)) {
+    const auto stored = pipeline::StoredResult::open(place.store);
+    if (!stored) return tl::unexpected<core::Error>(stored.error());
+    if (!place.result) path.trajectory = stored->trajectory();
+    if (lines) segments = stored->lines();
+  }
   scene.paths.push_back(std::move(path));
-  if (!lines) return {};
-  const auto segments = pipeline::read_lines_ply(result.lines());
-  if (!segments) return tl::unexpected<core::Error>(segments.error());
-  for (const auto& [a, b] : *segments) scene.segments.push_back({a, b});
+  for (const auto& [a, b] : segments) scene.segments.push_back({a, b});
   return {};
 }
 
@@ -129,36 +146,31 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
   return drawn;
 }
 
-core::Result<void> render(RenderRequest& request, Console& console) {
+core::Result<void> render(RenderRequest& request, Session& session) {
   if (auto applied = request.flags->apply(); !applied) return applied;
   if (!request.size.empty()) {
     if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
   }
   if (auto checked = check_output(request); !checked) return checked;
+  const auto found = map_of(request.input);
+  if (!found) return tl::unexpected<core::Error>(found.error());
+  const std::optional<pipeline::MapPlace>& place = *found;
   std::error_code ec;
-  if (!fs::exists(request.input, ec)) {
-    return core::input_error(fmt::format("{}: no such map or cloud", request.input.string()));
-  }
-  const auto result = result_of(request.input);
-  if (!result && fs::is_directory(request.input, ec)) {
-    return core::input_error(fmt::format("{}: is no result of plumbline map", request.input.string()));
-  }
-  const bool folder = fs::is_directory(request.input, ec);
-  const auto file = folder ? pipeline::read_result_cloud(*result) : cloud::read_cloud(request.input);
+  const bool cloud_file = fs::is_regular_file(request.input, ec) && request.input.extension() != ".db";
+  const auto file =
+      cloud_file ? cloud::read_cloud(request.input) : pipeline::read_map_cloud(*place, session.executor());
   if (!file) return tl::unexpected<core::Error>(file.error());
   viz::Scene scene;
   scene.cloud = file->cloud;
-  scene.title = display_name(result ? result->folder : request.input);
-  if (result) {
-    if (auto added = add_paths(*result, request.lines, scene); !added) return added;
+  scene.title = display_name(place && place->result ? place->result->folder : request.input);
+  if (place) {
+    if (auto added = add_paths(*place, request.lines, scene); !added) return added;
   } else if (request.lines) {
     return core::usage_error("--lines: only a result folder has lines");
   }
-  if (auto added = add_scalars(*file, folder ? result->ply() : request.input, request.options.color, scene);
-      !added) {
-    return added;
-  }
-  if (request.turntable > 0) return turn(request, scene, console);
+  const fs::path colours = cloud_file || !place->result ? request.input : place->result->ply();
+  if (auto added = add_scalars(*file, colours, request.options.color, scene); !added) return added;
+  if (request.turntable > 0) return turn(request, scene, session.console());
   return viz::render_snapshot(scene, request.options, request.output);
 }
 
@@ -169,10 +181,11 @@ void add_render(CLI::App& app, Session& session) {
   request->options.declare(request->table);
   CLI::App* command =
       add_command(app, session, "render", "Draw a map or cloud; needs no display", [&session, request] {
-        const auto done = render(*request, session.console());
+        const auto done = render(*request, session);
         return done ? 0 : session.fail(done.error());
       });
-  command->add_option("INPUT", request->input, "A result folder, or a PLY, PCD or XYZ file")->required();
+  command->add_option("INPUT", request->input, "A result folder, map.db, or a PLY, PCD or XYZ file")
+      ->required();
   command->add_option("-o,--output", request->output, "Picture to write")
       ->required()
       ->type_name("FILE.png|DIR|.gif|.mp4");

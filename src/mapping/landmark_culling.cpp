@@ -29,6 +29,16 @@ LandmarkCuller::Verdict LandmarkCuller::verdict(const Landmark& landmark, int ag
   return well_known || age >= kMaxAge ? Verdict::kStay : Verdict::kWait;
 }
 
+void LandmarkCuller::restore(const maps::Map& map, core::KeyframeId newest) {
+  const auto watch_again = [&](const auto& landmark) {
+    if (landmark.id.robot != newest.robot || landmark.observations.empty()) return;
+    const core::KeyframeId born = landmark.observations.front().keyframe;
+    if (verdict(landmark, newest.index - born.index) == Verdict::kWait) watch(landmark.id, born);
+  };
+  for (const core::PointId id : map.point_ids()) watch_again(map.point(id));
+  for (const core::LineId id : map.line_ids()) watch_again(map.line(id));
+}
+
 int LandmarkCuller::judge(maps::Map& map, core::KeyframeId newest) {
   int removed = 0;
   const auto judge_all = [&](auto& watched, const auto& find, const auto& remove) {

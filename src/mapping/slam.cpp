@@ -125,6 +125,34 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
 }
 
+/// The motion between the last two frames, per second, as the tracker had it.
+static geometry::Vector6d last_motion(const std::vector<maps::FramePose>& frames, const maps::Map& map) {
+  if (frames.size() < 2) return geometry::Vector6d::Zero();
+  const maps::FramePose& now = frames[frames.size() - 1];
+  const maps::FramePose& before = frames[frames.size() - 2];
+  constexpr double kLongest_s = 0.5;
+  const double dt = now.stamp - before.stamp;
+  if (!now.tracked || !before.tracked || !(dt > 1e-4 && dt < kLongest_s)) return geometry::Vector6d::Zero();
+  const Rigid3 now_from_world = now.camera_from_reference * map.pose_of(now.reference);
+  const Rigid3 before_from_world = before.camera_from_reference * map.pose_of(before.reference);
+  return geometry::log_se3(now_from_world * before_from_world.inverse()) / dt;
+}
+
+void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {
+  if (map.keyframe_count() == 0) return;
+  map_ = std::move(map);
+  frames_ = std::move(frames);
+  clock_ = static_cast<std::int64_t>(frames_.size());
+  const core::KeyframeId newest = map_.keyframe_ids().back();
+  last_camera_from_world_ = map_.camera_from_world(newest);
+  tracker_.restore(map_, newest, last_camera_from_world_, last_motion(frames_, map_));
+  rule_.keyframe_made();
+  mapper_.restore(map_, newest);
+  if (options_.loops.enabled) closer_.restore(map_, newest);
+  const bool calm = map_.keyframe(newest).turn_rate <= options_.mapper.bundle_max_turn_rate;
+  if (options_.mapper.bundle && calm) bundle_.request(map_, newest, clock_);
+}
+
 void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
   const core::KeyframeId reference = tracker_.reference();
   frames_.push_back(

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "debug_video.hpp"
@@ -17,6 +18,7 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
+#include "resumed_run.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -71,7 +73,41 @@ std::string input_text(const dataset::FrameSource& source) {
   return text + fmt::format("stamps: {:016x}\n", hash);
 }
 
+core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::filesystem::path& pipeline) {
+  if (!keeps) {
+    return core::usage_error(fmt::format(
+        "{}: keeps no map.db to go on from; add a store stage, or leave out --resume", pipeline.string()));
+  }
+  if (!request.debug_video.empty()) {
+    return core::usage_error(
+        "--debug-video: there are no pictures of what an earlier run tracked; leave it out with --resume");
+  }
+  return {};
+}
+
+void tell_resumed(const std::filesystem::path& folder, const std::optional<ResumedRun>& run, core::Log& log) {
+  log.info(run ? fmt::format("going on after frame {}, with {} keyframes of {}", run->frames - 1,
+                             run->map.map.keyframe_count(), run->store.string())
+               : fmt::format("{}: nothing is there to go on from; beginning with the first frame",
+                             folder.string()));
+}
+
+/// What a run that fails had stored stays.
+core::Error with_what_is_kept(core::Error error, OutputFolder& output) {
+  const std::size_t keyframes = stored_keyframes(output.path());
+  if (keyframes == 0) return error;
+  output.keep();
+  error.message += fmt::format("; {} keyframes are kept in {}: --resume goes on from there", keyframes,
+                               (output.path() / kStoreFile).string());
+  return error;
+}
+
 }  // namespace
+
+bool is_finished(const std::filesystem::path& out) {
+  std::error_code ec;
+  return is_result_folder(out) && !std::filesystem::exists(OutputFolder::partial_of(out), ec);
+}
 
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop,
@@ -96,8 +132,22 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   const auto source =
       open_input(request.input, request.open, request.pipelines_folder / "scenes", executor, log);
   if (!source) return fail(source.error());
-  auto output = OutputFolder::prepare(request.output, request.replace);
+  const bool keeps = std::any_of(graph->nodes.begin(), graph->nodes.end(),
+                                 [](const Node& node) { return node.stage->wants_map_changes(); });
+  if (request.resume) {
+    if (auto can = can_resume(request, keeps, *pipeline_file); !can) return fail(can.error());
+  }
+  auto output = request.resume ? OutputFolder::resume(request.output, request.replace)
+                               : OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
+  std::optional<ResumedRun> resumed;
+  if (request.resume) {
+    auto opened = open_resumed(output->path(), config_text(request, *graph, 0), input_text(**source),
+                               (*source)->camera());
+    if (!opened) return fail(opened.error());
+    resumed = std::move(*opened);
+    tell_resumed(output->path(), resumed, log);
+  }
   if (auto written =
           write_config(output->path() / "config.yaml", config_text(request, *graph, executor.threads()));
       !written) {
@@ -121,10 +171,10 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   if (debug) context.debug_folder = debug->path();
   context.configuration = config_text(request, *graph, 0);
   context.input = input_text(**source);
-  context.keep_changes = std::any_of(graph->nodes.begin(), graph->nodes.end(),
-                                     [](const Node& node) { return node.stage->wants_map_changes(); });
+  context.keep_changes = keeps;
+  if (resumed) context.resumed = &*resumed;
   const auto report = run_graph(*graph, context, progress);
-  if (!report) return fail(report.error());
+  if (!report) return fail(with_what_is_kept(report.error(), *output));
 
   RunSummary summary;
   summary.input = request.input;

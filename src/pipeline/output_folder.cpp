@@ -70,15 +70,19 @@ tl::unexpected<core::Error> another_run(const fs::path& partial) {
       fmt::format("{}: another run is writing there; wait or name another output folder", partial.string()));
 }
 
+tl::unexpected<core::Error> in_the_way(const fs::path& partial) {
+  return core::usage_error(
+      fmt::format("{}: is in the way; results are written there first. Remove it or name "
+                  "another output folder",
+                  partial.string()));
+}
+
 /// Removes what an interrupted run left, and nothing else.
 core::Result<void> clear_leftover(const fs::path& partial) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
-    return core::usage_error(
-        fmt::format("{}: is in the way; results are written there first. Remove it or name "
-                    "another output folder",
-                    partial.string()));
+    return in_the_way(partial);
   }
   const int lock = lock_marker(partial, O_RDONLY);
   if (lock < 0 && !fs::is_empty(partial, ec)) {
@@ -105,10 +109,11 @@ OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : target_(std::move(other.target_)),
       partial_(std::exchange(other.partial_, {})),
       lock_(std::exchange(other.lock_, -1)),
-      is_earlier_(other.is_earlier_) {}
+      is_earlier_(other.is_earlier_),
+      kept_(other.kept_) {}
 
 OutputFolder::~OutputFolder() {
-  if (!partial_.empty()) {
+  if (!partial_.empty() && !kept_) {
     std::error_code ignored;
     fs::remove_all(partial_, ignored);
   }
@@ -122,11 +127,33 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
     return tl::unexpected<core::Error>(checked.error());
   const fs::path partial = with_ending(target, ".partial");
   if (auto cleared = clear_leftover(partial); !cleared) return tl::unexpected<core::Error>(cleared.error());
+  return open(target, partial, is_earlier);
+}
+
+fs::path OutputFolder::partial_of(const fs::path& out) { return with_ending(normal(out), ".partial"); }
+
+core::Result<OutputFolder> OutputFolder::resume(const fs::path& out, bool replace, IsEarlier is_earlier) {
+  if (out.empty()) return core::usage_error("the output folder has no name");
+  const fs::path target = normal(out);
+  if (auto checked = check_target(target, replace, is_earlier); !checked)
+    return tl::unexpected<core::Error>(checked.error());
+  const fs::path partial = with_ending(target, ".partial");
+  std::error_code ec;
+  if (fs::exists(partial, ec) && !fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
+    return in_the_way(partial);
+  }
+  auto folder = open(target, partial, is_earlier);
+  if (folder) folder->keep();
+  return folder;
+}
+
+core::Result<OutputFolder> OutputFolder::open(const fs::path& target, const fs::path& partial,
+                                              IsEarlier is_earlier) {
   std::error_code ec;
   fs::create_directories(partial, ec);
   if (ec) {
     return core::output_error(fmt::format("{}: cannot be created ({}); name a folder where you may write",
-                                          out.string(), ec.message()));
+                                          target.string(), ec.message()));
   }
   const int lock = lock_marker(partial, O_CREAT | O_WRONLY);
   if (lock < 0) {
@@ -134,13 +161,13 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
     if (fs::exists(partial / kMarker, gone))
       return another_run(partial);  // it began a moment before this one
     return core::output_error(
-        fmt::format("{}: cannot be written; name a folder where you may write", out.string()));
+        fmt::format("{}: cannot be written; name a folder where you may write", target.string()));
   }
   OutputFolder folder(target, partial, lock, is_earlier);
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
-                                          out.string(), space.available / kMegabyte, kLeastFreeMb));
+                                          target.string(), space.available / kMegabyte, kLeastFreeMb));
   }
   return folder;
 }

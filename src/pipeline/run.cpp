@@ -12,6 +12,8 @@
 #include <mutex>
 #include <optional>
 
+#include "resumed_run.hpp"
+
 namespace plumbline::pipeline {
 namespace {
 
@@ -73,11 +75,15 @@ class Runner {
   }
 
   core::Result<RunReport> run() {
+    if (context_.resumed != nullptr) before_ = context_.resumed->frames;
     for (Node& node : graph_.nodes) {
       auto started = guarded(node.name, [&] { return node.stage->start(context_); });
       if (!started) return tl::unexpected<core::Error>(started.error());
-      report_.stages.push_back({node.name, {}, 0.0});
+      const std::vector<float> unknown(before_, std::numeric_limits<float>::quiet_NaN());
+      report_.stages.push_back({node.name, unknown, 0.0});
     }
+    report_.frames = before_;
+    started_ = before_;
     total_ = graph_.source().stage->frames();
     report_.frames_available = total_;
     const auto start = Clock::now();
@@ -192,6 +198,7 @@ class Runner {
   std::vector<std::size_t> last_use_;  ///< [node]: the last node that reads from it
   FirstFailure failure_;
   std::size_t total_ = 0;
+  std::size_t before_ = 0;  ///< frames of the run that this one goes on from
   std::size_t started_ = 0;
   RunReport report_;
 };

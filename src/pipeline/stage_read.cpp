@@ -7,6 +7,7 @@
 
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "resumed_run.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
@@ -20,6 +21,11 @@ class ReadStage : public Stage {
     source_ = context.source;
     log_ = context.log;
     if (source_ == nullptr || source_->size() == 0) return core::input_error("the recording has no frames");
+    if (context.resumed != nullptr) {
+      resumed_ = context.resumed->rows.size();
+      read_ = resumed_;
+      unreadable_ = context.resumed->frames - resumed_;
+    }
     return {};
   }
   [[nodiscard]] std::size_t frames() const override { return source_->size(); }
@@ -58,12 +64,14 @@ class ReadStage : public Stage {
 
   void summarise(RunSummary& summary) const override {
     summary.frames.read = read_;
+    summary.frames.resumed = resumed_;
     summary.frames.unreadable = unreadable_;
   }
 
  private:
   const dataset::FrameSource* source_ = nullptr;
   core::Log* log_ = nullptr;
+  std::size_t resumed_ = 0;
   std::atomic<std::size_t> read_{0};
   std::atomic<std::size_t> unreadable_{0};
 };

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // store: the map as map.db while the run goes, so that a run that ends early has lost nothing.
-#include <fmt/format.h>
-
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,12 +8,11 @@
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/maps/store.hpp"
+#include "resumed_run.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
 namespace {
-
-const char* const kFile = "map.db";
 
 class StoreStage : public Stage {
  public:
@@ -26,29 +23,30 @@ class StoreStage : public Stage {
         "from");
   }
   [[nodiscard]] std::vector<std::string> files() const override {
-    return enabled_ ? std::vector<std::string>{kFile} : std::vector<std::string>{};
+    return enabled_ ? std::vector<std::string>{kStoreFile} : std::vector<std::string>{};
   }
   [[nodiscard]] bool wants_map_changes() const override { return enabled_; }
 
   core::Result<void> start(const RunContext& context) override {
     if (!enabled_) return {};
+    if (context.resumed != nullptr) {
+      frames_ = context.resumed->map.frames.size();
+      return take(maps::StoreWriter::resume(context.resumed->store));
+    }
     maps::StoreHeader header;
     header.camera = context.source->camera();
     header.configuration = context.configuration;
     header.input = context.input;
     header.robot = context.source->name();
     header.program_version = core::version();
-    auto writer = maps::StoreWriter::create(context.output_folder / kFile, header);
-    if (!writer) return tl::unexpected<core::Error>(writer.error());
-    writer_.emplace(std::move(*writer));
-    return {};
+    return take(maps::StoreWriter::create(context.output_folder / kStoreFile, header));
   }
 
   /// One transaction a keyframe; what comes between waits for the next one.
   core::Result<void> process(StageIo& io) override {
     if (!writer_) return {};
     const auto track = io.input<TrackedFrame>("track");
-    step_.log.push_back(fmt::format("{},{},{}", track->row.frame, track->row.state, track->row.columns));
+    step_.log.push_back(to_line(track->row));
     if (track->pose) step_.frames.push_back(*track->pose);
     if (const auto cloud = io.input<KeyframeCloud>("cloud")) keep_cloud(*track, *cloud);
     if (!track->keyframe.valid()) return {};
@@ -80,6 +78,11 @@ class StoreStage : public Stage {
   }
 
  private:
+  core::Result<void> take(core::Result<maps::StoreWriter> writer) {
+    if (!writer) return tl::unexpected<core::Error>(writer.error());
+    writer_.emplace(std::move(*writer));
+    return {};
+  }
   /// A frame between keyframes that was lost lies nowhere: its cloud is of no use.
   void keep_cloud(const TrackedFrame& track, const KeyframeCloud& cloud) {
     if (cloud.id.valid()) {

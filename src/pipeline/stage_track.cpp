@@ -10,6 +10,7 @@
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "resumed_run.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
@@ -58,6 +59,11 @@ class TrackStage : public Stage {
     keep_changes_ = context.keep_changes;
     if (auto loaded = options_.loops.load(); !loaded) return loaded;
     slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
+    if (context.resumed != nullptr) {
+      slam_->restore(context.resumed->map.map, context.resumed->map.frames);
+      moment_ = slam_->map().now();
+      rows_ = context.resumed->rows;
+    }
     return {};
   }
 

@@ -353,6 +353,20 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
   last_.valid = true;
 }
 
+void Tracker::restore(const maps::Map& map, core::KeyframeId reference, const Rigid3& camera_from_world,
+                      const Vector6d& velocity) {
+  map_changed(map, reference, camera_from_world);
+  const maps::Keyframe& keyframe = map.keyframe(reference);
+  last_.stamp = keyframe.stamp;
+  if (keyframe.features != nullptr) {
+    last_.thumbnail = keyframe.features->thumbnail;
+    last_.thumbnail_depth = keyframe.features->thumbnail_depth;
+  }
+  last_.valid = keyframe.features != nullptr;
+  velocity_ = velocity;
+  lost_frames_ = 0;
+}
+
 void Tracker::map_changed(const maps::Map& map, core::KeyframeId reference,
                           const Rigid3& last_camera_from_world) {
   local_map_ = build_local_map(map, reference, options_.local_map);

@@ -28,6 +28,9 @@ class LandmarkCuller {
   void watch(core::PointId id, core::KeyframeId born) { points_.push_back({id, born.index}); }
   void watch(core::LineId id, core::KeyframeId born) { lines_.push_back({id, born.index}); }
 
+  /// Watches again those of a robot's landmarks that are not beyond judgement, as another one left them.
+  void restore(const maps::Map& map, core::KeyframeId newest);
+
   /// Keyframe `newest` has been made. Removes landmarks that were found in too small a share of the frames
   /// that should see them, and those that too few keyframes see although `grace_keyframes` were made since
   /// theirs. Returns how many.

@@ -44,6 +44,9 @@ class LocalMapper {
   LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera)
       : options_(options), camera_(camera), culler_(options.culling) {}
 
+  /// Goes on where another mapper left `map`, whose newest keyframe is `newest`.
+  void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
+
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth.
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                           const std::shared_ptr<const features::FrameFeatures>& features,

@@ -58,6 +58,11 @@ class Slam {
   Slam(const Slam&) = delete;  // the tracker asks this one for places
   Slam& operator=(const Slam&) = delete;
 
+  /// Goes on where another Slam stopped when it had just made a keyframe: with its map and frame_poses(). To be
+  /// called before the first frame. What ran beside the tracker is begun again; landmarks are watched, and
+  /// places known, as the map tells. A map without keyframes is no place to go on from: nothing happens.
+  void restore(maps::Map map, std::vector<maps::FramePose> frames);
+
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
   FrameReport process(const sensor::RgbdFrame& frame,
                       std::shared_ptr<const features::FrameFeatures> features);

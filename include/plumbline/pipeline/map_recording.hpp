@@ -26,12 +26,17 @@ struct MapRequest {
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   dataset::OpenOptions open;               ///< format, camera, from, to, every
   bool replace = false;                    ///< replace an earlier result
+  bool resume = false;                     ///< go on from what an interrupted run left in OUT.partial
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
 };
 
+/// Whether there is nothing to go on with: OUT is whole and no run was interrupted since.
+bool is_finished(const std::filesystem::path& out);
+
 /// Checks everything first (pipeline: kUsage, recording: kInput, output folder: kOutput), then maps. When the
 /// result is written but should not be trusted, the summary's `reason` says why. Errors leave an earlier
-/// result untouched. `progress` may be empty.
+/// result untouched; what a run that failed on the way had stored stays in OUT.partial. `resume` with another
+/// input or configuration than that run's is kUsage. `progress` may be empty.
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop, const Progress& progress);
 

@@ -38,7 +38,8 @@ using Progress = std::function<void(std::size_t done, std::size_t total)>;
 /// threads plus two, so that memory stays bounded. Stateless stages work side by side, serial stages see the
 /// frames in order: results do not depend on the number of threads. The run ends early, in order, when the
 /// context's stop token says so (stages still finish) or when a stage fails: then the error of the earliest
-/// such frame is returned and no stage finishes.
+/// such frame is returned and no stage finishes. A run that goes on from another begins with the frame after
+/// the last one of that; the report counts those, too, but has no times of them.
 core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress);
 
 }  // namespace plumbline::pipeline

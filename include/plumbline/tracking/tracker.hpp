@@ -69,6 +69,11 @@ class Tracker {
   void map_changed(const maps::Map& map, core::KeyframeId reference,
                    const geometry::Rigid3& last_camera_from_world);
 
+  /// Goes on where another tracker left `map`: it had just tracked the keyframe `reference` at
+  /// `camera_from_world`, with this motion of camera_from_world per second.
+  void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Rigid3& camera_from_world,
+               const geometry::Vector6d& velocity);
+
   /// Who knows which keyframes of the map look like a picture, best first. Asked when tracking is lost, beside
   /// what the tracker finds by itself.
   using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;

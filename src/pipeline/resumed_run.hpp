@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What an interrupted run left in its store, for the stages of the run that goes on.
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/pipeline/data.hpp"
+
+namespace plumbline::pipeline {
+
+constexpr const char* kStoreFile = "map.db";  ///< in the result folder
+
+struct ResumedRun {
+  std::filesystem::path store;  ///< its file; clouds are read from there
+  maps::StoredMap map;
+  std::vector<FrameRow> rows;  ///< of the frames that are done and could be read
+  std::size_t frames = 0;      ///< how many are done, the unreadable ones too
+};
+
+/// A row as a line of frames.csv.
+std::string to_line(const FrameRow& row);
+
+/// Opens the store of `folder`. None: no keyframe was stored, and what there is was removed. kUsage: it was
+/// begun with another configuration, recording or camera; the message says what differs. kInput: damaged.
+core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path& folder,
+                                                     const std::string& configuration,
+                                                     const std::string& input, const sensor::Camera& camera);
+
+/// Keyframes in the store of `folder`; 0 when there is none that opens.
+std::size_t stored_keyframes(const std::filesystem::path& folder);
+
+}  // namespace plumbline::pipeline
