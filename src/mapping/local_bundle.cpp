@@ -75,10 +75,12 @@ class Builder {
     for (core::LineId id : lines) add_line(id);
   }
 
+  /// A sheared picture's depth is sheared, too: its surfaces say as little about where it was as its corners.
   void add_edges() {
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
         if (edge.b != id || !has(edge.a)) continue;  // each edge once, at its newer end
+        if (!calm(edge.a) || !calm(edge.b)) continue;
         const int a = index_.at(edge.a);
         const int b = index_.at(edge.b);
         if (pose_fixed(a) && pose_fixed(b)) continue;
@@ -87,12 +89,18 @@ class Builder {
     }
   }
 
+  /// Without a keyframe that is held and speaks, the oldest that speaks is held: all could drift otherwise.
   LocalBundle take() {
-    auto& poses = bundle_.problem.poses;
-    const bool anchored = std::any_of(poses.begin(), poses.end(), [](const auto& p) { return p.fixed; });
-    if (!anchored && !poses.empty()) {
-      const auto oldest = std::min_element(bundle_.keyframes.begin(), bundle_.keyframes.end());
-      poses[static_cast<std::size_t>(oldest - bundle_.keyframes.begin())].fixed = true;
+    KeyframeId oldest;
+    bool anchored = false;
+    for (std::size_t i = 0; i < bundle_.keyframes.size(); ++i) {
+      const KeyframeId id = bundle_.keyframes[i];
+      if (!calm(id)) continue;
+      anchored = anchored || bundle_.problem.poses[i].fixed;
+      if (!oldest.valid() || id < oldest) oldest = id;
+    }
+    if (!anchored && oldest.valid()) {
+      bundle_.problem.poses[static_cast<std::size_t>(index_.at(oldest))].fixed = true;
     }
     return std::move(bundle_);
   }

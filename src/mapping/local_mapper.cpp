@@ -151,14 +151,22 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
   }
 }
 
+/// Pictures taken while turning fast are sheared: their rays lie, and what they show does not lie where it
+/// seems to.
+bool LocalMapper::sheared(const maps::Map& map, core::KeyframeId id) const {
+  return map.keyframe(id).turn_rate > options_.bundle_max_turn_rate;
+}
+
+std::vector<core::KeyframeId> LocalMapper::nearest_sharp(const maps::Map& map, core::KeyframeId id,
+                                                         int count) const {
+  std::vector<core::KeyframeId> neighbours = nearest(map, id, count);
+  const auto bad = [&](core::KeyframeId k) { return sheared(map, k); };
+  neighbours.erase(std::remove_if(neighbours.begin(), neighbours.end(), bad), neighbours.end());
+  return neighbours;
+}
+
 void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id) {
-  // Pictures taken while turning fast are sheared: their rays lie.
-  const auto sheared = [&](core::KeyframeId k) {
-    return map.keyframe(k).turn_rate > options_.bundle_max_turn_rate;
-  };
-  if (sheared(id)) return;
-  std::vector<core::KeyframeId> neighbours = nearest(map, id, options_.triangulation.keyframes);
-  neighbours.erase(std::remove_if(neighbours.begin(), neighbours.end(), sheared), neighbours.end());
+  const std::vector<core::KeyframeId> neighbours = nearest_sharp(map, id, options_.triangulation.keyframes);
   const TriangulationOptions& how = options_.triangulation;
   const double measured = options_.max_landmark_depth_m;
   for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how))
@@ -167,9 +175,10 @@ void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id) {
 }
 
 void LocalMapper::refine(maps::Map& map, core::KeyframeId id) {
-  if (options_.triangulate) triangulate(map, id);
-  if (options_.fuse) {
-    const std::vector<core::KeyframeId> neighbours = nearest(map, id, options_.fusion.keyframes);
+  const bool speaks = !sheared(map, id);
+  if (options_.triangulate && speaks) triangulate(map, id);
+  if (options_.fuse && speaks) {
+    const std::vector<core::KeyframeId> neighbours = nearest_sharp(map, id, options_.fusion.keyframes);
     fuse_points(map, id, neighbours, camera_, options_.fusion);
     fuse_lines(map, id, neighbours, camera_, options_.fusion);
   }

@@ -2,6 +2,7 @@
 // Local bundles taken from a map of known truth, adjusted and put back.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 
 #include "plumbline/mapping/local_bundle.hpp"
@@ -22,14 +23,15 @@ struct SmallMap {
   std::vector<Eigen::Vector3d> points;
   core::PointId single;  ///< seen by keyframe 2 only
 
-  explicit SmallMap(double turn_rate_of_last = 0.0) {
+  explicit SmallMap(double turn_rate_of_last = 0.0, double turn_rate_of_first = 0.0) {
+    const std::array<double, 3> turn_rates{turn_rate_of_first, 0.0, turn_rate_of_last};
     tests::Random random(3);
     for (int i = 0; i < 60; ++i) {
       points.emplace_back(random.uniform(-0.8, 0.8), random.uniform(-0.6, 0.6), random.uniform(1.5, 3.0));
     }
     for (int k = 0; k < 3; ++k) {
       truth.emplace_back(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-0.1 * k, 0.02 * k, 0.0));
-      add_keyframe(k, k == 2 ? turn_rate_of_last : 0.0);
+      add_keyframe(k, turn_rates[static_cast<std::size_t>(k)]);
     }
     for (const Eigen::Vector3d& p : points) {
       maps::MapPoint point;
@@ -100,6 +102,22 @@ TEST(LocalBundle, AKeyframeTakenWhileTurningFastIsHeldAndSilent) {
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
   put_back(bundle, world.map);
   EXPECT_EQ(tests::distance(world.map.camera_from_world({0, 2}), before), 0.0);
+}
+
+TEST(LocalBundle, AnEdgeOfAKeyframeTakenWhileTurningFastIsSilent) {
+  for (const double turn_rate : {0.0, 5.0}) {
+    SmallMap world(turn_rate);
+    world.map.add_edge({{0, 1}, {0, 2}, {}, geometry::Matrix6d::Identity(), 1.0, 1.0});
+    const LocalBundle bundle = take_local_bundle(world.map, {0, 1}, kCamera, {});
+    EXPECT_EQ(bundle.problem.edges.size(), turn_rate > 0.0 ? 0U : 1U);
+  }
+}
+
+TEST(LocalBundle, WhatIsHeldButSilentIsNoAnchor) {
+  SmallMap world(5.0, 5.0);
+  const LocalBundle bundle = take_local_bundle(world.map, {0, 1}, kCamera, {});
+  ASSERT_EQ(bundle.keyframes.size(), 3U);
+  for (const auto& pose : bundle.problem.poses) EXPECT_TRUE(pose.fixed);
 }
 
 TEST(LocalBundle, AWrongObservationIsTakenOutOfTheMap) {

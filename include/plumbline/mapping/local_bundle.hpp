@@ -31,13 +31,13 @@ struct LocalBundle {
 
 struct LocalBundleOptions {
   int keyframes = 12;          ///< how many may move
-  double max_turn_rate = 0.6;  ///< rad/s; keyframes taken while turning faster are held, and do not speak
+  double max_turn_rate = 0.6;  ///< rad/s; keyframes taken while turning faster are held and silent
   double orb_scale_factor = 1.2;
 };
 
 /// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most
-/// with. Keyframes around these, that see the same landmarks, are held. Without any of these the oldest
-/// keyframe is held.
+/// with. Keyframes around these, that see the same landmarks, are held. Without any of these that speaks
+/// the oldest keyframe that does is held.
 LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, const sensor::Pinhole& camera,
                               const LocalBundleOptions& options,
                               const std::vector<core::KeyframeId>& also = {});

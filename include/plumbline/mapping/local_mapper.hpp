@@ -70,6 +70,9 @@ class LocalMapper {
   void add_points(maps::Map& map, core::KeyframeId keyframe);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
   void triangulate(maps::Map& map, core::KeyframeId keyframe);
+  [[nodiscard]] bool sheared(const maps::Map& map, core::KeyframeId keyframe) const;
+  [[nodiscard]] std::vector<core::KeyframeId> nearest_sharp(const maps::Map& map, core::KeyframeId keyframe,
+                                                            int count) const;
 
   LocalMapperOptions options_;
   sensor::Pinhole camera_;
