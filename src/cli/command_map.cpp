@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "app.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
@@ -11,7 +13,9 @@
 namespace plumbline::cli {
 namespace {
 
-int map(Session& session, pipeline::MapRequest request) {
+int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs) {
+  request.input = inputs.front();
+  request.others.assign(inputs.begin() + 1, inputs.end());
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return session.fail(pipelines.error());
   request.pipelines_folder = *pipelines;
@@ -42,11 +46,13 @@ int map(Session& session, pipeline::MapRequest request) {
 
 void add_map(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
+  const auto inputs = std::make_shared<std::vector<std::string>>();
   CLI::App* command = add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
-                                  [&session, request] { return map(session, *request); });
+                                  [&session, request, inputs] { return map(session, *request, *inputs); });
   command
-      ->add_option("INPUT", request->input,
-                   "A TUM RGB-D, 7-Scenes or Redwood folder, or synth:SCENE?frames=900&texture=none&seed=3")
+      ->add_option("INPUT", *inputs,
+                   "A TUM RGB-D, 7-Scenes or Redwood folder, or synth:SCENE?frames=900&texture=none&seed=3; "
+                   "several: recordings of as many robots, fused into one map")
       ->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
   command->add_option("-p,--pipeline", request->pipeline, "Shipped pipeline or file (default: rgbd)")

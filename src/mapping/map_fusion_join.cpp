@@ -30,11 +30,14 @@ class PartsCollector {
  public:
   void add(const maps::Map& map, const RobotNumbers& to, const Rigid3& world_from_map) {
     const Rigid3 map_from_world = world_from_map.inverse();
+    // A map that stays where it is keeps every bit.
+    const bool stays = world_from_map.rotation.isIdentity(0.0) && world_from_map.translation.isZero(0.0);
     for (const KeyframeId id : map.keyframe_ids()) {
       auto data = std::make_shared<maps::Keyframe>(map.keyframe(id));
       data->id = renamed(id, to);
       parts_.keyframes.push_back(
-          {data, map.camera_from_world(id) * map_from_world, renamed(map.parent(id), to)});
+          {data, stays ? map.camera_from_world(id) : map.camera_from_world(id) * map_from_world,
+           renamed(map.parent(id), to)});
     }
     for (const core::PointId id : map.point_ids()) {
       maps::MapPoint point = map.point(id);

@@ -124,7 +124,7 @@ std::string judge(const MergeEvidence& merge, const MapFusionOptions& options) {
         "is not enough",
         merge.span_m, merge.span_rad);
   }
-  if (merge.rival >= 2 && merge.rival >= options.rival * merge.agreeing) {
+  if (merge.rival >= 1 && merge.rival >= options.rival * merge.agreeing) {
     return fmt::format(
         "two answers exclude each other: {} keyframes say one thing, {} another; places look "
         "alike here",

@@ -18,6 +18,7 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 #include "resumed_run.hpp"
 
 namespace plumbline::pipeline {
@@ -40,6 +41,9 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
       core::version());
   text += "run:\n";
   text += fmt::format("  input: {}\n  pipeline: {}\n", quoted(request.input), quoted(request.pipeline));
+  for (std::size_t i = 0; i < request.others.size(); ++i) {
+    text += fmt::format("  input{}: {}\n", i + 2, quoted(request.others[i]));
+  }
   text +=
       fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format));
   text += fmt::format("  from: {} s\n", request.open.from_s);
@@ -73,10 +77,33 @@ std::string input_text(const dataset::FrameSource& source) {
   return text + fmt::format("stamps: {:016x}\n", hash);
 }
 
+/// The recording, or several side by side; these are `recordings`, too.
+core::Result<std::unique_ptr<dataset::FrameSource>> open_inputs(const MapRequest& request,
+                                                                const core::Executor& executor,
+                                                                core::Log& log,
+                                                                const RobotRecordings*& recordings) {
+  const std::filesystem::path scenes = request.pipelines_folder / "scenes";
+  auto first = open_input(request.input, request.open, scenes, executor, log);
+  if (!first || request.others.empty()) return first;
+  std::vector<std::unique_ptr<dataset::FrameSource>> all;
+  all.push_back(std::move(*first));
+  for (const std::string& input : request.others) {
+    auto other = open_input(input, request.open, scenes, executor, log);
+    if (!other) return other;
+    all.push_back(std::move(*other));
+  }
+  auto several = std::make_unique<RobotRecordings>(std::move(all));
+  recordings = several.get();
+  return several;
+}
+
 core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::filesystem::path& pipeline) {
   if (!keeps) {
-    return core::usage_error(fmt::format(
-        "{}: keeps no map.db to go on from; add a store stage, or leave out --resume", pipeline.string()));
+    return core::usage_error(
+        fmt::format("{}: keeps no map.db to go on from; it takes one recording, a track stage and a store "
+                    "stage, or leave out "
+                    "--resume",
+                    pipeline.string()));
   }
   if (!request.debug_video.empty()) {
     return core::usage_error(
@@ -115,7 +142,9 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
 
-  const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
+  const bool several = !request.others.empty();
+  const std::string pipeline = several && request.pipeline == "rgbd" ? "robots" : request.pipeline;
+  const auto pipeline_file = find_pipeline(pipeline, request.pipelines_folder);
   if (!pipeline_file) return fail(pipeline_file.error());
   StageRegistry registry;
   register_stages(registry);
@@ -129,13 +158,19 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
         fmt::format("{}: has no track stage whose work could be drawn; leave out --debug-video",
                     pipeline_file->string()));
   }
-  const auto source =
-      open_input(request.input, request.open, request.pipelines_folder / "scenes", executor, log);
+  if (several && graph->source().type->name != "maps" &&
+      std::none_of(graph->nodes.begin(), graph->nodes.end(),
+                   [](const Node& node) { return node.type->name == "robots"; })) {
+    return core::usage_error(fmt::format(
+        "{}: maps one recording; several need a pipeline with a robots stage", pipeline_file->string()));
+  }
+  const RobotRecordings* recordings = nullptr;
+  const auto source = open_inputs(request, executor, log, recordings);
   if (!source) return fail(source.error());
   const bool keeps = std::any_of(graph->nodes.begin(), graph->nodes.end(),
                                  [](const Node& node) { return node.stage->wants_map_changes(); });
   if (request.resume) {
-    if (auto can = can_resume(request, keeps, *pipeline_file); !can) return fail(can.error());
+    if (auto can = can_resume(request, keeps && tracks, *pipeline_file); !can) return fail(can.error());
   }
   auto output = request.resume ? OutputFolder::resume(request.output, request.replace)
                                : OutputFolder::prepare(request.output, request.replace);
@@ -164,6 +199,7 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
 
   RunContext context;
   context.source = source->get();
+  context.recordings = recordings;
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
@@ -178,20 +214,23 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
 
   RunSummary summary;
   summary.input = request.input;
-  summary.pipeline = request.pipeline;
+  for (const std::string& other : request.others) summary.input += " " + other;
+  summary.pipeline = pipeline;
   summary.threads = executor.threads();
   add_report(*report, summary);
   for (const Node& node : graph->nodes) node.stage->summarise(summary);
   judge(summary);
   if (auto written = write_timing(output->path() / "timing.csv", *report, summary.parts, **source);
       !written) {
-    return fail(written.error());
+    return fail(with_what_is_kept(written.error(), *output));
   }
   summary.peak_rss_mb = peak_rss_mb();
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (auto written = write_summary(output->path() / "summary.json", summary); !written)
-    return fail(written.error());
-  if (auto committed = output->commit(); !committed) return fail(committed.error());
+    return fail(with_what_is_kept(written.error(), *output));
+  if (auto committed = output->commit(); !committed) {
+    return fail(with_what_is_kept(committed.error(), *output));
+  }
   if (debug) {
     if (auto committed = debug->commit(); !committed) return fail(committed.error());
   }

@@ -16,6 +16,7 @@ void register_stages(StageRegistry& registry) {
   registry.add(fuse_stage());
   registry.add(filter_stage());
   registry.add(store_stage());
+  registry.add(robots_stage());
   registry.add(maps_stage());
   registry.add(keep_stage());
   registry.add(output_stage());

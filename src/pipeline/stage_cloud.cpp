@@ -8,6 +8,7 @@
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
@@ -30,17 +31,24 @@ class CloudStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     camera_ = context.source->camera().color;
     frames_ = context.source->size();
+    recordings_ = context.recordings;
     return {};
   }
 
   core::Result<void> process(StageIo& io) override {
     const auto track = io.input<TrackedFrame>("track");
+    const std::int32_t robot = recordings_ != nullptr ? recordings_->robot_of(io.frame()) : 0;
+    const std::size_t number = recordings_ != nullptr ? recordings_->frame_of(io.frame()) : io.frame();
+    const std::size_t frames = recordings_ != nullptr ? recordings_->frames_of(robot) : frames_;
     // The last frame shows what no other does when the camera was on its way somewhere.
     const bool between =
-        between_ > 0 && (io.frame() % static_cast<std::size_t>(between_) == 0 || io.frame() + 1 == frames_);
+        between_ > 0 && (number % static_cast<std::size_t>(between_) == 0 || number + 1 == frames);
     if (!track->keyframe.valid() && !between) return {};
     const auto frame = io.input<sensor::RgbdFrame>("frame");
-    cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera_, options_);
+    const sensor::Pinhole camera = recordings_ != nullptr
+                                       ? recordings_->robots()[static_cast<std::size_t>(robot)].camera.color
+                                       : camera_;
+    cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera, options_);
     cloud::FilterContext context;
     context.viewpoint = Eigen::Vector3f::Zero();
     context.run = std::to_string(track->keyframe.index);
@@ -49,6 +57,7 @@ class CloudStage : public Stage {
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
     result->stamp = track->stamp;
+    result->robot = robot;
     result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**filtered));
     result->cloud = std::move(*filtered);
     io.output<KeyframeCloud>("cloud", result);
@@ -61,6 +70,7 @@ class CloudStage : public Stage {
   std::size_t frames_ = 0;
   ChainOption filters_{"filters/keyframe.yaml"};
   sensor::Pinhole camera_;
+  const RobotRecordings* recordings_ = nullptr;  ///< null: one robot
 };
 
 }  // namespace

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // features: points and lines of every frame.
 #include <memory>
-#include <optional>
+#include <vector>
 
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/features/frame_features.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
@@ -14,19 +15,30 @@ class FeaturesStage : public Stage {
  public:
   void declare(core::OptionTable& table) override { options_.declare(table); }
   core::Result<void> start(const RunContext& context) override {
-    extractor_.emplace(options_, context.source->camera().color);
+    recordings_ = context.recordings;
+    if (recordings_ == nullptr) {
+      extractors_.push_back(
+          std::make_unique<features::FeatureExtractor>(options_, context.source->camera().color));
+      return {};
+    }
+    for (const RobotInfo& robot : recordings_->robots()) {
+      extractors_.push_back(std::make_unique<features::FeatureExtractor>(options_, robot.camera.color));
+    }
     return {};
   }
   core::Result<void> process(StageIo& io) override {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
-    io.output<features::FrameFeatures>(
-        "features", std::make_shared<features::FrameFeatures>(extractor_->extract(*frame)));
+    const std::int32_t robot = recordings_ != nullptr ? recordings_->robot_of(io.frame()) : 0;
+    const features::FeatureExtractor& extractor = *extractors_[static_cast<std::size_t>(robot)];
+    io.output<features::FrameFeatures>("features",
+                                       std::make_shared<features::FrameFeatures>(extractor.extract(*frame)));
     return {};
   }
 
  private:
   features::FeatureOptions options_;
-  std::optional<features::FeatureExtractor> extractor_;
+  const RobotRecordings* recordings_ = nullptr;
+  std::vector<std::unique_ptr<features::FeatureExtractor>> extractors_;  ///< by robot
 };
 
 }  // namespace

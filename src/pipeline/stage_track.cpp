@@ -12,41 +12,10 @@
 #include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
 #include "stages.hpp"
+#include "track_rows.hpp"
 
 namespace plumbline::pipeline {
 namespace {
-
-const char* const kColumns =
-    "stamp,reference,keyframe,relocalised,points,points_rms,lines,lines_rms,surface,surface_rms,min_"
-    "eigenvalue,"
-    "weak_directions,frames_since_keyframe,shared,overlap,parallax,rotation_rad,mapper_idle,cone_candidate,"
-    "cone_shared,cone_matched,cone_all,cone_changed,cone_theta,cone_beta,cone_alpha,cone_initial,cone_"
-    "adaptive,"
-    "cone_ecog,cone_offset,wanted,urgent,bundle,bundle_cost,bundle_outliers";
-
-std::string columns_of(const mapping::ConeTerms& c) {
-  return fmt::format("{},{:.4f},{},{},{},{:.4f},{:.4f},{:.4f},{:.2f},{:.2f},{:.4f},{:.4f}",
-                     c.candidate ? 1 : 0, c.shared, c.now.matched, c.now.all, c.now.changed,
-                     c.threshold.theta, c.threshold.beta, c.threshold.alpha, c.threshold.initial,
-                     c.threshold.adaptive, c.balance.ecog, c.balance.offset);
-}
-
-std::string columns_of(const mapping::BundleReport& b) {
-  if (!b.keyframe.valid()) return "-1,,";
-  const double ratio = b.summary.initial_cost > 0.0 ? b.summary.final_cost / b.summary.initial_cost : 1.0;
-  return fmt::format("{},{:.4f},{}", b.keyframe.index, ratio,
-                     b.summary.point_outliers + b.summary.line_outliers);
-}
-
-std::string columns(const mapping::FrameReport& r) {
-  const mapping::KeyframeDecision& d = r.decision;
-  return fmt::format(
-      "{:.6f},{},{},{},{},{:.4f},{},{:.4f},{},{:.4f},{:.6g},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{},{}",
-      r.stamp, r.reference.index, r.keyframe.index, r.relocalised ? 1 : 0, r.points.inliers, r.points.rms,
-      r.lines.inliers, r.lines.rms, r.surface.inliers, r.surface.rms, r.min_eigenvalue, r.weak_directions,
-      d.frames_since, d.shared, d.overlap, d.parallax, d.rotation_rad, d.mapper_idle ? 1 : 0,
-      columns_of(d.cone), d.wanted ? 1 : 0, d.urgent ? 1 : 0, columns_of(r.bundle));
-}
 
 class TrackStage : public Stage {
  public:
@@ -72,7 +41,7 @@ class TrackStage : public Stage {
     const auto features = io.input<features::FrameFeatures>("features");
     const std::size_t poses = slam_->frame_poses().size();
     const mapping::FrameReport report = slam_->process(*frame, features);
-    rows_.push_back({io.frame(), tracking::to_string(report.state), columns(report)});
+    rows_.push_back({io.frame(), tracking::to_string(report.state), row_columns(report)});
     note_times(io.frame(), report.bundle);
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->keyframe = report.keyframe;
@@ -94,7 +63,7 @@ class TrackStage : public Stage {
     result->map = std::make_shared<maps::Map>(slam_->map());
     result->frame_poses = slam_->frame_poses();
     take_poses_from_map(*result);
-    result->frame_columns = kColumns;
+    result->frame_columns = kRowColumns;
     result->frames = rows_;
     lines_ = result->lines.size();
     if (options_.loops.enabled) {
@@ -111,7 +80,8 @@ class TrackStage : public Stage {
     summary.lines = lines_;
     const mapping::LoopCounts& loops = slam_->loop_counts();
     summary.loops = {static_cast<std::size_t>(loops.candidates), static_cast<std::size_t>(loops.verified),
-                     static_cast<std::size_t>(loops.accepted)};
+                     static_cast<std::size_t>(loops.accepted), static_cast<std::size_t>(loops.rejected),
+                     slam_->loop_trials()};
     summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
     summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
   }

@@ -20,6 +20,7 @@ StageType refine_stage();
 StageType fuse_stage();
 StageType filter_stage();
 StageType store_stage();
+StageType robots_stage();
 StageType maps_stage();
 StageType keep_stage();
 StageType output_stage();

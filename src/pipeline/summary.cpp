@@ -35,6 +35,41 @@ nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
   return matrix;
 }
 
+/// Every candidate that was verified: what was found, and why it is no loop.
+nlohmann::ordered_json trials_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const mapping::LoopTrial& trial : summary.loops.trials) {
+    const mapping::PlaceVerification& e = trial.loop.evidence;
+    list.push_back({{"query", trial.loop.query.index},
+                    {"match", trial.loop.match.index},
+                    {"closed", trial.closed},
+                    {"reason", trial.refused},
+                    {"score", rounded(trial.score)},
+                    {"matches", e.matched_points + e.matched_lines},
+                    {"points", e.points},
+                    {"lines", e.lines},
+                    {"found", rounded(e.found)},
+                    {"rms", rounded(e.rms_px)},
+                    {"overlap", rounded(e.overlap)},
+                    {"contradiction", rounded(e.contradiction)},
+                    {"correction_m", rounded(trial.correction_m)},
+                    {"correction_rad", rounded(trial.correction_rad)},
+                    {"way_m", rounded(trial.way_m)}});
+  }
+  return list;
+}
+
+nlohmann::ordered_json traffic_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::Traffic& robot : summary.traffic) {
+    list.push_back({{"name", robot.robot},
+                    {"messages", robot.messages},
+                    {"bytes", robot.bytes},
+                    {"largest_message", robot.most}});
+  }
+  return list;
+}
+
 nlohmann::ordered_json merges_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::Merge& merge : summary.merges) {
@@ -155,7 +190,11 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"keyframes", s.keyframes},
       {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
       {"loops",
-       {{"candidates", s.loops.candidates}, {"verified", s.loops.verified}, {"accepted", s.loops.accepted}}},
+       {{"candidates", s.loops.candidates},
+        {"verified", s.loops.verified},
+        {"accepted", s.loops.accepted},
+        {"rejected", s.loops.rejected},
+        {"list", trials_of(s)}}},
       {"refine",
        {{"local_maps", s.refine.local_maps},
         {"tried", s.refine.tried},
@@ -165,6 +204,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"mean_shift_m", rounded(s.refine.mean_shift_m)},
         {"max_shift_m", rounded(s.refine.max_shift_m)}}},
       {"merges", merges_of(s)},
+      {"robots", traffic_of(s)},
       {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},
       {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
       {"timing",

@@ -19,20 +19,22 @@ namespace plumbline::pipeline {
 
 struct MapRequest {
   std::string input;                       ///< folder or synth:...
+  std::vector<std::string> others;         ///< further recordings, each of a robot of its own
   std::filesystem::path output;            ///< the result folder
   std::string pipeline = "rgbd";           ///< shipped name or file
   std::vector<std::string> overrides;      ///< stage.key=value
   std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
-  dataset::OpenOptions open;               ///< format, camera, from, to, every
-  bool replace = false;                    ///< replace an earlier result
-  bool resume = false;                     ///< go on from what an interrupted run left in OUT.partial
+  dataset::OpenOptions open;                                 ///< format, camera, from, to, every
+  bool replace = false;                                      ///< replace an earlier result
+  bool resume = false;                ///< go on from what an interrupted run left in OUT.partial
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
 };
 
 /// Whether there is nothing to go on with: OUT is whole and no run was interrupted since.
 bool is_finished(const std::filesystem::path& out);
 
+/// With `others`, `rgbd` stands for the shipped pipeline for several robots, `robots`.
 /// Checks everything first (pipeline: kUsage, recording: kInput, output folder: kOutput), then maps. When the
 /// result is written but should not be trusted, the summary's `reason` says why. Errors leave an earlier
 /// result untouched; what a run that failed on the way had stored stays in OUT.partial. `resume` with another

@@ -35,6 +35,7 @@ namespace plumbline::pipeline {
 
 struct ResumedRun;
 struct RunSummary;
+class RobotRecordings;
 class StoredMaps;
 
 /// How often a port carries a value.
@@ -108,8 +109,9 @@ class StageIo {
 /// What a run lends to its stages; outlives them.
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
-  const StoredMaps* stored_maps = nullptr;  ///< what a maps stage reads; null: there is none
-  std::string anchor;                             ///< robot whose frame finished maps are laid into; empty: any
+  const StoredMaps* stored_maps = nullptr;      ///< what a maps stage reads; null: there is none
+  const RobotRecordings* recordings = nullptr;  ///< `source`, when it is several robots'; else null
+  std::string anchor;                           ///< robot whose frame finished maps are laid into; empty: any
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;
   core::StopToken stop;

@@ -10,6 +10,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "plumbline/pipeline/run.hpp"
 
@@ -36,14 +37,16 @@ struct RunSummary {
   struct Loops {
     std::size_t candidates = 0;
     std::size_t verified = 0;
-    std::size_t accepted = 0;
+    std::size_t accepted = 0;  ///< times that loops moved the map
+    std::size_t rejected = 0;  ///< of the verified, taken for wrong by the pose graph
+    std::vector<mapping::LoopTrial> trials;
   } loops;
   struct Refine {
     std::size_t local_maps = 0;
-    std::size_t tried = 0;     ///< alignments of two local maps
-    std::size_t accepted = 0;  ///< of these, used
-    std::size_t rejected = 0;  ///< of the accepted, taken for wrong by the pose graph
-    double mean_rms = 0.0;     ///< of the accepted, standard deviations of the depth noise
+    std::size_t tried = 0;      ///< alignments of two local maps
+    std::size_t accepted = 0;   ///< of these, used
+    std::size_t rejected = 0;   ///< of the accepted, taken for wrong by the pose graph
+    double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
     double mean_shift_m = 0.0;  ///< how far keyframes moved
     double max_shift_m = 0.0;
   } refine;
@@ -55,14 +58,22 @@ struct RunSummary {
     mapping::MergeEvidence evidence;
   };
   std::vector<Merge> merges;
+  /// What a robot told the fusion end.
+  struct Traffic {
+    std::string robot;
+    std::size_t messages = 0;  ///< one a keyframe
+    std::size_t bytes = 0;
+    std::size_t most = 0;  ///< bytes of the largest message
+  };
+  std::vector<Traffic> traffic;
   std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;
   std::string up = "none";           ///< what the output's frame stands on: floor, camera or none
   geometry::Rigid3 output_from_map;  ///< to that frame from the one that tracking began in
-  double wall_s = 0.0;    ///< the whole run
-  double map_s = 0.0;     ///< first frame read to last change of the map
-  double export_s = 0.0;  ///< clouds, pictures and tables
+  double wall_s = 0.0;               ///< the whole run
+  double map_s = 0.0;                ///< first frame read to last change of the map
+  double export_s = 0.0;             ///< clouds, pictures and tables
   struct StageTime {
     std::string name;
     double median_ms = 0.0;

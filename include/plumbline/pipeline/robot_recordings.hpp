@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Several recordings side by side, each of a robot of its own, as one source of frames.
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/pipeline/data.hpp"
+
+namespace plumbline::pipeline {
+
+/// Frames come in the order of their stamps, ties by robot. Recordings that do not overlap in time are laid
+/// side by side: then the seconds since each one's first frame count.
+class RobotRecordings : public dataset::FrameSource {
+ public:
+  /// One recording a robot, numbered in this order; of several with one name, later ones get a number behind
+  /// it. Throws std::invalid_argument without recordings.
+  explicit RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings);
+
+  [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
+  [[nodiscard]] std::int32_t robot_of(std::size_t index) const { return order_.at(index).robot; }
+  /// Its number within its recording, and how many that has.
+  [[nodiscard]] std::size_t frame_of(std::size_t index) const { return order_.at(index).index; }
+  [[nodiscard]] std::size_t frames_of(std::int32_t robot) const {
+    return recordings_[static_cast<std::size_t>(robot)]->size();
+  }
+  /// Seconds since the run began, of a frame.
+  [[nodiscard]] double time_of(std::size_t index) const { return order_.at(index).time; }
+
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] const std::string& format() const override { return recordings_.front()->format(); }
+  [[nodiscard]] const sensor::Camera& camera() const override { return recordings_.front()->camera(); }
+  [[nodiscard]] std::size_t size() const override { return order_.size(); }
+  [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
+  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
+
+ private:
+  struct Place {
+    double time = 0.0;
+    std::int32_t robot = 0;
+    std::size_t index = 0;  ///< in its recording
+  };
+  [[nodiscard]] const dataset::FrameSource& of(const Place& place) const {
+    return *recordings_[static_cast<std::size_t>(place.robot)];
+  }
+  std::string name_;
+  std::vector<std::unique_ptr<dataset::FrameSource>> recordings_;
+  std::vector<RobotInfo> robots_;
+  std::vector<Place> order_;
+};
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/keyframe_message.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "store_bytes.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+constexpr std::uint16_t kVersion = 1;
+constexpr double kPixelSteps = 32.0;     // per pixel, for pictures up to 2000 pixels wide
+constexpr double kLengthSteps = 4000.0;  // per metre
+constexpr double kNoiseSteps = 10000.0;
+
+std::uint16_t unsigned_steps(double value, double steps) {
+  return static_cast<std::uint16_t>(std::clamp(std::lround(value * steps), 0L, 65535L));
+}
+std::int16_t signed_steps(double value, double steps) {
+  return static_cast<std::int16_t>(std::clamp(std::lround(value * steps), -32767L, 32767L));
+}
+std::uint8_t byte_of(double value, double steps) {
+  return static_cast<std::uint8_t>(std::clamp(std::lround(value * steps), 0L, 255L));
+}
+float from(double value, double steps) { return static_cast<float>(value / steps); }
+
+/// Pixels begin half a pixel before the middle of the first one.
+double pixel_steps(const sensor::Pinhole& camera) {
+  return std::min(kPixelSteps, 65000.0 / std::max(1, std::max(camera.width, camera.height)));
+}
+
+/// Collects one column after another.
+template <typename T, typename Items, typename Get>
+void column(ByteWriter& to, const Items& items, const Get& get) {
+  std::vector<T> values;
+  values.reserve(items.size());
+  for (const auto& item : items) values.push_back(static_cast<T>(get(item)));
+  to.planes(values);
+}
+
+void write_points(const features::FrameFeatures& f, double steps, ByteWriter& to) {
+  to.count(f.points.size());
+  using P = features::PointFeature;
+  column<std::uint16_t>(to, f.points,
+                        [&](const P& p) { return unsigned_steps(double{p.pixel.x()} + 0.5, steps); });
+  column<std::uint16_t>(to, f.points,
+                        [&](const P& p) { return unsigned_steps(double{p.pixel.y()} + 0.5, steps); });
+  column<std::uint16_t>(to, f.points,
+                        [](const P& p) { return unsigned_steps(double{p.depth}, kLengthSteps); });
+  column<std::uint8_t>(to, f.points, [](const P& p) { return std::lround(p.angle / 360.0F * 256.0F) & 255; });
+  column<std::uint8_t>(to, f.points, [](const P& p) { return p.octave; });
+  for (const features::Descriptor256& d : f.descriptors) to.put(d);
+}
+
+void read_points(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f) {
+  const double steps = pixel_steps(camera);
+  const std::size_t n = bytes.count(40);
+  const auto x = bytes.planes<std::uint16_t>(n);
+  const auto y = bytes.planes<std::uint16_t>(n);
+  const auto depth = bytes.planes<std::uint16_t>(n);
+  const auto angle = bytes.planes<std::uint8_t>(n);
+  const auto octave = bytes.planes<std::uint8_t>(n);
+  f.points.resize(n);
+  f.descriptors.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    f.points[i].pixel = {from(x[i], steps) - 0.5F, from(y[i], steps) - 0.5F};
+    f.points[i].depth = from(depth[i], kLengthSteps);
+    f.points[i].angle = static_cast<float>(angle[i]) * 360.0F / 256.0F;
+    f.points[i].octave = octave[i];
+    bytes.get(f.descriptors[i]);
+  }
+  f.grid = features::PointGrid(f.points, camera.width, camera.height);
+}
+
+void write_lines(const features::FrameFeatures& f, double steps, ByteWriter& to) {
+  to.count(f.lines.size());
+  for (const features::LineFeature& line : f.lines) {
+    for (const Eigen::Vector2f& end : {line.segment.start, line.segment.end}) {
+      to.put(unsigned_steps(double{end.x()} + 0.5, steps));
+      to.put(unsigned_steps(double{end.y()} + 0.5, steps));
+    }
+    to.put(byte_of(double{line.segment.response}, 2.0));
+    to.put(line.descriptor);
+    to.flag(line.line3.has_value());
+    if (!line.line3) continue;
+    // The ends lie on the rays of the segment's ends: their depth says it all.
+    to.put(unsigned_steps(line.line3->start.z(), kLengthSteps));
+    to.put(unsigned_steps(line.line3->end.z(), kLengthSteps));
+    for (const features::EndpointNoise& noise : {line.line3->start_noise, line.line3->end_noise}) {
+      to.put(unsigned_steps(double{noise.depth}, kNoiseSteps));
+      to.put(unsigned_steps(double{noise.across}, kNoiseSteps));
+    }
+    to.put(byte_of(line.line3->inlier_share, 255.0));
+    to.put(byte_of(line.line3->coverage, 255.0));
+  }
+}
+
+void read_lines(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f) {
+  const double steps = pixel_steps(camera);
+  f.lines.resize(bytes.count(42));
+  for (features::LineFeature& line : f.lines) {
+    for (Eigen::Vector2f* end : {&line.segment.start, &line.segment.end}) {
+      end->x() = from(bytes.get<std::uint16_t>(), steps) - 0.5F;
+      end->y() = from(bytes.get<std::uint16_t>(), steps) - 0.5F;
+    }
+    line.segment.response = from(bytes.get<std::uint8_t>(), 2.0);
+    bytes.get(line.descriptor);
+    if (!bytes.flag()) continue;
+    features::Line3 line3;
+    const auto on_ray = [&](const Eigen::Vector2f& pixel) {
+      return camera.unproject(double{pixel.x()}, double{pixel.y()},
+                              bytes.get<std::uint16_t>() / kLengthSteps);
+    };
+    line3.start = on_ray(line.segment.start);
+    line3.end = on_ray(line.segment.end);
+    for (features::EndpointNoise* noise : {&line3.start_noise, &line3.end_noise}) {
+      noise->depth = from(bytes.get<std::uint16_t>(), kNoiseSteps);
+      noise->across = from(bytes.get<std::uint16_t>(), kNoiseSteps);
+    }
+    line3.inlier_share = bytes.get<std::uint8_t>() / 255.0;
+    line3.coverage = bytes.get<std::uint8_t>() / 255.0;
+    line.line3 = line3;
+  }
+}
+
+void write_surface(const std::vector<SurfaceSample>& surface, ByteWriter& to) {
+  constexpr double kUnit = 127.0;
+  to.count(surface.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    column<std::int16_t>(to, surface,
+                         [&](const SurfaceSample& s) { return signed_steps(double{s.point[axis]}, 2000.0); });
+    column<std::int8_t>(to, surface,
+                        [&](const SurfaceSample& s) { return std::lround(double{s.normal[axis]} * kUnit); });
+  }
+  column<std::uint16_t>(to, surface,
+                        [](const SurfaceSample& s) { return unsigned_steps(double{s.sigma}, kNoiseSteps); });
+}
+
+std::vector<SurfaceSample> read_surface(ByteReader& bytes) {
+  std::vector<SurfaceSample> surface(bytes.count(11));
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto points = bytes.planes<std::int16_t>(surface.size());
+    const auto normals = bytes.planes<std::int8_t>(surface.size());
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+      surface[i].point[axis] = from(points[i], 2000.0);
+      surface[i].normal[axis] = normals[i];
+    }
+  }
+  const auto sigma = bytes.planes<std::uint16_t>(surface.size());
+  for (std::size_t i = 0; i < surface.size(); ++i) {
+    surface[i].normal.normalize();
+    surface[i].sigma = from(sigma[i], kNoiseSteps);
+  }
+  return surface;
+}
+
+void write_depth(const cv::Mat& depth, ByteWriter& to) {
+  to.put(static_cast<std::uint16_t>(depth.cols));
+  to.put(static_cast<std::uint16_t>(depth.rows));
+  std::vector<std::uint16_t> steps;  // from one pixel to the next: small numbers pack well
+  std::uint16_t last = 0;
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      const std::uint16_t now = unsigned_steps(double{depth.at<float>(y, x)}, 250.0);  // 4 mm
+      steps.push_back(static_cast<std::uint16_t>(now - last));
+      last = now;
+    }
+  }
+  to.planes(steps);
+}
+
+cv::Mat read_depth(ByteReader& bytes) {
+  const int columns = bytes.get<std::uint16_t>();
+  const int rows = bytes.get<std::uint16_t>();
+  const auto steps =
+      bytes.planes<std::uint16_t>(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  if (steps.empty()) return {};
+  cv::Mat depth(rows, columns, CV_32FC1);
+  std::uint16_t last = 0;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    last = static_cast<std::uint16_t>(last + steps[i]);
+    depth.at<float>(static_cast<int>(i) / columns, static_cast<int>(i) % columns) = from(last, 250.0);
+  }
+  return depth;
+}
+
+template <typename IdType>
+std::vector<std::int32_t> numbers_of(const std::vector<IdType>& ids, std::size_t features) {
+  std::vector<std::int32_t> numbers(features, -1);
+  for (std::size_t i = 0; i < std::min(ids.size(), features); ++i) {
+    if (ids[i].valid()) numbers[i] = ids[i].index;
+  }
+  return numbers;
+}
+
+KeyframeMessage decode(const Bytes& packed) {
+  const Bytes plain = unpack(packed.data(), packed.size());
+  ByteReader bytes(plain);
+  if (bytes.get<std::uint16_t>() != kVersion) throw BadBytes("it is of another version");
+  KeyframeMessage message;
+  auto keyframe = std::make_shared<Keyframe>();
+  bytes.get(keyframe->id);
+  bytes.get(keyframe->frame_index);
+  bytes.get(keyframe->stamp);
+  bytes.get(keyframe->turn_rate);
+  bytes.get(message.camera_from_world);
+  sensor::Pinhole& c = message.camera;
+  for (int* size : {&c.width, &c.height}) *size = bytes.get<std::int32_t>();
+  for (double* value : {&c.fx, &c.fy, &c.cx, &c.cy}) bytes.get(*value);
+  constexpr int kMost_px = 65000;
+  if (c.width < 1 || c.height < 1 || c.width > kMost_px || c.height > kMost_px)
+    throw BadBytes("it has no camera");
+  auto features = std::make_shared<features::FrameFeatures>();
+  read_points(bytes, c, *features);
+  read_lines(bytes, c, *features);
+  features->thumbnail_depth = read_depth(bytes);
+  message.points = bytes.planes<std::int32_t>(features->points.size());
+  message.lines = bytes.planes<std::int32_t>(features->lines.size());
+  keyframe->features = features;
+  keyframe->surface = read_surface(bytes);
+  message.keyframe = keyframe;
+  message.moved.resize(bytes.count(104));
+  for (auto& [id, pose] : message.moved) {
+    bytes.get(id);
+    bytes.get(pose);
+  }
+  message.cloud = bytes.planes<std::uint8_t>(bytes.count(1));
+  bytes.expect_end();
+  return message;
+}
+
+}  // namespace
+
+KeyframeMessage make_message(const Map& map, KeyframeId id, const sensor::Pinhole& camera, int recent) {
+  KeyframeMessage message;
+  const Keyframe& keyframe = map.keyframe(id);
+  auto copy = std::make_shared<Keyframe>(keyframe);
+  if (copy->features == nullptr) copy->features = std::make_shared<features::FrameFeatures>();
+  message.camera_from_world = map.camera_from_world(id);
+  message.camera = camera;
+  message.points = numbers_of(map.points_of(id), copy->features->points.size());
+  message.lines = numbers_of(map.lines_of(id), copy->features->lines.size());
+  message.keyframe = copy;
+  for (std::int32_t i = id.index - 1; i >= 0 && static_cast<int>(message.moved.size()) < recent; --i) {
+    const KeyframeId earlier{id.robot, i};
+    if (map.has_keyframe(earlier)) message.moved.emplace_back(earlier, map.camera_from_world(earlier));
+  }
+  return message;
+}
+
+std::vector<std::uint8_t> encode_message(const KeyframeMessage& message) {
+  const Keyframe& keyframe = *message.keyframe;
+  const features::FrameFeatures& features = *keyframe.features;
+  const double steps = pixel_steps(message.camera);
+  ByteWriter to;
+  to.put(kVersion);
+  to.put(keyframe.id);
+  to.put(keyframe.frame_index);
+  to.put(keyframe.stamp);
+  to.put(keyframe.turn_rate);
+  to.put(message.camera_from_world);
+  const sensor::Pinhole& c = message.camera;
+  for (const int size : {c.width, c.height}) to.put(static_cast<std::int32_t>(size));
+  for (const double value : {c.fx, c.fy, c.cx, c.cy}) to.put(value);
+  write_points(features, steps, to);
+  write_lines(features, steps, to);
+  write_depth(features.thumbnail_depth, to);
+  to.planes(message.points);
+  to.planes(message.lines);
+  write_surface(keyframe.surface, to);
+  to.count(message.moved.size());
+  for (const auto& [id, pose] : message.moved) {
+    to.put(id);
+    to.put(pose);
+  }
+  to.count(message.cloud.size());
+  to.planes(message.cloud);
+  return pack(to.bytes());
+}
+
+core::Result<KeyframeMessage> decode_message(const std::vector<std::uint8_t>& bytes) {
+  try {
+    return decode(bytes);
+  } catch (const BadBytes& bad) {
+    return core::input_error(fmt::format("a keyframe's message cannot be read: {}", bad.what()));
+  }
+}
+
+}  // namespace plumbline::maps

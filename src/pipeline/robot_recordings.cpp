@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/robot_recordings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+namespace plumbline::pipeline {
+
+RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings)
+    : recordings_(std::move(recordings)) {
+  if (recordings_.empty()) throw std::invalid_argument("RobotRecordings: no recordings");
+  std::set<std::string> taken;
+  double latest_start = std::numeric_limits<double>::lowest();
+  double earliest_start = std::numeric_limits<double>::max();
+  double earliest_end = std::numeric_limits<double>::max();
+  for (const auto& recording : recordings_) {
+    RobotInfo robot;
+    robot.number = static_cast<std::int32_t>(robots_.size());
+    robot.name = recording->name();
+    for (int i = 2; !taken.insert(robot.name).second; ++i)
+      robot.name = fmt::format("{}-{}", recording->name(), i);
+    robot.camera = recording->camera();
+    name_ += (name_.empty() ? "" : " ") + robot.name;
+    robots_.push_back(std::move(robot));
+    if (recording->size() == 0) continue;
+    const double start = recording->info(0).stamp;
+    latest_start = std::max(latest_start, start);
+    earliest_start = std::min(earliest_start, start);
+    earliest_end = std::min(earliest_end, recording->info(recording->size() - 1).stamp);
+  }
+  const bool together = latest_start <= earliest_end;
+  for (const RobotInfo& robot : robots_) {
+    const dataset::FrameSource& recording = *recordings_[static_cast<std::size_t>(robot.number)];
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      const double begin = together ? earliest_start : recording.info(0).stamp;
+      order_.push_back({recording.info(i).stamp - begin, robot.number, i});
+    }
+  }
+  std::sort(order_.begin(), order_.end(), [](const Place& a, const Place& b) {
+    return std::tie(a.time, a.robot, a.index) < std::tie(b.time, b.robot, b.index);
+  });
+}
+
+dataset::PairInfo RobotRecordings::info(std::size_t index) const {
+  const Place& place = order_.at(index);
+  return of(place).info(place.index);
+}
+
+core::Result<sensor::RgbdFrame> RobotRecordings::read(std::size_t index) const {
+  const Place& place = order_.at(index);
+  return of(place).read(place.index);
+}
+
+}  // namespace plumbline::pipeline

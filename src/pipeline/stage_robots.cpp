@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// robots: the SLAM of several robots side by side, and the end that fuses their maps while they go (METHOD
+// section 6, Algorithm 2). Between robots and fusion end travel messages only.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "plumbline/mapping/fusion_end.hpp"
+#include "plumbline/mapping/slam.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "robot_merge.hpp"
+#include "stages.hpp"
+#include "track_rows.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class RobotsStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    slam_.declare(table);
+    table.boolean("online", online_, "Look for overlaps while the robots map, not only at the end");
+  }
+
+  core::Result<void> start(const RunContext& context) override {
+    context_ = &context;
+    recordings_ = context.recordings;
+    if (recordings_ == nullptr) {
+      return core::usage_error("a pipeline with a robots stage maps several recordings: name them all");
+    }
+    if (auto loaded = slam_.loops.load(); !loaded) return loaded;
+    fusion_.verify = slam_.loops.verify;
+    for (const RobotInfo& robot : recordings_->robots()) {
+      slams_.push_back(std::make_unique<mapping::Slam>(slam_, robot.camera.color, robot.number,
+                                                       *context.executor, *context.log));
+    }
+    end_ = std::make_unique<mapping::FusionEnd>(fusion_, slams_.size(), *context.executor);
+    return {};
+  }
+
+  core::Result<void> process(StageIo& io) override {
+    const auto frame = io.input<sensor::RgbdFrame>("frame");
+    const auto features = io.input<features::FrameFeatures>("features");
+    const std::int32_t robot = recordings_->robot_of(io.frame());
+    mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot)];
+    const mapping::FrameReport report = slam.process(*frame, features);
+    rows_.push_back({io.frame(), tracking::to_string(report.state),
+                     fmt::format("{},{}", recordings_->robots()[static_cast<std::size_t>(robot)].name,
+                                 row_columns(report))});
+    auto tracked = std::make_shared<TrackedFrame>();
+    tracked->keyframe = report.keyframe;
+    tracked->stamp = report.stamp;
+    tracked->row = rows_.back();
+    if (!slam.frame_poses().empty()) tracked->pose = slam.frame_poses().back();
+    io.output<TrackedFrame>("track", tracked);
+    if (!online_ || !report.keyframe.valid()) return {};
+    return send(slam.map(), report.keyframe, io.frame());
+  }
+
+  core::Result<void> finish(StageIo& io) override {
+    std::vector<RobotPart> parts;
+    for (const RobotInfo& robot : recordings_->robots()) {
+      mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
+      slam.finish();
+      if (slam.map().keyframe_count() == 0) {
+        return core::input_error(
+            fmt::format("{}: no frame could begin a map; leave this recording out", robot.name));
+      }
+      parts.push_back(
+          {robot.name, {&slam.map(), {{robot.number, robot.camera.color}}}, {robot}, &slam.frame_poses()});
+    }
+    merged_ = merge_robots(parts, parts.size(), fusion_, *context_->executor, *context_->log);
+    for (RunSummary::Merge& merge : merged_.merges) {
+      const auto when = times_.find({merge.evidence.a, merge.evidence.b});
+      if (when != times_.end()) merge.time_s = when->second;
+    }
+    auto map = std::make_shared<MapResult>(*merged_.map);
+    map->frame_columns = std::string("robot,") + kRowColumns;
+    map->frames = rows_;
+    merged_.map = map;
+    io.output<MapResult>("map", map);
+    return {};
+  }
+
+  void summarise(RunSummary& summary) const override {
+    count_frames(rows_, summary);
+    summary.keyframes = merged_.map->map->keyframe_count();
+    summary.points = merged_.map->map->point_count();
+    summary.lines = merged_.map->lines.size();
+    summary.merges = merged_.merges;
+    summary.unconnected = merged_.unconnected;
+    for (const RobotInfo& robot : recordings_->robots()) {
+      const auto r = static_cast<std::size_t>(robot.number);
+      const mapping::LoopCounts& loops = slams_[r]->loop_counts();
+      summary.loops.candidates += static_cast<std::size_t>(loops.candidates);
+      summary.loops.verified += static_cast<std::size_t>(loops.verified);
+      summary.loops.accepted += static_cast<std::size_t>(loops.accepted);
+      const mapping::FusionEnd::Traffic& traffic = end_->traffic(r);
+      summary.traffic.push_back({robot.name, traffic.messages, traffic.bytes, traffic.most});
+    }
+  }
+
+ private:
+  core::Result<void> send(const maps::Map& map, core::KeyframeId id, std::size_t frame) {
+    const RobotInfo& robot = recordings_->robots()[static_cast<std::size_t>(id.robot)];
+    const auto certain = end_->receive(maps::encode_message(maps::make_message(map, id, robot.camera.color)));
+    if (!certain) return tl::unexpected<core::Error>(certain.error());
+    for (const mapping::MergeEvidence& merge : *certain) {
+      const double time = recordings_->time_of(frame);
+      times_[{merge.a, merge.b}] = time;
+      context_->log->info(fmt::format("{} and {} have met after {:.1f} s: {} keyframes agree to {:.0f} mm",
+                                      recordings_->robots()[merge.a].name,
+                                      recordings_->robots()[merge.b].name, time, merge.agreeing,
+                                      1e3 * merge.spread_m));
+    }
+    return {};
+  }
+
+  const RunContext* context_ = nullptr;
+  const RobotRecordings* recordings_ = nullptr;
+  mapping::SlamOptions slam_;
+  mapping::MapFusionOptions fusion_;
+  bool online_ = true;
+  std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
+  std::unique_ptr<mapping::FusionEnd> end_;
+  std::map<std::pair<std::size_t, std::size_t>, double>
+      times_;  ///< when two robots' maps were found to overlap
+  std::vector<FrameRow> rows_;
+  MergedRobots merged_;
+};
+
+}  // namespace
+
+StageType robots_stage() {
+  return {"robots",
+          "Tracks several cameras side by side, each with a map of its own, and fuses the maps where they "
+          "overlap",
+          Mode::kSerial,
+          {{"frame", frame_port()}, {"features", features_port()}},
+          {{"track", track_port()}, {"map", map_port()}},
+          [] { return std::make_unique<RobotsStage>(); }};
+}
+
+}  // namespace plumbline::pipeline
