@@ -9,7 +9,7 @@
 namespace plumbline::maps {
 
 Bytes pack(const Bytes& bytes) {
-  constexpr int kLevel = 3;
+  constexpr int kLevel = 1;  // written while a tracker waits for the processor
   const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
   if (context == nullptr) throw std::bad_alloc();
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);

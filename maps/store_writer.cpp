@@ -18,6 +18,8 @@ using core::ErrorKind;
 void use_log(Database& database) {
   database.run("PRAGMA journal_mode = WAL");
   database.run("PRAGMA synchronous = NORMAL");
+  database.run(
+      "PRAGMA wal_autocheckpoint = 4000");  // pages: the log is taken in every 32 MB, and synced only then
 }
 
 /// One file again, that opens in a folder that may not be written. Where that cannot be, for somebody reads

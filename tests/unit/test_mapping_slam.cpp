@@ -231,27 +231,59 @@ TEST(Slam, ABlackStartWaitsForTheFirstPicture) {
   EXPECT_LT(ate(result.trajectory, recording.truth), 0.005);
 }
 
-TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
-  const Recording& recording = Recording::get();
-  std::vector<Shot> shots(recording.shots.begin(), recording.shots.begin() + 30);
-  geometry::Trajectory truth(recording.truth.begin(), recording.truth.begin() + 30);
-  const double step = shots[1].frame.stamp - shots[0].frame.stamp;
-  const auto append = [&](Shot shot, const geometry::Rigid3& pose) {
-    shot.frame.stamp = shots.back().frame.stamp + step;
+/// Filmed up to frame 30, covered, then carried back to where frames 2-7 were filmed.
+struct CarriedBack {
+  std::vector<Shot> shots;
+  geometry::Trajectory truth;
+  CarriedBack() {
+    const Recording& recording = Recording::get();
+    shots.assign(recording.shots.begin(), recording.shots.begin() + 30);
+    truth.assign(recording.truth.begin(), recording.truth.begin() + 30);
+    step_ = shots[1].frame.stamp - shots[0].frame.stamp;
+    const Shot black = blackened(shots[0]);
+    for (int i = 0; i < 15; ++i) append(black, recording.truth[29].world_from_camera);
+    for (std::size_t i = 2; i < 8; ++i) append(recording.shots[i], recording.truth[i].world_from_camera);
+  }
+
+ private:
+  void append(Shot shot, const geometry::Rigid3& pose) {
+    shot.frame.stamp = shots.back().frame.stamp + step_;
     shot.frame.depth_stamp = shot.frame.stamp;
     truth.push_back({shot.frame.stamp, pose});
     shots.push_back(std::move(shot));
-  };
-  const Shot black = blackened(shots[0]);
-  for (int i = 0; i < 15; ++i) append(black, recording.truth[29].world_from_camera);
-  for (std::size_t i = 2; i < 8; ++i) append(recording.shots[i], recording.truth[i].world_from_camera);
-  const SlamRun result = run(shots);
-  for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
-  for (std::size_t i = 30; i < 45; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kLost) << i;
-  for (std::size_t i = 45; i < 51; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
-  EXPECT_TRUE(result.reports[45].relocalised) << "carried back while covered: only the picture can tell";
-  EXPECT_EQ(result.trajectory.size(), 36U);
-  EXPECT_LT(ate(result.trajectory, truth), 0.005);
+  }
+  double step_ = 0.0;
+};
+
+TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
+  const CarriedBack world;
+  for (const bool loops : {false, true}) {  // with them the places are asked, and must confirm what is found
+    SlamOptions options;
+    options.loops.enabled = loops;
+    const SlamRun result = run(world.shots, 1, options);
+    for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
+    for (std::size_t i = 30; i < 45; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kLost) << i;
+    for (std::size_t i = 45; i < 51; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
+    EXPECT_TRUE(result.reports[45].relocalised) << "carried back while covered: only the picture can tell";
+    EXPECT_EQ(result.trajectory.size(), 36U);
+    EXPECT_LT(ate(result.trajectory, world.truth), 0.005);
+  }
+}
+
+TEST(Slam, FoundFarAwayIsNotBelievedWithoutVerification) {
+  const CarriedBack world;
+  const Eigen::Vector3d carried =
+      world.truth[45].world_from_camera.translation - world.truth[29].world_from_camera.translation;
+  ASSERT_GT(carried.norm(), 0.0);
+  SlamOptions options;
+  options.loops.enabled = true;
+  options.loops.verify.min_inliers = 10000;  // nothing passes
+  const SlamRun result = run(world.shots, 1, options);
+  const double turned = geometry::rotation_angle(world.truth[45].world_from_camera.rotation.transpose() *
+                                                 world.truth[29].world_from_camera.rotation);
+  const bool far = carried.norm() > 1.0 || turned > 1.0;
+  EXPECT_EQ(result.reports[45].state, far ? TrackState::kLost : TrackState::kTracked)
+      << carried.norm() << " m " << turned << " rad";
 }
 
 TEST(Slam, NothingButBlackFramesGiveNoTrajectory) {
@@ -276,6 +308,53 @@ TEST(Slam, EachFamilyAloneTracksTheFurnishedRoom) {
     EXPECT_LT(ate(result.trajectory, recording.truth), depth ? 0.01 : 0.005)
         << (depth ? "depth" : "points and lines");
   }
+}
+
+TEST(Slam, GoesOnWhereAnotherOneStopped) {
+  const Recording& recording = Recording::get();
+  const SlamRun whole = run(recording.shots);
+  const core::Executor executor(1);
+  const auto log = core::null_log();
+  Slam first({}, recording.camera, 0, executor, *log);
+  std::size_t next = 0;
+  int keyframes = 0;
+  while (next < recording.shots.size() && keyframes < 3) {
+    const Shot& shot = recording.shots[next++];
+    keyframes += first.process(shot.frame, shot.features).keyframe.valid() ? 1 : 0;
+  }
+  ASSERT_LT(next, recording.shots.size() - 8) << "nothing is left to go on with";
+  Slam second({}, recording.camera, 0, executor, *log);
+  second.restore(first.map(), first.frame_poses());
+  EXPECT_EQ(second.map().keyframe_count(), first.map().keyframe_count());
+  for (std::size_t i = next; i < recording.shots.size(); ++i) {
+    const FrameReport report = second.process(recording.shots[i].frame, recording.shots[i].features);
+    ASSERT_EQ(report.state, TrackState::kTracked) << i;
+    EXPECT_FALSE(report.relocalised) << i;
+    if (report.keyframe.valid()) ++keyframes;
+  }
+  second.finish();
+  const geometry::Trajectory trajectory = second.trajectory();
+  ASSERT_EQ(trajectory.size(), whole.trajectory.size());
+  EXPECT_LT(ate(trajectory, recording.truth), 0.005);
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    EXPECT_EQ(trajectory[i].stamp, whole.trajectory[i].stamp);
+    EXPECT_LT(
+        (trajectory[i].world_from_camera.translation - whole.trajectory[i].world_from_camera.translation)
+            .norm(),
+        0.003)
+        << i;
+  }
+  EXPECT_GT(keyframes, 3) << "no keyframe was made after";
+}
+
+TEST(Slam, AMapWithoutKeyframesIsNothingToGoOnFrom) {
+  const Recording& recording = Recording::get();
+  const core::Executor executor(1);
+  const auto log = core::null_log();
+  Slam slam({}, recording.camera, 0, executor, *log);
+  slam.restore({}, {});
+  const Shot& shot = recording.shots.front();
+  EXPECT_EQ(slam.process(shot.frame, shot.features).keyframe.index, 0);
 }
 
 }  // namespace

@@ -77,6 +77,46 @@ TEST_F(OutputFolders, WhatAKilledRunLeftIsClearedAway) {
   EXPECT_FALSE(fs::exists(out->path() / "map.ply"));
 }
 
+TEST_F(OutputFolders, WhatAKilledRunLeftIsTakenOver) {
+  fs::create_directories(folder_ / "out.partial");
+  std::ofstream(folder_ / "out.partial" / ".plumbline-unfinished") << "x";
+  std::ofstream(folder_ / "out.partial" / "map.db") << "half";
+  {
+    const auto out = OutputFolder::resume(folder_ / "out", false);
+    ASSERT_TRUE(out) << out.error().message;
+    EXPECT_EQ(out->path(), OutputFolder::partial_of(folder_ / "out"));
+    EXPECT_TRUE(fs::exists(out->path() / "map.db"));
+    EXPECT_FALSE(OutputFolder::resume(folder_ / "out", false)) << "one at a time";
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "map.db")) << "it failed, and the next one may go on";
+  auto out = OutputFolder::resume(folder_ / "out", false);
+  ASSERT_TRUE(out) << out.error().message;
+  ASSERT_TRUE(out->commit());
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "map.db"));
+  EXPECT_FALSE(fs::exists(folder_ / "out.partial"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / ".plumbline-unfinished"));
+}
+
+TEST_F(OutputFolders, WhatIsNobodysIsNotTakenOver) {
+  fs::create_directories(folder_ / "out.partial");
+  std::ofstream(folder_ / "out.partial" / "thesis.txt") << "x";
+  EXPECT_EQ(OutputFolder::resume(folder_ / "out", false).error().kind, core::ErrorKind::kUsage);
+  EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "thesis.txt"));
+  const auto fresh = OutputFolder::resume(folder_ / "other", false);
+  ASSERT_TRUE(fresh) << "nothing there is no error";
+}
+
+TEST_F(OutputFolders, CanBeKeptWithoutCommit) {
+  {
+    auto out = OutputFolder::prepare(folder_ / "out", false);
+    ASSERT_TRUE(out);
+    std::ofstream(out->path() / "map.db") << "half";
+    out->keep();
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "map.db"));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
 TEST_F(OutputFolders, PlacesThatCannotBeWrittenAreOutputErrors) {
   EXPECT_EQ(OutputFolder::prepare("/proc/nothing", false).error().kind, core::ErrorKind::kOutput);
   std::ofstream(folder_ / "file") << "x";

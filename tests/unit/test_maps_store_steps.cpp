@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The store as a run writes it: step by step, only what came and what changed.
+#include <gtest/gtest.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/maps/store.hpp"
+#include "store_folder.hpp"
+#include "store_world.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using tests::equal;
+using tests::header_of;
+using tests::same_all;
+using tests::StoreFolder;
+using tests::StoreWorld;
+
+std::shared_ptr<const std::vector<std::uint8_t>> cloud_of(int points) {
+  cloud::Cloud cloud;
+  for (int i = 0; i < points; ++i) {
+    cloud::Point p;
+    p.x = 0.01F * static_cast<float>(i);
+    p.z = 2.0F;
+    cloud.push_back(p);
+  }
+  return std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(cloud));
+}
+
+/// Follows a world as the stages of a run do.
+class Follower {
+ public:
+  explicit Follower(StoreWorld& world) : world_(world) {}
+
+  StoreStep step() {
+    StoreStep step;
+    const KeyframeId id = world_.step();
+    step.map = std::make_shared<MapChanges>(world_.map.changes_since(moment_));
+    moment_ = world_.map.now();
+    step.frames.assign(world_.frames.begin() + static_cast<std::ptrdiff_t>(frames_), world_.frames.end());
+    for (std::size_t f = frames_; f < world_.frames.size(); ++f) {
+      step.log.push_back(std::to_string(f) + ",tracked,0.1,\"ä\"");
+      log.push_back(step.log.back());
+    }
+    frames_ = world_.frames.size();
+    step.clouds.push_back({id, 0, cloud_of(id.index + 1)});
+    if (frames_ > 1) {
+      step.clouds.push_back({{}, frames_ - 2, cloud_of(500 + id.index)});
+      frame_clouds.push_back(frames_ - 2);
+    }
+    return step;
+  }
+  void go_on() { moment_ = world_.map.now(); }
+
+  std::vector<std::string> log;
+  std::vector<std::size_t> frame_clouds;
+
+ private:
+  StoreWorld& world_;
+  MapMoment moment_;
+  std::size_t frames_ = 0;
+};
+
+TEST(StoreSteps, EachLeavesTheMapInEveryBit) {
+  const StoreFolder folder;
+  StoreWorld world(21);
+  Follower follower(world);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer) << writer.error().message;
+  for (int i = 0; i < 25; ++i) {
+    const auto added = writer->add(follower.step());
+    ASSERT_TRUE(added) << added.error().message;
+    const auto stored = load_map(folder.file());
+    ASSERT_TRUE(stored) << i << ": " << stored.error().message;
+    ASSERT_TRUE(equal(stored->map, world.map)) << "after " << i;
+    ASSERT_TRUE(same_all(stored->frames, world.frames)) << "after " << i;
+    ASSERT_EQ(stored->log, follower.log) << "after " << i;
+    ASSERT_FALSE(stored->complete);
+  }
+  ASSERT_GT(world.map.retired_ids().size(), 1U) << "the world is too simple";
+  ASSERT_GT(world.map.point_ids().back().index, 70) << "one page proves nothing";
+  const auto reader = StoreReader::open(folder.file());
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(reader->frame_cloud_ids().value(), follower.frame_clouds);
+  EXPECT_EQ(reader->frame_cloud(follower.frame_clouds.front()).value()->size(), 501U);
+  EXPECT_EQ(reader->frame_cloud(100000).error().kind, core::ErrorKind::kInput);
+  const StoreContents contents = reader->contents().value();
+  EXPECT_EQ(contents.keyframes, world.map.keyframe_count());
+  EXPECT_EQ(contents.points, world.map.point_count());
+  EXPECT_EQ(contents.lines, world.map.line_count());
+  EXPECT_EQ(contents.edges, world.map.edges().size());
+  EXPECT_EQ(contents.frames, world.frames.size());
+  EXPECT_EQ(contents.keyframe_clouds, 25U);
+  EXPECT_EQ(contents.frame_clouds, follower.frame_clouds.size());
+  EXPECT_GT(contents.cloud_bytes, 1000U);
+  EXPECT_FALSE(contents.complete);
+}
+
+TEST(StoreSteps, ChangesAreFewWhenLittleChanged) {
+  StoreWorld world(22);
+  for (int i = 0; i < 30; ++i) world.step();
+  const MapChanges all = world.map.changes_since({});
+  EXPECT_TRUE(all.whole);
+  ASSERT_GT(all.points.size(), 3U);
+  const MapMoment moment = world.map.now();
+  const MapChanges none = world.map.changes_since(moment);
+  EXPECT_FALSE(none.whole);
+  EXPECT_TRUE(none.points.empty() && none.lines.empty() && none.edges.empty());
+  EXPECT_EQ(none.keyframes.size(), world.map.keyframe_count());
+  const PointId moved = world.map.point_ids().front();
+  world.map.point(moved).position.x() += 1.0;
+  const MapChanges one = world.map.changes_since(moment);
+  ASSERT_EQ(one.points.size(), 1U);
+  EXPECT_EQ(one.points[0].landmarks.front().position, world.map.point(moved).position);
+}
+
+TEST(StoreSteps, GoOnAfterTheRunWasEnded) {
+  const StoreFolder folder;
+  StoreWorld world(23);
+  Follower follower(world);
+  {
+    auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+    ASSERT_TRUE(writer);
+    for (int i = 0; i < 10; ++i) ASSERT_TRUE(writer->add(follower.step()));
+  }
+  auto left = load_map(folder.file());
+  ASSERT_TRUE(left);
+  world.map = std::move(left->map);  // what a run that goes on begins with
+  follower.go_on();
+  auto writer = StoreWriter::resume(folder.file());
+  ASSERT_TRUE(writer) << writer.error().message;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(writer->add(follower.step()));
+    const auto stored = load_map(folder.file());
+    ASSERT_TRUE(stored) << stored.error().message;
+    ASSERT_TRUE(equal(stored->map, world.map)) << i;
+    ASSERT_TRUE(same_all(stored->frames, world.frames));
+    ASSERT_EQ(stored->log, follower.log);
+  }
+}
+
+TEST(StoreSteps, TheEndKeepsTheRestAndTheFrameOfTheResults) {
+  const StoreFolder folder;
+  StoreWorld world(24);
+  Follower follower(world);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(writer->add(follower.step()));
+  EXPECT_EQ(load_map(folder.file())->result.output_from_map.translation, Eigen::Vector3d::Zero());
+  ResultFrame frame;
+  frame.output_from_map = tests::Random(5).pose(1.0, 1.0);
+  frame.upright = true;
+  StoreStep rest;
+  rest.log = {"last"};
+  rest.clouds.push_back({{}, 0, cloud_of(7)});
+  const auto saved = writer->save_final(world.map, world.frames, frame, rest);
+  ASSERT_TRUE(saved) << saved.error().message;
+  const auto stored = load_map(folder.file());
+  ASSERT_TRUE(stored) << stored.error().message;
+  EXPECT_TRUE(stored->complete);
+  EXPECT_TRUE(stored->result.upright);
+  EXPECT_EQ(stored->result.output_from_map.rotation, frame.output_from_map.rotation);
+  EXPECT_EQ(stored->result.output_from_map.translation, frame.output_from_map.translation);
+  EXPECT_EQ(stored->log.back(), "last");
+  EXPECT_EQ(StoreReader::open(folder.file())->frame_cloud(0).value()->size(), 7U);
+}
+
+TEST(StoreSteps, SameStepsSameBytes) {
+  std::string bytes[2];
+  for (std::string& file : bytes) {
+    const StoreFolder folder;
+    StoreWorld world(25);
+    Follower follower(world);
+    {
+      auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+      ASSERT_TRUE(writer);
+      for (int i = 0; i < 8; ++i) ASSERT_TRUE(writer->add(follower.step()));
+      ASSERT_TRUE(writer->save_final(world.map, world.frames));
+    }
+    std::ifstream in(folder.file(), std::ios::binary);
+    file = {std::istreambuf_iterator<char>(in), {}};
+  }
+  EXPECT_GT(bytes[0].size(), 10000U);
+  EXPECT_TRUE(bytes[0] == bytes[1]);
+}
+
+TEST(StoreSteps, ABlankStoreIsKnownAsOne) {
+  const StoreFolder folder;
+  EXPECT_FALSE(is_blank_store(folder.file()));
+  std::ofstream(folder.file()).close();
+  EXPECT_TRUE(is_blank_store(folder.file()).value()) << "an empty file: the run ended as it made it";
+  std::filesystem::remove(folder.file());
+  StoreWorld world(26);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  EXPECT_FALSE(is_blank_store(folder.file()).value());
+  const std::filesystem::path other = folder.path / "other.db";
+  std::ofstream(other) << std::string(5000, 'x');
+  EXPECT_FALSE(is_blank_store(other));
+}
+
+}  // namespace
+}  // namespace plumbline::maps
