@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "store_bytes.hpp"
 
@@ -13,9 +15,11 @@ namespace plumbline::maps {
 namespace {
 
 constexpr std::uint16_t kVersion = 1;
-constexpr double kPixelSteps = 32.0;     // per pixel, for pictures up to 2000 pixels wide
-constexpr double kLengthSteps = 4000.0;  // per metre
+constexpr double kPixelSteps = 4.0;      // per pixel, for pictures up to 16000 pixels wide
+constexpr double kLengthSteps = 1000.0;  // per metre
+constexpr double kPictureSteps = 100.0;  // per metre, of the small depth picture
 constexpr double kNoiseSteps = 10000.0;
+constexpr double kEndSteps = 2000.0;  // per metre, of the noise of lines' ends
 
 std::uint16_t unsigned_steps(double value, double steps) {
   return static_cast<std::uint16_t>(std::clamp(std::lround(value * steps), 0L, 65535L));
@@ -42,37 +46,58 @@ void column(ByteWriter& to, const Items& items, const Get& get) {
   to.planes(values);
 }
 
-void write_points(const features::FrameFeatures& f, double steps, ByteWriter& to) {
-  to.count(f.points.size());
-  using P = features::PointFeature;
-  column<std::uint16_t>(to, f.points,
-                        [&](const P& p) { return unsigned_steps(double{p.pixel.x()} + 0.5, steps); });
-  column<std::uint16_t>(to, f.points,
-                        [&](const P& p) { return unsigned_steps(double{p.pixel.y()} + 0.5, steps); });
-  column<std::uint16_t>(to, f.points,
-                        [](const P& p) { return unsigned_steps(double{p.depth}, kLengthSteps); });
-  column<std::uint8_t>(to, f.points, [](const P& p) { return std::lround(p.angle / 360.0F * 256.0F) & 255; });
-  column<std::uint8_t>(to, f.points, [](const P& p) { return p.octave; });
-  for (const features::Descriptor256& d : f.descriptors) to.put(d);
+/// From above to below: what follows each other lies close, and small steps pack well.
+std::vector<std::size_t> by_row(const features::FrameFeatures& f) {
+  std::vector<std::size_t> order(f.points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return f.points[a].pixel.y() < f.points[b].pixel.y();
+  });
+  return order;
 }
 
-void read_points(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f) {
+void write_points(const features::FrameFeatures& f, const std::vector<std::int32_t>& landmarks, double steps,
+                  ByteWriter& to) {
+  const std::vector<std::size_t> order = by_row(f);
+  const auto at = [&](std::size_t i) -> const features::PointFeature& { return f.points[i]; };
+  to.count(order.size());
+  std::uint16_t last = 0;
+  column<std::uint16_t>(to, order, [&](std::size_t i) {
+    const std::uint16_t row = unsigned_steps(double{at(i).pixel.y()} + 0.5, steps);
+    return row - std::exchange(last, row);
+  });
+  column<std::uint16_t>(to, order,
+                        [&](std::size_t i) { return unsigned_steps(double{at(i).pixel.x()} + 0.5, steps); });
+  column<std::uint16_t>(to, order,
+                        [&](std::size_t i) { return unsigned_steps(double{at(i).depth}, kLengthSteps); });
+  column<std::uint8_t>(to, order,
+                       [&](std::size_t i) { return std::lround(at(i).angle / 360.0F * 256.0F) & 255; });
+  column<std::uint8_t>(to, order, [&](std::size_t i) { return at(i).octave; });
+  for (const std::size_t i : order) to.put(f.descriptors[i]);
+  column<std::int32_t>(to, order, [&](std::size_t i) { return landmarks[i]; });
+}
+
+void read_points(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f,
+                 std::vector<std::int32_t>& landmarks) {
   const double steps = pixel_steps(camera);
-  const std::size_t n = bytes.count(40);
-  const auto x = bytes.planes<std::uint16_t>(n);
+  const std::size_t n = bytes.count(44);
   const auto y = bytes.planes<std::uint16_t>(n);
+  const auto x = bytes.planes<std::uint16_t>(n);
   const auto depth = bytes.planes<std::uint16_t>(n);
   const auto angle = bytes.planes<std::uint8_t>(n);
   const auto octave = bytes.planes<std::uint8_t>(n);
   f.points.resize(n);
   f.descriptors.resize(n);
+  std::uint16_t row = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    f.points[i].pixel = {from(x[i], steps) - 0.5F, from(y[i], steps) - 0.5F};
+    row = static_cast<std::uint16_t>(row + y[i]);
+    f.points[i].pixel = {from(x[i], steps) - 0.5F, from(row, steps) - 0.5F};
     f.points[i].depth = from(depth[i], kLengthSteps);
     f.points[i].angle = static_cast<float>(angle[i]) * 360.0F / 256.0F;
     f.points[i].octave = octave[i];
     bytes.get(f.descriptors[i]);
   }
+  landmarks = bytes.planes<std::int32_t>(n);
   f.grid = features::PointGrid(f.points, camera.width, camera.height);
 }
 
@@ -91,8 +116,8 @@ void write_lines(const features::FrameFeatures& f, double steps, ByteWriter& to)
     to.put(unsigned_steps(line.line3->start.z(), kLengthSteps));
     to.put(unsigned_steps(line.line3->end.z(), kLengthSteps));
     for (const features::EndpointNoise& noise : {line.line3->start_noise, line.line3->end_noise}) {
-      to.put(unsigned_steps(double{noise.depth}, kNoiseSteps));
-      to.put(unsigned_steps(double{noise.across}, kNoiseSteps));
+      to.put(byte_of(double{noise.depth}, kEndSteps));
+      to.put(byte_of(double{noise.across}, kEndSteps));
     }
     to.put(byte_of(line.line3->inlier_share, 255.0));
     to.put(byte_of(line.line3->coverage, 255.0));
@@ -118,8 +143,8 @@ void read_lines(ByteReader& bytes, const sensor::Pinhole& camera, features::Fram
     line3.start = on_ray(line.segment.start);
     line3.end = on_ray(line.segment.end);
     for (features::EndpointNoise* noise : {&line3.start_noise, &line3.end_noise}) {
-      noise->depth = from(bytes.get<std::uint16_t>(), kNoiseSteps);
-      noise->across = from(bytes.get<std::uint16_t>(), kNoiseSteps);
+      noise->depth = from(bytes.get<std::uint8_t>(), kEndSteps);
+      noise->across = from(bytes.get<std::uint8_t>(), kEndSteps);
     }
     line3.inlier_share = bytes.get<std::uint8_t>() / 255.0;
     line3.coverage = bytes.get<std::uint8_t>() / 255.0;
@@ -127,8 +152,12 @@ void read_lines(ByteReader& bytes, const sensor::Pinhole& camera, features::Fram
   }
 }
 
-void write_surface(const std::vector<SurfaceSample>& surface, ByteWriter& to) {
+void write_surface(const std::vector<SurfaceSample>& all, ByteWriter& to) {
   constexpr double kUnit = 127.0;
+  constexpr std::size_t kMost = 256;  // evenly chosen: they are spread over the picture
+  std::vector<SurfaceSample> surface;
+  const std::size_t step = (all.size() + kMost - 1) / kMost;
+  for (std::size_t i = 0; i < all.size(); i += step) surface.push_back(all[i]);
   to.count(surface.size());
   for (int axis = 0; axis < 3; ++axis) {
     column<std::int16_t>(to, surface,
@@ -165,7 +194,7 @@ void write_depth(const cv::Mat& depth, ByteWriter& to) {
   std::uint16_t last = 0;
   for (int y = 0; y < depth.rows; ++y) {
     for (int x = 0; x < depth.cols; ++x) {
-      const std::uint16_t now = unsigned_steps(double{depth.at<float>(y, x)}, 250.0);  // 4 mm
+      const std::uint16_t now = unsigned_steps(double{depth.at<float>(y, x)}, kPictureSteps);
       steps.push_back(static_cast<std::uint16_t>(now - last));
       last = now;
     }
@@ -183,7 +212,7 @@ cv::Mat read_depth(ByteReader& bytes) {
   std::uint16_t last = 0;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     last = static_cast<std::uint16_t>(last + steps[i]);
-    depth.at<float>(static_cast<int>(i) / columns, static_cast<int>(i) % columns) = from(last, 250.0);
+    depth.at<float>(static_cast<int>(i) / columns, static_cast<int>(i) % columns) = from(last, kPictureSteps);
   }
   return depth;
 }
@@ -215,18 +244,23 @@ KeyframeMessage decode(const Bytes& packed) {
   if (c.width < 1 || c.height < 1 || c.width > kMost_px || c.height > kMost_px)
     throw BadBytes("it has no camera");
   auto features = std::make_shared<features::FrameFeatures>();
-  read_points(bytes, c, *features);
+  read_points(bytes, c, *features, message.points);
   read_lines(bytes, c, *features);
   features->thumbnail_depth = read_depth(bytes);
-  message.points = bytes.planes<std::int32_t>(features->points.size());
   message.lines = bytes.planes<std::int32_t>(features->lines.size());
   keyframe->features = features;
   keyframe->surface = read_surface(bytes);
   message.keyframe = keyframe;
-  message.moved.resize(bytes.count(104));
+  message.moved.resize(bytes.count(32));
   for (auto& [id, pose] : message.moved) {
-    bytes.get(id);
-    bytes.get(pose);
+    id.robot = keyframe->id.robot;
+    bytes.get(id.index);
+    Eigen::Matrix<float, 4, 1> turn;
+    Eigen::Matrix<float, 3, 1> shift;
+    bytes.get(turn);
+    bytes.get(shift);
+    if (!turn.allFinite() || turn.norm() < 0.5F) throw BadBytes("a pose is none");
+    pose = {Eigen::Quaterniond(turn.cast<double>()), shift.cast<double>()};
   }
   message.cloud = bytes.planes<std::uint8_t>(bytes.count(1));
   bytes.expect_end();
@@ -266,16 +300,16 @@ std::vector<std::uint8_t> encode_message(const KeyframeMessage& message) {
   const sensor::Pinhole& c = message.camera;
   for (const int size : {c.width, c.height}) to.put(static_cast<std::int32_t>(size));
   for (const double value : {c.fx, c.fy, c.cx, c.cy}) to.put(value);
-  write_points(features, steps, to);
+  write_points(features, message.points, steps, to);
   write_lines(features, steps, to);
   write_depth(features.thumbnail_depth, to);
-  to.planes(message.points);
   to.planes(message.lines);
   write_surface(keyframe.surface, to);
   to.count(message.moved.size());
   for (const auto& [id, pose] : message.moved) {
-    to.put(id);
-    to.put(pose);
+    to.put(id.index);
+    to.put(Eigen::Matrix<float, 4, 1>(pose.quaternion().coeffs().cast<float>()));
+    to.put(Eigen::Matrix<float, 3, 1>(pose.translation.cast<float>()));
   }
   to.count(message.cloud.size());
   to.planes(message.cloud);

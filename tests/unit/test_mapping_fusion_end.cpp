@@ -2,6 +2,8 @@
 // What robots tell a fusion end, and when it knows that two maps overlap.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "plumbline/mapping/fusion_end.hpp"
 #include "poster_view.hpp"
 
@@ -69,7 +71,10 @@ maps::KeyframeMessage full_message(int points, int lines) {
   }
   maps::Map map;
   map.add_keyframe(keyframe, Rigid3{});
-  return maps::make_message(map, {0, 0}, kTestCamera);
+  maps::KeyframeMessage message = maps::make_message(map, {0, 0}, kTestCamera);
+  for (std::size_t i = 0; i < message.points.size(); i += 2)
+    message.points[i] = static_cast<int>(random() % 20000);
+  return message;
 }
 
 TEST(KeyframeMessage, ComesBackNearlyAsItWas) {
@@ -81,21 +86,25 @@ TEST(KeyframeMessage, ComesBackNearlyAsItWas) {
   const features::FrameFeatures& a = *sent.keyframe->features;
   const features::FrameFeatures& b = *back->keyframe->features;
   ASSERT_EQ(b.points.size(), 50U);
-  EXPECT_EQ(a.descriptors, b.descriptors);
-  for (std::size_t i = 0; i < 50; ++i) {
-    EXPECT_LT((a.points[i].pixel - b.points[i].pixel).norm(), 0.03F);
-    EXPECT_NEAR(a.points[i].depth, b.points[i].depth, 0.0002F);
-    EXPECT_EQ(a.points[i].octave, b.points[i].octave);
+  for (std::size_t i = 0; i < 50; ++i) {  // they come in another order
+    const auto found = std::find(b.descriptors.begin(), b.descriptors.end(), a.descriptors[i]);
+    ASSERT_NE(found, b.descriptors.end());
+    const auto j = static_cast<std::size_t>(found - b.descriptors.begin());
+    EXPECT_LT((a.points[i].pixel - b.points[j].pixel).norm(), 0.2F);
+    EXPECT_NEAR(a.points[i].depth, b.points[j].depth, 0.0006F);
+    EXPECT_EQ(a.points[i].octave, b.points[j].octave);
+    EXPECT_EQ(sent.points[i], back->points[j]);
   }
   ASSERT_EQ(b.lines.size(), 20U);
   for (std::size_t i = 0; i < 20; ++i) {
     EXPECT_EQ(a.lines[i].descriptor, b.lines[i].descriptor);
-    EXPECT_LT((a.lines[i].line3->start - b.lines[i].line3->start).norm(), 0.001);
+    EXPECT_LT((a.lines[i].line3->start - b.lines[i].line3->start).norm(), 0.005);
   }
   ASSERT_EQ(b.thumbnail_depth.cols, 80);
-  EXPECT_NEAR(a.thumbnail_depth.at<float>(30, 40), b.thumbnail_depth.at<float>(30, 40), 0.003F);
-  ASSERT_EQ(back->keyframe->surface.size(), 300U);
-  EXPECT_LT((sent.keyframe->surface[9].point - back->keyframe->surface[9].point).norm(), 0.001F);
+  EXPECT_NEAR(a.thumbnail_depth.at<float>(30, 40), b.thumbnail_depth.at<float>(30, 40), 0.006F);
+  ASSERT_EQ(back->keyframe->surface.size(), 150U);
+  EXPECT_LT((sent.keyframe->surface[8].point - back->keyframe->surface[4].point).norm(), 0.001F);
+  ASSERT_EQ(back->moved.size(), 0U);
 }
 
 TEST(KeyframeMessage, ThousandPointsFitInFiftyKilobytes) {

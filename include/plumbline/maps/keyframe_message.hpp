@@ -29,8 +29,9 @@ struct KeyframeMessage {
 KeyframeMessage make_message(const Map& map, KeyframeId keyframe, const sensor::Pinhole& camera,
                              int recent = 8);
 
-/// Kept: descriptors, landmarks and poses exactly; pixels to 1/32 of a pixel of 2048, depth and 3D to 0.25 mm
-/// (up to 16 m), directions to a degree. Same message, same bytes.
+/// Kept: descriptors, landmarks and the pose exactly; pixels to a quarter, depth to a millimetre (up to 65
+/// m), the small depth picture to a centimetre, directions to a degree; 256 samples of the surface. Points
+/// come back in the order of their rows, with their landmarks. Same message, same bytes.
 std::vector<std::uint8_t> encode_message(const KeyframeMessage& message);
 
 /// Errors (kInput): not such bytes, another version, truncated, damaged.
