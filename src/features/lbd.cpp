@@ -94,7 +94,8 @@ bool inside(const Support& s, const cv::Mat& gradient) {
 using Row = std::array<std::int32_t, kMaxColumns>;  // packed (gx, gy)
 
 std::int32_t fixed(float value) {
-  return static_cast<std::int32_t>(std::lround(static_cast<double>(value) * kFixed));
+  const double scaled = static_cast<double>(value) * kFixed;
+  return static_cast<std::int32_t>(scaled < 0.0 ? scaled - 0.5 : scaled + 0.5);
 }
 
 // Walks the support row by row and fetches the nearest gradients.

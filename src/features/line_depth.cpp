@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "clones.hpp"
 #include "plumbline/features/line_segment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -22,6 +23,7 @@ constexpr int kMaxSide = 10;           // px
 constexpr double kSameSurface = 0.02;  // of depth: spread across a few pixels of one (slanted) surface
 constexpr std::uint32_t kSeed = 0x9E3779B9U;
 constexpr int kRefinements = 3;
+constexpr int kMostRounds = 1000;  // of RANSAC
 
 struct Sample {
   double s;        // place along the segment, [0, 1]
@@ -37,9 +39,10 @@ struct InverseDepth {
 double inverse_sigma(double inverse) { return sensor::depth_sigma(1.0 / inverse) * inverse * inverse; }
 
 float depth_at(const cv::Mat& depth, double x, double y) {
-  const int u = static_cast<int>(std::lround(x));
-  const int v = static_cast<int>(std::lround(y));
-  if (u < 0 || v < 0 || u >= depth.cols || v >= depth.rows) return 0.0F;
+  if (!(x > -0.5 && y > -0.5)) return 0.0F;
+  const int u = static_cast<int>(x + 0.5);
+  const int v = static_cast<int>(y + 0.5);
+  if (u >= depth.cols || v >= depth.rows) return 0.0F;
   return depth.at<float>(v, u);
 }
 
@@ -105,22 +108,57 @@ bool supports(const InverseDepth& line, const Sample& sample, double gate) {
   return predicted > 0.0 && std::abs(sample.inverse - predicted) <= gate * inverse_sigma(predicted);
 }
 
+/// Samples in columns, so that all are tried at once.
+struct Columns {
+  std::vector<double> s;
+  std::vector<double> inverse;
+  explicit Columns(const std::vector<Sample>& samples) {
+    s.reserve(samples.size());
+    inverse.reserve(samples.size());
+    for (const Sample& q : samples) {
+      s.push_back(q.s);
+      inverse.push_back(q.inverse);
+    }
+  }
+};
+
+// How many samples support a line, as `supports` says.
+PLUMBLINE_CLONES std::int64_t count_support(const double* s, const double* inverse, std::size_t count,
+                                            double start, double end, double gate) {
+  std::int64_t support = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double predicted = (1.0 - s[i]) * start + s[i] * end;
+    const double limit = gate * (sensor::depth_sigma(1.0 / predicted) * predicted * predicted);
+    support += static_cast<std::int64_t>((predicted > 0.0) & (std::abs(inverse[i] - predicted) <= limit));
+  }
+  return support;
+}
+
+// The same for every line: the result depends on its own samples only.
+std::vector<std::uint32_t> draw_numbers(std::size_t count) {
+  std::mt19937 random(kSeed);
+  std::vector<std::uint32_t> numbers(count);
+  for (std::uint32_t& n : numbers) n = static_cast<std::uint32_t>(random());
+  return numbers;
+}
+
 std::optional<InverseDepth> ransac(const std::vector<Sample>& samples, const LineDepthOptions& options) {
-  std::mt19937 random(kSeed);  // the same rounds for every line: the result depends on its own samples only
+  static const std::vector<std::uint32_t> numbers = draw_numbers(2 * kMostRounds);
+  const Columns columns(samples);
   const auto count = static_cast<std::uint32_t>(samples.size());
+  const auto rounds = static_cast<std::size_t>(std::clamp(options.ransac_rounds, 0, kMostRounds));
   std::optional<InverseDepth> best;
-  int most = 0;
-  for (int round = 0; round < options.ransac_rounds; ++round) {
+  std::int64_t most = 0;
+  for (std::size_t round = 0; round < rounds && most < static_cast<std::int64_t>(count); ++round) {
     // A short base extrapolates badly: the two come from different thirds or farther apart.
-    const Sample& a = samples[random() % count];
-    const Sample& b = samples[random() % count];
+    const Sample& a = samples[numbers[2 * round] % count];
+    const Sample& b = samples[numbers[2 * round + 1] % count];
     if (std::abs(a.s - b.s) < 0.25) continue;
     const double slope = (b.inverse - a.inverse) / (b.s - a.s);
     const InverseDepth line{a.inverse - slope * a.s, a.inverse + slope * (1.0 - a.s)};
     if (!plausible(line, options)) continue;
-    const int support = static_cast<int>(std::count_if(samples.begin(), samples.end(), [&](const Sample& q) {
-      return supports(line, q, options.inlier_sigmas);
-    }));
+    const std::int64_t support = count_support(columns.s.data(), columns.inverse.data(), samples.size(),
+                                               line.start, line.end, options.inlier_sigmas);
     if (support > most) {
       most = support;
       best = line;
@@ -202,7 +240,8 @@ void LineDepthOptions::declare(core::OptionTable& table) {
   table.number("depth_min_coverage", min_coverage, {0.1, 1.0}, "",
                "Smallest share of the length with support");
   table.integer("depth_min_inliers", min_inliers, {3, 400}, "", "Fewest agreeing samples");
-  table.integer("depth_ransac_rounds", ransac_rounds, {1, 1000}, "", "RANSAC rounds of the 3D line fit");
+  table.integer("depth_ransac_rounds", ransac_rounds, {1, kMostRounds}, "",
+                "RANSAC rounds of the 3D line fit");
   table.number("depth_pixel_sigma", pixel_sigma, {0.05, 10.0}, "px",
                "Standard deviation of an endpoint's position");
 }

@@ -39,10 +39,15 @@ class Lsd {
   std::vector<cv::Vec4f> detect(float min_length);
 
  private:
-  using Region = std::vector<int>;  // pixel indices, the seed first
+  struct Pixel {
+    int index;
+    float x, y;
+    [[nodiscard]] Eigen::Vector2f position() const { return {x, y}; }
+  };
+  using Region = std::vector<Pixel>;  // the seed first
 
-  [[nodiscard]] Eigen::Vector2f position(int index) const {
-    return {static_cast<float>(index % width_), static_cast<float>(index / width_)};
+  [[nodiscard]] Pixel pixel(int index) const {
+    return {index, static_cast<float>(index % width_), static_cast<float>(index / width_)};
   }
   void grow(int seed, float cosine);
   [[nodiscard]] Rectangle fit() const;
@@ -112,21 +117,34 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient)
 
 // Neighbours join while their level-line angle is within the tolerance of the region's.
 void Lsd::grow(int seed, float cosine) {
-  const std::array<int, 8> around = {-width_ - 1, -width_,    -width_ + 1, -1,
-                                     1,           width_ - 1, width_,      width_ + 1};
-  region_.assign(1, seed);
+  struct Step {
+    int index;
+    float x, y;
+  };
+  const std::array<Step, 8> around = {{{-width_ - 1, -1.0F, -1.0F},
+                                       {-width_, 0.0F, -1.0F},
+                                       {-width_ + 1, 1.0F, -1.0F},
+                                       {-1, -1.0F, 0.0F},
+                                       {1, 1.0F, 0.0F},
+                                       {width_ - 1, -1.0F, 1.0F},
+                                       {width_, 0.0F, 1.0F},
+                                       {width_ + 1, 1.0F, 1.0F}}};
+  region_.assign(1, pixel(seed));
   used_[static_cast<std::size_t>(seed)] = 1;
   float sx = gradients_[static_cast<std::size_t>(seed)].x;
   float sy = gradients_[static_cast<std::size_t>(seed)].y;
   float limit = cosine;  // cos(tolerance) |sum|
+  std::uint8_t* const used = used_.data();
+  const Gradient* const gradients = gradients_.data();
   for (std::size_t i = 0; i < region_.size(); ++i) {
-    for (const int step : around) {
-      const auto index = static_cast<std::size_t>(region_[i] + step);
-      if (used_[index] != 0) continue;
-      const Gradient& g = gradients_[index];
+    const Pixel from = region_[i];
+    for (const Step& step : around) {
+      const int index = from.index + step.index;
+      if (used[index] != 0) continue;
+      const Gradient& g = gradients[index];
       if (g.x * sx + g.y * sy < limit) continue;
-      used_[index] = 1;
-      region_.push_back(static_cast<int>(index));
+      used[index] = 1;
+      region_.push_back({index, from.x + step.x, from.y + step.y});
       sx += g.x;
       sy += g.y;
       limit = cosine * std::sqrt(sx * sx + sy * sy);
@@ -140,18 +158,18 @@ void Lsd::grow(int seed, float cosine) {
 Rectangle Lsd::fit() const {
   float weight = 0.0F;
   Eigen::Vector2f centre = Eigen::Vector2f::Zero();
-  for (const int i : region_) {
-    const float g = gradients_[static_cast<std::size_t>(i)].magnitude;
+  for (const Pixel& i : region_) {
+    const float g = gradients_[static_cast<std::size_t>(i.index)].magnitude;
     weight += g;
-    centre += g * position(i);
+    centre += g * i.position();
   }
   centre /= weight;
   float xx = 0.0F;
   float yy = 0.0F;
   float xy = 0.0F;
-  for (const int i : region_) {
-    const float g = gradients_[static_cast<std::size_t>(i)].magnitude;
-    const Eigen::Vector2f p = position(i) - centre;
+  for (const Pixel& i : region_) {
+    const float g = gradients_[static_cast<std::size_t>(i.index)].magnitude;
+    const Eigen::Vector2f p = i.position() - centre;
     xx += g * p.x() * p.x();
     yy += g * p.y() * p.y();
     xy += g * p.x() * p.y();
@@ -163,8 +181,8 @@ Rectangle Lsd::fit() const {
   float high = 0.0F;
   float left = 0.0F;
   float right = 0.0F;
-  for (const int i : region_) {
-    const Eigen::Vector2f p = position(i) - centre;
+  for (const Pixel& i : region_) {
+    const Eigen::Vector2f p = i.position() - centre;
     const float along = d.dot(p);
     const float across = d.x() * p.y() - d.y() * p.x();
     low = std::min(low, along);
@@ -181,14 +199,14 @@ Rectangle Lsd::fit() const {
 
 // Twice the standard deviation of the level-line angles within `radius` of the seed.
 float Lsd::tolerance_near_seed(float radius) const {
-  const Eigen::Vector2f seed = position(region_.front());
-  const Gradient& g = gradients_[static_cast<std::size_t>(region_.front())];
+  const Eigen::Vector2f seed = region_.front().position();
+  const Gradient& g = gradients_[static_cast<std::size_t>(region_.front().index)];
   float sum = 0.0F;
   float squares = 0.0F;
   float count = 0.0F;
-  for (const int i : region_) {
-    if ((position(i) - seed).squaredNorm() > radius * radius) continue;
-    const Gradient& h = gradients_[static_cast<std::size_t>(i)];
+  for (const Pixel& i : region_) {
+    if ((i.position() - seed).squaredNorm() > radius * radius) continue;
+    const Gradient& h = gradients_[static_cast<std::size_t>(i.index)];
     const float angle = std::atan2(g.x * h.y - g.y * h.x, g.x * h.x + g.y * h.y);
     sum += angle;
     squares += angle * angle;
@@ -201,20 +219,21 @@ float Lsd::tolerance_near_seed(float radius) const {
 // A region bent or branched has too few points for its rectangle: cut it back.
 bool Lsd::make_dense(Rectangle& rectangle) {
   if (density(rectangle) >= kDensity) return true;
-  const int seed = region_.front();
+  const Pixel seed = region_.front();
   const float tolerance = tolerance_near_seed(rectangle.width);
-  for (const int i : region_) used_[static_cast<std::size_t>(i)] = 0;
-  grow(seed, std::cos(tolerance));
+  for (const Pixel& i : region_) used_[static_cast<std::size_t>(i.index)] = 0;
+  grow(seed.index, std::cos(tolerance));
   if (region_.size() < 3) return false;
   rectangle = fit();
-  const Eigen::Vector2f middle = position(seed);
+  const Eigen::Vector2f middle = seed.position();
   float radius = std::max((rectangle.start - middle).norm(), (rectangle.end - middle).norm());
   while (density(rectangle) < kDensity) {
     radius *= kRadiusStep;
-    const auto outside = [&](int i) { return (position(i) - middle).squaredNorm() > radius * radius; };
-    const auto kept =
-        std::stable_partition(region_.begin(), region_.end(), [&](int i) { return !outside(i); });
-    for (auto i = kept; i != region_.end(); ++i) used_[static_cast<std::size_t>(*i)] = 0;
+    const auto inside = [&](const Pixel& i) {
+      return !((i.position() - middle).squaredNorm() > radius * radius);
+    };
+    const auto kept = std::stable_partition(region_.begin(), region_.end(), inside);
+    for (auto i = kept; i != region_.end(); ++i) used_[static_cast<std::size_t>(i->index)] = 0;
     region_.erase(kept, region_.end());
     if (region_.size() < 3) return false;
     rectangle = fit();

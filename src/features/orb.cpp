@@ -3,82 +3,75 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "fast.hpp"
+#include "orb_describe.hpp"
 
 namespace plumbline::features {
 namespace {
 
-constexpr int kEdge = 16;  // ORB's patch (31 px) must lie inside the picture
-constexpr int kHalfPatch = 15;
+constexpr int kEdge = 16;        // the patch of a corner 3 px further in must lie inside the picture
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
+static_assert(kEdge + 3 == kOrbMargin);
 
-/// Half width of the circular patch in each row, as in the ORB paper's intensity centroid. u^2 + v^2 <= r (r
-/// + 1) is the same seen along x and along y; rounding each row is not, and bends orientations by several
-/// degrees.
-std::array<int, kHalfPatch + 1> patch_rows() {
-  std::array<int, kHalfPatch + 1> rows{};
-  for (int v = 0; v <= kHalfPatch; ++v) {
-    rows[static_cast<std::size_t>(v)] =
-        static_cast<int>(std::sqrt(static_cast<double>(kHalfPatch * (kHalfPatch + 1) - v * v)));
+/// Which cell of a grid over a width x height area a corner lies in.
+class Cells {
+ public:
+  Cells(int width, int height)
+      : width_(width),
+        height_(height),
+        columns_(std::max(1, width / kCellPixels)),
+        rows_(std::max(1, height / kCellPixels)) {}
+  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(columns_ * rows_); }
+  [[nodiscard]] std::size_t of(const Corner& corner) const {
+    const int c = std::min(columns_ - 1, corner.x * columns_ / width_);
+    const int r = std::min(rows_ - 1, corner.y * rows_ / height_);
+    return static_cast<std::size_t>(r * columns_ + c);
   }
-  return rows;
-}
 
-/// Orientation from the first moments of a circular patch (Rublee et al., ICCV 2011), degrees.
-float patch_angle(const cv::Mat& image, int x, int y, const std::array<int, kHalfPatch + 1>& rows) {
-  const auto step = static_cast<std::ptrdiff_t>(image.step1());
-  const std::uint8_t* centre = image.ptr<std::uint8_t>(y) + x;
-  int m01 = 0;
-  int m10 = 0;
-  for (int u = -kHalfPatch; u <= kHalfPatch; ++u) m10 += u * centre[u];
-  for (int v = 1; v <= kHalfPatch; ++v) {
-    const int d = rows[static_cast<std::size_t>(v)];
-    const std::uint8_t* below = centre + v * step;
-    const std::uint8_t* above = centre - v * step;
-    int row_difference = 0;
-    for (int u = -d; u <= d; ++u) {
-      row_difference += below[u] - above[u];
-      m10 += u * (below[u] + above[u]);
-    }
-    m01 += v * row_difference;
-  }
-  return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
-}
+ private:
+  int width_;
+  int height_;
+  int columns_;
+  int rows_;
+};
 
-/// Strongest first; ties by position, so that the order never depends on how FAST found them.
-bool stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
-  if (a.response != b.response) return a.response > b.response;
-  if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;
-  return a.pt.x < b.pt.x;
+/// Strongest first; ties by position, so that the order never depends on how corners were found.
+bool stronger(const Corner& a, const Corner& b) {
+  if (a.score != b.score) return a.score > b.score;
+  if (a.y != b.y) return a.y < b.y;
+  return a.x < b.x;
 }
 
 /// Picks about `wanted` corners: every cell gives its strongest in turn until enough are taken.
-std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, const cv::Size& size, int wanted) {
-  if (static_cast<int>(corners.size()) <= wanted) {
+std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, int wanted) {
+  const auto count = static_cast<std::size_t>(std::max(0, wanted));
+  if (corners.size() <= count) {
     std::sort(corners.begin(), corners.end(), stronger);
     return corners;
   }
-  const int columns = std::max(1, size.width / kCellPixels);
-  const int rows = std::max(1, size.height / kCellPixels);
-  std::vector<std::vector<cv::KeyPoint>> cells(static_cast<std::size_t>(columns * rows));
-  for (const cv::KeyPoint& corner : corners) {
-    const int c = std::min(columns - 1, static_cast<int>(corner.pt.x) * columns / size.width);
-    const int r = std::min(rows - 1, static_cast<int>(corner.pt.y) * rows / size.height);
-    cells[static_cast<std::size_t>(r * columns + c)].push_back(corner);
-  }
-  for (auto& cell : cells) std::sort(cell.begin(), cell.end(), stronger);
+  const Cells cells(size.width, size.height);
+  std::vector<std::size_t> begin(cells.count() + 1, 0);
+  for (const Corner& corner : corners) ++begin[cells.of(corner) + 1];
+  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<Corner> by_cell(corners.size());
+  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
+  for (const Corner& corner : corners) by_cell[next[cells.of(corner)]++] = corner;
+  const auto place = [&](std::size_t i) { return by_cell.begin() + static_cast<std::ptrdiff_t>(i); };
+  for (std::size_t i = 0; i + 1 < begin.size(); ++i)
+    std::sort(place(begin[i]), place(begin[i + 1]), stronger);
 
-  std::vector<cv::KeyPoint> chosen;
-  chosen.reserve(static_cast<std::size_t>(wanted));
-  for (std::size_t rank = 0; static_cast<int>(chosen.size()) < wanted; ++rank) {
-    std::vector<cv::KeyPoint> round;
-    for (const auto& cell : cells) {
-      if (rank < cell.size()) round.push_back(cell[rank]);
+  std::vector<Corner> chosen;
+  chosen.reserve(count);
+  std::vector<Corner> round;
+  for (std::size_t rank = 0; chosen.size() < count; ++rank) {
+    round.clear();
+    for (std::size_t i = 0; i + 1 < begin.size(); ++i) {
+      if (begin[i] + rank < begin[i + 1]) round.push_back(by_cell[begin[i] + rank]);
     }
     if (round.empty()) break;
-    const auto room = static_cast<std::size_t>(wanted) - chosen.size();
+    const std::size_t room = count - chosen.size();
     if (round.size() > room) {
       std::sort(round.begin(), round.end(), stronger);
       round.resize(room);
@@ -89,29 +82,20 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> corners, const cv::Si
 }
 
 /// FAST over the region; cells where the high threshold finds nothing get the low one.
-std::vector<cv::KeyPoint> detect(const cv::Mat& level, const cv::Rect& region, int high, int low) {
-  std::vector<cv::KeyPoint> all;
-  cv::FAST(level(region), all, low, true);
-  const int columns = std::max(1, region.width / kCellPixels);
-  const int rows = std::max(1, region.height / kCellPixels);
-  std::vector<char> has_strong(static_cast<std::size_t>(columns * rows), 0);
-  const auto cell_of = [&](const cv::KeyPoint& k) {
-    const int c = std::min(columns - 1, static_cast<int>(k.pt.x) * columns / region.width);
-    const int r = std::min(rows - 1, static_cast<int>(k.pt.y) * rows / region.height);
-    return static_cast<std::size_t>(r * columns + c);
-  };
-  for (const cv::KeyPoint& k : all) {
-    if (k.response >= static_cast<float>(high)) has_strong[cell_of(k)] = 1;
+std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int high, int low) {
+  std::vector<Corner> corners = fast_corners(level(region), low);
+  const Cells cells(region.width, region.height);
+  std::vector<char> has_strong(cells.count(), 0);
+  for (const Corner& c : corners) {
+    if (c.score >= high) has_strong[cells.of(c)] = 1;
   }
-  std::vector<cv::KeyPoint> kept;
-  kept.reserve(all.size());
-  for (cv::KeyPoint& k : all) {
-    if (k.response < static_cast<float>(high) && has_strong[cell_of(k)] != 0) continue;
-    k.pt.x += static_cast<float>(region.x);
-    k.pt.y += static_cast<float>(region.y);
-    kept.push_back(k);
+  const auto not_needed = [&](const Corner& c) { return c.score < high && has_strong[cells.of(c)] != 0; };
+  corners.erase(std::remove_if(corners.begin(), corners.end(), not_needed), corners.end());
+  for (Corner& c : corners) {
+    c.x += region.x;
+    c.y += region.y;
   }
-  return kept;
+  return corners;
 }
 
 }  // namespace
@@ -136,13 +120,27 @@ float OrbExtractor::sigma(int octave) const {
   return scale_[static_cast<std::size_t>(std::clamp(octave, 0, options_.levels - 1))];
 }
 
+namespace {
+
+/// Where corners of a level may lie, `region` being of the full picture.
+cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale) {
+  const int x0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.x) / scale)) + 3);
+  const int y0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.y) / scale)) + 3);
+  const int x1 = std::min(level.width - kEdge,
+                          static_cast<int>(static_cast<float>(region.x + region.width) / scale) - 3);
+  const int y1 = std::min(level.height - kEdge,
+                          static_cast<int>(static_cast<float>(region.y + region.height) / scale) - 3);
+  return {x0, y0, x1 - x0, y1 - y0};
+}
+
+}  // namespace
+
 OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) const {
-  static const auto rows = patch_rows();
   OrbFeatures result;
   double share_sum = 0.0;
   for (float s : scale_) share_sum += 1.0 / s;
-  std::vector<cv::KeyPoint> keypoints;
-  std::vector<cv::Mat> pyramid{gray};
+  cv::Mat image = gray;  // of the level: where corners are looked for
+  cv::Mat exact = gray;  // the same by OpenCV's exact resize, as cv::ORB describes them
   for (int level = 0; level < options_.levels; ++level) {
     const float scale = scale_[static_cast<std::size_t>(level)];
     if (level > 0) {
@@ -150,42 +148,27 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
       const cv::Size size(cvRound(static_cast<float>(gray.cols) / scale),
                           cvRound(static_cast<float>(gray.rows) / scale));
       if (size.width < 2 * kEdge + 8 || size.height < 2 * kEdge + 8) break;
-      cv::resize(pyramid.back(), smaller, size, 0, 0, cv::INTER_LINEAR);
-      pyramid.push_back(smaller);
+      cv::resize(image, smaller, size, 0, 0, cv::INTER_LINEAR);
+      image = smaller;
+      cv::Mat smaller_exact;
+      cv::resize(exact, smaller_exact, size, 0, 0, cv::INTER_LINEAR_EXACT);
+      exact = smaller_exact;
     }
-    const cv::Mat& image = pyramid.back();
-    const int x0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.x) / scale)) + 3);
-    const int y0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.y) / scale)) + 3);
-    const int x1 = std::min(image.cols - kEdge,
-                            static_cast<int>(static_cast<float>(region.x + region.width) / scale) - 3);
-    const int y1 = std::min(image.rows - kEdge,
-                            static_cast<int>(static_cast<float>(region.y + region.height) / scale) - 3);
-    if (x1 - x0 < 8 || y1 - y0 < 8) continue;
+    const cv::Rect inner = inner_region(region, image.size(), scale);
+    if (inner.width < 8 || inner.height < 8) continue;
     const int wanted = static_cast<int>(std::lround(options_.count / (scale * share_sum)));
-    auto corners = spread(detect(image, {x0, y0, x1 - x0, y1 - y0}, options_.fast_threshold,
-                                 std::min(options_.fast_threshold, options_.fast_threshold_min)),
-                          image.size(), wanted);
-    for (cv::KeyPoint& k : corners) {
-      k.angle = patch_angle(image, cvRound(k.pt.x), cvRound(k.pt.y), rows);
-      k.octave = level;
-      k.size = 31.0F * scale;
-      k.pt *= scale;
-      keypoints.push_back(k);
+    const std::vector<Corner> corners =
+        spread(detect(image, inner, options_.fast_threshold,
+                      std::min(options_.fast_threshold, options_.fast_threshold_min)),
+               image.size(), wanted);
+    if (corners.empty()) continue;
+    const cv::Mat smooth = orb_smooth(exact);
+    for (const Corner& c : corners) {
+      const float angle = orb_orientation(image, c.x, c.y);
+      const Eigen::Vector2f pixel(static_cast<float>(c.x) * scale, static_cast<float>(c.y) * scale);
+      result.points.push_back({pixel, 0.0F, angle, static_cast<float>(c.score), level});
+      result.descriptors.push_back(orb_descriptor(smooth, c.x, c.y, angle));
     }
-  }
-  if (keypoints.empty()) return result;
-
-  cv::Mat descriptors;
-  const auto orb =
-      cv::ORB::create(static_cast<int>(keypoints.size()), static_cast<float>(options_.scale_factor),
-                      options_.levels, kEdge, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
-  orb->compute(gray, keypoints, descriptors);
-  result.points.resize(keypoints.size());
-  result.descriptors.resize(keypoints.size());
-  for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    const cv::KeyPoint& k = keypoints[i];
-    result.points[i] = {{k.pt.x, k.pt.y}, 0.0F, k.angle, k.response, k.octave};
-    std::memcpy(result.descriptors[i].data(), descriptors.ptr(static_cast<int>(i)), 32);
   }
   return result;
 }

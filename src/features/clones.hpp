@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// PLUMBLINE_CLONES: a function is compiled twice, for AVX2 and for any x86-64, and chosen when the program
+// starts. Both give the same bits: AVX2 alone does not bring fused multiply-add.
+#if defined(__x86_64__)
+#define PLUMBLINE_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define PLUMBLINE_CLONES
+#endif
