@@ -14,7 +14,7 @@ using geometry::Rigid3;
 using geometry::Vector6d;
 
 struct NormalEquations {
-  Matrix6d h = Matrix6d::Zero();  ///< lower triangle
+  Matrix6d h = Matrix6d::Zero();  ///< lower triangle of what terms add
   Vector6d g = Vector6d::Zero();
   double cost = 0.0;
 };
@@ -44,17 +44,35 @@ Vector6d damping(const Matrix6d& h, double lambda) {
   return d;
 }
 
-void add_row(const Row6& j, double r, double w, NormalEquations& n) {
-  for (int a = 0; a < 6; ++a) {
-    const double wa = w * j(a);
-    for (int b = 0; b <= a; ++b) n.h(a, b) += wa * j(b);
-    n.g(a) += wa * r;
+/// Lower triangle of the sums of w j^T j and w j^T r, each row padded to whole vectors: more products than
+/// needed, but no odd ones. Every entry is summed in the order of the terms.
+struct RowSums {
+  alignas(32) double h[6][8] = {};
+  alignas(32) double g[8] = {};
+  void add(const Row6& j, double r, double w) {
+    alignas(32) const double row[8] = {j(0), j(1), j(2), j(3), j(4), j(5), 0.0, 0.0};
+    for (int a = 0; a < 4; ++a) {
+      const double wa = w * row[a];
+      for (int b = 0; b < 4; ++b) h[a][b] += wa * row[b];
+    }
+    for (int a = 4; a < 6; ++a) {
+      const double wa = w * row[a];
+      for (int b = 0; b < 6; ++b) h[a][b] += wa * row[b];
+    }
+    for (int a = 0; a < 6; ++a) g[a] += (w * row[a]) * r;
   }
-}
+  void move_to(NormalEquations& n) const {
+    for (int a = 0; a < 6; ++a) {
+      for (int b = 0; b <= a; ++b) n.h(a, b) = h[a][b];
+      n.g(a) = g[a];
+    }
+  }
+};
 
 template <bool kDerivatives>
 NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options) {
   NormalEquations n;
+  RowSums sums;
   Eigen::Matrix<double, 3, 6> j3;
   Eigen::Matrix<double, 2, 6> j2;
   Row6 j1;
@@ -75,9 +93,9 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
       n.cost += options.point_weight * depth.cost;
     }
     if constexpr (kDerivatives) {
-      add_row(j3.row(0), r(0), options.point_weight * pixel.weight, n);
-      add_row(j3.row(1), r(1), options.point_weight * pixel.weight, n);
-      if (rows == 3) add_row(j3.row(2), r(2), depth_weight, n);
+      sums.add(j3.row(0), r(0), options.point_weight * pixel.weight);
+      sums.add(j3.row(1), r(1), options.point_weight * pixel.weight);
+      if (rows == 3) sums.add(j3.row(2), r(2), depth_weight);
     }
   }
   const Eigen::Matrix3d projection =
@@ -91,16 +109,17 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
     const Robust robust = huber(r.squaredNorm(), options.line_loss);
     n.cost += options.line_weight * robust.cost;
     if constexpr (kDerivatives) {
-      add_row(j2.row(0), r(0), options.line_weight * robust.weight, n);
-      add_row(j2.row(1), r(1), options.line_weight * robust.weight, n);
+      sums.add(j2.row(0), r(0), options.line_weight * robust.weight);
+      sums.add(j2.row(1), r(1), options.line_weight * robust.weight);
     }
   }
   for (const PlaneTerm& term : problem.planes) {
     const double r = plane_residual(term, pose, kDerivatives ? &j1 : nullptr);
     const Robust robust = huber(r * r, options.plane_loss);
     n.cost += options.plane_weight * robust.cost;
-    if constexpr (kDerivatives) add_row(j1, r, options.plane_weight * robust.weight, n);
+    if constexpr (kDerivatives) sums.add(j1, r, options.plane_weight * robust.weight);
   }
+  sums.move_to(n);
   return n;
 }
 

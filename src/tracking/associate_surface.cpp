@@ -10,9 +10,9 @@ namespace {
 
 /// Depth at a sub-pixel place: bilinear where all four neighbours lie on one surface, else 0.
 float depth_at(const cv::Mat& depth, double u, double v) {
-  const int x = static_cast<int>(std::floor(u));
-  const int y = static_cast<int>(std::floor(v));
-  if (x < 0 || y < 0 || x + 1 >= depth.cols || y + 1 >= depth.rows) return 0.0F;
+  if (!(u >= 0.0 && v >= 0.0 && u < depth.cols - 1 && v < depth.rows - 1)) return 0.0F;
+  const int x = static_cast<int>(u);
+  const int y = static_cast<int>(v);
   const float* r0 = depth.ptr<float>(y) + x;
   const float* r1 = depth.ptr<float>(y + 1) + x;
   const float low = std::min(std::min(r0[0], r0[1]), std::min(r1[0], r1[1]));
@@ -44,10 +44,11 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
     const WorldSurface& s = surface[i];
     const Eigen::Vector3d p = depth_from_world * s.point;
     if (p.z() < 0.25 || p.z() > options.max_depth_m + 0.5) continue;
+    const Eigen::Vector2d pixel = camera.project(p);
+    if (!camera.contains(pixel)) continue;
     const Eigen::Vector3d normal = depth_from_world.rotation * s.normal;
     const double cosine = -normal.dot(p) / p.norm();
     if (cosine < 0.25) continue;
-    const Eigen::Vector2d pixel = camera.project(p);
     const double z = depth_at(depth, pixel.x(), pixel.y());
     if (!(z > 0.25) || z > options.max_depth_m) continue;
     if (in_view != nullptr) ++*in_view;

@@ -25,10 +25,19 @@ bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_f
          low.y() < static_cast<float>(camera.height) && segment.length() > 10.0F;
 }
 
-float line_distance(const features::LineSegment& line, const Eigen::Vector2f& p) {
-  const Eigen::Vector2f d = line.direction();
-  const Eigen::Vector2f r = p - line.start;
-  return std::abs(d.x() * r.y() - d.y() * r.x());
+/// What every landmark asks of every line of the frame.
+struct Candidate {
+  Eigen::Vector2f direction;
+  Eigen::Vector2f middle;
+};
+
+std::vector<Candidate> candidates_of(const features::FrameFeatures& frame) {
+  std::vector<Candidate> candidates;
+  candidates.reserve(frame.lines.size());
+  for (const features::LineFeature& line : frame.lines) {
+    candidates.push_back({line.segment.direction(), line.segment.middle()});
+  }
+  return candidates;
 }
 
 }  // namespace
@@ -38,6 +47,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
                                    const geometry::Rigid3& camera_from_world, double radius,
                                    const AssociationOptions& options, std::vector<core::LineId>* visible) {
   const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
+  const std::vector<Candidate> candidates = candidates_of(frame);
   std::vector<LineMatch> by_feature(frame.lines.size());
   for (core::LineId id : lines) {
     const maps::MapLine* line = map.find_line(id);
@@ -45,10 +55,12 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
     if (line == nullptr || !project_segment(*line, camera_from_world, camera, predicted)) continue;
     if (visible != nullptr) visible->push_back(id);
     LineMatch best{id, -1, options.max_line_hamming + 1};
-    for (std::size_t i = 0; i < frame.lines.size(); ++i) {
+    const Eigen::Vector2f d = predicted.direction();
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      if (d.dot(candidates[i].direction) < min_cosine) continue;
+      const Eigen::Vector2f r = candidates[i].middle - predicted.start;
+      if (std::abs(d.x() * r.y() - d.y() * r.x()) > static_cast<float>(radius)) continue;
       const features::LineFeature& candidate = frame.lines[i];
-      if (predicted.direction().dot(candidate.segment.direction()) < min_cosine) continue;
-      if (line_distance(predicted, candidate.segment.middle()) > static_cast<float>(radius)) continue;
       if (features::overlap(predicted, candidate.segment) < 0.4) continue;
       const int distance = features::hamming(line->descriptor, candidate.descriptor);
       if (distance < best.distance) best = {id, static_cast<int>(i), distance};

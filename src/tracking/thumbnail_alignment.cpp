@@ -19,9 +19,9 @@ struct Pixel {
 
 /// Bilinear value and gradient; false outside.
 bool sample(const cv::Mat& image, double u, double v, double& value, double& du, double& dv) {
-  const int x = static_cast<int>(std::floor(u));
-  const int y = static_cast<int>(std::floor(v));
-  if (x < 1 || y < 1 || x + 2 >= image.cols || y + 2 >= image.rows) return false;
+  if (!(u >= 1.0 && v >= 1.0 && u < image.cols - 2 && v < image.rows - 2)) return false;
+  const int x = static_cast<int>(u);
+  const int y = static_cast<int>(v);
   const double fx = u - x;
   const double fy = v - y;
   const float* r0 = image.ptr<float>(y) + x;
@@ -50,6 +50,7 @@ struct Step {
 Step linearise(const std::vector<Pixel>& pixels, const cv::Mat& current, const sensor::Pinhole& camera,
                const Rigid3& pose, double bias, double loss) {
   Step step;
+  alignas(32) double h[7][8] = {};  // rows padded to whole vectors
   for (const Pixel& pixel : pixels) {
     const Eigen::Vector3d p = pose * pixel.point;
     if (p.z() < 0.1) continue;
@@ -65,13 +66,17 @@ Step linearise(const std::vector<Pixel>& pixels, const cv::Mat& current, const s
                              -(du * camera.fx * p.x() + dv * camera.fy * p.y()) * iz * iz);
     Vector7d j;
     j << dp, p.cross(dp), -1.0;
+    alignas(32) const double row[8] = {j(0), j(1), j(2), j(3), j(4), j(5), j(6), 0.0};
     for (int a = 0; a < 7; ++a) {
-      const double wa = weight * j(a);
-      for (int b = 0; b <= a; ++b) step.h(a, b) += wa * j(b);
+      const double wa = weight * row[a];
+      for (int b = 0; b < (a < 4 ? 4 : 8); ++b) h[a][b] += wa * row[b];
     }
     step.g.noalias() += weight * r * j;
     step.squares += weight * r * r;
     ++step.count;
+  }
+  for (int a = 0; a < 7; ++a) {
+    for (int b = 0; b <= a; ++b) step.h(a, b) = h[a][b];
   }
   return step;
 }

@@ -302,6 +302,7 @@ std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const senso
     local_map_ = build_local_map(map, guess.keyframe, options_.local_map);
     TrackResult attempt = estimate(map, frame, features, guess.camera_from_world, guess.rough ? 24.0 : 10.0);
     if (attempt.state != TrackState::kTracked || (guess.rough && !beyond_doubt(attempt))) continue;
+    if (is_place_ && !is_place_(frame, features, guess.keyframe, attempt.camera_from_world)) continue;
     attempt.relocalised = true;
     velocity_.setZero();
     last_.valid = false;
