@@ -14,8 +14,9 @@ namespace plumbline::cloud {
 namespace {
 
 constexpr float kSigmas = 3.0F;
-constexpr float kPose_m = 0.03F;  // poses are not exact
-constexpr int kFewestCells = 7;   // of 3 x 3
+constexpr float kPose_m = 0.03F;   // poses are not exact
+constexpr int kFewestCells = 7;    // of 3 x 3
+constexpr double kAround_m = 0.1;  // no more than the margin of a tile
 
 /// What of a view matters for a box: null transforms are never used.
 struct NearView {
@@ -23,6 +24,55 @@ struct NearView {
   Eigen::Matrix3f rotation;
   Eigen::Vector3f translation;
 };
+
+enum class Verdict : std::uint8_t { kStays, kDoubtful, kGoes };
+
+struct Votes {
+  int free = 0;
+  int surface = 0;
+  int hidden = 0;
+};
+
+Votes count(const Eigen::Vector3f& position, const std::vector<NearView>& views) {
+  Votes votes;
+  for (const NearView& view : views) {
+    const Evidence found = evidence(*view.raster, view.raster->camera,
+                                    Eigen::Vector3f(view.rotation * position + view.translation));
+    votes.free += found == Evidence::kFree ? 1 : 0;
+    votes.surface += found == Evidence::kSurface ? 1 : 0;
+    votes.hidden += found == Evidence::kHidden ? 1 : 0;
+  }
+  return votes;
+}
+
+Verdict judge(const Votes& v) {
+  // One view against another is enough when no third one knows better.
+  if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
+  const bool rarely_seen = v.hidden >= 3 && 4 * v.surface <= v.hidden;
+  return v.free > 0 || rarely_seen ? Verdict::kDoubtful : Verdict::kStays;
+}
+
+/// Whether at least half of the points around that are no matter of doubt go.
+bool among_what_goes(const Sheets& sheets, std::size_t sheet, const std::vector<Verdict>& verdicts) {
+  const Eigen::Vector3d position = sheets.position(sheets.all()[sheet]);
+  const int reach = std::max(1, static_cast<int>(kAround_m / sheets.block_m()));
+  const double radius = std::max(kAround_m, sheets.block_m());
+  std::size_t going = 0;
+  std::size_t staying = 0;
+  const Eigen::Vector3i& block = sheets.all()[sheet].block;
+  for (int x = -reach; x <= reach; ++x) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int z = -reach; z <= reach; ++z) {
+        sheets.visit_block(block + Eigen::Vector3i(x, y, z), [&](std::uint32_t s) {
+          if ((sheets.position(sheets.all()[s]) - position).norm() > radius) return;
+          if (verdicts[s] == Verdict::kGoes) going += sheets.all()[s].points;
+          if (verdicts[s] == Verdict::kStays) staying += sheets.all()[s].points;
+        });
+      }
+    }
+  }
+  return going > 0 && going >= staying;
+}
 
 /// Views whose furthest measurement may reach into the box.
 std::vector<NearView> views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
@@ -103,18 +153,15 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
   for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
   if (sheets.all().empty()) return goes;
   const std::vector<NearView> views = views_near(box, rasters, world_from_camera);
+  std::vector<Verdict> verdicts(goes.size());
   for (std::size_t s = 0; s < goes.size(); ++s) {
-    const Eigen::Vector3f position = sheets.position(sheets.all()[s]).cast<float>();
-    int free = 0;
-    int surface = 0;
-    for (const NearView& view : views) {
-      const Evidence found = evidence(*view.raster, view.raster->camera,
-                                      Eigen::Vector3f(view.rotation * position + view.translation));
-      free += found == Evidence::kFree ? 1 : 0;
-      surface += found == Evidence::kSurface ? 1 : 0;
-    }
-    // One view against another is enough when no third one knows better.
-    goes[s] = free > 0 && 2 * free >= surface && (free > 1 || surface < 2) ? 1 : 0;
+    verdicts[s] = judge(count(sheets.position(sheets.all()[s]).cast<float>(), views));
+  }
+  for (std::size_t s = 0; s < goes.size(); ++s) {
+    goes[s] = verdicts[s] == Verdict::kGoes ||
+                      (verdicts[s] == Verdict::kDoubtful && among_what_goes(sheets, s, verdicts))
+                  ? 1
+                  : 0;
   }
   return goes;
 }

@@ -69,6 +69,10 @@ void add_curtain(Builder& b, const geometry::Rigid3& frame, double width, double
 void add_panel(Builder& b, const geometry::Rigid3& frame, double width, double height, double thickness,
                const std::string& material, const std::string& rim, bool frame_bars);
 
+// ---- walker.cpp ----
+
+void add_walker(Builder& b, const Walker& walker);
+
 // ---- walls.cpp ----
 
 struct Opening {

@@ -183,16 +183,26 @@ void fill_between(const World& world, View& view) {
 
 }  // namespace
 
-View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera) {
+View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera,
+          std::optional<double> time) {
   View view;
+  view.time = time;
   view.camera = camera;
   view.world_from_camera = world_from_camera;
   const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
   EdgeTiles edges(camera, camera_from_world);
   view.faces.reserve(world.scene.faces.size());
-  for (std::size_t i = 0; i < world.scene.faces.size(); ++i) {
+  for (std::size_t i = 0; i < world.fixed_faces; ++i) {
     view.faces.push_back(view_face(world, i, camera, camera_from_world));
     edges.add(world.scene.faces[i]);
+  }
+  for (const World::Mover& mover : world.movers) {
+    geometry::Rigid3 camera_from_rest = camera_from_world;
+    camera_from_rest.translation +=
+        camera_from_world.rotation * (mover.walker.at(time.value_or(0.0)) - mover.walker.from);
+    for (std::size_t i = mover.first; i < mover.first + mover.count; ++i) {
+      view.faces.push_back(view_face(world, i, camera, camera_from_rest));
+    }
   }
   view.ids.create(camera.height, camera.width);
   RayBatch rays(world, view);
@@ -215,6 +225,7 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
   }
   rays.flush();
   fill_between(world, view);
+  if (time) MovingFaces(world, view, *time).draw(view);
   return view;
 }
 

@@ -13,6 +13,8 @@ namespace plumbline::synth {
 void SynthOptions::declare(core::OptionTable& table) {
   table.integer("frames", frames, {-1, 1000000}, "", "Frames of each robot; -1 = the path once");
   table.integer("robots", robots, {1, 64}, "", "Number of recordings");
+  table.integer("walkers", walkers, {0, 16}, "",
+                "How many of the scene's walkers are about: filmed, but no part of reference.ply");
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
                "full; weak: faint; none: white cloth and grey floors");

@@ -134,6 +134,7 @@ nlohmann::json describe_robot(const SynthSource& source, const std::string& fold
 nlohmann::json describe_options(const SynthOptions& o) {
   return {{"frames", o.frames},
           {"robots", o.robots},
+          {"walkers", o.walkers},
           {"texture", to_string(o.texture)},
           {"sensor", to_string(o.sensor)},
           {"motion", to_string(o.motion)},

@@ -201,7 +201,7 @@ double default_spacing(const Scene& scene) {
 core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file, const World& world,
                                               const Visibility& visibility, double spacing,
                                               const core::Executor& executor) {
-  std::vector<std::vector<PlySample>> parts(world.scene.faces.size());
+  std::vector<std::vector<PlySample>> parts(world.fixed_faces);
   executor.parallel_for(parts.size(),
                         [&](std::size_t i) { parts[i] = sample_face(world, visibility, i, spacing); });
   ReferenceCounts counts;

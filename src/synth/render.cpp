@@ -255,6 +255,14 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
     }
   }
   rays.flush();
+  if (const MovingFaces moving(world, view, view.time.value_or(0.0)); view.time && !moving.empty()) {
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        seen[i][k] = moving.in_front(view, seen[i][k], static_cast<float>(pixels[i].x) + kSpots[k][0],
+                                     static_cast<float>(pixels[i].y) + kSpots[k][1]);
+      }
+    }
+  }
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     Shader::store(
         shader.mean(seen[i], static_cast<float>(pixels[i].x), static_cast<float>(pixels[i].y), kSpots) *

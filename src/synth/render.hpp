@@ -3,6 +3,8 @@
 
 // Pictures of a world from a pose. Const functions, no shared scratch: frames render side by side.
 #include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"
@@ -21,7 +23,27 @@ struct View {
   sensor::Pinhole camera;
   geometry::Rigid3 world_from_camera;
   std::vector<FaceView> faces;
-  cv::Mat1i ids;  ///< face per pixel, -1 = nothing
+  cv::Mat1i ids;               ///< face per pixel, -1 = nothing
+  std::optional<double> time;  ///< s after the first frame: walkers are where they are then; none: no walkers
+};
+
+/// The walkers' faces as one picture sees them.
+class MovingFaces {
+ public:
+  MovingFaces(const World& world, const View& view, double t);
+  /// `fixed`, the face that is seen there without walkers, or the walker's that is in front of it.
+  [[nodiscard]] int in_front(const View& view, int fixed, float x, float y) const;
+  void draw(View& view) const;
+  [[nodiscard]] bool empty() const { return spots_.empty(); }
+
+ private:
+  struct Spot {
+    std::size_t face;
+    Eigen::Vector3d shift;  ///< from where the walk begins
+    cv::Rect reach;         ///< pixels
+  };
+  const World& world_;
+  std::vector<Spot> spots_;
 };
 
 /// Texels of level 0 per metre along a face's u and v.
@@ -32,7 +54,9 @@ TexelScale texel_scale(const World& world, std::size_t face);
 
 /// Finds the face behind every pixel. Rays are cast only where an edge may cross the picture: there at every
 /// second pixel of every second row, and at the pixels between where their neighbours differ.
-View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera);
+/// `time`: as in View.
+View look(const World& world, const sensor::Pinhole& camera, const geometry::Rigid3& world_from_camera,
+          std::optional<double> time = {});
 
 /// Metres along z of what `ids` names; 0 = nothing.
 cv::Mat1f exact_depth(const View& view);

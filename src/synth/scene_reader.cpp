@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "builder.hpp"
 #include "object_reader.hpp"
@@ -95,6 +96,35 @@ void read_robots(const ConfigNode& root, Scene& scene, ConfigProblems& problems)
   }
 }
 
+void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems) {
+  if (list.kind != ConfigNode::Kind::kSequence) {
+    problems.push_back({list.mark, "walkers", "must be a list: '- {from: [0, 0], to: [1, 0]}'"});
+    return;
+  }
+  for (std::size_t i = 0; i < list.items.size(); ++i) {
+    const ConfigNode& node = list.items[i];
+    const std::string path = fmt::format("walkers[{}]", i);
+    std::vector<double> from, to;
+    Walker walker;
+    walker.mark = node.mark;
+    core::OptionTable table;
+    table.numbers("from", from, 2, {-1000.0, 1000.0}, "m", "Where the walk begins");
+    table.numbers("to", to, 2, {-1000.0, 1000.0}, "m", "Where it turns back");
+    table.number("speed", walker.speed, {0.02, 5.0}, "m/s", "Speed");
+    table.choice("material", walker.material, material_names(), "What is worn");
+    const std::size_t before = problems.size();
+    table.set_all(node, path, problems);
+    if (problems.size() != before) continue;
+    if (from.size() != 2 || to.size() != 2 || std::hypot(to[0] - from[0], to[1] - from[1]) < 0.01) {
+      problems.push_back({node.mark, path, "needs from: [x, y] and to: [x, y], two places"});
+      continue;
+    }
+    walker.from = {from[0], from[1], 0.0};
+    walker.to = {to[0], to[1], 0.0};
+    scene.walkers.push_back(walker);
+  }
+}
+
 void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   std::string events, motion = "handheld";
   core::OptionTable table;
@@ -103,7 +133,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   table.number("ambient", scene.ambient, {0.0, 1.0}, "", "Share of light without direction");
   table.choice("motion", motion, {"handheld", "wheeled"}, "How cameras are carried");
   table.text("events", events, "Hard moments, as the option of the same name");
-  table.set_all(root, "", problems, {"objects", "robots"});
+  table.set_all(root, "", problems, {"objects", "robots", "walkers"});
   scene.motion = motion == "wheeled" ? Motion::kWheeled : Motion::kHandheld;
   if (auto parsed = parse_events(events)) {
     scene.events = *parsed;
@@ -118,6 +148,7 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
     problems.push_back({root.mark, "objects", "a scene needs a list of objects"});
   }
   read_robots(root, scene, problems);
+  if (const ConfigNode* walkers = root.find("walkers")) read_walkers(*walkers, scene, problems);
   if (problems.empty() && scene.faces.empty())
     problems.push_back({root.mark, "objects", "the world is empty"});
 }

@@ -181,7 +181,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
 
 cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   const Sensor sensor = world->options.sensor;
-  const View view = look(*world, camera.color, pose(at.color));
+  const View view = look(*world, camera.color, pose(at.color), at.color - kFirstStamp);
   const bool real = sensor != Sensor::kIdeal;
   Exposure exposure{gain(at.number), real ? 0.18F : 0.0F};
   if (event(EventKind::kLampOff, at.color) != 0.0) exposure.gain *= 0.08F;
@@ -286,7 +286,7 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
   if (blind(index)) {
     raw = cv::Mat1w::zeros(color.size());
   } else {
-    const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth));
+    const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth), at.depth - kFirstStamp);
     raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
                         {impl_->seed, at.number});
   }
@@ -311,7 +311,7 @@ ExactFrame SynthSource::exact(std::size_t index) const {
   ExactFrame out;
   out.world_from_color = impl_->pose(at.color);
   out.world_from_depth = impl_->pose(at.depth);
-  const View view = look(*impl_->world, impl_->camera.color, out.world_from_depth);
+  const View view = look(*impl_->world, impl_->camera.color, out.world_from_depth, at.depth - kFirstStamp);
   out.depth = exact_depth(view);
   out.face = view.ids;
   return out;

@@ -4,12 +4,14 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <stdexcept>
 #include <tuple>
 
+#include "builder.hpp"
 #include "random.hpp"
 
 namespace plumbline::synth {
@@ -18,6 +20,14 @@ using Eigen::Vector3d;
 
 World::World(Scene s, SynthOptions o) : scene(std::move(s)), options(std::move(o)), events(scene.events) {
   if (auto more = parse_events(options.events)) events.insert(events.end(), more->begin(), more->end());
+  fixed_faces = scene.faces.size();
+  const std::size_t walkers = std::min(scene.walkers.size(), static_cast<std::size_t>(options.walkers));
+  for (std::size_t i = 0; i < walkers; ++i) {
+    const std::size_t first = scene.faces.size();
+    Builder builder(scene);
+    add_walker(builder, scene.walkers[i]);
+    movers.push_back({scene.walkers[i], first, scene.faces.size() - first});
+  }
   for (const Face& face : scene.faces) materials.push_back(find_material(face.material));
   build_bvh();
 }
@@ -36,9 +46,9 @@ void World::build_bvh() {
   rtcSetSceneFlags(bvh_, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(bvh_, RTC_BUILD_QUALITY_HIGH);
   std::size_t vertices = 0, triangles = 0;
-  for (const Face& face : scene.faces) {
-    vertices += face.polygon.size();
-    triangles += face.polygon.size() - 2;
+  for (std::size_t i = 0; i < fixed_faces; ++i) {
+    vertices += scene.faces[i].polygon.size();
+    triangles += scene.faces[i].polygon.size() - 2;
   }
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
@@ -46,7 +56,7 @@ void World::build_bvh() {
   auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
   unsigned base = 0;
-  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+  for (std::size_t i = 0; i < fixed_faces; ++i) {
     const Face& face = scene.faces[i];
     for (const Eigen::Vector2d& uv : face.polygon) {
       const Vector3d p = face.at(uv.x(), uv.y());
@@ -180,6 +190,10 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
     if (find_material(face.material) == nullptr) {
       return core::usage_error(fmt::format("scene '{}': no material '{}'", scene.name, face.material));
     }
+  }
+  if (static_cast<std::size_t>(options.walkers) > scene.walkers.size()) {
+    return core::usage_error(
+        fmt::format("walkers: scene '{}' has {}, not {}", scene.name, scene.walkers.size(), options.walkers));
   }
   // The cheap things that can go wrong come before the second or two of drawing.
   if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());

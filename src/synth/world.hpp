@@ -54,8 +54,17 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  Scene scene;
+  /// Faces [first, first + count) of the scene walk: they are where the walk begins and move with the time.
+  struct Mover {
+    Walker walker;
+    std::size_t first = 0;
+    std::size_t count = 0;
+  };
+
+  Scene scene;  ///< and behind its own faces those of the walkers
   SynthOptions options;
+  std::size_t fixed_faces = 0;  ///< the scene's own; only these are cast against
+  std::vector<Mover> movers;
   std::vector<Event> events;               ///< of scene and options
   std::vector<const Material*> materials;  ///< per face
   std::vector<LightMap> light;             ///< per face

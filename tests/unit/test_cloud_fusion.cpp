@@ -125,6 +125,42 @@ TEST(DenseFusion, WhatOthersLookThroughGoes) {
   EXPECT_GT(report.seen_through, 1000U);
 }
 
+/// Twelve views of a wall, five with a box before it. Of the others, which measure nothing where the right
+/// part of the box was, one looks through that part and, if the box is gone, all look through the left one.
+Views views_of_a_box(bool gone) {
+  const cv::Rect box(200, 150, 70, 160);
+  const cv::Rect left(180, 130, 66, 200);
+  const cv::Rect right(246, 130, 44, 200);
+  Views views;
+  for (int v = 0; v < 12; ++v) {
+    cv::Mat depth = plane_depth({0, 0, 1}, 2.5, 1.0, static_cast<unsigned>(v + 1));
+    if (v < 5) depth = with_box(depth, box, 1.5F);
+    if (v >= 5 && !gone) depth(left) = 0.0F;
+    if (v > 5) depth(right) = 0.0F;
+    views.add(depth, 0.0);
+  }
+  return views;
+}
+
+TEST(DenseFusion, OneViewIsEnoughAmongWhatGoes) {
+  DenseFusionOptions keep = fine();
+  keep.free_space = false;
+  const Views views = views_of_a_box(true);
+  const auto kept = views.fuse(keep);
+  const auto cleaned = views.fuse(fine());
+  ASSERT_TRUE(kept && cleaned);
+  EXPECT_GT(nearer_than(*kept->cloud, 1.7F), 1000U);
+  EXPECT_LE(nearer_than(*cleaned->cloud, 1.7F), nearer_than(*kept->cloud, 1.7F) / 100);
+}
+
+TEST(DenseFusion, OneViewAgainstManyIsNotEnough) {
+  DenseFusionOptions keep = fine();
+  keep.free_space = false;
+  const Views views = views_of_a_box(false);
+  EXPECT_GT(nearer_than(*views.fuse(fine())->cloud, 1.7F),
+            nearer_than(*views.fuse(keep)->cloud, 1.7F) * 9 / 10);
+}
+
 TEST(DenseFusion, WhatMostSeeStays) {
   const cv::Rect box(200, 150, 120, 160);
   Views views;

@@ -57,6 +57,12 @@ class Sheets {
   /// Mean position of a sheet's points, metres.
   [[nodiscard]] Eigen::Vector3d position(const Sheet& sheet) const;
 
+  /// visit(index into all()) for the sheets of a block.
+  template <typename Visit>
+  void visit_block(const Eigen::Vector3i& block, const Visit& visit) const {
+    for (std::uint32_t s = first_of(block); s != kNone; s = next_[s]) visit(s);
+  }
+
   /// Finds the planes: over all 27 blocks around if one plane explains them, else over the sheet alone.
   void fit_planes();
   /// Moves the points of flat sheets along their normals to the planes, which are blended between blocks, and

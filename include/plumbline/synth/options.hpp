@@ -17,6 +17,7 @@ enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene fi
 struct SynthOptions {
   int frames = -1;  ///< of each robot; -1 = the path once; more than the path: it goes on round it
   int robots = 1;   ///< how many recordings
+  int walkers = 0;  ///< how many of the scene's walkers are about: filmed, but no part of reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur
   Motion motion = Motion::kScene;

@@ -63,6 +63,18 @@ struct RobotPath {
   double turn_rate = 0.6;           ///< rad/s, slower where the camera has to turn faster
 };
 
+/// Someone who walks to and fro on a straight line: a body of 0.5 x 0.3 m with a head, 1.7 m high.
+struct Walker {
+  Eigen::Vector3d from;  ///< middle of the feet
+  Eigen::Vector3d to;    ///< at least 1 cm away
+  double speed = 0.7;    ///< m/s
+  std::string material = "fabric";
+  core::ConfigMark mark;
+
+  /// Where the feet are, t seconds after the first frame.
+  [[nodiscard]] Eigen::Vector3d at(double t) const;
+};
+
 struct Scene {
   std::string name;
   std::string description;
@@ -73,6 +85,7 @@ struct Scene {
   double ambient = 0.35;              ///< share of light without direction
   Motion motion = Motion::kHandheld;  ///< when the options do not choose
   std::vector<RobotPath> robots;      ///< at least one
+  std::vector<Walker> walkers;        ///< as many of them are about as the options say
   std::vector<Event> events;
 };
 

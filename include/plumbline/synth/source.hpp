@@ -24,7 +24,7 @@ struct ExactFrame {
   geometry::Rigid3 world_from_color;  ///< pose at the colour stamp
   geometry::Rigid3 world_from_depth;  ///< pose at the depth stamp
   cv::Mat depth;  ///< CV_32FC1 metres, of the true surfaces at the depth stamp, 0 = nothing hit
-  cv::Mat face;   ///< CV_32SC1, index into Scene::faces, -1 = nothing hit
+  cv::Mat face;   ///< CV_32SC1, index into Scene::faces, beyond them: a walker's, -1 = nothing hit
 };
 
 class SynthSource final : public dataset::FrameSource {
