@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "app.hpp"
+#include "hush.hpp"
 #include "option_flags.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/mesh.hpp"
@@ -123,7 +124,10 @@ core::Result<void> export_mesh(const pipeline::MapPlace& place, const ExportRequ
   }
   const auto file = cloud_of(place, request, executor);
   if (!file) return tl::unexpected<core::Error>(file.error());
-  const auto mesh = cloud::make_mesh(*file->cloud, request.mesh_options);
+  const auto mesh = [&] {
+    const Hush hush;  // PCL's Poisson prints what it thinks of the points
+    return cloud::make_mesh(*file->cloud, request.mesh_options);
+  }();
   if (!mesh) return tl::unexpected<core::Error>(mesh.error());
   return cloud::write_mesh(request.output, *mesh);
 }

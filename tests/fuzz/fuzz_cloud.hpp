@@ -22,12 +22,16 @@ inline void read_as_cloud(const std::uint8_t* data, std::size_t size, const char
     return;
   }
   const cloud::Cloud& points = *cloud->cloud;
-  check_memory(watch, size + points.size() * sizeof(cloud::Point));
+  const auto& others = cloud->columns.others;
+  check_memory(watch, size + points.size() * (sizeof(cloud::Point) + others.size() * sizeof(float)));
   require(points.size() == std::size_t{points.width} * points.height, "width x height is the size");
   require(points.size() <= points_per_byte * size, "the file can hold its points");
   for (const std::size_t column :
        {cloud->columns.confidence.size(), cloud->columns.observations.size(), cloud->columns.robot.size()}) {
     require(column == 0 || column == points.size(), "columns are as long as the cloud");
+  }
+  for (const auto& other : others) {
+    require(other.values.size() == points.size(), "columns are as long as the cloud");
   }
 }
 
