@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "plumbline/sensor/depth_noise.hpp"
 #include "store_bytes.hpp"
 
 namespace plumbline::maps {
@@ -17,18 +18,15 @@ namespace {
 constexpr std::uint16_t kVersion = 1;
 constexpr double kPixelSteps = 4.0;      // per pixel, for pictures up to 16000 pixels wide
 constexpr double kLengthSteps = 1000.0;  // per metre
-constexpr double kPictureSteps = 100.0;  // per metre, of the small depth picture
+constexpr double kPictureSteps = 50.0;   // per metre, of the small depth picture
 constexpr double kNoiseSteps = 10000.0;
-constexpr double kEndSteps = 2000.0;  // per metre, of the noise of lines' ends
+constexpr int kTurn = 32;  // directions
 
 std::uint16_t unsigned_steps(double value, double steps) {
   return static_cast<std::uint16_t>(std::clamp(std::lround(value * steps), 0L, 65535L));
 }
 std::int16_t signed_steps(double value, double steps) {
   return static_cast<std::int16_t>(std::clamp(std::lround(value * steps), -32767L, 32767L));
-}
-std::uint8_t byte_of(double value, double steps) {
-  return static_cast<std::uint8_t>(std::clamp(std::lround(value * steps), 0L, 255L));
 }
 float from(double value, double steps) { return static_cast<float>(value / steps); }
 
@@ -70,8 +68,8 @@ void write_points(const features::FrameFeatures& f, const std::vector<std::int32
                         [&](std::size_t i) { return unsigned_steps(double{at(i).pixel.x()} + 0.5, steps); });
   column<std::uint16_t>(to, order,
                         [&](std::size_t i) { return unsigned_steps(double{at(i).depth}, kLengthSteps); });
-  column<std::uint8_t>(to, order,
-                       [&](std::size_t i) { return std::lround(at(i).angle / 360.0F * 256.0F) & 255; });
+  column<std::uint8_t>(
+      to, order, [&](std::size_t i) { return std::lround(at(i).angle / 360.0F * kTurn) & (kTurn - 1); });
   column<std::uint8_t>(to, order, [&](std::size_t i) { return at(i).octave; });
   for (const std::size_t i : order) to.put(f.descriptors[i]);
   column<std::int32_t>(to, order, [&](std::size_t i) { return landmarks[i]; });
@@ -93,7 +91,7 @@ void read_points(ByteReader& bytes, const sensor::Pinhole& camera, features::Fra
     row = static_cast<std::uint16_t>(row + y[i]);
     f.points[i].pixel = {from(x[i], steps) - 0.5F, from(row, steps) - 0.5F};
     f.points[i].depth = from(depth[i], kLengthSteps);
-    f.points[i].angle = static_cast<float>(angle[i]) * 360.0F / 256.0F;
+    f.points[i].angle = static_cast<float>(angle[i]) * 360.0F / kTurn;
     f.points[i].octave = octave[i];
     bytes.get(f.descriptors[i]);
   }
@@ -108,31 +106,23 @@ void write_lines(const features::FrameFeatures& f, double steps, ByteWriter& to)
       to.put(unsigned_steps(double{end.x()} + 0.5, steps));
       to.put(unsigned_steps(double{end.y()} + 0.5, steps));
     }
-    to.put(byte_of(double{line.segment.response}, 2.0));
     to.put(line.descriptor);
     to.flag(line.line3.has_value());
     if (!line.line3) continue;
     // The ends lie on the rays of the segment's ends: their depth says it all.
     to.put(unsigned_steps(line.line3->start.z(), kLengthSteps));
     to.put(unsigned_steps(line.line3->end.z(), kLengthSteps));
-    for (const features::EndpointNoise& noise : {line.line3->start_noise, line.line3->end_noise}) {
-      to.put(byte_of(double{noise.depth}, kEndSteps));
-      to.put(byte_of(double{noise.across}, kEndSteps));
-    }
-    to.put(byte_of(line.line3->inlier_share, 255.0));
-    to.put(byte_of(line.line3->coverage, 255.0));
   }
 }
 
 void read_lines(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f) {
   const double steps = pixel_steps(camera);
-  f.lines.resize(bytes.count(42));
+  f.lines.resize(bytes.count(41));
   for (features::LineFeature& line : f.lines) {
     for (Eigen::Vector2f* end : {&line.segment.start, &line.segment.end}) {
       end->x() = from(bytes.get<std::uint16_t>(), steps) - 0.5F;
       end->y() = from(bytes.get<std::uint16_t>(), steps) - 0.5F;
     }
-    line.segment.response = from(bytes.get<std::uint8_t>(), 2.0);
     bytes.get(line.descriptor);
     if (!bytes.flag()) continue;
     features::Line3 line3;
@@ -142,19 +132,19 @@ void read_lines(ByteReader& bytes, const sensor::Pinhole& camera, features::Fram
     };
     line3.start = on_ray(line.segment.start);
     line3.end = on_ray(line.segment.end);
-    for (features::EndpointNoise* noise : {&line3.start_noise, &line3.end_noise}) {
-      noise->depth = from(bytes.get<std::uint8_t>(), kEndSteps);
-      noise->across = from(bytes.get<std::uint8_t>(), kEndSteps);
-    }
-    line3.inlier_share = bytes.get<std::uint8_t>() / 255.0;
-    line3.coverage = bytes.get<std::uint8_t>() / 255.0;
+    const auto expected = [&](const Eigen::Vector3d& end) {
+      return features::EndpointNoise{static_cast<float>(sensor::depth_sigma(end.z())),
+                                     static_cast<float>(end.z() / camera.fx)};
+    };
+    line3.start_noise = expected(line3.start);
+    line3.end_noise = expected(line3.end);
     line.line3 = line3;
   }
 }
 
 void write_surface(const std::vector<SurfaceSample>& all, ByteWriter& to) {
   constexpr double kUnit = 127.0;
-  constexpr std::size_t kMost = 256;  // evenly chosen: they are spread over the picture
+  constexpr std::size_t kMost = 128;  // evenly chosen: they are spread over the picture
   std::vector<SurfaceSample> surface;
   const std::size_t step = (all.size() + kMost - 1) / kMost;
   for (std::size_t i = 0; i < all.size(); i += step) surface.push_back(all[i]);
