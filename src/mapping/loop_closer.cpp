@@ -192,6 +192,15 @@ void LoopCloser::merge_doubles(maps::Map& map, const PoseEdge& edge) const {
   }
 }
 
+void LoopCloser::note_verdict(const PoseEdge& edge, bool believed) {
+  for (auto trial = trials_.rbegin(); trial != trials_.rend(); ++trial) {
+    if (trial->loop.match != edge.a || trial->loop.query != edge.b) continue;
+    trial->closed = believed;
+    if (!believed) trial->refused = "the pose graph took it for wrong";
+    return;
+  }
+}
+
 bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   const auto gone = [&](const PoseEdge& e) { return !map.has_keyframe(e.a) || !map.has_keyframe(e.b); };
   edges_.erase(std::remove_if(edges_.begin(), edges_.end(), gone), edges_.end());
@@ -208,6 +217,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   std::vector<PoseEdge> fresh;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool wrong = i < solved.summary.edges.size() && solved.summary.edges[i].rejected;
+    if (i >= edges_.size()) note_verdict(all[i], !wrong);
     if (wrong) {
       ++counts_.rejected;
       continue;

@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "plumbline/tracking/surface_sampler.hpp"
+
 namespace plumbline::mapping {
 
 using geometry::Rigid3;
@@ -45,9 +47,46 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
   tracker_.set_place_finder([this](const features::FrameFeatures& picture) {
     return closer_.look_alikes(map_, picture, kLookAlikes);
   });
+  tracker_.set_place_judge([this](const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                                  core::KeyframeId keyframe, const Rigid3& camera_from_world) {
+    return is_place(frame, features, keyframe, camera_from_world);
+  });
 }
 
 Slam::~Slam() = default;
+
+/// A camera that turns up far from where it was lost must pass as a loop would: corridors look alike from
+/// both ends. Near by there is nothing to confuse.
+bool Slam::is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                    core::KeyframeId keyframe, const Rigid3& camera_from_world) const {
+  constexpr double kNear_m = 1.0;
+  constexpr double kNear_rad = 1.0;
+  constexpr double kSame_m = 0.1;
+  constexpr double kSame_rad = 0.05;
+  const auto apart = [](const Rigid3& a, const Rigid3& b) {
+    return (a.inverse().translation - b.inverse().translation).norm();
+  };
+  const auto turned = [](const Rigid3& a, const Rigid3& b) {
+    return geometry::rotation_angle(a.rotation * b.rotation.transpose());
+  };
+  if (apart(camera_from_world, last_camera_from_world_) < kNear_m &&
+      turned(camera_from_world, last_camera_from_world_) < kNear_rad) {
+    return true;
+  }
+  if (features.points.empty() && features.lines.empty()) return true;  // depth alone: nothing to match
+  auto seen = std::make_shared<maps::Keyframe>();
+  seen->id = {robot_, 0};
+  seen->stamp = frame.stamp;
+  seen->features = std::make_shared<features::FrameFeatures>(features);
+  seen->surface = tracking::sample_surface(frame.depth, camera_, options_.mapper.surface);
+  maps::Map probe;
+  probe.add_keyframe(seen, camera_from_world);
+  const PlaceVerification found = verify_place({&probe, seen->id, camera_}, {&map_, keyframe, camera_},
+                                               options_.loops.verify, options_.loops.seed);
+  if (!found.accepted) return false;
+  const Rigid3 verified = found.query_from_match * map_.camera_from_world(keyframe);
+  return apart(camera_from_world, verified) < kSame_m && turned(camera_from_world, verified) < kSame_rad;
+}
 
 void Slam::start_map(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {

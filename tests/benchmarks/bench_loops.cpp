@@ -5,7 +5,8 @@
 //   bench_loops --replay [--wrong SHARE] FILE       loops of a finished map that --save wrote, without
 //   tracking
 // INPUT: a recording's folder with truth, or synth:SCENE?... A loop is false when its relative pose is off by
-// more than 0.2 m or 6 degrees. --wrong: such a share of wrong loops is forced upon the pose graph, with and
+// more than 0.2 m or 6 degrees. --bend: the map is first bent by RATE rad of yaw a metre, as a tracker that
+// drifts would have left it. --wrong: such a share of wrong loops is forced upon the pose graph, with and
 // without its robustness. Milliseconds are processor time of one thread.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -76,6 +77,29 @@ void describe(const mapping::LoopTrial& t, const PoseError& error) {
       t.refused.empty() ? "VERIFIED" : t.refused.c_str());
 }
 
+/// Where the camera was lost, and how far off the frames between are, as the map's first second sees them.
+void describe_way(const std::vector<maps::FramePose>& frames, const geometry::Trajectory& estimate,
+                  const geometry::Trajectory& truth) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].tracked || (i > 0 && !frames[i - 1].tracked)) continue;
+    std::size_t end = i;
+    while (end < frames.size() && !frames[end].tracked) ++end;
+    std::fprintf(stderr, "lost: frames %zu-%zu\n", i, end - 1);
+  }
+  if (estimate.empty()) return;
+  const auto origin = geometry::pose_at(truth, estimate.front().stamp);
+  if (!origin) return;
+  const geometry::Rigid3 truth_from_map = *origin * estimate.front().world_from_camera.inverse();
+  for (std::size_t i = 0; i < estimate.size(); i += 60) {
+    const auto here = geometry::pose_at(truth, estimate[i].stamp);
+    if (!here) continue;
+    const geometry::Rigid3 off = (truth_from_map * estimate[i].world_from_camera).inverse() * *here;
+    std::fprintf(stderr, "%.2f s: off by %.3f m %.2f deg at %.2f %.2f\n", estimate[i].stamp,
+                 off.translation.norm(), kDegrees * geometry::rotation_angle(off.rotation),
+                 here->translation.x(), here->translation.y());
+  }
+}
+
 /// One row of the table.
 void print_row(const std::string& input, const std::string& name, double tracked_percent,
                const geometry::Trajectory& trajectory, const geometry::Trajectory& truth,
@@ -114,6 +138,7 @@ class Run {
     slam_->finish();
     print_row(input, name_, 100.0 * tracked_ / std::max(1, frames_), slam_->trajectory(), truth, slam_->map(),
               slam_->loop_trials(), slam_->loop_counts(), ms_ / std::max(1, frames_), tell);
+    if (tell) describe_way(slam_->frame_poses(), slam_->trajectory(), truth);
   }
   [[nodiscard]] const mapping::Slam& slam() const { return *slam_; }
 
@@ -141,6 +166,7 @@ struct Settings {
   std::vector<std::string> overrides;
   std::string save;
   double wrong = 0.0;      ///< share of the edges
+  double bend = 0.0;       ///< rad a metre
   std::size_t frames = 0;  ///< at most; 0: all
   bool replay = false;
   bool tell = false;
@@ -252,12 +278,43 @@ void force_wrong(const maps::StoredMap& stored, const geometry::Trajectory& trut
   }
 }
 
+/// Leaves of a map what its first frames gave.
+void cut(maps::StoredMap& stored, std::size_t frames) {
+  if (frames >= stored.frames.size()) return;
+  stored.frames.resize(frames);
+  const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
+  for (auto id = ids.rbegin(); id != ids.rend() && stored.map.stamp_of(*id) > stored.frames.back().stamp;
+       ++id) {
+    stored.map.remove_keyframe(*id);
+  }
+}
+
+/// What a drift of `rate` rad a metre, always the same way, would have made of the map.
+void bend(maps::Map& map, double rate) {
+  mapping::KeyframePoses poses;
+  geometry::Rigid3 before;
+  geometry::Rigid3 bent;
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    const geometry::Rigid3& pose = map.camera_from_world(id);
+    if (poses.empty()) {
+      bent = pose;
+    } else {
+      const geometry::Rigid3 step = pose * before.inverse();
+      const Eigen::Vector3d yaw(0.0, rate * step.translation.norm(), 0.0);
+      bent = geometry::Rigid3(geometry::exp_so3(yaw), Eigen::Vector3d::Zero()) * step * bent;
+    }
+    before = pose;
+    poses.emplace_back(id, bent);
+  }
+  mapping::move_keyframes(map, poses);
+}
+
 /// Closes the loops of a finished map, keyframe by keyframe.
 core::Result<void> replay(const std::string& file, const Settings& settings, const core::Executor& executor) {
   const auto log = core::stderr_log(core::LogLevel::kWarning);
   auto reader = maps::StoreReader::open(file);
   if (!reader) return tl::unexpected<core::Error>(reader.error());
-  const auto stored = reader->load();
+  auto stored = reader->load();
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   const auto source = open(stored->header.input, settings.pipelines, executor, *log);
   if (!source) return tl::unexpected<core::Error>(source.error());
@@ -265,8 +322,11 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   if (!truth) return core::input_error(stored->header.input + ": comes without truth");
   const auto options = options_of(settings.overrides, true);
   if (!options) return tl::unexpected<core::Error>(options.error());
+  if (settings.frames > 0) cut(*stored, settings.frames);
+  if (settings.bend != 0.0) bend(stored->map, settings.bend);
   maps::Map map = stored->map;
   const std::string name = short_name(file);
+  if (settings.tell) describe_way(stored->frames, maps::trajectory(stored->frames, map), *truth);
   print_row(name, "off", 100.0, maps::trajectory(stored->frames, map), *truth, map, {}, {}, 0.0, false);
   mapping::LoopCloser closer(options->loops, stored->header.camera.color);
   const double start = thread_ms();
@@ -280,9 +340,15 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
       (thread_ms() - start) / static_cast<double>(std::max<std::size_t>(1, map.keyframe_count()));
   print_row(name, "replayed, ms a keyframe", 100.0, maps::trajectory(stored->frames, map), *truth, map,
             closer.trials(), closer.counts(), ms, settings.tell);
-  if (settings.wrong > 0.0 && !closer.edges().empty()) {
-    force_wrong(*stored, *truth, name, options->loops, closer.edges(), settings.wrong);
+  if (!(settings.wrong > 0.0)) return {};
+  mapping::LoopCloser watcher(options->loops, stored->header.camera.color);  // all that could be closed
+  std::vector<mapping::PoseEdge> edges;
+  for (const core::KeyframeId id : stored->map.keyframe_ids()) {
+    for (const mapping::Loop& loop : watcher.look(stored->map, id)) {
+      edges.push_back(mapping::LoopCloser::to_edge(loop));
+    }
   }
+  if (!edges.empty()) force_wrong(*stored, *truth, name, options->loops, edges, settings.wrong);
   return {};
 }
 
@@ -297,6 +363,7 @@ int main(int argc, char** argv) {
   app.add_flag("--tell", settings.tell, "Every verified place, on stderr");
   app.add_option("--save", settings.save, "Write the map of the first run: loops off, unless --on-only");
   app.add_flag("--replay", settings.replay, "INPUT is a map that --save wrote");
+  app.add_option("--bend", settings.bend, "With --replay: drift that the map is given, rad a metre");
   app.add_option("--wrong", settings.wrong, "With --replay: share of wrong loops")
       ->check(CLI::Range(0.0, 0.9));
   app.add_flag("--on-only", settings.on_only, "Not the run without loops");

@@ -141,6 +141,26 @@ TEST_F(TwoPlaces, FoundAgainByLandmarksOrByTheWholePicture) {
   }
 }
 
+TEST_F(TwoPlaces, APlaceThatTheJudgeRefusesIsNotTaken) {
+  const Rigid3 moved(geometry::exp_so3({0.01, 0.02, 0.01}), {0.02, 0.01, 0.02});
+  const Look seen = look(second_, moved);
+  for (const bool believed : {true, false}) {
+    Tracker tracker(only(true, true, true), kTestCamera);
+    tracker.map_changed(map_, here_, Rigid3());
+    int asked = 0;
+    tracker.set_place_judge([&](const sensor::RgbdFrame&, const features::FrameFeatures&,
+                                core::KeyframeId keyframe, const Rigid3& pose) {
+      ++asked;
+      EXPECT_EQ(keyframe, there_);
+      EXPECT_LT(tests::distance(pose, moved * away_), 0.005);
+      return believed;
+    });
+    const TrackResult result = tracker.track(map_, seen.frame, seen.features);
+    EXPECT_GE(asked, 1);
+    EXPECT_EQ(result.state, believed ? TrackState::kTracked : TrackState::kLost);
+  }
+}
+
 TEST_F(TwoPlaces, PointsAreNotAskedWhenTheyAreOff) {
   // Without lines and points only depth could confirm the place, and a flat wall does not.
   const Look seen = look(second_, {});

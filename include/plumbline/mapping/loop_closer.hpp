@@ -64,6 +64,7 @@ struct LoopTrial {
   double correction_m = 0.0;  ///< how far closing it would move the query; 0 when there is no pose
   double correction_rad = 0.0;
   double way_m = 0.0;   ///< from the match to the query, along the keyframes
+  bool closed = false;  ///< the pose graph believed it, and the map was moved
   std::string refused;  ///< why it is no loop; empty: it passed
 };
 
@@ -79,8 +80,8 @@ class LoopCloser {
   /// to be closed; mostly none.
   std::vector<Loop> look(const maps::Map& map, core::KeyframeId keyframe);
 
-  /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are part of
-  /// the map by then.
+  /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are part
+  /// of the map by then.
   void restore(const maps::Map& map, core::KeyframeId newest);
 
   /// Pose graph with these edges and those of earlier loops. When it believes one of the new edges: moves the
@@ -106,6 +107,7 @@ class LoopCloser {
  private:
   [[nodiscard]] std::vector<Loop> verify(const maps::Map& map, core::KeyframeId keyframe,
                                          const std::vector<places::Candidate>& candidates);
+  void note_verdict(const PoseEdge& edge, bool believed);
   void measure_correction(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::vector<Loop> confirmed(const maps::Map& map, core::KeyframeId keyframe) const;

@@ -93,6 +93,8 @@ class Slam {
   void put_back_bundle(BundleReport& report);
   void settle_bundles();
   void close_loops(core::KeyframeId keyframe);
+  [[nodiscard]] bool is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                              core::KeyframeId keyframe, const geometry::Rigid3& camera_from_world) const;
   void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;

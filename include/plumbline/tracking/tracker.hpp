@@ -79,6 +79,12 @@ class Tracker {
   using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
   void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
 
+  /// Who can tell whether a pose that was found by looks, near `keyframe`, is where the picture was taken and
+  /// not a place that looks the same. Asked before such a pose is believed; without one it is believed.
+  using PlaceJudge = std::function<bool(const sensor::RgbdFrame&, const features::FrameFeatures&,
+                                        core::KeyframeId keyframe, const geometry::Rigid3& camera_from_world)>;
+  void set_place_judge(PlaceJudge judge) { is_place_ = std::move(judge); }
+
   /// How fast the camera turned between the last two frames, rad/s.
   [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
@@ -123,6 +129,7 @@ class Tracker {
   sensor::Pinhole camera_;
   LocalMap local_map_;
   PlaceFinder find_places_;
+  PlaceJudge is_place_;
   Last last_;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
   int lost_frames_ = 0;
