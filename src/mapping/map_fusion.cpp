@@ -105,24 +105,28 @@ MapFusionOptions::MapFusionOptions() {
   adjustment.bundle_options.max_iterations = 10;
 }
 
-void MapFusionOptions::declare(core::OptionTable& table) {
-  table.integer("min_pairs", min_pairs, {2, 1000}, "",
+void MapFusionOptions::declare_decision(core::OptionTable& table, const std::string& prefix) {
+  table.integer(prefix + "min_pairs", min_pairs, {2, 1000}, "",
                 "Keyframes of each of two maps that must agree on how the maps lie");
-  table.number("min_span", min_span_m, {0.0, 100.0}, "m",
+  table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
                "How far apart the keyframes that agree lie, at least");
-  table.number("min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
-  table.number("max_apart", consistency.max_apart_m, {0.0, 10.0}, "m",
+  table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
+  table.number(prefix + "max_apart", consistency.max_apart_m, {0.0, 10.0}, "m",
                "How far apart pairs that agree may put the maps");
-  table.number("max_turned", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
-  table.number("drift", consistency.apart_per_metre, {0.0, 1.0}, "",
+  table.number(prefix + "max_turned", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.number(prefix + "drift", consistency.apart_per_metre, {0.0, 1.0}, "",
                "Metres more for every metre between the pairs: maps drift");
-  table.number("rival", rival, {0.0, 1.0}, "",
+  table.number(prefix + "rival", rival, {0.0, 1.0}, "",
                "A second answer with this share of the best one's keyframes makes both doubtful");
-  table.number("min_confirmed", min_confirmed, {0.0, 1.0}, "",
+  table.number(prefix + "min_confirmed", min_confirmed, {0.0, 1.0}, "",
                "Share of the keyframes with a view of the other map that must see what it holds");
-  table.integer("verifications", verifications, {1, 100000}, "",
+  table.integer(prefix + "verifications", verifications, {1, 100000}, "",
                 "Pairs of keyframes that are verified for each two maps, at most");
-  table.boolean("robust", robust, "The pose graph may take pairs of keyframes for wrong");
+  table.boolean(prefix + "robust", robust, "The pose graph may take pairs of keyframes for wrong");
+}
+
+void MapFusionOptions::declare(core::OptionTable& table) {
+  declare_decision(table);
   vocabulary.declare(table);
   places.declare(table);
   verify.declare(table);

@@ -23,6 +23,7 @@ class RobotsStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     slam_.declare(table);
+    fusion_.declare_decision(table, "merge.");
     table.boolean("online", online_, "Look for overlaps while the robots map, not only at the end");
   }
 

@@ -29,7 +29,7 @@ struct MapFusionOptions {
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
-  double rival = 0.1;           ///< a second answer with so many keyframes, as share of the best one, is a doubt
+  double rival = 0.1;  ///< a second answer with so many keyframes, as share of the best one, is a doubt
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
   bool robust = true;          ///< the pose graph may take pairs for wrong
@@ -41,6 +41,8 @@ struct MapFusionOptions {
   GlobalAdjustmentOptions adjustment;
   MapFusionOptions();
   void declare(core::OptionTable& table);
+  /// Only what decides whether maps are merged.
+  void declare_decision(core::OptionTable& table, const std::string& prefix = "");
 };
 
 /// A map in a world frame of its own; its robots' numbers are no other part's. Outlives what is given it.
