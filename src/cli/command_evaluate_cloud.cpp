@@ -28,6 +28,7 @@ struct CloudRequest {
   evaluate::CloudOptions options;
   core::OptionTable table;
   std::unique_ptr<OptionFlags> flags;
+  const CLI::App* command = nullptr;
 };
 
 /// What the user named, else what lies beside cloud and reference.
@@ -78,6 +79,9 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
 
 core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   if (auto applied = request.flags->apply(); !applied) return applied;
+  if (!request.trajectories.empty() && request.command->count("--align") == 0) {
+    request.options.align = evaluate::CloudAlignment::kSe3;  // who names a start wants to be aligned
+  }
   if (!request.output.empty() && request.reference.empty()) {
     return core::usage_error("-o: colours by error need a REFERENCE to measure against");
   }
@@ -126,7 +130,9 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
   command->add_option(
       "REFERENCE", request->reference,
       "The true surface (PLY, mesh or samples); without it only what the cloud tells of itself");
-  command->add_option("--trajectory", request->trajectories, "Estimated path to start the alignment from")
+  command
+      ->add_option("--trajectory", request->trajectories,
+                   "Estimated path to start the alignment from; --align is se3 then, if it is not given")
       ->type_name("EST")
       ->allow_extra_args(false);
   command->add_option("--truth", request->truths, "Its truth, in the reference's frame")
@@ -139,6 +145,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
       ->type_name("DIR");
   command->add_flag("--json", request->json, "Print JSON");
   request->flags = std::make_unique<OptionFlags>(*command, request->table);
+  request->command = command;
 }
 
 }  // namespace plumbline::cli

@@ -115,6 +115,10 @@ TEST_F(Tools, EvaluateTellsWhatIsThere) {
   EXPECT_LT(nlohmann::json::parse(cloud.out)["accuracy_mm"]["rmse"], 1.0) << cloud;
   EXPECT_EQ(run("evaluate cloud out").code, 0);
   EXPECT_EQ(run("evaluate cloud out out/map.ply --trajectory out/trajectory.txt").code, 2);
+  const std::string start =
+      "evaluate cloud out out/map.ply --json --trajectory out --truth out/trajectory.txt";
+  EXPECT_EQ(nlohmann::json::parse(run(start).out)["alignment"]["type"], "se3");
+  EXPECT_EQ(nlohmann::json::parse(run(start + " --align none").out)["alignment"]["type"], "none");
 }
 
 TEST_F(Tools, SynthWritesARecordingThatMaps) {
