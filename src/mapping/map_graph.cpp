@@ -2,6 +2,7 @@
 // Pose graph of a map, and what moves when keyframes do.
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "plumbline/mapping/global_adjustment.hpp"
 
@@ -82,29 +83,43 @@ Matrix6d covariance_of_way(const maps::Map& map, const std::vector<KeyframeId>& 
   return sum;
 }
 
+/// What an edge from elsewhere says against the way that leads from its one end to the other.
+struct Discrepancy {
+  bool known = false;               ///< both ends of one robot, and the edge may be wrong
+  geometry::Vector6d error;         ///< as seen from the later keyframe
+  Matrix6d own = Matrix6d::Zero();  ///< covariance of the edge
+  Matrix6d way = Matrix6d::Zero();  ///< of the way, were its errors independent
+  int steps = 0;
+  [[nodiscard]] double chi2(double factor) const {
+    return error.dot((own + factor * way).ldlt().solve(error));
+  }
+};
+
+Discrepancy discrepancy(const maps::Map& map, const std::vector<KeyframeId>& ids, const PoseEdge& e) {
+  Discrepancy d;
+  d.known = !e.trusted && e.a.robot == e.b.robot;
+  if (!d.known) return d;
+  const Rigid3 b_from_a = map.camera_from_world(e.b) * map.camera_from_world(e.a).inverse();
+  Rigid3 error = b_from_a * e.b_from_a.inverse();
+  d.own = (e.information + 1e-6 * Matrix6d::Identity()).inverse();
+  if (e.b < e.a) {
+    error = b_from_a.inverse() * e.b_from_a;
+    const Matrix6d carry = adjoint(b_from_a.inverse());
+    d.own = carry * d.own * carry.transpose();
+  }
+  d.error = geometry::log_se3(error);
+  d.way = covariance_of_way(map, ids, std::min(e.a, e.b), std::max(e.a, e.b), d.steps);
+  return d;
+}
+
 /// Errors of neighbours are alike, so that drift grows with the way rather than with its root: with all alike
 /// the variance after n steps is n times what independent ones would have. By how much the covariance of the
 /// map's own edges must grow for the measured edges to be explained: the median over these, so that wrong
 /// ones do not decide it.
-double drift_factor(const maps::Map& map, const std::vector<KeyframeId>& ids,
-                    const std::vector<PoseEdge>& measured) {
+double drift_factor(const std::vector<Discrepancy>& discrepancies) {
   std::vector<double> factors;
-  for (const PoseEdge& e : measured) {
-    if (e.trusted || e.a.robot != e.b.robot) continue;
-    int steps = 0;
-    const Matrix6d way = e.a < e.b ? covariance_of_way(map, ids, e.a, e.b, steps)
-                                   : covariance_of_way(map, ids, e.b, e.a, steps);
-    const Rigid3 b_from_a = map.camera_from_world(e.b) * map.camera_from_world(e.a).inverse();
-    Rigid3 error = b_from_a * e.b_from_a.inverse();
-    Matrix6d own = (e.information + 1e-6 * Matrix6d::Identity()).inverse();
-    if (e.b < e.a) {  // as seen from the later one
-      error = b_from_a.inverse() * e.b_from_a;
-      const Matrix6d carry = adjoint(b_from_a.inverse());
-      own = carry * own * carry.transpose();
-    }
-    const geometry::Vector6d xi = geometry::log_se3(error);
-    const double ratio = xi.dot((own + way).ldlt().solve(xi)) / 6.0;
-    factors.push_back(std::clamp(ratio, 1.0, std::max(1.0, static_cast<double>(steps))));
+  for (const Discrepancy& d : discrepancies) {
+    if (d.known) factors.push_back(std::clamp(d.chi2(1.0) / 6.0, 1.0, std::max(1.0, 1.0 * d.steps)));
   }
   if (factors.empty()) return 1.0;
   const auto middle = factors.begin() + static_cast<std::ptrdiff_t>((factors.size() - 1) / 2);
@@ -160,15 +175,37 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
     index[id] = static_cast<int>(graph.poses.size());
     graph.poses.push_back({map.camera_from_world(id), id == anchor});
   }
+  std::vector<Discrepancy> discrepancies;
   for (const PoseEdge& e : extra) {
+    if (index.count(e.a) == 0 || index.count(e.b) == 0)
+      throw std::out_of_range("solve_map_graph: no such keyframe");
+    discrepancies.push_back(discrepancy(map, ids, e));
+  }
+  // What no drift explains would tear the graph before the others could tell that it is wrong: it stays out.
+  const double factor = drift_factor(discrepancies);
+  const double gate = optimize::chi_square_gate(6, options.false_alarm);
+  std::vector<int> place(extra.size(), -1);  // in the graph
+  for (std::size_t i = 0; i < extra.size(); ++i) {
+    const PoseEdge& e = extra[i];
+    const bool robust = options.robust != optimize::EdgeRobustness::kNone;
+    if (robust && discrepancies[i].known && discrepancies[i].chi2(factor) > gate) continue;
+    place[i] = static_cast<int>(graph.edges.size());
     graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information, e.trusted});
   }
-  const double factor = drift_factor(map, ids, extra);
   for (const PoseEdge& e : map_edges(map)) {
     graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information / factor, true});
   }
   result.summary = optimize::solve_pose_graph(graph, options);
-  result.summary.edges.resize(extra.size());
+  std::vector<optimize::EdgeVerdict> verdicts(extra.size());
+  for (std::size_t i = 0; i < extra.size(); ++i) {
+    if (place[i] >= 0 && !result.summary.edges.empty()) {
+      verdicts[i] = result.summary.edges[static_cast<std::size_t>(place[i])];
+    } else if (place[i] < 0) {
+      verdicts[i] = {discrepancies[i].chi2(factor), 6, 0.0, true};
+      ++result.summary.rejected;
+    }
+  }
+  result.summary.edges = std::move(verdicts);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     result.poses.emplace_back(ids[i], graph.poses[i].camera_from_world);
   }

@@ -167,6 +167,31 @@ TEST(LoopCloser, DriftThatGoesOneWayIsNoReasonToRefuseALoop) {
   }
 }
 
+TEST(LoopCloser, WrongLoopsAmongRightOnesDoNoHarmToAMapThatDrifts) {
+  std::vector<PoseEdge> right;
+  Ring clean(0.006, 240);
+  tie_neighbours(clean.map, Ring::kCount);
+  for (int i = 0; i < 7; ++i) right.push_back(clean.edge(i, 39 - i));
+  LoopCloser alone(without_bundle(), kTestCamera);
+  ASSERT_TRUE(alone.close(clean.map, right));
+  ASSERT_EQ(alone.counts().rejected, 0);
+  std::vector<PoseEdge> all = right;
+  for (const auto& [a, b] : {std::pair{3, 20}, std::pair{8, 30}, std::pair{12, 25}}) {
+    // The same place, as the look-alikes of a corridor say.
+    all.push_back({{0, a},
+                   {0, b},
+                   Rigid3(geometry::exp_so3({0.0, 0.2, 0.0}), {0.2, 0.0, -0.3}),
+                   right.front().information,
+                   false});
+  }
+  Ring forced(0.006, 240);
+  tie_neighbours(forced.map, Ring::kCount);
+  LoopCloser robust(without_bundle(), kTestCamera);
+  ASSERT_TRUE(robust.close(forced.map, all));
+  EXPECT_EQ(robust.counts().rejected, 3);
+  EXPECT_LE(forced.worst(), 1.1 * clean.worst());
+}
+
 TEST(LoopCloser, OnlyWrongLoopsChangeNothing) {
   Ring ring;
   const double before = ring.worst();

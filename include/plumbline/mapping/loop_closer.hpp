@@ -38,6 +38,7 @@ struct LoopOptions {
   places::RecogniserOptions places;
   VerificationOptions verify;
   FusionOptions fusion;
+  LoopOptions() { verify.rounds = 200; }  ///< enough where a third agrees; asked at every keyframe
   void declare(core::OptionTable& table);
   /// Reads vocabulary_file, if one is named.
   core::Result<void> load();
