@@ -91,7 +91,7 @@ TEST(StoreSteps, EachLeavesTheMapInEveryBit) {
   const auto reader = StoreReader::open(folder.file());
   ASSERT_TRUE(reader);
   EXPECT_EQ(reader->frame_cloud_ids().value(), follower.frame_clouds);
-  EXPECT_EQ(reader->frame_cloud(follower.frame_clouds.front()).value()->size(), 501U);
+  EXPECT_EQ(reader->frame_cloud(follower.frame_clouds.front()).value()->size(), 500U);
   EXPECT_EQ(reader->frame_cloud(100000).error().kind, core::ErrorKind::kInput);
   const StoreContents contents = reader->contents().value();
   EXPECT_EQ(contents.keyframes, world.map.keyframe_count());
