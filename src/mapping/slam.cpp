@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/tracking/surface_sampler.hpp"
 
 namespace plumbline::mapping {
@@ -117,6 +118,11 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.stamp = frame.stamp;
   ++clock_;
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);
+  if (options_.tracker.readout_s > 0.0 && !tracker_.turning().isZero(0.0)) {
+    auto still = std::make_shared<features::FrameFeatures>(*features);
+    features::undo_rolling_shutter(*still, camera_, tracker_.turning(), options_.tracker.readout_s);
+    features = std::move(still);
+  }
   last_track_ = tracker_.track(map_, frame, *features);
   const tracking::TrackResult& track = last_track_;
   report.state = track.state;

@@ -120,6 +120,8 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
   table.boolean("align_stamps", align_stamps,
                 "Bring colour and depth stamped apart together with the motion model");
+  table.number("readout", readout_s, {0.0, 0.1}, "s",
+               "Rolling shutter: time from the first to the last row of a picture; 0: all rows at once");
   table.integer("min_inliers", min_inliers, {3, 1000}, "", "Features that a pose must explain to be trusted");
   table.integer("min_surface", min_surface, {10, 100000}, "",
                 "Depth samples that a pose without enough features must explain");

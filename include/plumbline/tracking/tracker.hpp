@@ -29,6 +29,9 @@ struct TrackerOptions {
   bool lines = true;
   bool depth = true;
   bool align_stamps = true;
+  /// Time from the first to the last row of a picture, s; 0: all at once. What it shears is put right with
+  /// the motion model before a frame is tracked (features::undo_rolling_shutter).
+  double readout_s = 0.0;
   int min_inliers = 15;
   int min_surface = 300;
   AssociationOptions association;
@@ -74,17 +77,23 @@ class Tracker {
   void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Rigid3& camera_from_world,
                const geometry::Vector6d& velocity);
 
-  /// Who knows which keyframes of the map look like a picture, best first. Asked when tracking is lost, beside
-  /// what the tracker finds by itself.
+  /// Who knows which keyframes of the map look like a picture, best first. Asked when tracking is lost,
+  /// beside what the tracker finds by itself.
   using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
   void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
 
   /// Who can tell whether a pose that was found by looks, near `keyframe`, is where the picture was taken and
   /// not a place that looks the same. Asked before such a pose is believed; without one it is believed.
-  using PlaceJudge = std::function<bool(const sensor::RgbdFrame&, const features::FrameFeatures&,
-                                        core::KeyframeId keyframe, const geometry::Rigid3& camera_from_world)>;
+  using PlaceJudge =
+      std::function<bool(const sensor::RgbdFrame&, const features::FrameFeatures&, core::KeyframeId keyframe,
+                         const geometry::Rigid3& camera_from_world)>;
   void set_place_judge(PlaceJudge judge) { is_place_ = std::move(judge); }
 
+  /// How the camera turned between the last two frames, rad/s in its frame:
+  /// camera_from_world(t + dt) = Exp(turning dt) camera_from_world(t). Zero when that is not known.
+  [[nodiscard]] Eigen::Vector3d turning() const {
+    return last_.valid && lost_frames_ == 0 ? Eigen::Vector3d(velocity_.tail<3>()) : Eigen::Vector3d::Zero();
+  }
   /// How fast the camera turned between the last two frames, rad/s.
   [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
