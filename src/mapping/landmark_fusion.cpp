@@ -12,9 +12,11 @@ namespace {
 using core::KeyframeId;
 using core::PointId;
 
-constexpr double kPixelGate = 5.99;     // chi-square, 2 degrees of freedom, 95 %
-constexpr double kDepthSigmas = 3.0;    // between a landmark and a measured depth, and between landmarks
-constexpr double kSamePlace_px = 3.0F;  // corners of several octaves at one place are one corner
+// Strict: the neighbours' poses are known to a fraction of a pixel, and what lies further off is rather
+// another corner of the same shape. One wrong observation costs more than ten right ones give.
+constexpr double kPixelGate = 1.5;     // squared distance in squared standard deviations
+constexpr double kDepthSigmas = 3.0;   // between a landmark and a measured depth, and between landmarks
+constexpr double kSamePlace_px = 1.0;  // corners of several octaves at one place are one corner
 
 const features::PointFeature& feature_of(const maps::Map& map, const maps::Observation& o) {
   return map.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];

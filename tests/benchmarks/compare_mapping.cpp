@@ -2,7 +2,7 @@
 // What local mapping and the keyframe rule are worth: every recording is mapped side by side with local
 // mapping off and on, with the cone rule, and with the plain rule at several densities of keyframes, of which
 // the one is shown that comes nearest to the cone rule's number.
-//   compare_mapping [--csv] [--threads N] [--set key=value]... [--off key=value]... INPUT...
+//   compare_mapping [--csv] [--threads N] [--frames N] [--set key=value]... [--off key=value]... INPUT...
 // INPUT: a recording's folder with truth, or synth:SCENE?... ; --set holds for all, --off for local mapping
 // off alone. Coverage: of the 5 cm voxels that depth images of all frames fill (at the true poses), the share
 // that those of the keyframes fill. The numbers are the same on every run.
@@ -31,8 +31,8 @@ constexpr std::size_t kChunk = 16;  // frames in memory
 constexpr double kVoxel = 0.05;     // m
 constexpr int kStride = 8;          // px, of the depth images that coverage is counted with
 constexpr double kMaxDepth = 6.0;   // m
-/// Factors on what the plain rule allows between keyframes.
-constexpr std::array<double, 9> kDensities{0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.1, 2.8};
+/// Factors on what the plain rule allows between keyframes, besides 1.
+constexpr std::array<double, 5> kDensities{0.45, 0.65, 0.82, 1.25, 1.6};
 
 core::Result<mapping::SlamOptions> options_of(const Texts& texts) {
   mapping::SlamOptions options;
@@ -120,16 +120,19 @@ double coverage(const Run& run, const std::vector<Voxels>& seen, std::size_t all
 
 class Comparison {
  public:
-  Comparison(const dataset::FrameSource& source, geometry::Trajectory truth)
-      : source_(source), truth_(std::move(truth)), camera_(source.camera().color), extractor_({}, camera_) {}
+  Comparison(const dataset::FrameSource& source, geometry::Trajectory truth, std::size_t frames)
+      : source_(source),
+        truth_(std::move(truth)),
+        frames_(std::min(frames, source.size())),
+        camera_(source.camera().color),
+        extractor_({}, camera_) {}
 
   void add(const mapping::SlamOptions& options) { runs_.push_back(std::make_unique<Run>(options, camera_)); }
 
   void run(const core::Executor& executor) {
-    const std::size_t frames = source_.size();
-    seen_.resize(frames);
-    for (std::size_t begin = 0; begin < frames; begin += kChunk) {
-      std::vector<Prepared> chunk(std::min(kChunk, frames - begin));
+    seen_.resize(frames_);
+    for (std::size_t begin = 0; begin < frames_; begin += kChunk) {
+      std::vector<Prepared> chunk(std::min(kChunk, frames_ - begin));
       executor.parallel_for(chunk.size(), [&](std::size_t i) { chunk[i] = prepare(begin + i); });
       executor.parallel_for(runs_.size(), [&](std::size_t r) {
         for (std::size_t i = 0; i < chunk.size(); ++i) runs_[r]->process(begin + i, chunk[i]);
@@ -151,10 +154,10 @@ class Comparison {
     const Run& run = *runs_[r];
     const auto report = evaluate::evaluate_trajectory(run.slam.trajectory(), truth_);
     const double ate = report ? report->ate_m.rmse : std::nan("");
-    const double percent = 100.0 * static_cast<double>(run.tracked) / static_cast<double>(source_.size());
+    const double percent = 100.0 * static_cast<double>(run.tracked) / static_cast<double>(frames_);
     std::printf(csv ? "%s,%s,%zu,%.1f,%.4f,%zu,%.3f,%zu,%zu\n"
                     : "| %s | %s | %zu | %.1f | %.4f | %zu | %.3f | %zu | %zu |\n",
-                sequence.c_str(), name, source_.size(), percent, ate, run.keyframes.size(),
+                sequence.c_str(), name, frames_, percent, ate, run.keyframes.size(),
                 coverage(run, seen_, voxels_), run.slam.map().point_count(), run.slam.map().line_count());
     std::fflush(stdout);
   }
@@ -175,6 +178,7 @@ class Comparison {
 
   const dataset::FrameSource& source_;
   geometry::Trajectory truth_;
+  std::size_t frames_;  ///< from the first on
   sensor::Pinhole camera_;
   features::FeatureExtractor extractor_;
   std::vector<std::unique_ptr<Run>> runs_;
@@ -184,7 +188,7 @@ class Comparison {
 
 core::Result<void> compare(const std::string& input, const std::string& pipelines,
                            const mapping::SlamOptions& on, const mapping::SlamOptions& off,
-                           const core::Executor& executor, bool csv) {
+                           std::size_t frames, const core::Executor& executor, bool csv) {
   const auto log = core::stderr_log(core::LogLevel::kWarning);
   dataset::OpenOptions open;
   open.cameras_folder = pipelines + "/cameras";
@@ -194,7 +198,7 @@ core::Result<void> compare(const std::string& input, const std::string& pipeline
   if (!source) return tl::unexpected<core::Error>(source.error());
   const auto truth = (*source)->truth();
   if (!truth) return core::input_error(input + ": comes without truth; there is nothing to compare with");
-  Comparison comparison(**source, *truth);
+  Comparison comparison(**source, *truth, frames);
   mapping::SlamOptions cone = on;
   cone.keyframe.rule = mapping::KeyframeRuleOptions::Rule::kCone;
   comparison.add(off);
@@ -203,7 +207,7 @@ core::Result<void> compare(const std::string& input, const std::string& pipeline
   for (const double density : kDensities) comparison.add(at_density(on, density));
   comparison.run(executor);
   const auto wanted = static_cast<double>(comparison.of(2).keyframes.size());
-  std::size_t nearest = 3;
+  std::size_t nearest = 1;  // the plain rule as it is
   for (std::size_t r = 3; r < 3 + kDensities.size(); ++r) {
     const auto distance = [&](std::size_t run) {
       return std::abs(static_cast<double>(comparison.of(run).keyframes.size()) - wanted);
@@ -224,17 +228,20 @@ int main(int argc, char** argv) {
   CLI::App app("Maps recordings with local mapping off and on and by both keyframe rules");
   Texts inputs;
   Texts overrides;
-  Texts off{"bundle=off", "edges=off"};
+  Texts off{"bundle=off", "edges=off", "triangulate=off", "fuse=off"};
   std::string pipelines = PLUMBLINE_SOURCE_DIR "/pipelines";
   bool csv = false;
   int threads = 1;
+  std::size_t frames = 1000000;
   app.add_option("INPUT", inputs, "Recordings with truth, or synth:SCENE?...")->required();
   app.add_flag("--csv", csv, "Comma-separated values instead of a Markdown table");
   app.add_option("--threads", threads, "Frames and variants side by side")->check(CLI::Range(1, 256));
+  app.add_option("--frames", frames, "Only so many, from the first on")->check(CLI::PositiveNumber);
   app.add_option("--set", overrides, "Set an option of the track stage; may be repeated")
       ->type_name("key=value")
       ->allow_extra_args(false);
-  app.add_option("--off", off, "What local mapping off means, instead of bundle=off edges=off")
+  app.add_option("--off", off,
+                 "What local mapping off means, instead of bundle, edges, triangulate and fuse off")
       ->type_name("key=value")
       ->allow_extra_args(false);
   app.add_option("--pipelines-dir", pipelines, "Folder with cameras/ and scenes/");
@@ -257,7 +264,8 @@ int main(int argc, char** argv) {
           : "| sequence | variant | frames | tracked %% | ATE m | keyframes | coverage | points | lines |\n"
             "|---|---|---|---|---|---|---|---|---|\n");
   for (const std::string& input : inputs) {
-    if (auto done = compare(input, pipelines, *on, *plain, executor, csv); !done) return fail(done.error());
+    if (auto done = compare(input, pipelines, *on, *plain, frames, executor, csv); !done)
+      return fail(done.error());
   }
   return 0;
 }

@@ -184,6 +184,30 @@ TEST(Fusion, NeighboursInSpaceOrInOnePictureStayTwo) {
   EXPECT_EQ(pair.map.point_count(), 2U);
 }
 
+TEST(Fusion, ACornerTwoPixelsOffIsAnother) {
+  for (const double error_m : {0.003, 0.008}) {  // 0.8 and 2.1 px
+    LandmarkWorld world(11, 1, 0);
+    world.points = {{0.0, 0.0, 2.0}};
+    const KeyframeId a = world.add_keyframe(looking_from(0.0));
+    const KeyframeId b = world.add_keyframe(looking_from(0.05));
+    world.add_point(0, {a}, {error_m, 0.0, 0.0});
+    EXPECT_EQ(fuse_points(world.map, b, {a}, world.camera, {}).observed, error_m < 0.005 ? 1 : 0);
+  }
+}
+
+TEST(Fusion, EdgesThatMeetInOnePictureStayTwo) {
+  for (const double behind_m : {0.0, 0.025}) {
+    LandmarkWorld world(12, 0, 1);
+    world.lines = {{{0.0, -0.4, 2.0}, {0.0, 0.4, 2.0}}};
+    const KeyframeId aside = world.add_keyframe(looking_from(0.8));
+    const KeyframeId before = world.add_keyframe(looking_from(0.0));
+    world.add_line(0, {aside});
+    world.add_line(0, {before}, {0.0, 0.0, behind_m});
+    EXPECT_EQ(fuse_lines(world.map, before, {aside}, world.camera, {}).merged, behind_m > 0.0 ? 0 : 1);
+    EXPECT_EQ(world.map.line_count(), behind_m > 0.0 ? 2U : 1U);
+  }
+}
+
 TEST(LandmarkCuller, KeepsWhatIsSeenAndFound) {
   LandmarkWorld world(10, 10, 4);
   std::vector<KeyframeId> k;

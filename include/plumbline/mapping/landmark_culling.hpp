@@ -13,7 +13,7 @@ namespace plumbline::mapping {
 struct LandmarkCullingOptions {
   double min_found_share = 0.3;
   int min_visible = 10;
-  int min_keyframes = 1;  ///< 3 in the paper; what that is worth has not been measured yet
+  int min_keyframes = 1;  ///< 3 in the paper, whose keyframes are denser
   int grace_keyframes = 5;
 
   void declare(core::OptionTable& table);

@@ -22,9 +22,9 @@ namespace plumbline::mapping {
 struct LocalMapperOptions {
   double max_landmark_depth_m = 8.0;
   LandmarkCullingOptions culling;
-  bool triangulate = false;
+  bool triangulate = true;
   TriangulationOptions triangulation;
-  bool fuse = false;
+  bool fuse = true;
   FusionOptions fusion;
   bool cull_keyframes = false;
   KeyframeCullingOptions keyframe_culling;
