@@ -149,8 +149,8 @@ class StoreReader {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether a file is a store in whose first moment its run ended: nothing was ever committed. Errors (kInput):
-/// not there, no SQLite file.
+/// Whether a file is a store in whose first moment its run ended: nothing was ever committed. Errors
+/// (kInput): not there, no SQLite file.
 core::Result<bool> is_blank_store(const std::filesystem::path& file);
 
 /// StoreReader::open and load.
