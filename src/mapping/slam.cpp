@@ -60,8 +60,8 @@ Slam::~Slam() = default;
 /// both ends. Near by there is nothing to confuse.
 bool Slam::is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                     core::KeyframeId keyframe, const Rigid3& camera_from_world) const {
-  constexpr double kNear_m = 1.0;
-  constexpr double kNear_rad = 1.0;
+  constexpr double kNear_m = 0.6;
+  constexpr double kNear_rad = 0.6;
   constexpr double kSame_m = 0.1;
   constexpr double kSame_rad = 0.05;
   const auto apart = [](const Rigid3& a, const Rigid3& b) {

@@ -278,9 +278,7 @@ TEST(Slam, FoundFarAwayIsNotBelievedWithoutVerification) {
   options.loops.enabled = true;
   options.loops.verify.min_inliers = 10000;  // nothing passes
   const SlamRun result = run(world.shots, 1, options);
-  const double turned = geometry::rotation_angle(world.truth[45].world_from_camera.rotation.transpose() *
-                                                 world.truth[29].world_from_camera.rotation);
-  ASSERT_TRUE(carried.norm() > 1.0 || turned > 1.0) << carried.norm() << " m " << turned << " rad";
+  ASSERT_GT(carried.norm(), 0.6) << "near by, nothing has to pass";
   EXPECT_EQ(result.reports[45].state, TrackState::kLost);
 }
 
