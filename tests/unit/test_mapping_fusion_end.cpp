@@ -60,7 +60,7 @@ maps::KeyframeMessage full_message(int points, int lines) {
   features->thumbnail_depth.create(60, 80, CV_32FC1);
   for (int y = 0; y < 60; ++y) {
     for (int x = 0; x < 80; ++x)
-      features->thumbnail_depth.at<float>(y, x) = 2.0F + 0.02F * y + 0.01F * share();
+      features->thumbnail_depth.at<float>(y, x) = 2.0F + 0.02F * static_cast<float>(y) + 0.01F * share();
   }
   auto keyframe = std::make_shared<maps::Keyframe>();
   keyframe->id = {0, 0};
@@ -120,7 +120,9 @@ TEST(KeyframeMessage, DamagedBytesAreRefused) {
     auto damaged = bytes;
     damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ 0x5aU);
     const auto back = maps::decode_message(damaged);
-    if (!back) EXPECT_NE(back.error().message.find("message"), std::string::npos);
+    if (!back) {
+      EXPECT_NE(back.error().message.find("message"), std::string::npos);
+    }
   }
   bytes.resize(bytes.size() / 2);
   EXPECT_FALSE(maps::decode_message(bytes).has_value());
