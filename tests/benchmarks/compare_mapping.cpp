@@ -32,7 +32,7 @@ constexpr double kVoxel = 0.05;     // m
 constexpr int kStride = 8;          // px, of the depth images that coverage is counted with
 constexpr double kMaxDepth = 6.0;   // m
 /// Factors on what the plain rule allows between keyframes, besides 1.
-constexpr std::array<double, 5> kDensities{0.45, 0.65, 0.82, 1.25, 1.6};
+constexpr std::array<double, 5> kDensities{0.75, 1.35, 1.8, 2.4, 3.2};
 
 core::Result<mapping::SlamOptions> options_of(const Texts& texts) {
   mapping::SlamOptions options;
