@@ -101,6 +101,17 @@ int witnesses(const ConsistentSet& set) {
   return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b));
 }
 
+/// Whether these pairs mean another place than `a_from_b` does, and not only the same one less exactly.
+bool elsewhere(const maps::Map& a, const maps::Map& b, const std::vector<PlacePair>& pairs,
+               const Rigid3& a_from_b) {
+  constexpr double kApart_m = 1.0;  // more than maps drift within what they share
+  constexpr double kTurned_rad = 0.3;
+  const Rigid3 said = mean_transform(a, b, pairs).a_from_b;
+  const Eigen::Vector3d camera = b.camera_from_world(pairs.front().b).inverse().translation;
+  return (said * camera - a_from_b * camera).norm() > kApart_m ||
+         geometry::rotation_angle(said.rotation.transpose() * a_from_b.rotation) > kTurned_rad;
+}
+
 void sum_up(MergeEvidence& merge) {
   const auto n = static_cast<double>(merge.pairs.size());
   for (const VerifiedPair& pair : merge.pairs) {
@@ -194,7 +205,6 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
   if (!sets.empty()) {
     merge.agreeing = witnesses(sets.front());
     merge.span_m = sets.front().span_m;
-    for (std::size_t i = 1; i < sets.size(); ++i) merge.rival = std::max(merge.rival, witnesses(sets[i]));
     std::vector<PlacePair> best;
     for (const std::size_t i : sets.front().members) {
       best.push_back(all.places[i]);
@@ -205,6 +215,12 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
     merge.a_from_b = mean.a_from_b;
     merge.covariance = mean.covariance;
     merge.spread_m = mean.spread_m;
+    for (std::size_t i = 1; i < sets.size(); ++i) {
+      std::vector<PlacePair> other;
+      for (const std::size_t k : sets[i].members) other.push_back(all.places[k]);
+      if (elsewhere(map_a, map_b, other, mean.a_from_b))
+        merge.rival = std::max(merge.rival, witnesses(sets[i]));
+    }
   }
   merge.refused = judge(merge, options);
   if (merge.refused.empty()) {
