@@ -8,6 +8,8 @@
 namespace plumbline::mapping {
 namespace {
 
+constexpr int kDepthIsBack = 50;  // corners with depth
+
 struct View {
   double overlap = 1.0;
   double depth = 2.0;  ///< median, metres
@@ -136,6 +138,7 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
   d.urgent = d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap ||
              (tracked < options_.min_features && d.shared < 0.8);
+  if (map.keyframe(reference).surface.empty() && circumstances.depth_points >= kDepthIsBack) d.urgent = true;
   d.mapper_idle = circumstances.mapper_idle;
   d.cone = look_at_cones(map, reference, track, camera, circumstances);
   // Cones need landmarks that know their normal; where there are next to none the plain rule speaks.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/mapping/slam.hpp"
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <utility>
@@ -28,6 +29,11 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
   constexpr double kMinMeasured = 0.05;  // share of the pixels
   return !frame.depth.empty() &&
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
+}
+
+static int points_with_depth(const features::FrameFeatures& features) {
+  return static_cast<int>(std::count_if(features.points.begin(), features.points.end(),
+                                        [](const features::PointFeature& f) { return f.depth > 0.0F; }));
 }
 
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
@@ -145,8 +151,9 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   }
   last_camera_from_world_ = track.camera_from_world;
   mapper_.count_sightings(map_, track);
-  report.decision = rule_.decide(map_, tracker_.reference(), track, camera_,
-                                 {static_cast<int>(features->points.size()), bundle_.idle()});
+  report.decision =
+      rule_.decide(map_, tracker_.reference(), track, camera_,
+                   {static_cast<int>(features->points.size()), bundle_.idle(), points_with_depth(*features)});
   if (report.decision.wanted) make_keyframe(frame, features, report);
   remember_pose(frame.stamp, last_camera_from_world_, true);
   return report;

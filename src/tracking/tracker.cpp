@@ -72,6 +72,12 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
 }
 
 constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
+constexpr double kBlind = 100.0;  // and of 10 cm
+constexpr double kAlone = 1e7;    // and of 0.3 mm
+constexpr double kShareOfNormals =
+    0.004;  // squared, in a direction that they hold: they are good to 3 degrees
+constexpr double kAllTheSurface = 0.9;
+constexpr double kLongestCoast_s = 2.5;
 
 /// Principal directions of the information, rotations counted in units that move the scene as much as a metre
 /// of translation does, at 2 m.
@@ -87,14 +93,24 @@ Directions weigh_directions(const geometry::Matrix6d& information) {
   return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 
+/// Information below which a direction is weak. Where surfaces are alone, the noise of their normals seems to
+/// hold what it does not: a direction needs its share of the normals.
+double weak_below(const geometry::Matrix6d& information, bool surface_alone) {
+  return surface_alone ? std::max(kWeak, kShareOfNormals * information.topLeftCorner<3, 3>().trace()) : kWeak;
+}
+
 /// What no measurement holds is held by the motion model: information of 2 cm in the weak directions only.
+/// Beside surfaces alone it is more, so that what uneven normals say does not brake the camera frame by
+/// frame.
 std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
-                                                const Rigid3& predicted) {
+                                                const Rigid3& predicted, bool surface_alone) {
   const Directions directions = weigh_directions(information);
-  if (directions.eigenvalues(0) >= kWeak) return std::nullopt;
+  const double limit = weak_below(information, surface_alone);
+  if (directions.eigenvalues(0) >= limit) return std::nullopt;
   geometry::Matrix6d weak = geometry::Matrix6d::Zero();
-  for (int i = 0; i < 6 && directions.eigenvalues(i) < kWeak; ++i) {
-    weak += kWeak * directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();
+  for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
+    weak += (surface_alone ? kAlone : kWeak) * directions.eigenvectors.col(i) *
+            directions.eigenvectors.col(i).transpose();
   }
   const Vector6d inverse = kDirectionScale.cwiseInverse();
   return optimize::PosePrior{predicted, inverse.asDiagonal() * weak * inverse.asDiagonal()};
@@ -207,7 +223,9 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
     pose = result.estimate.camera_from_world;
-    problem.prior = motion_prior(result.estimate.information, predicted);
+    const bool surface_alone =
+        result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
+    problem.prior = motion_prior(result.estimate.information, predicted, surface_alone);
     if (round.gate) {
       drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
       drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);
@@ -238,8 +256,17 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
   }
   const Directions directions = weigh_directions(information);
   result.min_eigenvalue = directions.eigenvalues(0);
-  result.weak_directions = static_cast<int>((directions.eigenvalues.array() < kWeak).count());
-  const bool held = result.weak_directions == 0 ? by_features || by_surface : by_features && by_surface;
+  result.weak_directions =
+      static_cast<int>((directions.eigenvalues.array() < weak_below(information, !by_features)).count());
+  // Far corners or one wall leave a direction to the motion model. It may hold that for a while, when what is
+  // seen is no chance find.
+  const bool many = estimate.points.inliers + 2 * estimate.lines.inliers >= 3 * options_.min_inliers &&
+                    result.min_eigenvalue >= kBlind;
+  const bool all_surface = by_surface && result.surface_share > kAllTheSurface;
+  result.held_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
+  const bool coasts = last_.valid && lost_frames_ == 0 && coasting_s_ < kLongestCoast_s &&
+                      ((by_features && many) || all_surface);
+  const bool held = result.held_by_motion ? coasts : by_features || by_surface;
   result.state =
       held && result.camera_from_world.translation.allFinite() ? TrackState::kTracked : TrackState::kLost;
 }
@@ -303,7 +330,8 @@ std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const senso
   for (const Guess& guess : guesses) {
     local_map_ = build_local_map(map, guess.keyframe, options_.local_map);
     TrackResult attempt = estimate(map, frame, features, guess.camera_from_world, guess.rough ? 24.0 : 10.0);
-    if (attempt.state != TrackState::kTracked || (guess.rough && !beyond_doubt(attempt))) continue;
+    if (attempt.state != TrackState::kTracked || attempt.held_by_motion) continue;
+    if (guess.rough && !beyond_doubt(attempt)) continue;
     if (is_place_ && !is_place_(frame, features, guess.keyframe, attempt.camera_from_world)) continue;
     attempt.relocalised = true;
     velocity_.setZero();
@@ -348,6 +376,7 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
   } else {
     velocity_.setZero();
   }
+  coasting_s_ = result.held_by_motion && last_.valid ? coasting_s_ + dt : 0.0;
   lost_frames_ = 0;
   last_.stamp = frame.stamp;
   last_.camera_from_world = result.camera_from_world;

@@ -142,6 +142,20 @@ TEST_F(Rule, UrgentWhenTrackingIsAboutToBeLost) {
   EXPECT_EQ(none.shared, 0.0);
 }
 
+TEST_F(Rule, DepthThatIsBackIsTakenAtOnce) {
+  maps::Map map;
+  auto blind = std::make_shared<maps::Keyframe>(map_.keyframe({0, 0}));
+  blind->surface.clear();
+  map.add_keyframe(blind, {});
+  const auto decide_on = [this](const maps::Map& on, int corners) {
+    return rule_.decide(on, {0, 0}, track({}, 0, 0), kCamera, {300, true, corners});
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(decide_on(map, 10).wanted) << "there is none yet";
+  EXPECT_FALSE(decide_on(map_, 200).wanted) << "the last keyframe has a surface";
+  EXPECT_TRUE(decide_on(map, 200).urgent);
+  EXPECT_TRUE(decide_on(map, 200).wanted);
+}
+
 TEST_F(Rule, ASceneThatNeverHadFeaturesDoesNotFireForever) {
   for (int i = 0; i < 50; ++i) EXPECT_FALSE(decide({}, 0).wanted);
 }

@@ -57,11 +57,13 @@ struct KeyframeDecision {
 struct KeyframeCircumstances {
   int frame_points = 0;     ///< corners in the picture
   bool mapper_idle = true;  ///< no bundle waits to be put back
+  int depth_points = 0;     ///< corners with depth
 };
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
 /// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the picture; where next
-/// to no landmark knows its normal the plain rule speaks. Both: at once when tracking gets thin.
+/// to no landmark knows its normal the plain rule speaks. Both: at once when tracking gets thin, and when
+/// depth is back after a keyframe that had none.
 class KeyframeRule {
  public:
   explicit KeyframeRule(const KeyframeRuleOptions& options) : options_(options) {}

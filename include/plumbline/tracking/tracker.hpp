@@ -56,6 +56,7 @@ struct TrackResult {
   /// depth.
   double min_eigenvalue = 0.0;
   int weak_directions = 0;  ///< of six, that no trusted family holds, but the motion model at best
+  bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
   bool relocalised = false;
 };
 
@@ -142,6 +143,7 @@ class Tracker {
   Last last_;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
   int lost_frames_ = 0;
+  double coasting_s_ = 0.0;  ///< how long the motion model has held what nothing else does
 };
 
 }  // namespace plumbline::tracking
