@@ -74,8 +74,8 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
 constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
 constexpr double kBlind = 100.0;  // and of 10 cm
 constexpr double kAlone = 1e7;    // and of 0.3 mm
-constexpr double kShareOfNormals =
-    0.004;  // squared, in a direction that they hold: they are good to 3 degrees
+// Squared, in a direction that they hold; they are good to 3 degrees.
+constexpr double kShareOfNormals = 0.004;
 constexpr double kAllTheSurface = 0.9;
 constexpr double kLongestCoast_s = 2.5;
 
@@ -94,7 +94,8 @@ Directions weigh_directions(const geometry::Matrix6d& information) {
 }
 
 /// Information below which a direction is weak. Where surfaces are alone, the noise of their normals seems to
-/// hold what it does not: a direction needs its share of the normals.
+/// hold what it does not: a direction needs its share of the normals. (Without features by choice there is
+/// nothing better to go by.)
 double weak_below(const geometry::Matrix6d& information, bool surface_alone) {
   return surface_alone ? std::max(kWeak, kShareOfNormals * information.topLeftCorner<3, 3>().trace()) : kWeak;
 }
@@ -224,6 +225,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     result.estimate = optimize::solve_pose(problem, pose, solver);
     pose = result.estimate.camera_from_world;
     const bool surface_alone =
+        uses_features() &&
         result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
     problem.prior = motion_prior(result.estimate.information, predicted, surface_alone);
     if (round.gate) {
@@ -256,8 +258,8 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
   }
   const Directions directions = weigh_directions(information);
   result.min_eigenvalue = directions.eigenvalues(0);
-  result.weak_directions =
-      static_cast<int>((directions.eigenvalues.array() < weak_below(information, !by_features)).count());
+  result.weak_directions = static_cast<int>(
+      (directions.eigenvalues.array() < weak_below(information, uses_features() && !by_features)).count());
   // Far corners or one wall leave a direction to the motion model. It may hold that for a while, when what is
   // seen is no chance find.
   const bool many = estimate.points.inliers + 2 * estimate.lines.inliers >= 3 * options_.min_inliers &&

@@ -130,6 +130,7 @@ class Tracker {
   [[nodiscard]] std::optional<TrackResult> by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                       const features::FrameFeatures& features);
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
+  [[nodiscard]] bool uses_features() const { return options_.points || options_.lines; }
   [[nodiscard]] bool beyond_doubt(const TrackResult& result) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;
   void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
