@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/tracking/tracker.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "held_directions.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/thumbnail_alignment.hpp"
 
@@ -71,51 +71,9 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
   terms.resize(kept);
 }
 
-constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
-constexpr double kBlind = 100.0;  // and of 10 cm
-constexpr double kAlone = 1e7;    // and of 0.3 mm
-// Squared, in a direction that they hold; they are good to 3 degrees.
-constexpr double kShareOfNormals = 0.004;
+constexpr double kBlind = 100.0;  // information of a standard deviation of 10 cm
 constexpr double kAllTheSurface = 0.9;
 constexpr double kLongestCoast_s = 2.5;
-
-/// Principal directions of the information, rotations counted in units that move the scene as much as a metre
-/// of translation does, at 2 m.
-struct Directions {
-  Vector6d eigenvalues;  ///< ascending
-  geometry::Matrix6d eigenvectors;
-};
-const Vector6d kDirectionScale = (Vector6d() << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5).finished();
-
-Directions weigh_directions(const geometry::Matrix6d& information) {
-  const geometry::Matrix6d h = kDirectionScale.asDiagonal() * information * kDirectionScale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(h);
-  return {eigen.eigenvalues(), eigen.eigenvectors()};
-}
-
-/// Information below which a direction is weak. Where surfaces are alone, the noise of their normals seems to
-/// hold what it does not: a direction needs its share of the normals. (Without features by choice there is
-/// nothing better to go by.)
-double weak_below(const geometry::Matrix6d& information, bool surface_alone) {
-  return surface_alone ? std::max(kWeak, kShareOfNormals * information.topLeftCorner<3, 3>().trace()) : kWeak;
-}
-
-/// What no measurement holds is held by the motion model: information of 2 cm in the weak directions only.
-/// Beside surfaces alone it is more, so that what uneven normals say does not brake the camera frame by
-/// frame.
-std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
-                                                const Rigid3& predicted, bool surface_alone) {
-  const Directions directions = weigh_directions(information);
-  const double limit = weak_below(information, surface_alone);
-  if (directions.eigenvalues(0) >= limit) return std::nullopt;
-  geometry::Matrix6d weak = geometry::Matrix6d::Zero();
-  for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
-    weak += (surface_alone ? kAlone : kWeak) * directions.eigenvectors.col(i) *
-            directions.eigenvectors.col(i).transpose();
-  }
-  const Vector6d inverse = kDirectionScale.cwiseInverse();
-  return optimize::PosePrior{predicted, inverse.asDiagonal() * weak * inverse.asDiagonal()};
-}
 
 }  // namespace
 

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "held_directions.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace plumbline::tracking {
+
+using geometry::Rigid3;
+using geometry::Vector6d;
+
+namespace {
+
+constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
+constexpr double kAlone = 1e7;    // and of 0.3 mm
+// Squared, in a direction that they hold; they are good to 3 degrees.
+constexpr double kShareOfNormals = 0.004;
+const Vector6d kDirectionScale = (Vector6d() << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5).finished();
+
+}  // namespace
+
+Directions weigh_directions(const geometry::Matrix6d& information) {
+  const geometry::Matrix6d h = kDirectionScale.asDiagonal() * information * kDirectionScale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(h);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+double weak_below(const geometry::Matrix6d& information, bool surface_alone) {
+  return surface_alone ? std::max(kWeak, kShareOfNormals * information.topLeftCorner<3, 3>().trace()) : kWeak;
+}
+
+std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
+                                                const Rigid3& predicted, bool surface_alone) {
+  const Directions directions = weigh_directions(information);
+  const double limit = weak_below(information, surface_alone);
+  if (directions.eigenvalues(0) >= limit) return std::nullopt;
+  geometry::Matrix6d weak = geometry::Matrix6d::Zero();
+  for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
+    weak += (surface_alone ? kAlone : kWeak) * directions.eigenvectors.col(i) *
+            directions.eigenvectors.col(i).transpose();
+  }
+  const Vector6d inverse = kDirectionScale.cwiseInverse();
+  return optimize::PosePrior{predicted, inverse.asDiagonal() * weak * inverse.asDiagonal()};
+}
+
+}  // namespace plumbline::tracking
