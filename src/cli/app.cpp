@@ -55,6 +55,14 @@ int Session::fail(const core::Error& error) {
   return static_cast<int>(error.kind);
 }
 
+int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output) {
+  if (!summary) return fail(summary.error());
+  if (!quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), output.string());
+  if (summary->reason.empty()) return 0;
+  console().warning("the result is not trustworthy: " + summary->reason);
+  return static_cast<int>(core::ErrorKind::kUntrustworthy);
+}
+
 CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
                       std::function<int()> run) {
   CLI::App* command = parent.add_subcommand(name, help);

@@ -13,6 +13,7 @@
 #include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
+#include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::cli {
 
@@ -35,6 +36,8 @@ struct Session {
   const core::Executor& executor();
   /// Prints the error and gives its exit code.
   int fail(const core::Error& error);
+  /// Tells what a run came to, which wrote `output`, and gives its exit code.
+  int finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output);
 
  private:
   std::unique_ptr<Console> console_;

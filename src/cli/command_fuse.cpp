@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline fuse MAP MAP... -o OUT
-#include <fmt/format.h>
-
 #include <memory>
 
 #include "app.hpp"
@@ -25,11 +23,7 @@ int fuse(Session& session, pipeline::FuseRequest request) {
       request, session.executor(), console, stop,
       [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
   console.end_progress();
-  if (!summary) return session.fail(summary.error());
-  if (!session.quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), request.output.string());
-  if (summary->reason.empty()) return 0;
-  console.warning("the result is not trustworthy: " + summary->reason);
-  return static_cast<int>(core::ErrorKind::kUntrustworthy);
+  return session.finish(summary, request.output);
 }
 
 }  // namespace

@@ -35,11 +35,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
       request, session.executor(), console, stop,
       [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
   console.end_progress();
-  if (!summary) return session.fail(summary.error());
-  if (!session.quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), request.output.string());
-  if (summary->reason.empty()) return 0;
-  console.warning("the result is not trustworthy: " + summary->reason);
-  return static_cast<int>(core::ErrorKind::kUntrustworthy);
+  return session.finish(summary, request.output);
 }
 
 }  // namespace
