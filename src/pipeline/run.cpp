@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 
+#include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
 
 namespace plumbline::pipeline {
@@ -83,6 +84,7 @@ class Runner {
       report_.stages.push_back({node.name, unknown, 0.0});
     }
     report_.frames = before_;
+    report_.rss_mb.assign(before_, std::numeric_limits<float>::quiet_NaN());
     started_ = before_;
     total_ = graph_.source().stage->frames();
     report_.frames_available = total_;
@@ -160,6 +162,7 @@ class Runner {
   void done(const Tick& tick) {
     if (failure_.before(tick.frame)) return;
     for (std::size_t n = 0; n < tick.ms.size(); ++n) report_.stages[n].frame_ms.push_back(tick.ms[n]);
+    report_.rss_mb.push_back(static_cast<float>(rss_mb()));
     ++report_.frames;
     if (progress_) progress_(report_.frames, total_);
   }

@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "plumbline/core/output_file.hpp"
@@ -229,13 +232,15 @@ core::Result<void> write_timing(const std::filesystem::path& file, const RunRepo
   for (const StageTiming& part : parts) columns.push_back(&part);
   std::string text = "frame,stamp";
   for (const StageTiming* column : columns) text += "," + column->name + "_ms";
-  text += '\n';
+  text += ",rss_mb\n";
   for (std::size_t f = 0; f < report.frames; ++f) {
     text += fmt::format("{},{:.6f}", f, source.info(f).stamp);
     for (const StageTiming* column : columns) {
       const bool worked = f < column->frame_ms.size() && !std::isnan(column->frame_ms[f]);
       text += worked ? fmt::format(",{:.3f}", column->frame_ms[f]) : ",";
     }
+    const bool known = f < report.rss_mb.size() && !std::isnan(report.rss_mb[f]);
+    text += known ? fmt::format(",{:.1f}", report.rss_mb[f]) : ",";
     text += '\n';
   }
   return write_text(file, text);
@@ -263,6 +268,17 @@ double peak_rss_mb() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts in kB
+}
+
+double rss_mb() {
+  std::FILE* file = std::fopen("/proc/self/statm", "r");
+  if (file == nullptr) return std::numeric_limits<double>::quiet_NaN();
+  long all = 0;
+  long resident = 0;
+  const int fields = std::fscanf(file, "%ld %ld", &all, &resident);  // pages
+  std::fclose(file);
+  if (fields != 2) return std::numeric_limits<double>::quiet_NaN();
+  return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1024.0 * 1024.0);
 }
 
 }  // namespace plumbline::pipeline

@@ -29,6 +29,7 @@ struct RunReport {
       0.0;  ///< first frame read to last change of the map: frames and the end of non-export stages
   double export_s = 0.0;            ///< end of the stages that export
   std::vector<StageTiming> stages;  ///< in graph order
+  std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };
 
 /// Called in frame order, from one thread at a time.

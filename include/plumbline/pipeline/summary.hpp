@@ -98,7 +98,8 @@ void judge(RunSummary& summary);
 /// The one place that writes summary.json. Errors (kOutput) name the file.
 core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& summary);
 
-/// One line a frame: its number, stamp and the milliseconds of every stage and part (empty = nothing to do).
+/// One line a frame: its number, stamp, the milliseconds of every stage and part (empty = nothing to do), and
+/// the memory the process held when the frame was done, MB.
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
                                 const std::vector<StageTiming>& parts, const dataset::FrameSource& source);
 
@@ -107,5 +108,8 @@ std::string to_text(const RunSummary& summary);
 
 /// Most memory this process ever held, MB.
 double peak_rss_mb();
+
+/// Memory this process holds now, MB; NaN where the system does not tell.
+double rss_mb();
 
 }  // namespace plumbline::pipeline
