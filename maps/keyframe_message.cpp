@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <opencv2/core.hpp>
@@ -15,7 +16,7 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kVersion = 2;
 constexpr double kPixelSteps = 4.0;      // per pixel, for pictures up to 16000 pixels wide
 constexpr double kLengthSteps = 1000.0;  // per metre
 constexpr double kPictureSteps = 50.0;   // per metre, of the small depth picture
@@ -41,17 +42,46 @@ void column(ByteWriter& to, const Items& items, const Get& get) {
   std::vector<T> values;
   values.reserve(items.size());
   for (const auto& item : items) values.push_back(static_cast<T>(get(item)));
-  to.planes(values);
+  to.apart(values);
 }
 
-/// From above to below: what follows each other lies close, and small steps pack well.
+/// By octave, then from above to below: what follows each other lies close, and small steps pack well.
 std::vector<std::size_t> by_row(const features::FrameFeatures& f) {
   std::vector<std::size_t> order(f.points.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return f.points[a].pixel.y() < f.points[b].pixel.y();
+    const features::PointFeature& p = f.points[a];
+    const features::PointFeature& q = f.points[b];
+    return std::make_pair(p.octave, p.pixel.y()) < std::make_pair(q.octave, q.pixel.y());
   });
   return order;
+}
+
+/// Numbers of landmarks by feature: whether there is one, and those that there are.
+void write_landmarks(const std::vector<std::int32_t>& numbers, ByteWriter& to) {
+  std::vector<std::int32_t> known;
+  std::vector<std::uint8_t> any((numbers.size() + 7) / 8, 0);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] < 0) continue;
+    any[i / 8] = static_cast<std::uint8_t>(any[i / 8] | 1U << i % 8);
+    known.push_back(numbers[i]);
+  }
+  to.apart(any);
+  to.count(known.size());
+  to.apart(known);
+}
+
+std::vector<std::int32_t> read_landmarks(ByteReader& bytes, std::size_t n) {
+  const auto any = bytes.planes<std::uint8_t>((n + 7) / 8);
+  const auto known = bytes.planes<std::int32_t>(bytes.count(4));
+  std::vector<std::int32_t> numbers(n, -1);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if ((any[i / 8] >> i % 8 & 1) == 0) continue;
+    if (next == known.size()) throw BadBytes("it ends too early");
+    numbers[i] = known[next++];
+  }
+  return numbers;
 }
 
 void write_points(const features::FrameFeatures& f, const std::vector<std::int32_t>& landmarks, double steps,
@@ -72,13 +102,15 @@ void write_points(const features::FrameFeatures& f, const std::vector<std::int32
       to, order, [&](std::size_t i) { return std::lround(at(i).angle / 360.0F * kTurn) & (kTurn - 1); });
   column<std::uint8_t>(to, order, [&](std::size_t i) { return at(i).octave; });
   for (const std::size_t i : order) to.put(f.descriptors[i]);
-  column<std::int32_t>(to, order, [&](std::size_t i) { return landmarks[i]; });
+  std::vector<std::int32_t> numbers;
+  for (const std::size_t i : order) numbers.push_back(landmarks[i]);
+  write_landmarks(numbers, to);
 }
 
 void read_points(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f,
                  std::vector<std::int32_t>& landmarks) {
   const double steps = pixel_steps(camera);
-  const std::size_t n = bytes.count(44);
+  const std::size_t n = bytes.count(40);
   const auto y = bytes.planes<std::uint16_t>(n);
   const auto x = bytes.planes<std::uint16_t>(n);
   const auto depth = bytes.planes<std::uint16_t>(n);
@@ -95,43 +127,66 @@ void read_points(ByteReader& bytes, const sensor::Pinhole& camera, features::Fra
     f.points[i].octave = octave[i];
     bytes.get(f.descriptors[i]);
   }
-  landmarks = bytes.planes<std::int32_t>(n);
+  landmarks = read_landmarks(bytes, n);
   f.grid = features::PointGrid(f.points, camera.width, camera.height);
+}
+
+/// Ends of segments and their depth: the ends of lines in space lie on the rays of the segments' ends.
+constexpr std::size_t kLineColumns = 6;
+
+std::array<std::uint16_t, kLineColumns> line_numbers(const features::LineFeature& line, double steps) {
+  const Eigen::Vector2f& start = line.segment.start;
+  const Eigen::Vector2f& end = line.segment.end;
+  std::array<std::uint16_t, kLineColumns> numbers{unsigned_steps(double{start.x()} + 0.5, steps),
+                                                  unsigned_steps(double{start.y()} + 0.5, steps),
+                                                  unsigned_steps(double{end.x()} + 0.5, steps),
+                                                  unsigned_steps(double{end.y()} + 0.5, steps),
+                                                  0,
+                                                  0};
+  if (line.line3) {
+    numbers[4] = unsigned_steps(line.line3->start.z(), kLengthSteps);
+    numbers[5] = unsigned_steps(line.line3->end.z(), kLengthSteps);
+  }
+  for (const std::size_t end_column : {2U, 3U}) {
+    numbers[end_column] = static_cast<std::uint16_t>(numbers[end_column] - numbers[end_column - 2]);
+  }
+  numbers[5] = static_cast<std::uint16_t>(numbers[5] - numbers[4]);
+  return numbers;
 }
 
 void write_lines(const features::FrameFeatures& f, double steps, ByteWriter& to) {
   to.count(f.lines.size());
-  for (const features::LineFeature& line : f.lines) {
-    for (const Eigen::Vector2f& end : {line.segment.start, line.segment.end}) {
-      to.put(unsigned_steps(double{end.x()} + 0.5, steps));
-      to.put(unsigned_steps(double{end.y()} + 0.5, steps));
-    }
-    to.put(line.descriptor);
-    to.flag(line.line3.has_value());
-    if (!line.line3) continue;
-    // The ends lie on the rays of the segment's ends: their depth says it all.
-    to.put(unsigned_steps(line.line3->start.z(), kLengthSteps));
-    to.put(unsigned_steps(line.line3->end.z(), kLengthSteps));
+  for (std::size_t k = 0; k < kLineColumns; ++k) {
+    column<std::uint16_t>(to, f.lines,
+                          [&](const features::LineFeature& l) { return line_numbers(l, steps)[k]; });
   }
+  column<std::uint8_t>(to, f.lines, [](const features::LineFeature& l) { return l.line3 ? 1 : 0; });
+  for (const features::LineFeature& line : f.lines) to.put(line.descriptor);
 }
 
 void read_lines(ByteReader& bytes, const sensor::Pinhole& camera, features::FrameFeatures& f) {
   const double steps = pixel_steps(camera);
-  f.lines.resize(bytes.count(41));
-  for (features::LineFeature& line : f.lines) {
-    for (Eigen::Vector2f* end : {&line.segment.start, &line.segment.end}) {
-      end->x() = from(bytes.get<std::uint16_t>(), steps) - 0.5F;
-      end->y() = from(bytes.get<std::uint16_t>(), steps) - 0.5F;
-    }
-    bytes.get(line.descriptor);
-    if (!bytes.flag()) continue;
-    features::Line3 line3;
-    const auto on_ray = [&](const Eigen::Vector2f& pixel) {
-      return camera.unproject(double{pixel.x()}, double{pixel.y()},
-                              bytes.get<std::uint16_t>() / kLengthSteps);
+  f.lines.resize(bytes.count(2 * kLineColumns + 33));
+  std::array<std::vector<std::uint16_t>, kLineColumns> columns;
+  for (auto& numbers : columns) numbers = bytes.planes<std::uint16_t>(f.lines.size());
+  const auto deep = bytes.planes<std::uint8_t>(f.lines.size());
+  for (std::size_t i = 0; i < f.lines.size(); ++i) {
+    features::LineFeature& line = f.lines[i];
+    const auto number = [&](std::size_t column) { return columns[column][i]; };
+    const auto sum = [&](std::size_t a, std::size_t b) {
+      return static_cast<std::uint16_t>(number(a) + number(b));
     };
-    line3.start = on_ray(line.segment.start);
-    line3.end = on_ray(line.segment.end);
+    line.segment.start = {from(number(0), steps) - 0.5F, from(number(1), steps) - 0.5F};
+    line.segment.end = {from(sum(0, 2), steps) - 0.5F, from(sum(1, 3), steps) - 0.5F};
+    bytes.get(line.descriptor);
+    if (deep[i] > 1) throw BadBytes("a flag is neither 0 nor 1");
+    if (deep[i] == 0) continue;
+    features::Line3 line3;
+    const auto on_ray = [&](const Eigen::Vector2f& pixel, std::uint16_t depth) {
+      return camera.unproject(double{pixel.x()}, double{pixel.y()}, depth / kLengthSteps);
+    };
+    line3.start = on_ray(line.segment.start, number(4));
+    line3.end = on_ray(line.segment.end, sum(4, 5));
     const auto expected = [&](const Eigen::Vector3d& end) {
       return features::EndpointNoise{static_cast<float>(sensor::depth_sigma(end.z())),
                                      static_cast<float>(end.z() / camera.fx)};
@@ -189,7 +244,7 @@ void write_depth(const cv::Mat& depth, ByteWriter& to) {
       last = now;
     }
   }
-  to.planes(steps);
+  to.apart(steps);
 }
 
 cv::Mat read_depth(ByteReader& bytes) {
@@ -237,7 +292,7 @@ KeyframeMessage decode(const Bytes& packed) {
   read_points(bytes, c, *features, message.points);
   read_lines(bytes, c, *features);
   features->thumbnail_depth = read_depth(bytes);
-  message.lines = bytes.planes<std::int32_t>(features->lines.size());
+  message.lines = read_landmarks(bytes, features->lines.size());
   keyframe->features = features;
   keyframe->surface = read_surface(bytes);
   message.keyframe = keyframe;
@@ -293,7 +348,7 @@ std::vector<std::uint8_t> encode_message(const KeyframeMessage& message) {
   write_points(features, message.points, steps, to);
   write_lines(features, steps, to);
   write_depth(features.thumbnail_depth, to);
-  to.planes(message.lines);
+  write_landmarks(message.lines, to);
   write_surface(keyframe.surface, to);
   to.count(message.moved.size());
   for (const auto& [id, pose] : message.moved) {
@@ -302,8 +357,8 @@ std::vector<std::uint8_t> encode_message(const KeyframeMessage& message) {
     to.put(Eigen::Matrix<float, 3, 1>(pose.translation.cast<float>()));
   }
   to.count(message.cloud.size());
-  to.planes(message.cloud);
-  return pack(to.bytes());
+  to.apart(message.cloud);
+  return pack(to.bytes(), to.cuts());
 }
 
 core::Result<KeyframeMessage> decode_message(const std::vector<std::uint8_t>& bytes) {

@@ -8,17 +8,57 @@
 
 namespace plumbline::maps {
 
+namespace {
+
+using Packer = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
+
+Packer packer(int level) {
+  Packer context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
+  if (context == nullptr) throw std::bad_alloc();
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+  return context;
+}
+
+void require_done(std::size_t code) {
+  if (ZSTD_isError(code) != 0U) throw std::runtime_error(std::string("zstd: ") + ZSTD_getErrorName(code));
+}
+
+}  // namespace
+
 Bytes pack(const Bytes& bytes) {
   constexpr int kLevel = 1;  // written while a tracker waits for the processor
-  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
-  if (context == nullptr) throw std::bad_alloc();
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
   Bytes packed(ZSTD_compressBound(bytes.size()));
   const std::size_t size =
-      ZSTD_compress2(context.get(), packed.data(), packed.size(), bytes.data(), bytes.size());
-  if (ZSTD_isError(size) != 0U) throw std::runtime_error(std::string("zstd: ") + ZSTD_getErrorName(size));
+      ZSTD_compress2(packer(kLevel).get(), packed.data(), packed.size(), bytes.data(), bytes.size());
+  require_done(size);
   packed.resize(size);
+  return packed;
+}
+
+Bytes pack(const Bytes& bytes, const std::vector<std::size_t>& cuts) {
+  constexpr int kLevel = 12;
+  constexpr std::size_t kBlock = 64;  // bytes of a block's head and code at most, when nothing can be saved
+  const Packer context = packer(kLevel);
+  require_done(ZSTD_CCtx_setPledgedSrcSize(context.get(), bytes.size()));
+  Bytes packed(ZSTD_compressBound(bytes.size()) + kBlock * (cuts.size() + 1));
+  ZSTD_outBuffer to{packed.data(), packed.size(), 0};
+  std::size_t from = 0;
+  const auto take = [&](std::size_t end, ZSTD_EndDirective then) {
+    ZSTD_inBuffer part{bytes.data() + from, end - from, 0};
+    std::size_t left = 1;
+    while (left != 0) {
+      left = ZSTD_compressStream2(context.get(), &to, &part, then);
+      require_done(left);
+      if (left != 0 && to.pos == to.size) throw std::logic_error("pack: no room");
+    }
+    from = end;
+  };
+  for (const std::size_t cut : cuts) {
+    if (cut > from && cut < bytes.size()) take(cut, ZSTD_e_flush);  // ends a block
+  }
+  take(bytes.size(), ZSTD_e_end);
+  packed.resize(to.pos);
   return packed;
 }
 

@@ -75,11 +75,24 @@ class ByteWriter {
       }
     }
   }
+  /// planes() of which each is packed by itself: for columns of which every bit counts.
+  template <typename T>
+  void apart(const std::vector<T>& values) {
+    planes(values);
+    const std::size_t first = bytes_.size() - values.size() * sizeof(T);
+    for (std::size_t k = 0; k <= sizeof(T); ++k) cuts_.push_back(first + k * values.size());
+  }
   [[nodiscard]] const Bytes& bytes() const { return bytes_; }
-  void clear() { bytes_.clear(); }
+  /// Where bytes of another kind begin, ascending; some may be the same.
+  [[nodiscard]] const std::vector<std::size_t>& cuts() const { return cuts_; }
+  void clear() {
+    bytes_.clear();
+    cuts_.clear();
+  }
 
  private:
   Bytes bytes_;
+  std::vector<std::size_t> cuts_;
 };
 
 /// Thrown by ByteReader, and caught where a stored thing is decoded: it names what the file says wrongly.
@@ -176,6 +189,9 @@ class ByteReader {
 
 /// One zstd frame with checksum. Same bytes, same frame.
 Bytes pack(const Bytes& bytes);
+/// The same in fewer bytes and more time: the parts between `cuts` (ascending) each get a code of their own,
+/// so that what cannot be packed does not spoil what can.
+Bytes pack(const Bytes& bytes, const std::vector<std::size_t>& cuts);
 /// Throws BadBytes: truncated, damaged, or more than 1 GiB.
 Bytes unpack(const std::uint8_t* bytes, std::size_t size);
 

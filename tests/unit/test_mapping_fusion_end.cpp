@@ -74,6 +74,8 @@ maps::KeyframeMessage full_message(int points, int lines) {
   maps::KeyframeMessage message = maps::make_message(map, {0, 0}, kTestCamera);
   for (std::size_t i = 0; i < message.points.size(); i += 2)
     message.points[i] = static_cast<int>(random() % 20000);
+  for (std::size_t i = 0; i < message.lines.size(); i += 3)
+    message.lines[i] = static_cast<int>(random() % 2000);
   return message;
 }
 
@@ -98,8 +100,12 @@ TEST(KeyframeMessage, ComesBackNearlyAsItWas) {
   ASSERT_EQ(b.lines.size(), 20U);
   for (std::size_t i = 0; i < 20; ++i) {
     EXPECT_EQ(a.lines[i].descriptor, b.lines[i].descriptor);
+    EXPECT_LT((a.lines[i].segment.start - b.lines[i].segment.start).norm(), 0.2F);
+    EXPECT_LT((a.lines[i].segment.end - b.lines[i].segment.end).norm(), 0.2F);
     EXPECT_LT((a.lines[i].line3->start - b.lines[i].line3->start).norm(), 0.005);
+    EXPECT_LT((a.lines[i].line3->end - b.lines[i].line3->end).norm(), 0.005);
   }
+  EXPECT_EQ(sent.lines, back->lines);
   ASSERT_EQ(b.thumbnail_depth.cols, 80);
   EXPECT_NEAR(a.thumbnail_depth.at<float>(30, 40), b.thumbnail_depth.at<float>(30, 40), 0.011F);
   ASSERT_EQ(back->keyframe->surface.size(), 100U);
@@ -107,8 +113,27 @@ TEST(KeyframeMessage, ComesBackNearlyAsItWas) {
   ASSERT_EQ(back->moved.size(), 0U);
 }
 
+TEST(KeyframeMessage, LinesWithoutDepthAndNothingAtAll) {
+  maps::KeyframeMessage sent = full_message(0, 9);
+  auto features = std::make_shared<features::FrameFeatures>(*sent.keyframe->features);
+  for (std::size_t i = 1; i < features->lines.size(); i += 2) features->lines[i].line3.reset();
+  auto keyframe = std::make_shared<maps::Keyframe>(*sent.keyframe);
+  keyframe->features = features;
+  sent.keyframe = keyframe;
+  const auto back = maps::decode_message(maps::encode_message(sent));
+  ASSERT_TRUE(back.has_value()) << back.error().message;
+  EXPECT_TRUE(back->keyframe->features->points.empty());
+  const auto& lines = back->keyframe->features->lines;
+  ASSERT_EQ(lines.size(), 9U);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(lines[i].line3.has_value(), i % 2 == 0);
+  EXPECT_EQ(back->lines, sent.lines);
+  const auto empty = maps::decode_message(maps::encode_message(full_message(0, 0)));
+  ASSERT_TRUE(empty.has_value()) << empty.error().message;
+  EXPECT_TRUE(empty->points.empty() && empty->lines.empty());
+}
+
 TEST(KeyframeMessage, ThousandPointsFitInFiftyKilobytes) {
-  const std::size_t bytes = maps::encode_message(full_message(1000, 120)).size();
+  const std::size_t bytes = maps::encode_message(full_message(1000, 160)).size();
   EXPECT_LE(bytes, 50000U);
   EXPECT_GE(bytes, 32000U);  // the descriptors alone, which are noise here
 }

@@ -31,7 +31,7 @@ KeyframeMessage make_message(const Map& map, KeyframeId keyframe, const sensor::
 
 /// Kept: descriptors, landmarks and the pose exactly; pixels to a quarter, depth to a millimetre (up to 65
 /// m), the small depth picture to two centimetres, directions to 11 degrees; 128 samples of the surface.
-/// Points come back in the order of their rows, with their landmarks; the noise of lines' ends is what their
+/// Points come back by octave and row, with their landmarks; the noise of lines' ends is what their
 /// depth lets expect. Same message, same bytes.
 std::vector<std::uint8_t> encode_message(const KeyframeMessage& message);
 
