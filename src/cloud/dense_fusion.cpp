@@ -58,18 +58,32 @@ FusedCloud chosen(const FusedCloud& points, const Keep& keep) {
   return result;
 }
 
-void append(FusedCloud&& from, FusedCloud& to) {
-  const auto move = [](auto& source, auto& target) {
-    target.insert(target.end(), source.begin(), source.end());
-    source = {};
+/// All parts one after the other. Room is taken once and each part given back when it is copied: what has
+/// been joined and what has not is never in memory twice.
+FusedCloud joined(std::vector<FusedCloud>&& parts) {
+  FusedCloud all;
+  all.cloud = std::make_shared<Cloud>();
+  std::size_t count = 0;
+  for (const FusedCloud& part : parts) count += part.cloud->size();
+  const auto join = [&](const auto& column_of) {
+    auto& whole = column_of(all);
+    whole.reserve(count);
+    for (FusedCloud& part : parts) {
+      auto& column = column_of(part);
+      whole.insert(whole.end(), column.begin(), column.end());
+      column = {};
+    }
   };
-  to.cloud->points.insert(to.cloud->points.end(), from.cloud->points.begin(), from.cloud->points.end());
-  from.cloud.reset();
-  move(from.columns.observations, to.columns.observations);
-  move(from.columns.confidence, to.columns.confidence);
-  move(from.spread_m, to.spread_m);
-  move(from.weight, to.weight);
-  move(from.noise_m, to.noise_m);
+  join([](FusedCloud & f) -> auto& { return f.columns.observations; });
+  join([](FusedCloud & f) -> auto& { return f.columns.confidence; });
+  join([](FusedCloud & f) -> auto& { return f.spread_m; });
+  join([](FusedCloud & f) -> auto& { return f.weight; });
+  join([](FusedCloud & f) -> auto& { return f.noise_m; });
+  join([](FusedCloud & f) -> auto& { return f.cloud->points; });
+  all.cloud->width = static_cast<std::uint32_t>(count);
+  all.cloud->height = 1;
+  all.cloud->is_dense = true;
+  return all;
 }
 
 class Fusion {
@@ -81,8 +95,7 @@ class Fusion {
 
   core::Result<FusedCloud> run(FusionReport& report) {
     if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
-    FusedCloud all;
-    all.cloud = std::make_shared<Cloud>();
+    std::vector<FusedCloud> all;
     for (std::size_t first = 0; first < tiles_.size(); first += kTilesAtATime) {
       const std::size_t count = std::min(kTilesAtATime, tiles_.size() - first);
       std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
@@ -94,15 +107,13 @@ class Fusion {
         voxels[k] = VoxelMap(options_.voxels);
       });
       for (std::size_t k = 0; k < count; ++k) {
-        append(std::move(parts[k]), all);
+        all.push_back(std::move(parts[k]));
         report.dust += reports[k].dust;
         report.seen_through += reports[k].seen_through;
       }
     }
-    all.cloud->width = static_cast<std::uint32_t>(all.cloud->size());
-    all.cloud->height = 1;
-    all.cloud->is_dense = true;
-    return all;
+    rasters_ = {};
+    return joined(std::move(all));
   }
 
  private:
@@ -111,13 +122,15 @@ class Fusion {
     std::vector<std::vector<ColorCell>> cells(poses_.size());
     std::vector<core::Result<void>> done(poses_.size());
     rasters_.resize(poses_.size());
+    is_look_.assign(poses_.size(), 0);
     executor_.parallel_for(poses_.size(), [&](std::size_t v) {
       const auto cloud = read_(v);
       if (!cloud) {
         done[v] = tl::unexpected<core::Error>(cloud.error());
         return;
       }
-      cells[v] = color_cells(**cloud, poses_[v], kCell_m);
+      is_look_[v] = is_look(**cloud, cameras_[v]) ? 1 : 0;
+      if (is_look_[v] == 0) cells[v] = color_cells(**cloud, poses_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, cameras_[v]);
     });
     if (const auto error = first_error(done)) return tl::unexpected<core::Error>(*error);
@@ -190,7 +203,7 @@ class Fusion {
   [[nodiscard]] FusedCloud cleaned(FusedCloud& points, FusionReport& report) const {
     Sheets sheets(points, block_m(options_.voxels.voxel_m));
     std::vector<std::uint8_t> goes(sheets.all().size(), 0);
-    if (options_.free_space) goes = seen_through(sheets, rasters_, poses_);
+    if (options_.free_space) goes = seen_through(sheets, rasters_, is_look_, poses_);
     sheets.fit_planes();
     if (options_.settle) sheets.settle(points);
     const auto least = static_cast<std::uint32_t>(options_.min_support);
@@ -214,6 +227,7 @@ class Fusion {
   const core::Executor& executor_;
   std::vector<FusionTile> tiles_;
   std::vector<DepthRaster> rasters_;    ///< by view
+  std::vector<std::uint8_t> is_look_;   ///< by view: free space only
   std::vector<Eigen::Vector3f> gains_;  ///< by view; empty: colours as they are
 };
 
@@ -229,7 +243,8 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
   table.boolean("exposure", exposure, "Even out colours between keyframes");
   table.integer("min_support", min_support, {0, 1000}, "",
                 "Points with fewer others around that face the same way are dust and go; 0: none");
-  table.number("tile_mb", tile_mb, {16.0, 100000.0}, "", "Memory that one tile of the map may take, MB");
+  table.number("tile_mb", tile_mb, {16.0, 100000.0}, "",
+               "Memory that one tile of the map may take, MB; four are worked on at a time");
 }
 
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 constexpr float kSigmas = 3.0F;
 constexpr float kPose_m = 0.03F;   // poses are not exact
 constexpr int kFewestCells = 7;    // of 3 x 3
+constexpr int kSolid = 4;          // clouds that see a surface where none looks through leave no doubt
 constexpr double kAround_m = 0.1;  // no more than the margin of a tile
 
 /// What of a view matters for a box: null transforms are never used.
@@ -33,8 +35,13 @@ struct Votes {
   int hidden = 0;
 };
 
-Votes count(const Eigen::Vector3f& position, const std::vector<NearView>& views) {
-  Votes votes;
+/// Views whose furthest measurement may reach into a box.
+struct NearViews {
+  std::vector<NearView> clouds;
+  std::vector<NearView> looks;
+};
+
+void count(const Eigen::Vector3f& position, const std::vector<NearView>& views, Votes& votes) {
   for (const NearView& view : views) {
     const Evidence found = evidence(*view.raster, view.raster->camera,
                                     Eigen::Vector3f(view.rotation * position + view.translation));
@@ -42,7 +49,6 @@ Votes count(const Eigen::Vector3f& position, const std::vector<NearView>& views)
     votes.surface += found == Evidence::kSurface ? 1 : 0;
     votes.hidden += found == Evidence::kHidden ? 1 : 0;
   }
-  return votes;
 }
 
 Verdict judge(const Votes& v) {
@@ -50,6 +56,13 @@ Verdict judge(const Votes& v) {
   if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
   const bool rarely_seen = v.hidden >= 3 && 4 * v.surface <= v.hidden;
   return v.free > 0 || rarely_seen ? Verdict::kDoubtful : Verdict::kStays;
+}
+
+Verdict judge(const Eigen::Vector3f& position, const NearViews& views) {
+  Votes votes;
+  count(position, views.clouds, votes);
+  if (votes.free > 0 || votes.surface < kSolid) count(position, views.looks, votes);
+  return judge(votes);
 }
 
 /// Whether at least half of the points around that are no matter of doubt go.
@@ -74,22 +87,73 @@ bool among_what_goes(const Sheets& sheets, std::size_t sheet, const std::vector<
   return going > 0 && going >= staying;
 }
 
-/// Views whose furthest measurement may reach into the box.
-std::vector<NearView> views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
-                                 const std::vector<geometry::Rigid3>& world_from_camera) {
+NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
+                     const std::vector<std::uint8_t>& is_look,
+                     const std::vector<geometry::Rigid3>& world_from_camera) {
   constexpr double kWidest = 1.5;  // distance over depth at the picture's corners, at most
-  std::vector<NearView> views;
+  NearViews views;
   for (std::size_t v = 0; v < rasters.size(); ++v) {
     const double distance = box.exteriorDistance(world_from_camera[v].translation);
     if (distance > kWidest * static_cast<double>(rasters[v].furthest_m)) continue;
     const geometry::Rigid3 camera_from_world = world_from_camera[v].inverse();
-    views.push_back(
-        {&rasters[v], camera_from_world.rotation.cast<float>(), camera_from_world.translation.cast<float>()});
+    (is_look[v] != 0 ? views.looks : views.clouds)
+        .push_back({&rasters[v], camera_from_world.rotation.cast<float>(),
+                    camera_from_world.translation.cast<float>()});
   }
   return views;
 }
 
 }  // namespace
+
+CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
+                    double max_depth_m) {
+  constexpr int kCell = DepthRaster::kCell_px;
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const auto least = static_cast<float>(min_depth_m), most = static_cast<float>(max_depth_m);
+  const int columns = (camera.width + kCell - 1) / kCell, rows = (camera.height + kCell - 1) / kCell;
+  Point none;
+  none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
+  none.r = none.g = none.b = 0;
+  auto look = std::make_shared<Cloud>();
+  look->points.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), none);
+  look->width = static_cast<std::uint32_t>(columns);
+  look->height = static_cast<std::uint32_t>(rows);
+  look->is_dense = false;
+  const int height = std::min(frame.depth.rows, rows * kCell),
+            width = std::min(frame.depth.cols, columns * kCell);
+  for (int v = 0; v < height; ++v) {
+    const float* depth = frame.depth.ptr<float>(v);
+    Point* cells = look->points.data() + static_cast<std::ptrdiff_t>(v / kCell) * columns;
+    for (int u = 0; u < width; ++u) {
+      const float z = depth[u];
+      if (!(z >= least && z <= most)) continue;
+      float& nearest = cells[u / kCell].z;
+      if (!(nearest <= z)) nearest = z;
+    }
+  }
+  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
+  constexpr float kMiddle = 0.5F * static_cast<float>(kCell) - 0.5F;
+  for (std::size_t i = 0; i < look->points.size(); ++i) {
+    Point& p = look->points[i];
+    if (!(p.z > 0.0F)) continue;
+    const auto column = static_cast<float>(i % look->width), row = static_cast<float>(i / look->width);
+    p.x = (static_cast<float>(kCell) * column + kMiddle - cx) / fx * p.z;
+    p.y = (static_cast<float>(kCell) * row + kMiddle - cy) / fy * p.z;
+  }
+  return look;
+}
+
+bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
+  constexpr int kCell = DepthRaster::kCell_px;
+  if (camera_cloud.height < 2 ||
+      camera_cloud.width != static_cast<std::uint32_t>((camera.width + kCell - 1) / kCell) ||
+      camera_cloud.height != static_cast<std::uint32_t>((camera.height + kCell - 1) / kCell)) {
+    return false;
+  }
+  return std::none_of(camera_cloud.points.begin(), camera_cloud.points.end(),
+                      [](const Point& p) { return std::isfinite(p.normal_x); });
+}
 
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
   DepthRaster raster;
@@ -147,15 +211,16 @@ Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, cons
 }
 
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
+                                       const std::vector<std::uint8_t>& is_look,
                                        const std::vector<geometry::Rigid3>& world_from_camera) {
   std::vector<std::uint8_t> goes(sheets.all().size(), 0);
   Eigen::AlignedBox3d box;
   for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
   if (sheets.all().empty()) return goes;
-  const std::vector<NearView> views = views_near(box, rasters, world_from_camera);
+  const NearViews views = views_near(box, rasters, is_look, world_from_camera);
   std::vector<Verdict> verdicts(goes.size());
   for (std::size_t s = 0; s < goes.size(); ++s) {
-    verdicts[s] = judge(count(sheets.position(sheets.all()[s]).cast<float>(), views));
+    verdicts[s] = judge(sheets.position(sheets.all()[s]).cast<float>(), views);
   }
   for (std::size_t s = 0; s < goes.size(); ++s) {
     goes[s] = verdicts[s] == Verdict::kGoes ||

@@ -6,6 +6,7 @@
 
 #include "chain_option.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
@@ -21,6 +22,8 @@ class CloudStage : public Stage {
     table.integer(
         "between", between_, {0, 100000}, "",
         "Every so many frames, and at the end, one that is no keyframe gives a cloud as well; 0: none");
+    table.integer("looks", looks_, {0, 100000}, "",
+                  "Every so many frames one that gives no cloud is kept as what it sees through; 0: none");
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
@@ -43,30 +46,39 @@ class CloudStage : public Stage {
     // The last frame shows what no other does when the camera was on its way somewhere.
     const bool between =
         between_ > 0 && (number % static_cast<std::size_t>(between_) == 0 || number + 1 == frames);
-    if (!track->keyframe.valid() && !between) return {};
+    const bool gives_cloud = track->keyframe.valid() || between;
+    const bool looks = looks_ > 0 && number % static_cast<std::size_t>(looks_) == 0;
+    if (!gives_cloud && !looks) return {};
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     const sensor::Pinhole camera = recordings_ != nullptr
                                        ? recordings_->robots()[static_cast<std::size_t>(robot)].camera.color
                                        : camera_;
-    cloud::CloudPtr cloud = cloud::organised_cloud(*frame, camera, options_);
-    cloud::FilterContext context;
-    context.viewpoint = Eigen::Vector3f::Zero();
-    context.run = std::to_string(track->keyframe.index);
-    auto filtered = filters_.chain().apply(cloud, context);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    core::Result<cloud::CloudPtr> made =
+        gives_cloud ? filtered(*frame, camera, track->keyframe)
+                    : cloud::depth_look(*frame, camera, options_.min_depth_m, options_.max_depth_m);
+    if (!made) return tl::unexpected<core::Error>(made.error());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
     result->stamp = track->stamp;
     result->robot = robot;
-    result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**filtered));
-    result->cloud = std::move(*filtered);
+    result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**made));
+    result->cloud = std::move(*made);
     io.output<KeyframeCloud>("cloud", result);
     return {};
   }
 
  private:
+  core::Result<cloud::CloudPtr> filtered(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,
+                                         core::KeyframeId keyframe) const {
+    cloud::FilterContext context;
+    context.viewpoint = Eigen::Vector3f::Zero();
+    context.run = std::to_string(keyframe.index);
+    return filters_.chain().apply(cloud::organised_cloud(frame, camera, options_), context);
+  }
+
   cloud::KeyframeCloudOptions options_;
   int between_ = 10;
+  int looks_ = 3;
   std::size_t frames_ = 0;
   ChainOption filters_{"filters/keyframe.yaml"};
   sensor::Pinhole camera_;

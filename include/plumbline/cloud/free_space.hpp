@@ -10,6 +10,7 @@
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/frame.hpp"
 
 namespace plumbline::cloud {
 
@@ -26,6 +27,15 @@ struct DepthRaster {
 /// From a view's cloud, camera frame.
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 
+/// A look: what a frame says of the space before it, and nothing else. The nearest depth of each cell of a
+/// raster, as an organised cloud (metres, camera frame) without normals and colours; cells without a
+/// measurement within [min_depth_m, max_depth_m] are NaN.
+CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
+                    double max_depth_m);
+
+/// Whether a view of `camera` is a look.
+bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera);
+
 /// What one view says about a place.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
 
@@ -34,11 +44,13 @@ enum class Evidence { kNone, kSurface, kFree, kHidden };
 /// too little was measured.
 Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
 
-/// For every sheet whether it is to go: at least half as many views look through it as see a surface there,
-/// two at least unless no more than one view sees it. Who walks towards the camera hides the place that he
-/// comes from: sheets that some view looks through, or that four times as many views cannot see as see them
-/// (three at least), go too where at least half of what is certain within 10 cm goes.
+/// `is_look`: by view; looks are asked only where clouds leave a doubt: some cloud looks through, or fewer
+/// than four see a surface. For every sheet whether it is to go: at least half as many views look through it
+/// as see a surface there, two at least unless no more than one view sees it. Who walks towards the camera
+/// hides the place that he comes from: sheets that some view looks through, or that four times as many views
+/// cannot see as see them (three at least), go too where at least half of what is certain within 10 cm goes.
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
+                                       const std::vector<std::uint8_t>& is_look,
                                        const std::vector<geometry::Rigid3>& world_from_camera);
 
 }  // namespace plumbline::cloud

@@ -67,7 +67,8 @@ struct MapResult {
   std::shared_ptr<const places::Vocabulary> vocabulary;  ///< of the places; null: none was needed
 };
 
-/// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame.
+/// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame; or of such a frame what it
+/// sees through (cloud::depth_look).
 struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes
   double stamp = 0.0;   ///< seconds
