@@ -2,6 +2,7 @@
 #include "plumbline/pipeline/run.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <oneapi/tbb/parallel_pipeline.h>
 
 #include <algorithm>
@@ -61,6 +62,13 @@ core::Result<void> guarded(const std::string& stage, const Call& call) {
   } catch (const std::exception& e) {
     return core::failure(core::ErrorKind::kInternal, fmt::format("stage {}: {}", stage, e.what()));
   }
+}
+
+/// The allocator's free pages, where it keeps them.
+void give_back_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 class Runner {
@@ -191,6 +199,14 @@ class Runner {
       (node.type->exports ? report_.export_s : report_.map_s) += report_.stages[n].finish_ms / 1000.0;
       if (!finished) return finished;
       results[n] = std::move(io.output_values());
+      // What nobody will read any more is given back at once, to the system, too: the next stage may need it.
+      for (std::size_t m = 0; m <= n; ++m) {
+        if (last_use_[m] == n) results[m].clear();
+      }
+      io.input_values().clear();
+      give_back_memory();
+      context_.log->debug(fmt::format("{}: its end took {:.0f} ms; {:.0f} MB are held, {:.0f} MB at most",
+                                      node.name, report_.stages[n].finish_ms, rss_mb(), peak_rss_mb()));
     }
     return {};
   }

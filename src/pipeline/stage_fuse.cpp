@@ -19,8 +19,8 @@
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
-#include "robot_columns.hpp"
 #include "resumed_run.hpp"
+#include "robot_columns.hpp"
 #include "stages.hpp"
 #include "up_frame.hpp"
 
@@ -89,15 +89,7 @@ class FuseStage : public Stage {
       if (auto written = write_keyframes(*map); !written) return written;
     }
     spool_.reset();
-    std::vector<cloud::FilterReport> reports;
-    cloud::FilterContext context;
-    context.executor = context_->executor;
-    context.columns = &fused->columns;
-    context.made_columns = &dense->columns;
-    auto filtered = filters_.chain().apply(fused->cloud, context, &reports);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-    if (!reports.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
-    dense->cloud = std::move(*filtered);
+    if (auto done = filter(std::move(*fused), *dense); !done) return done;
     points_ = dense->cloud->size();
     io.output<DenseCloud>("cloud", dense);
     return {};
@@ -183,6 +175,25 @@ class FuseStage : public Stage {
                     poses.size(), static_cast<double>(spool_->bytes()) / 1e6, report.tiles,
                     report.seen_through, report.dust, report.least_gain, report.most_gain));
     return fused;
+  }
+
+  /// The largest thing in memory is not copied when there is nothing to filter.
+  core::Result<void> filter(cloud::FusedCloud fused, DenseCloud& dense) const {
+    if (filters_.chain().size() == 0) {
+      dense.cloud = std::move(fused.cloud);
+      dense.columns = std::move(fused.columns);
+      return {};
+    }
+    std::vector<cloud::FilterReport> reports;
+    cloud::FilterContext context;
+    context.executor = context_->executor;
+    context.columns = &fused.columns;
+    context.made_columns = &dense.columns;
+    auto filtered = filters_.chain().apply(fused.cloud, context, &reports);
+    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
+    dense.cloud = std::move(*filtered);
+    return {};
   }
 
   core::Result<void> write_keyframes(const MapResult& map) const {
