@@ -261,6 +261,7 @@ void CloudOptions::declare(core::OptionTable& table) {
                "Farthest pairs that ICP starts with");
   table.number("icp_trim", icp_trim, {0.1, 1.0}, "", "Share of the pairs that ICP keeps, the nearest ones");
   wall.declare(table);
+  planes.declare(table);
 }
 
 core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Reference* reference,
@@ -281,7 +282,10 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
     if (!made) return tl::unexpected(made.error());
     truth = std::move(*made);
   }
-  report.wall = wall_thickness(*prepared->samples, prepared->density.spacing_m, options.wall, executor);
+  std::vector<WallPatch> patches =
+      wall_patches(*prepared->samples, prepared->density.spacing_m, options.wall, executor);
+  report.wall = thickness_of(patches);
+  report.planes = wall_planes(*prepared->samples, std::move(patches), options.wall.patch_m, options.planes);
   if (report.wall.patches == 0) {
     report.warnings.push_back("no flat patch was found that is dense enough: wall thickness is not known");
   }

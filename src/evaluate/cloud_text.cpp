@@ -40,6 +40,30 @@ Json json_of(const WallThickness& w) {
   return out;
 }
 
+Json json_of(const WallPlane& p) {
+  return {{"area_m2", p.area_m2},
+          {"normal", {p.normal.x(), p.normal.y(), p.normal.z()}},
+          {"offset_m", p.offset_m},
+          {"thickness_mm", json_of(p.thickness)},
+          {"straightness_mm", p.straightness_mm},
+          {"slab_rms_mm", p.slab_rms_mm},
+          {"points", p.points}};
+}
+
+/// A line a plane; nothing without planes.
+std::string table_of(const std::vector<WallPlane>& planes) {
+  if (planes.empty()) return "";
+  std::string out = fmt::format("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9}  {}\n", "largest planes", "m2",
+                                "thickness", "straight", "all", "doubled %", "normal");
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const WallPlane& p = planes[i];
+    out += fmt::format("{:<14} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.1f}  {:.2f} {:.2f} {:.2f}\n", i + 1,
+                       p.area_m2, p.thickness.rms_mm, p.straightness_mm, p.slab_rms_mm,
+                       p.thickness.layered_percent, p.normal.x(), p.normal.y(), p.normal.z());
+  }
+  return out;
+}
+
 std::string row(const char* name, const Statistics& s) {
   return fmt::format("{:<14} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f} {:>9.3f}  mm\n", name, s.mean, s.median,
                      s.rmse, s.p90, s.max);
@@ -59,6 +83,8 @@ std::string to_json(const CloudReport& r) {
     out["normal_consistency"] = r.normal_consistency ? Json(*r.normal_consistency) : Json(nullptr);
   }
   out["wall_thickness_mm"] = json_of(r.wall);
+  out["planes"] = Json::array();
+  for (const WallPlane& plane : r.planes) out["planes"].push_back(json_of(plane));
   out["density"] = {{"points_per_m2", r.density_per_m2}, {"spacing_mm", r.spacing_mm}};
   out["points"] = r.points;
   out["points_not_finite"] = r.not_finite;
@@ -101,6 +127,7 @@ std::string to_text(const CloudReport& r) {
         "wall thickness {:.2f} mm RMS, median {:.2f}, p90 {:.2f} over {} patches, {:.1f} % doubled\n",
         r.wall.rms_mm, r.wall.median_mm, r.wall.p90_mm, r.wall.patches, r.wall.layered_percent);
   }
+  out += table_of(r.planes);
   for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
   return out;
 }

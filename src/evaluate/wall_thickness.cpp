@@ -113,11 +113,6 @@ std::optional<Plane> main_plane(const Points& points, const Indices& voxel, doub
   return best;
 }
 
-struct Patch {
-  double thickness_m = 0.0;
-  bool layered = false;
-};
-
 class PatchMeasure {
  public:
   PatchMeasure(const SurfaceSamples& cloud, double spacing_m, const WallThicknessOptions& options)
@@ -129,7 +124,7 @@ class PatchMeasure {
 
   [[nodiscard]] std::size_t voxels() const { return buckets_.size(); }
 
-  [[nodiscard]] std::optional<Patch> measure(std::size_t voxel) const {
+  [[nodiscard]] std::optional<WallPatch> measure(std::size_t voxel) const {
     const Indices own = buckets_.points_of(voxel);
     if (own.size() < kLeastPatchPoints) return std::nullopt;
     auto plane = main_plane(cloud_.points, own, options_.flatness_m, Draw(voxel));
@@ -146,7 +141,7 @@ class PatchMeasure {
       if (!refined) return std::nullopt;
       plane = refined;
     }
-    return over_cells(heights_by_cell(near, *plane));
+    return over_cells(heights_by_cell(near, *plane), *plane);
   }
 
  private:
@@ -227,7 +222,8 @@ class PatchMeasure {
     return heights;
   }
 
-  [[nodiscard]] std::optional<Patch> over_cells(std::vector<std::vector<double>> heights) const {
+  [[nodiscard]] std::optional<WallPatch> over_cells(std::vector<std::vector<double>> heights,
+                                                    const Plane& plane) const {
     std::vector<double> thickness;
     std::size_t layered = 0;
     std::size_t covered = 0;  // by the main layer
@@ -243,7 +239,7 @@ class PatchMeasure {
     if (static_cast<double>(covered) < kLeastCoverage * static_cast<double>(heights.size())) {
       return std::nullopt;
     }
-    return Patch{summarize(thickness).median, 2 * layered > thickness.size()};
+    return WallPatch{plane.center, plane.normal, summarize(thickness).median, 2 * layered > thickness.size()};
   }
 
   const SurfaceSamples& cloud_;
@@ -262,19 +258,26 @@ void WallThicknessOptions::declare(core::OptionTable& table) {
   table.number("wall_flatness", flatness_m, {0.001, 0.5}, "m", "A patch's main layer is this flat");
 }
 
-WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
-                             const WallThicknessOptions& options, const core::Executor& executor) {
+std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_m,
+                                    const WallThicknessOptions& options, const core::Executor& executor) {
   const PatchMeasure measure(cloud, spacing_m, options);
-  std::vector<std::optional<Patch>> patches(measure.voxels());
-  for_chunks(executor, patches.size(), 16, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) patches[i] = measure.measure(i);
+  std::vector<std::optional<WallPatch>> found(measure.voxels());
+  for_chunks(executor, found.size(), 16, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) found[i] = measure.measure(i);
   });
+  std::vector<WallPatch> patches;
+  for (const auto& patch : found) {
+    if (patch) patches.push_back(*patch);
+  }
+  return patches;
+}
+
+WallThickness thickness_of(const std::vector<WallPatch>& patches) {
   std::vector<double> thickness_mm;
   std::size_t layered = 0;
-  for (const auto& patch : patches) {
-    if (!patch) continue;
-    thickness_mm.push_back(1000.0 * patch->thickness_m);
-    layered += patch->layered ? 1 : 0;
+  for (const WallPatch& patch : patches) {
+    thickness_mm.push_back(1000.0 * patch.thickness_m);
+    layered += patch.layered ? 1 : 0;
   }
   const Statistics s = summarize(thickness_mm);
   WallThickness wall;
@@ -285,6 +288,11 @@ WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
   wall.p90_mm = s.p90;
   if (s.count > 0) wall.layered_percent = 100.0 * static_cast<double>(layered) / static_cast<double>(s.count);
   return wall;
+}
+
+WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
+                             const WallThicknessOptions& options, const core::Executor& executor) {
+  return thickness_of(wall_patches(cloud, spacing_m, options, executor));
 }
 
 }  // namespace plumbline::evaluate

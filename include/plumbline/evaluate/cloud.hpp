@@ -13,6 +13,7 @@
 #include "plumbline/core/options.hpp"
 #include "plumbline/evaluate/statistics.hpp"
 #include "plumbline/evaluate/surface.hpp"
+#include "plumbline/evaluate/wall_planes.hpp"
 #include "plumbline/evaluate/wall_thickness.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/geometry/trajectory.hpp"
@@ -41,6 +42,7 @@ struct CloudOptions {
   double icp_max_distance_m = 0.3;  ///< farthest pairs ICP starts with
   double icp_trim = 0.8;            ///< share of the pairs ICP keeps, the nearest ones
   WallThicknessOptions wall;
+  WallPlanesOptions planes;
   void declare(core::OptionTable& table);  ///< wall options as wall_patch, wall_cell, ...
 };
 
@@ -83,6 +85,7 @@ struct CloudReport {
   /// only if the cloud has normals.
   std::optional<double> normal_consistency;
   WallThickness wall;
+  std::vector<WallPlane> planes;  ///< the largest, largest first
   double density_per_m2 = 0.0;  ///< median of 16 / (pi r16^2), r16 the distance to the 16th neighbour
   double spacing_mm = 0.0;      ///< median distance to the nearest neighbour
   CloudAlignmentReport alignment;

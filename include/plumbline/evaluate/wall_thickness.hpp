@@ -2,7 +2,9 @@
 #pragma once
 
 // How thick flat walls are in a cloud, from the cloud alone.
+#include <Eigen/Core>
 #include <cstddef>
+#include <vector>
 
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
@@ -35,7 +37,22 @@ struct WallThickness {
   double layered_percent = 0.0;  ///< share of patches where most cells have two layers
 };
 
-/// `spacing_m`: typical distance to the nearest neighbour. Points must be finite.
+/// A flat piece of a cloud, about patch_m wide.
+struct WallPatch {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< on the main layer
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< towards where most of its points face
+  double thickness_m = 0.0;
+  bool layered = false;  ///< most of its cells have two layers
+};
+
+/// The patches that count, in the order of their voxels. `spacing_m`: typical distance to the nearest
+/// neighbour. Points must be finite.
+std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_m,
+                                    const WallThicknessOptions& options, const core::Executor& executor);
+
+WallThickness thickness_of(const std::vector<WallPatch>& patches);
+
+/// Both at once. `spacing_m`: typical distance to the nearest neighbour. Points must be finite.
 WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
                              const WallThicknessOptions& options, const core::Executor& executor);
 
