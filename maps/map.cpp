@@ -183,6 +183,15 @@ void Map::add_edge(const SurfaceEdge& edge) {
   edges_.emplace(next_edge_++, edge);
 }
 
+void Map::set_loops(std::vector<LoopEdge> loops) {
+  for (const LoopEdge& loop : loops) {
+    if (loop.a == loop.b) throw std::invalid_argument("set_loops: both ends are one keyframe");
+    if (!has_keyframe(loop.a) || !has_keyframe(loop.b))
+      throw std::out_of_range("set_loops: no such keyframe");
+  }
+  loops_ = std::move(loops);
+}
+
 std::vector<SurfaceEdge> Map::edges_of(KeyframeId keyframe) const {
   std::vector<SurfaceEdge> result;
   for (std::uint64_t i : keyframes_.at(keyframe).edges) result.push_back(edges_.at(i));

@@ -69,6 +69,7 @@ MapChanges Map::changes_since(const MapMoment& moment) const {
   changes.lines = touched(lines_, moment.lines);
   for (const auto& [number, edge] : edges_) changes.edge_names.emplace_back(number, edge.a.robot);
   changes.edges.assign(edges_.lower_bound(moment.edges), edges_.end());
+  changes.loops = loops_;
   changes.point_count = points_.size();
   changes.line_count = lines_.size();
   changes.next = next_ids();
@@ -106,6 +107,7 @@ Map::Map(MapParts parts) {
     }
     require(parts.next.edge >= next_edge_, "an edge's number is too large");
     next_edge_ = parts.next.edge;
+    set_loops(std::move(parts.loops));
     for (const KeyframeId next : parts.next.keyframes) keyframes_.reserve(next);
     for (const PointId next : parts.next.points) points_.reserve(next);
     for (const LineId next : parts.next.lines) lines_.reserve(next);

@@ -120,6 +120,8 @@ void Map::forget_edges(KeyframeId id) {
     edges_.erase(i);
   }
   keyframes_.at(id).edges.clear();
+  const auto at_it = [id](const LoopEdge& loop) { return loop.a == id || loop.b == id; };
+  loops_.erase(std::remove_if(loops_.begin(), loops_.end(), at_it), loops_.end());
 }
 
 void Map::remove_keyframe(KeyframeId id) {

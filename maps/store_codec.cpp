@@ -144,6 +144,26 @@ SurfaceEdge decode_edge(const Bytes& bytes) {
   return edge;
 }
 
+void encode(const std::vector<LoopEdge>& loops, ByteWriter& to) {
+  for (const LoopEdge& loop : loops) {
+    to.put(loop.a);
+    to.put(loop.b);
+    to.put(loop.b_from_a);
+    to.put(loop.information);
+  }
+}
+std::vector<LoopEdge> decode_loops(const Bytes& bytes) {
+  std::vector<LoopEdge> loops;
+  for (ByteReader from(bytes); !from.at_end();) {
+    LoopEdge& loop = loops.emplace_back();
+    from.get(loop.a);
+    from.get(loop.b);
+    from.get(loop.b_from_a);
+    from.get(loop.information);
+  }
+  return loops;
+}
+
 void encode(const RetiredKeyframe& retired, ByteWriter& to) {
   to.put(retired.stamp);
   to.put(retired.heir);

@@ -37,6 +37,8 @@ void decode_page(const Bytes& bytes, std::vector<MapLine>& lines);
 
 void encode(const SurfaceEdge& edge, ByteWriter& to);
 SurfaceEdge decode_edge(const Bytes& bytes);
+void encode(const std::vector<LoopEdge>& loops, ByteWriter& to);
+std::vector<LoopEdge> decode_loops(const Bytes& bytes);
 void encode(const RetiredKeyframe& retired, ByteWriter& to);
 RetiredKeyframe decode_retired(const Bytes& bytes);
 

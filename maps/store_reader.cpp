@@ -119,6 +119,7 @@ StoredMap read_map(Database& database, const StoreHeader& header) {
   });
   std::sort(parts.edges.begin(), parts.edges.end(),  // the table is by robot first
             [](const auto& a, const auto& b) { return a.first < b.first; });
+  parts.loops = decode_loops(read_loops(database));
   read_table(database, "frame",
              [&](KeyframeId, std::int64_t, const Bytes& bytes) { decode_page(bytes, stored.frames); });
   stored.log = read_log(database);
@@ -240,6 +241,7 @@ core::Result<StoreContents> StoreReader::contents() const {
     contents.points = totals.points;
     contents.lines = totals.lines;
     contents.edges = totals.edges;
+    contents.loops = decode_loops(read_loops(database)).size();
     contents.frames = totals.frames;
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");

@@ -101,6 +101,16 @@ ResultFrame read_result_frame(Database& database) {
   return frame;
 }
 
+Bytes read_loops(Database& database) {
+  Statement statement(database, "SELECT value FROM header WHERE key = 'loops'");
+  return statement.step() ? statement.unpacked(0) : Bytes{};
+}
+
+void put_loops(Database& database, const Bytes& loops) {
+  const Bytes packed = pack(loops);
+  Statement(database, "REPLACE INTO header VALUES ('loops', ?)").bind(1, packed).run();
+}
+
 std::vector<std::string> read_log(Database& database) {
   std::vector<std::string> lines;
   Statement rows(database, "SELECT data FROM log ORDER BY robot, number");

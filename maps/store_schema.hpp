@@ -20,6 +20,9 @@ StoreHeader read_header(Database& database);
 void put_result_frame(Database& database, const ResultFrame& frame);
 /// The map's own frame when none was put.
 ResultFrame read_result_frame(Database& database);
+/// Loops that were closed, encoded; a store that was made before they were kept has none.
+Bytes read_loops(Database& database);
+void put_loops(Database& database, const Bytes& loops);
 /// The lines of the table log.
 std::vector<std::string> read_log(Database& database);
 /// Refuses what is no file before SQLite does with fewer words.

@@ -104,6 +104,7 @@ struct StoreWriter::Impl {
         edges(*database, "edge"),
         frames(*database, "frame"),
         log(*database, "log"),
+        loops(read_loops(*database)),
         frame_list(read_frames(*database)),
         log_lines(read_log(*database)) {}
 
@@ -121,6 +122,7 @@ struct StoreWriter::Impl {
   std::filesystem::path file;
   std::unique_ptr<Database> database;
   Mirror keyframes, states, retired, points, lines, edges, frames, log;
+  Bytes loops;                         ///< as in the file
   std::vector<FramePose> frame_list;   ///< as in the file
   std::vector<std::string> log_lines;  ///< as in the file
 };
@@ -165,6 +167,11 @@ void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
   }
   for (const auto& [number, robot] : map.edge_names) edges.stay({robot, static_cast<std::int64_t>(number)});
   edges.end();
+  bytes.clear();
+  encode(map.loops, bytes);
+  if (bytes.bytes() == loops) return;
+  put_loops(*database, bytes.bytes());
+  loops = bytes.bytes();
 }
 
 void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
@@ -217,6 +224,7 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
   const core::Result<void> reread = guarded(file, ErrorKind::kOutput, [&] {
     for (Mirror* mirror : {&keyframes, &states, &retired, &points, &lines, &edges, &frames, &log})
       mirror->reread();
+    loops = read_loops(*database);
     frame_list = read_frames(*database);
     log_lines = read_log(*database);
   });

@@ -53,7 +53,8 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
              contents->complete ? "yes" : "no; map --resume goes on from it, export and render read it");
   fmt::print("store.keyframes: {}\nstore.keyframes_retired: {}\nstore.points: {}\nstore.lines: {}\n",
              contents->keyframes, contents->retired, contents->points, contents->lines);
-  fmt::print("store.surface_edges: {}\nstore.frames: {}\n", contents->edges, contents->frames);
+  fmt::print("store.surface_edges: {}\nstore.loops: {}\nstore.frames: {}\n", contents->edges, contents->loops,
+             contents->frames);
   fmt::print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,
              contents->frame_clouds);
   for (const std::string& name : contents->attachments) fmt::print("store.attachment: {}\n", name);

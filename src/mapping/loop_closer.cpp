@@ -202,12 +202,11 @@ void LoopCloser::note_verdict(const PoseEdge& edge, bool believed) {
 }
 
 bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
-  const auto gone = [&](const PoseEdge& e) { return !map.has_keyframe(e.a) || !map.has_keyframe(e.b); };
-  edges_.erase(std::remove_if(edges_.begin(), edges_.end(), gone), edges_.end());
-  std::vector<PoseEdge> all = edges_;
+  std::vector<PoseEdge> all = loop_edges(map);
+  const std::size_t known = all.size();
   std::copy_if(edges.begin(), edges.end(), std::back_inserter(all),
-               [&](const PoseEdge& e) { return !gone(e); });
-  if (all.size() == edges_.size()) return false;
+               [&](const PoseEdge& e) { return map.has_keyframe(e.a) && map.has_keyframe(e.b); });
+  if (all.size() == known) return false;
 
   optimize::PoseGraphOptions graph;
   graph.robust = options_.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
@@ -217,15 +216,15 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   std::vector<PoseEdge> fresh;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool wrong = i < solved.summary.edges.size() && solved.summary.edges[i].rejected;
-    if (i >= edges_.size()) note_verdict(all[i], !wrong);
+    if (i >= known) note_verdict(all[i], !wrong);
     if (wrong) {
       ++counts_.rejected;
       continue;
     }
     believed.push_back(all[i]);
-    if (i >= edges_.size()) fresh.push_back(all[i]);
+    if (i >= known) fresh.push_back(all[i]);
   }
-  edges_ = std::move(believed);
+  set_loops(map, believed);
   if (fresh.empty()) return false;
 
   move_keyframes(map, solved.poses);
@@ -236,7 +235,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     adjustment.graph = graph;
     adjustment.orb_scale_factor = options_.verify.orb_scale_factor;
     const KeyframeId anchor{};
-    adjust_map(map, {{edges.front().b.robot, camera_}}, edges_, adjustment, anchor);
+    adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment, anchor);
   }
   return true;
 }

@@ -69,6 +69,9 @@ class PartsCollector {
       moved.b = renamed(edge.b, to);
       parts_.edges.emplace_back(first_edge + order, moved);
     }
+    for (const maps::LoopEdge& loop : map.loops()) {
+      parts_.loops.push_back({renamed(loop.a, to), renamed(loop.b, to), loop.b_from_a, loop.information});
+    }
     const maps::NextIds next = map.next_ids();
     for (const KeyframeId id : next.keyframes) parts_.next.keyframes.push_back(renamed(id, to));
     for (const core::PointId id : next.points) parts_.next.points.push_back(renamed(id, to));

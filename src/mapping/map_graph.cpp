@@ -160,6 +160,20 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
   return edges.take();
 }
 
+std::vector<PoseEdge> loop_edges(const maps::Map& map) {
+  std::vector<PoseEdge> edges;
+  for (const maps::LoopEdge& loop : map.loops()) {
+    edges.push_back({loop.a, loop.b, loop.b_from_a, loop.information, false});
+  }
+  return edges;
+}
+
+void set_loops(maps::Map& map, const std::vector<PoseEdge>& edges) {
+  std::vector<maps::LoopEdge> loops;
+  for (const PoseEdge& e : edges) loops.push_back({e.a, e.b, e.b_from_a, e.information});
+  map.set_loops(std::move(loops));
+}
+
 MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
                                const optimize::PoseGraphOptions& options, KeyframeId anchor) {
   MapGraphResult result;

@@ -2,6 +2,7 @@
 // refine: after the last frame, local maps are aligned with each other and the whole map is adjusted.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <utility>
@@ -75,19 +76,24 @@ class RefineStage : public Stage {
   void refine(maps::Map& map, const std::vector<RobotInfo>& robots) {
     std::vector<mapping::PoseEdge> edges;
     if (icp_) edges = align(map);
+    const std::size_t alignments = edges.size();
+    const std::vector<mapping::PoseEdge> loops = mapping::loop_edges(map);
+    edges.insert(edges.end(), loops.begin(), loops.end());
     mapping::Cameras cameras;
     for (const core::KeyframeId id : map.keyframe_ids()) cameras[id.robot] = camera_;
     for (const RobotInfo& robot : robots) cameras[robot.number] = robot.camera.color;
     const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras, edges, adjustment_);
-    counts_.rejected = static_cast<std::size_t>(summary.rejected);
+    for (std::size_t i = 0; i < std::min(alignments, summary.extra.size()); ++i) {
+      counts_.rejected += summary.extra[i].rejected ? 1U : 0U;
+    }
     counts_.mean_shift_m = summary.mean_shift_m;
     counts_.max_shift_m = summary.max_shift_m;
     if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
     log_->debug(
-        fmt::format("refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments; moved "
-                    "by {:.1f} mm on average, {:.1f} mm at most",
-                    summary.keyframes, summary.points, summary.lines, summary.surface_edges, edges.size(),
-                    1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
+        fmt::format("refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "
+                    "moved by {:.1f} mm on average, {:.1f} mm at most",
+                    summary.keyframes, summary.points, summary.lines, summary.surface_edges, alignments,
+                    loops.size(), 1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
   }
 
   std::vector<mapping::PoseEdge> align(const maps::Map& map) {

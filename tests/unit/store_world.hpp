@@ -118,7 +118,7 @@ struct StoreWorld {
     map.observe(map.add_line(id.robot, l), id, feature);
   }
 
-  /// Some poses and landmarks move, a surface edge is found.
+  /// Some poses and landmarks move, a surface edge is found, sometimes a loop is closed.
   void refine(core::KeyframeId id) {
     for (const core::KeyframeId k : map.keyframe_ids()) {
       if (random_.integer(0, 2) == 0) map.set_pose(k, random_.pose(3.0, 5.0));
@@ -132,6 +132,12 @@ struct StoreWorld {
       edge.information = random_.uniform(1, 1000) * geometry::Matrix6d::Identity();
       edge.information(0, 5) = random_.uniform(-1, 1);
       map.add_edge(edge);
+    }
+    if (steps_ % 3 == 0 && all.size() > 1) {  // a loop is closed
+      std::vector<maps::LoopEdge> loops = map.loops();
+      loops.push_back({all.front(), all.back(), random_.pose(1.0, 1.0), {}});
+      loops.back().information = random_.uniform(1, 1000) * geometry::Matrix6d::Identity();
+      map.set_loops(std::move(loops));
     }
     for (const core::PointId p : map.point_ids()) {
       if (random_.integer(0, 4) != 0) continue;
@@ -184,6 +190,9 @@ inline bool same(const maps::MapLine& a, const maps::MapLine& b) {
 inline bool same(const maps::SurfaceEdge& a, const maps::SurfaceEdge& b) {
   return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information &&
          a.overlap == b.overlap && a.rms == b.rms;
+}
+inline bool same(const maps::LoopEdge& a, const maps::LoopEdge& b) {
+  return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information;
 }
 inline bool same(const features::PointFeature& a, const features::PointFeature& b) {
   return a.pixel == b.pixel && a.depth == b.depth && a.angle == b.angle && a.response == b.response &&
@@ -263,6 +272,7 @@ inline testing::AssertionResult equal(const maps::Map& a, const maps::Map& b) {
     if (a.covisible(k, 1) != b.covisible(k, 1)) return differ("covisibilities");
     if (!same_all(a.edges_of(k), b.edges_of(k))) return differ("edges of a keyframe");
   }
+  if (!same_all(a.loops(), b.loops())) return differ("loops");
   for (const core::PointId p : a.point_ids()) {
     if (!same(a.point(p), b.point(p))) return differ("points");
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "plumbline/mapping/loop_closer.hpp"
+#include "plumbline/mapping/map_fusion.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {
@@ -110,7 +111,30 @@ TEST(LoopCloser, TakesTheDriftOut) {
   EXPECT_TRUE(closer.close(ring.map, {ring.edge(0, 39), ring.edge(1, 38)}));
   EXPECT_LT(ring.worst(), 0.5 * before);
   EXPECT_EQ(closer.counts().accepted, 1);
-  EXPECT_EQ(closer.edges().size(), 2U);
+  EXPECT_EQ(ring.map.loops().size(), 2U);
+}
+
+TEST(LoopCloser, LoopsOfTheMapHoldWhoeverClosedThem) {
+  Ring ring;
+  LoopCloser first(without_bundle(), kTestCamera);
+  ASSERT_TRUE(first.close(ring.map, {ring.edge(0, 39), ring.edge(1, 38), ring.edge(2, 37)}));
+  LoopCloser second(without_bundle(), kTestCamera);  // of a run that goes on
+  second.restore(ring.map, {0, 39});
+  PoseEdge wrong = ring.edge(3, 36);
+  wrong.b_from_a = Rigid3(geometry::exp_so3({0.0, 0.3, 0.0}), {0.5, -0.3, 0.4}) * wrong.b_from_a;
+  EXPECT_FALSE(second.close(ring.map, {wrong}));
+  EXPECT_EQ(ring.map.loops().size(), 3U);
+  EXPECT_TRUE(second.close(ring.map, {ring.edge(4, 35)}));
+  EXPECT_EQ(ring.map.loops().size(), 4U);
+  EXPECT_EQ(loop_edges(ring.map).size(), 4U);
+
+  const maps::Map other = renumbered(ring.map, {{0, 3}});
+  ASSERT_EQ(other.loops().size(), 4U);
+  EXPECT_EQ(other.loops()[3].a, (core::KeyframeId{3, 4}));
+  EXPECT_EQ(other.loops()[3].b, (core::KeyframeId{3, 35}));
+  EXPECT_EQ(other.loops()[3].b_from_a.translation, ring.map.loops()[3].b_from_a.translation);
+  const maps::Map both = joined({&ring.map, &other}, {Rigid3{}, Rigid3{}});
+  EXPECT_EQ(both.loops().size(), 8U);
 }
 
 TEST(LoopCloser, WrongLoopsAmongRightOnesDoNoHarm) {

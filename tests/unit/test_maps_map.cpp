@@ -255,6 +255,21 @@ TEST(Map, EdgesBelongToBothEnds) {
   EXPECT_EQ(map.edges_of(c).size(), 1U) << "a refused edge leaves no trace";
 }
 
+TEST(Map, LoopsGoWithTheirKeyframes) {
+  Map map;
+  const KeyframeId a = add_keyframe(map, 0, 0, 0);
+  const KeyframeId b = add_keyframe(map, 0, 0, 0);
+  const KeyframeId c = add_keyframe(map, 0, 0, 0);
+  map.set_loops({{a, b, {}, {}}, {b, c, {}, {}}, {a, c, {}, {}}});
+  EXPECT_THROW(map.set_loops({{a, a, {}, {}}}), std::invalid_argument);
+  EXPECT_THROW(map.set_loops({{a, {0, 9}, {}, {}}}), std::out_of_range);
+  ASSERT_EQ(map.loops().size(), 3U) << "a refused loop leaves no trace";
+  map.remove_keyframe(b);
+  ASSERT_EQ(map.loops().size(), 1U);
+  EXPECT_EQ(map.loops()[0].a, a);
+  EXPECT_EQ(map.loops()[0].b, c);
+}
+
 TEST(Map, LandmarkIdsAreNotReusedAndRobotsCountAlone) {
   Map map;
   EXPECT_EQ(map.add_point(0, {}), (PointId{0, 0}));

@@ -59,6 +59,7 @@ TEST(MapStore, EveryCommitIsTheMapInEveryBit) {
   }
   ASSERT_GT(world.map.retired_ids().size(), 1U) << "the world is too simple";
   ASSERT_GT(world.map.edges().size(), 5U);
+  ASSERT_FALSE(world.map.loops().empty());
 }
 
 TEST(MapStore, SavesTheFinalMap) {

@@ -98,6 +98,8 @@ TEST(StoreSteps, EachLeavesTheMapInEveryBit) {
   EXPECT_EQ(contents.points, world.map.point_count());
   EXPECT_EQ(contents.lines, world.map.line_count());
   EXPECT_EQ(contents.edges, world.map.edges().size());
+  ASSERT_FALSE(world.map.loops().empty());
+  EXPECT_EQ(contents.loops, world.map.loops().size());
   EXPECT_EQ(contents.frames, world.frames.size());
   EXPECT_EQ(contents.keyframe_clouds, 25U);
   EXPECT_EQ(contents.frame_clouds, follower.frame_clouds.size());

@@ -39,6 +39,11 @@ using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>
 /// All trusted; the information grows with what they share. The body of a pose graph.
 std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared = 30, int max_neighbours = 6);
 
+/// The loops of the map that were closed: edges that may be taken for wrong.
+std::vector<PoseEdge> loop_edges(const maps::Map& map);
+/// Makes these the map's loops. Throws as maps::Map::set_loops.
+void set_loops(maps::Map& map, const std::vector<PoseEdge>& edges);
+
 struct MapGraphResult {
   KeyframePoses poses;                 ///< all keyframes, by id
   optimize::PoseGraphSummary summary;  ///< its edges: those of `extra`, in their order

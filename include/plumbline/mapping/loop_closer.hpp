@@ -22,7 +22,7 @@
 namespace plumbline::mapping {
 
 struct LoopOptions {
-  bool enabled = false;
+  bool enabled = true;
   double min_gap_s = 3.0;  ///< keyframes made within this time are the present, not a loop
   int agreeing = 2;        ///< verified keyframes, following one another, that must tell the same story
   double max_rival = 0.5;  ///< another story may have this share of them at most
@@ -81,13 +81,14 @@ class LoopCloser {
   /// to be closed; mostly none.
   std::vector<Loop> look(const maps::Map& map, core::KeyframeId keyframe);
 
-  /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are part
-  /// of the map by then.
+  /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are in the
+  /// map.
   void restore(const maps::Map& map, core::KeyframeId newest);
 
-  /// Pose graph with these edges and those of earlier loops. When it believes one of the new edges: moves the
-  /// map, merges doubles around these, adjusts all. Returns whether the map was moved. Edges may come from
-  /// elsewhere too. Nothing must be under way that was taken from the map before.
+  /// Pose graph with these edges and the loops of the map; what it believes become the map's loops. When it
+  /// believes one of the new edges: moves the map, merges doubles around these, adjusts all. Returns whether
+  /// the map was moved. Edges may come from elsewhere too. Nothing must be under way that was taken from the
+  /// map before.
   bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
 
   /// As an edge of the pose graph: where the query lies relative to the match.
@@ -101,8 +102,6 @@ class LoopCloser {
   [[nodiscard]] const LoopCounts& counts() const { return counts_; }
   /// Every candidate that was verified so far.
   [[nodiscard]] const std::vector<LoopTrial>& trials() const { return trials_; }
-  /// Edges that closed a loop and are still believed.
-  [[nodiscard]] const std::vector<PoseEdge>& edges() const { return edges_; }
   [[nodiscard]] const places::Database& database() const { return database_; }
 
  private:
@@ -120,7 +119,6 @@ class LoopCloser {
   places::Recogniser recogniser_;
   core::KeyframeId last_;      ///< the keyframe before
   std::vector<Loop> waiting_;  ///< verified lately, not yet confirmed by others
-  std::vector<PoseEdge> edges_;
   LoopCounts counts_;
   std::vector<LoopTrial> trials_;
 };

@@ -33,7 +33,7 @@ struct Keyframe {
   KeyframeId id;
   std::int64_t frame_index = -1;
   double stamp = 0.0;      ///< seconds
-  double turn_rate = 0.0;  ///< rad/s: how fast the camera turned while the picture was taken
+  double turn_rate = 0.0;  ///< rad/s: how fast the camera turned; 0 when it takes all rows at once: no shear
   std::shared_ptr<const features::FrameFeatures> features;
   std::vector<SurfaceSample> surface;  ///< well spread over directions and over the picture
 };
@@ -81,6 +81,15 @@ struct SurfaceEdge {
   double rms = 0.0;      ///< of the confirmed samples, standard deviations
 };
 
+/// A place that was seen again: how two keyframes lie to each other as their landmarks say. The information
+/// is of xi = log(b_from_a_estimate * b_from_a^-1).
+struct LoopEdge {
+  KeyframeId a;
+  KeyframeId b;
+  geometry::Rigid3 b_from_a;
+  geometry::Matrix6d information = geometry::Matrix6d::Zero();
+};
+
 /// A keyframe that was taken out of the map: its pose moves with the keyframe that took its place.
 struct RetiredKeyframe {
   double stamp = 0.0;  ///< seconds
@@ -123,6 +132,7 @@ struct MapParts {
   std::vector<MapLine> lines;
   std::vector<std::pair<KeyframeId, RetiredKeyframe>> retired;
   std::vector<std::pair<std::uint64_t, SurfaceEdge>> edges;  ///< by order of creation
+  std::vector<LoopEdge> loops;
   NextIds next;
 };
 
@@ -136,6 +146,7 @@ struct MapChanges {
   std::vector<LandmarkPage<MapLine>> lines;
   std::vector<std::pair<std::uint64_t, std::int32_t>> edge_names;  ///< all: number and robot of a
   std::vector<std::pair<std::uint64_t, SurfaceEdge>> edges;        ///< new ones
+  std::vector<LoopEdge> loops;                                     ///< all
   std::size_t point_count = 0;
   std::size_t line_count = 0;
   NextIds next;
@@ -235,6 +246,11 @@ class Map {
   /// All edges by order of creation.
   [[nodiscard]] const std::map<std::uint64_t, SurfaceEdge>& edges() const { return edges_; }
 
+  /// Loops that were closed and are believed; those of a keyframe that is taken out go with it. Throws
+  /// std::invalid_argument when both ends are one, std::out_of_range when one is not in the map.
+  void set_loops(std::vector<LoopEdge> loops);
+  [[nodiscard]] const std::vector<LoopEdge>& loops() const { return loops_; }
+
   /// Recomputes view direction and the most typical descriptor from the observations.
   void refresh_point(PointId id);
 
@@ -263,6 +279,7 @@ class Map {
   IdMap<KeyframeId, RetiredKeyframe> retired_;
   std::map<std::uint64_t, SurfaceEdge> edges_;  ///< by order of creation
   std::uint64_t next_edge_ = 0;
+  std::vector<LoopEdge> loops_;
 };
 
 }  // namespace plumbline::maps

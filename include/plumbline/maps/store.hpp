@@ -55,6 +55,7 @@ struct StoreContents {
   std::size_t points = 0;     ///< landmarks
   std::size_t lines = 0;
   std::size_t edges = 0;
+  std::size_t loops = 0;
   std::size_t frames = 0;
   std::size_t keyframe_clouds = 0;
   std::size_t frame_clouds = 0;
