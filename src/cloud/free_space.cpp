@@ -19,6 +19,7 @@ constexpr float kPose_m = 0.03F;   // poses are not exact
 constexpr int kFewestCells = 7;    // of 3 x 3
 constexpr int kSolid = 4;          // clouds that see a surface where none looks through leave no doubt
 constexpr double kAround_m = 0.1;  // no more than the margin of a tile
+constexpr int kPasses = 3;         // the side of a person is 0.3 m deep
 
 /// What of a view matters for a box: null transforms are never used.
 struct NearView {
@@ -54,14 +55,17 @@ void count(const Eigen::Vector3f& position, const std::vector<NearView>& views, 
 Verdict judge(const Votes& v) {
   // One view against another is enough when no third one knows better.
   if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
-  const bool rarely_seen = v.hidden >= 3 && 4 * v.surface <= v.hidden;
+  const bool rarely_seen = v.hidden >= 3 && 3 * v.surface <= v.hidden;
   return v.free > 0 || rarely_seen ? Verdict::kDoubtful : Verdict::kStays;
 }
 
 Verdict judge(const Eigen::Vector3f& position, const NearViews& views) {
   Votes votes;
   count(position, views.clouds, votes);
-  if (votes.free > 0 || votes.surface < kSolid) count(position, views.looks, votes);
+  const Verdict of_clouds = judge(votes);
+  const bool clear = of_clouds == Verdict::kGoes || (votes.free == 0 && votes.surface >= kSolid);
+  if (clear || views.looks.empty()) return of_clouds;
+  count(position, views.looks, votes);
   return judge(votes);
 }
 
@@ -222,12 +226,13 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
   for (std::size_t s = 0; s < goes.size(); ++s) {
     verdicts[s] = judge(sheets.position(sheets.all()[s]).cast<float>(), views);
   }
-  for (std::size_t s = 0; s < goes.size(); ++s) {
-    goes[s] = verdicts[s] == Verdict::kGoes ||
-                      (verdicts[s] == Verdict::kDoubtful && among_what_goes(sheets, s, verdicts))
-                  ? 1
-                  : 0;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const std::vector<Verdict> before = verdicts;
+    for (std::size_t s = 0; s < goes.size(); ++s) {
+      if (before[s] == Verdict::kDoubtful && among_what_goes(sheets, s, before)) verdicts[s] = Verdict::kGoes;
+    }
   }
+  for (std::size_t s = 0; s < goes.size(); ++s) goes[s] = verdicts[s] == Verdict::kGoes ? 1 : 0;
   return goes;
 }
 

@@ -53,13 +53,13 @@ Json json_of(const WallPlane& p) {
 /// A line a plane; nothing without planes.
 std::string table_of(const std::vector<WallPlane>& planes) {
   if (planes.empty()) return "";
-  std::string out = fmt::format("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9}  {}\n", "largest planes", "m2",
-                                "thickness", "straight", "all", "doubled %", "normal");
+  std::string out = fmt::format("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}  {}\n", "largest planes", "m2",
+                                "thick RMS", "median", "straight", "all", "doubled %", "normal");
   for (std::size_t i = 0; i < planes.size(); ++i) {
     const WallPlane& p = planes[i];
-    out += fmt::format("{:<14} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.1f}  {:.2f} {:.2f} {:.2f}\n", i + 1,
-                       p.area_m2, p.thickness.rms_mm, p.straightness_mm, p.slab_rms_mm,
-                       p.thickness.layered_percent, p.normal.x(), p.normal.y(), p.normal.z());
+    out += fmt::format("{:<14} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.1f}  {:.2f} {:.2f} {:.2f}\n",
+                       i + 1, p.area_m2, p.thickness.rms_mm, p.thickness.median_mm, p.straightness_mm,
+                       p.slab_rms_mm, p.thickness.layered_percent, p.normal.x(), p.normal.y(), p.normal.z());
   }
   return out;
 }

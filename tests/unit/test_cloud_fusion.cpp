@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
@@ -123,6 +124,56 @@ TEST(DenseFusion, WhatOthersLookThroughGoes) {
   EXPECT_GT(nearer_than(*kept->cloud, 2.0F), 1000U);
   EXPECT_LE(nearer_than(*cleaned->cloud, 2.0F), nearer_than(*kept->cloud, 2.0F) / 100);
   EXPECT_GT(report.seen_through, 1000U);
+}
+
+/// One view with a box before a wall; then, as the camera would turn away, no more clouds of it, but looks
+/// that show the box gone, or still there.
+Views a_box_and_looks(int gone, int there) {
+  const cv::Rect box(200, 150, 120, 160);
+  Views views;
+  const auto wall = [](int v) { return plane_depth({0, 0, 1}, 2.5, 1.0, static_cast<unsigned>(v + 1)); };
+  views.add(with_box(wall(0), box, 1.5F), 0.0);
+  for (int v = 1; v <= gone + there; ++v) {
+    views.add(v <= gone ? wall(v) : with_box(wall(v), box, 1.5F), 0.0);
+    views.clouds.back() =
+        depth_look(frame_of(v <= gone ? wall(v) : with_box(wall(v), box, 1.5F)), camera(), 0.2, 8.0);
+  }
+  return views;
+}
+
+TEST(DenseFusion, LooksTellWhatIsGoneAndAddNoPoints) {
+  DenseFusionOptions keep = fine();
+  keep.free_space = false;
+  const auto kept = a_box_and_looks(2, 0).fuse(keep);
+  const auto alone = a_box_and_looks(0, 0).fuse(keep);
+  ASSERT_TRUE(kept && alone);
+  EXPECT_EQ(kept->cloud->size(), alone->cloud->size());
+  const std::size_t box = nearer_than(*kept->cloud, 2.0F);
+  EXPECT_GT(box, 1000U);
+  EXPECT_LE(nearer_than(*a_box_and_looks(2, 0).fuse(fine())->cloud, 2.0F), box / 100);
+  EXPECT_GT(nearer_than(*a_box_and_looks(1, 4).fuse(fine())->cloud, 2.0F), box * 9 / 10);
+  EXPECT_GT(nearer_than(*a_box_and_looks(0, 3).fuse(fine())->cloud, 2.0F), box * 9 / 10);
+}
+
+TEST(DenseFusion, ALookKeepsTheNearestOfItsCells) {
+  cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(2.0F));
+  depth.at<float>(101, 202) = 1.0F;        // in cell (50, 25)
+  depth(cv::Rect(400, 200, 4, 4)) = 0.0F;  // nothing measured
+  depth(cv::Rect(404, 200, 4, 4)) = 9.0F;  // out of range
+  const CloudPtr look = depth_look(frame_of(depth), camera(), 0.2, 8.0);
+  ASSERT_EQ(look->width, 160U);
+  ASSERT_EQ(look->height, 120U);
+  EXPECT_TRUE(is_look(*look, camera()));
+  EXPECT_FLOAT_EQ(look->at(50, 25).z, 1.0F);
+  EXPECT_FLOAT_EQ(look->at(51, 25).z, 2.0F);
+  EXPECT_TRUE(std::isnan(look->at(100, 50).z));
+  EXPECT_TRUE(std::isnan(look->at(101, 50).z));
+  const auto bytes = encode_cloud(*look);
+  const auto again = decode_cloud(bytes.data(), bytes.size());
+  ASSERT_TRUE(again.has_value());
+  EXPECT_TRUE(is_look(**again, camera()));
+  EXPECT_EQ(depth_raster(**again, camera()).nearest, depth_raster(*look, camera()).nearest);
+  EXPECT_FALSE(is_look(*organised_cloud(frame_of(depth), camera()), camera()));
 }
 
 /// Twelve views of a wall, five with a box before it. Of the others, which measure nothing where the right

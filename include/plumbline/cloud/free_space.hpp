@@ -44,10 +44,10 @@ enum class Evidence { kNone, kSurface, kFree, kHidden };
 /// too little was measured.
 Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
 
-/// `is_look`: by view; looks are asked only where clouds leave a doubt: some cloud looks through, or fewer
+/// `is_look`: by view; looks are asked only where clouds alone do not let a sheet go: some cloud looks through, or fewer
 /// than four see a surface. For every sheet whether it is to go: at least half as many views look through it
 /// as see a surface there, two at least unless no more than one view sees it. Who walks towards the camera
-/// hides the place that he comes from: sheets that some view looks through, or that four times as many views
+/// hides the place that he comes from: sheets that some view looks through, or that three times as many views
 /// cannot see as see them (three at least), go too where at least half of what is certain within 10 cm goes.
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
                                        const std::vector<std::uint8_t>& is_look,
