@@ -118,6 +118,10 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
                "Metres more for every metre between the pairs: maps drift");
   table.number(prefix + "rival", rival, {0.0, 1.0}, "",
                "A second answer with this share of the best one's keyframes makes both doubtful");
+  table.number(prefix + "rival_fit", rival_fit, {0.0, 1.0}, "",
+               "Another answer that fits this share of the landmarks the best one fits is a doubt too");
+  table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",
+               "Share of the landmarks seen through that rules such an answer out");
   table.number(prefix + "min_confirmed", min_confirmed, {0.0, 1.0}, "",
                "Share of the keyframes with a view of the other map that must see what it holds");
   table.integer(prefix + "verifications", verifications, {1, 100000}, "",
@@ -165,6 +169,8 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   }
   fused.edges = static_cast<int>(edges.size());
   if (edges.empty()) return fused;
+  const std::vector<PoseEdge> loops = loop_edges(fused.map);  // that each robot has closed
+  edges.insert(edges.end(), loops.begin(), loops.end());
   const std::vector<KeyframeId> ids = parts[anchor].map->keyframe_ids();
   GlobalAdjustmentOptions adjustment = options.adjustment;
   adjustment.graph.robust =
@@ -179,6 +185,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   }
   std::set<std::pair<KeyframeId, KeyframeId>> done;
   for (const PoseEdge& edge : believed) merge_doubles(edge, options, done, fused);
+  set_loops(fused.map, believed);
   adjustment.bundle = true;
   adjustment.pose_graph = false;
   adjust_map(fused.map, fused.cameras, believed, adjustment, ids.front());

@@ -96,22 +96,6 @@ double turn_between(const maps::Map& map, const std::vector<PlacePair>& pairs) {
   return most;
 }
 
-/// Different keyframes on the side that has fewer: one keyframe seen from ten others is one witness.
-int witnesses(const ConsistentSet& set) {
-  return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b));
-}
-
-/// Whether these pairs mean another place than `a_from_b` does, and not only the same one less exactly.
-bool elsewhere(const maps::Map& a, const maps::Map& b, const std::vector<PlacePair>& pairs,
-               const Rigid3& a_from_b) {
-  constexpr double kApart_m = 1.0;  // more than maps drift within what they share
-  constexpr double kTurned_rad = 0.3;
-  const Rigid3 said = mean_transform(a, b, pairs).a_from_b;
-  const Eigen::Vector3d camera = b.camera_from_world(pairs.front().b).inverse().translation;
-  return (said * camera - a_from_b * camera).norm() > kApart_m ||
-         geometry::rotation_angle(said.rotation.transpose() * a_from_b.rotation) > kTurned_rad;
-}
-
 void sum_up(MergeEvidence& merge) {
   const auto n = static_cast<double>(merge.pairs.size());
   for (const VerifiedPair& pair : merge.pairs) {
@@ -134,12 +118,6 @@ std::string judge(const MergeEvidence& merge, const MapFusionOptions& options) {
         "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike "
         "is not enough",
         merge.span_m, merge.span_rad);
-  }
-  if (merge.rival >= 1 && merge.rival >= options.rival * merge.agreeing) {
-    return fmt::format(
-        "two answers exclude each other: {} keyframes say one thing, {} another; places look "
-        "alike here",
-        merge.agreeing, merge.rival);
   }
   return {};
 }
@@ -215,14 +193,9 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
     merge.a_from_b = mean.a_from_b;
     merge.covariance = mean.covariance;
     merge.spread_m = mean.spread_m;
-    for (std::size_t i = 1; i < sets.size(); ++i) {
-      std::vector<PlacePair> other;
-      for (const std::size_t k : sets[i].members) other.push_back(all.places[k]);
-      if (elsewhere(map_a, map_b, other, mean.a_from_b))
-        merge.rival = std::max(merge.rival, witnesses(sets[i]));
-    }
   }
   merge.refused = judge(merge, options);
+  if (merge.refused.empty()) merge.refused = doubts(parts, all, sets, options, merge);
   if (merge.refused.empty()) {
     ask_others(parts, options, executor, merge);
     if (merge.confirmed < options.min_confirmed * merge.expected) {

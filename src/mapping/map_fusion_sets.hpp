@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What verified pairs of keyframes say of how the worlds of two maps lie.
+// What verified pairs of keyframes say of how the worlds of two maps lie, and what speaks against it.
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "plumbline/mapping/consistent_pairs.hpp"
@@ -28,5 +29,15 @@ struct MeanTransform {
   double spread_m = 0.0;
 };
 MeanTransform mean_transform(const maps::Map& a, const maps::Map& b, const std::vector<PlacePair>& pairs);
+
+/// Different keyframes on the side that has fewer: one keyframe seen from ten others is one witness.
+int witnesses(const ConsistentSet& set);
+
+/// What speaks against the answer of sets[0], of which `merge` has the transform and the pairs: the maps do
+/// not fit where it lays them, or another set of pairs, or a step by which things repeat, would fit as well.
+/// Fills laid, rival, rival_laid and rival_m; empty: nothing.
+std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
+                   const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
+                   MergeEvidence& merge);
 
 }  // namespace plumbline::mapping

@@ -73,6 +73,13 @@ nlohmann::ordered_json traffic_of(const RunSummary& summary) {
   return list;
 }
 
+nlohmann::ordered_json laid(const mapping::LaidOver& fit) {
+  return {{"expected", fit.expected},
+          {"matched", fit.matched},
+          {"chance", rounded(fit.chance)},
+          {"seen_through", fit.contradicted}};
+}
+
 nlohmann::ordered_json merges_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::Merge& merge : summary.merges) {
@@ -97,6 +104,7 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"refused", refused},
                                     {"agreeing", e.agreeing},
                                     {"rival", e.rival},
+                                    {"laid_over", laid(e.laid)},
                                     {"expected", e.expected},
                                     {"confirmed", e.confirmed},
                                     {"pairs", e.pairs.size()},
@@ -108,6 +116,10 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"span_m", rounded(e.span_m)},
                                     {"span_rad", rounded(e.span_rad)},
                                     {"spread_m", rounded(e.spread_m)}};
+    if (e.rival_m > 0.0) {
+      entry["rival_m"] = rounded(e.rival_m);
+      entry["rival_laid_over"] = laid(e.rival_laid);
+    }
     if (e.accepted) {
       entry["sigma"] = sigma;
       entry["covariance"] = covariance;

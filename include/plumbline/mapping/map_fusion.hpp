@@ -3,8 +3,9 @@
 
 // Maps of several robots become one (METHOD section 6, Algorithm 2). Each map has a world frame of its own.
 // Places that two maps share are looked for by what keyframes look like, verified one by one, and believed
-// only when enough of them say the same of how the two worlds lie; two answers that exclude each other are no
-// answer.
+// only when enough of them say the same of how the two worlds lie, the maps laid over each other fit, and no
+// other way to lay them is as good.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -29,7 +30,9 @@ struct MapFusionOptions {
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
-  double rival = 0.1;  ///< a second answer with so many keyframes, as share of the best one, is a doubt
+  double rival = 0.1;      ///< a second answer with so many keyframes, as share of the best one, is a doubt
+  double rival_fit = 0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
+  double max_seen_through = 0.06;  ///< share of landmarks seen through that refutes such an answer
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
   bool robust = true;          ///< the pose graph may take pairs for wrong
@@ -58,6 +61,23 @@ struct VerifiedPair {
   PlaceVerification evidence;
 };
 
+/// One map laid over another: landmarks of either one, at their place in the other.
+struct LaidOver {
+  int expected = 0;      ///< where the other one measured a surface, from a like side and distance
+  int matched = 0;       ///< of these, that the other one has too
+  int contradicted = 0;  ///< where the other one saw through
+  double chance = 0.0;   ///< so many would match any other landmarks that lie as densely
+  /// Of the expected that match, beyond chance.
+  [[nodiscard]] double share() const {
+    return expected > 0 ? std::max(0.0, matched - chance) / expected : 0.0;
+  }
+  /// Share of all that can be told.
+  [[nodiscard]] double seen_through() const {
+    const int told = expected + contradicted;
+    return told > 0 ? static_cast<double>(contradicted) / told : 0.0;
+  }
+};
+
 /// All that was found out about two parts.
 struct MergeEvidence {
   std::size_t a = 0;  ///< parts, a < b
@@ -66,13 +86,16 @@ struct MergeEvidence {
   int tried = 0;       ///< of these, verified or refused
   int verified = 0;
   int agreeing = 0;      ///< of the verified, in the largest set that says the same
-  int rival = 0;         ///< in the largest set that says something else
+  int rival = 0;         ///< in the largest set that says something else and is not refuted by the maps
   int expected = 0;      ///< keyframes of b that should see what a saw, if the set is right
   int confirmed = 0;     ///< of these, that do
   int matches = 0;       ///< of the agreeing pairs, sums: by descriptor,
   int inliers = 0;       ///< points and lines that fit in the end
   double rms_px = 0.0;   ///< mean over the agreeing pairs, standard deviations
   double overlap = 0.0;  ///< of the surfaces, mean
+  LaidOver laid;         ///< the maps, as the set has it
+  LaidOver rival_laid;   ///< as the best other answer has it that the maps do not refute, and
+  double rival_m = 0.0;  ///< how far from the set's it puts b's cameras; 0: there is none
   double span_m = 0.0;   ///< how far apart the agreeing keyframes lie
   double span_rad = 0.0;
   double spread_m = 0.0;      ///< RMS of what the agreeing pairs say of b's cameras, about the mean

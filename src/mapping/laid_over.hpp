@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Does one map fit when it is laid over another one, and would it fit elsewhere as well? Where things repeat
+// (doors along a corridor, desks of one kind) the same pictures allow several answers; an answer is worth
+// believing when the others are contradicted by what was seen. Landmarks that look alike a fixed step apart
+// tell of a repetition even where no keyframe stands at both of its ends: cameras see farther than they go.
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plumbline/mapping/map_fusion.hpp"
+
+namespace plumbline::mapping {
+
+class LaidMaps {
+ public:
+  LaidMaps(const MapPart& a, const MapPart& b);
+
+  /// The fit of b laid over a.
+  [[nodiscard]] LaidOver fit(const geometry::Rigid3& a_from_b) const;
+
+  /// Other ways to lay b over a, a step of `least_m` or more away from `a_from_b`, that most landmarks seen
+  /// by the keyframes of `pairs` speak for.
+  [[nodiscard]] std::vector<geometry::Rigid3> steps(const geometry::Rigid3& a_from_b,
+                                                    const std::vector<VerifiedPair>& pairs,
+                                                    double least_m) const;
+
+ private:
+  struct Landmark {
+    Eigen::Vector3d position;  ///< in the map's world
+    Eigen::Vector3d view;      ///< direction from the cameras, unit
+    double distance_m = 0.0;   ///< from its first camera
+    features::Descriptor256 descriptor{};
+  };
+  struct Side {
+    MapPart part;
+    std::vector<Landmark> landmarks;   ///< by cell
+    std::vector<std::uint64_t> cells;  ///< of these
+  };
+  static Side side(const MapPart& part);
+  static Landmark landmark(const maps::Map& map, core::PointId id);
+  void match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, LaidOver& sum) const;
+  void lay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
+           LaidOver& sum) const;
+  static void vote(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
+                   const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps);
+
+  Side a_;
+  Side b_;
+  double alike_ = 0.0;  ///< share of all pairs of landmarks, one of each map, that look alike
+};
+
+}  // namespace plumbline::mapping
