@@ -148,7 +148,7 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
   solver.linear_solver_ordering.reset(ordering);
   solver.num_threads = 1;  // sums in a fixed order
   solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = 1e-5;
+  solver.function_tolerance = options.tolerance;
   solver.parameter_tolerance = 1e-7;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -184,6 +184,8 @@ void mark_outliers(BundleProblem& problem, Blocks& blocks, const BundleOptions& 
 void BundleOptions::declare(core::OptionTable& table) {
   table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "", "Iterations of each round at most");
   table.integer("bundle.rounds", rounds, {1, 10}, "", "Solves; between them outliers are put aside");
+  table.number("bundle.tolerance", tolerance, {0.0, 0.1}, "",
+               "A round ends with an iteration that lowers the cost by a smaller share");
   table.number("bundle.point_loss", point_loss, {0.1, 100.0}, "",
                "Huber threshold of points, standard deviations");
   table.number("bundle.line_loss", line_loss, {0.1, 100.0}, "",

@@ -159,8 +159,10 @@ TEST(Slam, TracksEveryFrameWithinFiveMillimetres) {
 
 TEST(Slam, SameBytesTwiceAndForAnyNumberOfThreads) {
   const Recording& recording = Recording::get();
-  const SlamRun a = run(recording.shots, 1);
-  const SlamRun b = run(recording.shots, 2);
+  SlamOptions options;
+  options.bundle_lag = 6;  // several bundles in so few frames
+  const SlamRun a = run(recording.shots, 1, options);
+  const SlamRun b = run(recording.shots, 2, options);
   EXPECT_TRUE(same_bytes(a.trajectory, b.trajectory));
   EXPECT_TRUE(same_bytes(a.keyframes, b.keyframes));
   EXPECT_EQ(a.points, b.points);
@@ -175,7 +177,9 @@ TEST(Slam, SameBytesTwiceAndForAnyNumberOfThreads) {
 
 TEST(Slam, SameBytesWhileOthersKeepTheMachineBusy) {
   const Recording& recording = Recording::get();
-  const SlamRun quiet = run(recording.shots, 2);
+  SlamOptions options;
+  options.bundle_lag = 6;
+  const SlamRun quiet = run(recording.shots, 2, options);
   std::atomic<bool> stop{false};
   std::vector<std::thread> others;
   for (int i = 0; i < 4; ++i) {
@@ -184,7 +188,7 @@ TEST(Slam, SameBytesWhileOthersKeepTheMachineBusy) {
       while (!stop) x = x * 1.0000001;
     });
   }
-  const SlamRun busy = run(recording.shots, 2);
+  const SlamRun busy = run(recording.shots, 2, options);
   stop = true;
   for (std::thread& other : others) other.join();
   EXPECT_TRUE(same_bytes(quiet.trajectory, busy.trajectory));

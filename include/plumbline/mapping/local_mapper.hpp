@@ -36,6 +36,7 @@ struct LocalMapperOptions {
   double edge_min_overlap = 0.4;
   optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
+  LocalMapperOptions() { bundle_options.tolerance = 1e-3; }  // the next keyframe's bundle goes on from here
   void declare(core::OptionTable& table);
 };
 

@@ -28,7 +28,7 @@ struct SlamOptions {
   tracking::TrackerOptions tracker;
   KeyframeRuleOptions keyframe;
   LocalMapperOptions mapper;
-  int bundle_lag = 6;  ///< frames
+  int bundle_lag = 12;  ///< frames
   LoopOptions loops;
   void declare(core::OptionTable& table);
 };

@@ -68,6 +68,7 @@ struct BundleProblem {
 struct BundleOptions {
   int max_iterations = 8;    ///< of each round
   int rounds = 2;            ///< after each, outliers are put aside and the solve is repeated
+  double tolerance = 1e-5;   ///< a round ends with an iteration that lowers the cost by a smaller share
   double point_loss = 2.45;  ///< Huber, standard deviations
   double line_loss = 2.45;
   double edge_loss = 4.0;
