@@ -28,7 +28,7 @@ struct NearView {
   Eigen::Vector3f translation;
 };
 
-enum class Verdict : std::uint8_t { kStays, kDoubtful, kGoes };
+enum class Verdict : std::uint8_t { kStays, kDoubtful, kHardlySeen, kGoes };
 
 struct Votes {
   int free = 0;
@@ -56,7 +56,8 @@ Verdict judge(const Votes& v) {
   // One view against another is enough when no third one knows better.
   if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
   const bool rarely_seen = v.hidden >= 3 && 3 * v.surface <= v.hidden;
-  return v.free > 0 || rarely_seen ? Verdict::kDoubtful : Verdict::kStays;
+  if (rarely_seen) return Verdict::kHardlySeen;
+  return v.free > 0 ? Verdict::kDoubtful : Verdict::kStays;
 }
 
 Verdict judge(const Eigen::Vector3f& position, const NearViews& views) {
@@ -229,7 +230,9 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<Verdict> before = verdicts;
     for (std::size_t s = 0; s < goes.size(); ++s) {
-      if (before[s] == Verdict::kDoubtful && among_what_goes(sheets, s, before)) verdicts[s] = Verdict::kGoes;
+      // Only what is hardly seen goes with what was itself a doubt: else good surfaces would go one by one.
+      const bool asked = before[s] == Verdict::kHardlySeen || (pass == 0 && before[s] == Verdict::kDoubtful);
+      if (asked && among_what_goes(sheets, s, before)) verdicts[s] = Verdict::kGoes;
     }
   }
   for (std::size_t s = 0; s < goes.size(); ++s) goes[s] = verdicts[s] == Verdict::kGoes ? 1 : 0;
