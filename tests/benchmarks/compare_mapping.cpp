@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What local mapping and the keyframe rule are worth: every recording is mapped side by side with local
-// mapping off and on, with the cone rule, and with the plain rule at several densities of keyframes, of which
-// the one is shown that comes nearest to the cone rule's number.
+// mapping off and on, each at several densities of keyframes, and with the cone rule. At the end: the density
+// that is best for each side in the median over all recordings, both sides at theirs, and the cone rule
+// beside the plain one's density that comes nearest to its number of keyframes.
 //   compare_mapping [--csv] [--threads N] [--frames N] [--set key=value]... [--off key=value]... INPUT...
 // INPUT: a recording's folder with truth, or synth:SCENE?... ; --set holds for all, --off for local mapping
 // off alone. Coverage: of the 5 cm voxels that depth images of all frames fill (at the true poses), the share
 // that those of the keyframes fill. The numbers are the same on every run.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <opencv2/core/utility.hpp>
 #include <string>
@@ -31,8 +35,9 @@ constexpr std::size_t kChunk = 16;  // frames in memory
 constexpr double kVoxel = 0.05;     // m
 constexpr int kStride = 8;          // px, of the depth images that coverage is counted with
 constexpr double kMaxDepth = 6.0;   // m
-/// Factors on what the plain rule allows between keyframes, besides 1.
-constexpr std::array<double, 5> kDensities{0.75, 1.35, 1.8, 2.4, 3.2};
+/// Factors on what the plain rule allows between keyframes.
+constexpr std::array<double, 4> kOff{0.75, 1.0, 1.35, 1.8};
+constexpr std::array<double, 6> kOn{0.75, 1.0, 1.35, 1.8, 2.4, 3.2};
 
 core::Result<mapping::SlamOptions> options_of(const Texts& texts) {
   mapping::SlamOptions options;
@@ -118,6 +123,76 @@ double coverage(const Run& run, const std::vector<Voxels>& seen, std::size_t all
   return all > 0 ? static_cast<double>(covered.size()) / static_cast<double>(all) : 0.0;
 }
 
+struct Score {
+  std::string sequence;
+  std::string variant;
+  std::size_t frames = 0;
+  double tracked_percent = 0.0;
+  double ate_m = 0.0;
+  std::size_t keyframes = 0;
+  double coverage = 0.0;
+  std::size_t points = 0;
+  std::size_t lines = 0;
+};
+
+void print(bool csv, const Score& s) {
+  std::printf(csv ? "%s,%s,%zu,%.1f,%.4f,%zu,%.3f,%zu,%zu\n"
+                  : "| %s | %s | %zu | %.1f | %.4f | %zu | %.3f | %zu | %zu |\n",
+              s.sequence.c_str(), s.variant.c_str(), s.frames, s.tracked_percent, s.ate_m, s.keyframes,
+              s.coverage, s.points, s.lines);
+  std::fflush(stdout);
+}
+
+/// The variants of one recording.
+struct Scores {
+  std::array<Score, kOff.size()> off;
+  std::array<Score, kOn.size()> on;
+  Score cone;
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n == 0 ? std::nan("") : 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+}
+
+/// The density of one side that is best in the median over all recordings.
+template <typename Side>
+std::size_t best_density(const std::vector<Scores>& all, Side side) {
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t d = 0; d < (all.front().*side).size(); ++d) {
+    std::vector<double> ates;
+    for (const Scores& scores : all) ates.push_back((scores.*side)[d].ate_m);
+    if (const double m = median(std::move(ates)); m < least) {
+      least = m;
+      best = d;
+    }
+  }
+  return best;
+}
+
+void summarise(const std::vector<Scores>& all) {
+  if (all.empty()) return;
+  const std::size_t off = best_density(all, &Scores::off);
+  const std::size_t on = best_density(all, &Scores::on);
+  std::printf("\n# best: off at density %g, on at %g\n", kOff[off], kOn[on]);
+  std::printf("# sequence, off, on, change; cone rule: ATE, keyframes, coverage; plain rule, as many\n");
+  std::vector<double> changes;
+  for (const Scores& s : all) {
+    changes.push_back(s.on[on].ate_m / s.off[off].ate_m - 1.0);
+    const auto distance = [&](const Score& score) {
+      return std::abs(static_cast<double>(score.keyframes) - static_cast<double>(s.cone.keyframes));
+    };
+    const Score& as_many = *std::min_element(
+        s.on.begin(), s.on.end(), [&](const Score& a, const Score& b) { return distance(a) < distance(b); });
+    std::printf("# %s, %.4f, %.4f, %+.0f %%; %.4f, %zu, %.3f; %.4f, %zu, %.3f\n", s.cone.sequence.c_str(),
+                s.off[off].ate_m, s.on[on].ate_m, 100.0 * changes.back(), s.cone.ate_m, s.cone.keyframes,
+                s.cone.coverage, as_many.ate_m, as_many.keyframes, as_many.coverage);
+  }
+  std::printf("# median change %+.0f %%\n", 100.0 * median(std::move(changes)));
+}
+
 class Comparison {
  public:
   Comparison(const dataset::FrameSource& source, geometry::Trajectory truth, std::size_t frames)
@@ -150,16 +225,20 @@ class Comparison {
 
   [[nodiscard]] const Run& of(std::size_t run) const { return *runs_[run]; }
 
-  void print(bool csv, const std::string& sequence, const char* name, std::size_t r) const {
+  [[nodiscard]] Score score(const std::string& sequence, const std::string& name, std::size_t r) const {
     const Run& run = *runs_[r];
     const auto report = evaluate::evaluate_trajectory(run.slam.trajectory(), truth_);
-    const double ate = report ? report->ate_m.rmse : std::nan("");
-    const double percent = 100.0 * static_cast<double>(run.tracked) / static_cast<double>(frames_);
-    std::printf(csv ? "%s,%s,%zu,%.1f,%.4f,%zu,%.3f,%zu,%zu\n"
-                    : "| %s | %s | %zu | %.1f | %.4f | %zu | %.3f | %zu | %zu |\n",
-                sequence.c_str(), name, frames_, percent, ate, run.keyframes.size(),
-                coverage(run, seen_, voxels_), run.slam.map().point_count(), run.slam.map().line_count());
-    std::fflush(stdout);
+    Score score;
+    score.sequence = sequence;
+    score.variant = name;
+    score.frames = frames_;
+    score.tracked_percent = 100.0 * static_cast<double>(run.tracked) / static_cast<double>(frames_);
+    score.ate_m = report ? report->ate_m.rmse : std::nan("");
+    score.keyframes = run.keyframes.size();
+    score.coverage = coverage(run, seen_, voxels_);
+    score.points = run.slam.map().point_count();
+    score.lines = run.slam.map().line_count();
+    return score;
   }
 
  private:
@@ -186,9 +265,9 @@ class Comparison {
   std::size_t voxels_ = 0;
 };
 
-core::Result<void> compare(const std::string& input, const std::string& pipelines,
-                           const mapping::SlamOptions& on, const mapping::SlamOptions& off,
-                           std::size_t frames, const core::Executor& executor, bool csv) {
+core::Result<Scores> compare(const std::string& input, const std::string& pipelines,
+                             const mapping::SlamOptions& on, const mapping::SlamOptions& off,
+                             std::size_t frames, const core::Executor& executor, bool csv) {
   const auto log = core::stderr_log(core::LogLevel::kWarning);
   dataset::OpenOptions open;
   open.cameras_folder = pipelines + "/cameras";
@@ -201,25 +280,22 @@ core::Result<void> compare(const std::string& input, const std::string& pipeline
   Comparison comparison(**source, *truth, frames);
   mapping::SlamOptions cone = on;
   cone.keyframe.rule = mapping::KeyframeRuleOptions::Rule::kCone;
-  comparison.add(off);
-  comparison.add(on);
+  for (const double density : kOff) comparison.add(at_density(off, density));
+  for (const double density : kOn) comparison.add(at_density(on, density));
   comparison.add(cone);
-  for (const double density : kDensities) comparison.add(at_density(on, density));
   comparison.run(executor);
-  const auto wanted = static_cast<double>(comparison.of(2).keyframes.size());
-  std::size_t nearest = 1;  // the plain rule as it is
-  for (std::size_t r = 3; r < 3 + kDensities.size(); ++r) {
-    const auto distance = [&](std::size_t run) {
-      return std::abs(static_cast<double>(comparison.of(run).keyframes.size()) - wanted);
-    };
-    if (distance(r) < distance(nearest)) nearest = r;
-  }
-  const std::string sequence = synthetic ? input.substr(input.find(':') + 1) : (*source)->name();
-  comparison.print(csv, sequence, "local mapping off", 0);
-  comparison.print(csv, sequence, "on", 1);
-  comparison.print(csv, sequence, "cone rule", 2);
-  comparison.print(csv, sequence, "plain rule, as many", nearest);
-  return {};
+  const std::string sequence = synthetic ? input.substr(input.find(':') + 1) : input;
+  Scores scores;
+  std::size_t run = 0;
+  const auto next = [&](const std::string& name) {
+    const Score score = comparison.score(sequence, name, run++);
+    print(csv, score);
+    return score;
+  };
+  for (std::size_t d = 0; d < kOff.size(); ++d) scores.off[d] = next(fmt::format("off at {}", kOff[d]));
+  for (std::size_t d = 0; d < kOn.size(); ++d) scores.on[d] = next(fmt::format("on at {}", kOn[d]));
+  scores.cone = next("on, cone rule");
+  return scores;
 }
 
 }  // namespace
@@ -263,9 +339,12 @@ int main(int argc, char** argv) {
       csv ? "sequence,variant,frames,tracked_percent,ate_rmse_m,keyframes,coverage,points,lines\n"
           : "| sequence | variant | frames | tracked %% | ATE m | keyframes | coverage | points | lines |\n"
             "|---|---|---|---|---|---|---|---|---|\n");
+  std::vector<Scores> all;
   for (const std::string& input : inputs) {
-    if (auto done = compare(input, pipelines, *on, *plain, frames, executor, csv); !done)
-      return fail(done.error());
+    const auto scores = compare(input, pipelines, *on, *plain, frames, executor, csv);
+    if (!scores) return fail(scores.error());
+    all.push_back(*scores);
   }
+  summarise(all);
   return 0;
 }
