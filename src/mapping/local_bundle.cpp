@@ -91,6 +91,7 @@ class Builder {
 
   /// Without a keyframe that is held and speaks, the oldest that speaks is held: all could drift otherwise.
   LocalBundle take() {
+    hold_loose_poses();
     KeyframeId oldest;
     bool anchored = false;
     for (std::size_t i = 0; i < bundle_.keyframes.size(); ++i) {
@@ -113,6 +114,33 @@ class Builder {
   }
   [[nodiscard]] bool pose_fixed(int i) const {
     return bundle_.problem.poses[static_cast<std::size_t>(i)].fixed;
+  }
+
+  /// A pose that little ties to those that speak goes where a few wrong matches pull it: it stays.
+  void hold_loose_poses() {
+    constexpr int kFewest = 40;  // points that another sees, too
+    std::vector<int> ties(bundle_.keyframes.size(), 0);
+    const auto tie = [&ties](const auto& observations, auto landmark, int worth) {
+      for (std::size_t begin = 0, end = 0; begin < observations.size(); begin = end) {
+        while (end < observations.size() && landmark(observations[end]) == landmark(observations[begin]))
+          ++end;
+        if (end - begin < 2) continue;
+        for (std::size_t i = begin; i < end; ++i)
+          ties[static_cast<std::size_t>(observations[i].pose)] += worth;
+      }
+    };
+    const optimize::BundleProblem& problem = bundle_.problem;
+    tie(
+        problem.point_observations, [](const auto& o) { return o.point; }, 1);
+    tie(
+        problem.line_observations, [](const auto& o) { return o.line; }, 2);
+    for (const optimize::BundleEdge& edge : problem.edges) {
+      ties[static_cast<std::size_t>(edge.a)] += kFewest;
+      ties[static_cast<std::size_t>(edge.b)] += kFewest;
+    }
+    for (std::size_t i = 0; i < ties.size(); ++i) {
+      if (ties[i] < kFewest) bundle_.problem.poses[i].fixed = true;
+    }
   }
 
   void hold_others(const std::vector<core::PointId>& points, const std::vector<core::LineId>& lines) {

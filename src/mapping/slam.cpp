@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/tracking/surface_sampler.hpp"
 
 namespace plumbline::mapping {
@@ -61,6 +60,15 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
 }
 
 Slam::~Slam() = default;
+
+void Slam::set_shutter(std::optional<double> readout_s) {
+  if (options_.tracker.readout_s > 0.0 || !readout_s) return;
+  tracker_.set_readout(*readout_s);
+  all_rows_at_once_ = *readout_s == 0.0;
+}
+
+/// Keyframes know how fast the camera turned because that shears their pictures; not with all rows at once.
+double Slam::shear_rate() const { return all_rows_at_once_ ? 0.0 : tracker_.turn_rate(); }
 
 /// A camera that turns up far from where it was lost must pass as a loop would: corridors look alike from
 /// both ends. Near by there is nothing to confuse.
@@ -124,12 +132,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.stamp = frame.stamp;
   ++clock_;
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);
-  if (options_.tracker.readout_s > 0.0 && !tracker_.turning().isZero(0.0)) {
-    auto still = std::make_shared<features::FrameFeatures>(*features);
-    features::undo_rolling_shutter(*still, camera_, tracker_.turning(), options_.tracker.readout_s);
-    features = std::move(still);
-  }
-  last_track_ = tracker_.track(map_, frame, *features);
+  last_track_ = tracker_.track(map_, frame, features);
+  if (last_track_.features != nullptr) features = last_track_.features;
   const tracking::TrackResult& track = last_track_;
   report.state = track.state;
   if (track.state == tracking::TrackState::kInitialising) {
@@ -162,7 +166,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
 void Slam::make_keyframe(const sensor::RgbdFrame& frame,
                          const std::shared_ptr<const features::FrameFeatures>& features,
                          FrameReport& report) {
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, tracker_.turn_rate());
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, shear_rate());
   report.reference = report.keyframe;
   if (options_.mapper.edges && options_.tracker.depth) {
     mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_.depth_from_camera,
@@ -172,7 +176,7 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   rule_.keyframe_made();
   tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
   if (options_.loops.enabled) close_loops(report.keyframe);
-  if (!options_.mapper.bundle || tracker_.turn_rate() > options_.mapper.bundle_max_turn_rate) return;
+  if (!options_.mapper.bundle || shear_rate() > options_.mapper.bundle_max_turn_rate) return;
   bundle_.request(map_, report.keyframe, clock_);
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
 }

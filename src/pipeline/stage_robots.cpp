@@ -38,6 +38,7 @@ class RobotsStage : public Stage {
     for (const RobotInfo& robot : recordings_->robots()) {
       slams_.push_back(std::make_unique<mapping::Slam>(slam_, robot.camera.color, robot.number,
                                                        *context.executor, *context.log));
+      slams_.back()->set_shutter(robot.camera.readout_s);
     }
     end_ = std::make_unique<mapping::FusionEnd>(fusion_, slams_.size(), *context.executor);
     return {};

@@ -28,6 +28,7 @@ class TrackStage : public Stage {
     keep_changes_ = context.keep_changes;
     if (auto loaded = options_.loops.load(); !loaded) return loaded;
     slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
+    slam_->set_shutter(context.source->camera().readout_s);
     if (context.resumed != nullptr) {
       slam_->restore(context.resumed->map.map, context.resumed->map.frames);
       moment_ = slam_->map().now();

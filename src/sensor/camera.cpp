@@ -171,6 +171,9 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   table.numbers("distortion", distortion, 0, {}, "", "k1 k2 p1 p2 k3 of the colour image");
   table.number("depth_scale", camera.depth_scale, {1e-3, 1e7}, "", "Raw depth units per metre");
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
+  double readout_s = 0.0;
+  table.number("readout", readout_s, {0.0, 0.1}, "s",
+               "From the first row of a picture to the last; 0: all at once");
   if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
 
   check_pinhole(*root, camera.color, "", problems);
@@ -180,6 +183,7 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   } else {
     std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   }
+  if (root->find("readout") != nullptr) camera.readout_s = readout_s;
   read_depth_camera(*root, camera, problems);
 
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
@@ -249,6 +253,10 @@ std::string to_yaml(const Camera& camera) {
   const Distortion& k = camera.distortion;
   text += fmt::format("distortion: [{}, {}, {}, {}, {}]  # k1 k2 p1 p2 k3\n", k[0], k[1], k[2], k[3], k[4]);
   text += fmt::format("depth_scale: {}  # raw units per metre\nfps: {}\n", camera.depth_scale, camera.fps);
+  if (camera.readout_s) {
+    text += fmt::format("readout: {}  # s from the first row of a picture to the last; 0: all at once\n",
+                        *camera.readout_s);
+  }
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();
     text += "color_from_depth:\n";

@@ -33,6 +33,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   if (sensor != Sensor::kKinect) camera.color.cy = 0.5 * (height - 1);
   camera.depth_scale = 5000.0;
   camera.fps = fps;
+  camera.readout_s = 0.0;
   return camera;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "held_directions.hpp"
+#include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/thumbnail_alignment.hpp"
 
@@ -95,8 +96,9 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
   table.boolean("align_stamps", align_stamps,
                 "Bring colour and depth stamped apart together with the motion model");
-  table.number("readout", readout_s, {0.0, 0.1}, "s",
-               "Rolling shutter: time from the first to the last row of a picture; 0: all rows at once");
+  table.number(
+      "readout", readout_s, {0.0, 0.1}, "s",
+      "Rolling shutter: time from the first to the last row of a picture; 0: as the camera's file says");
   table.integer("min_inliers", min_inliers, {3, 1000}, "", "Features that a pose must explain to be trusted");
   table.integer("min_surface", min_surface, {10, 100000}, "",
                 "Depth samples that a pose without enough features must explain");
@@ -302,21 +304,21 @@ std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const senso
   return std::nullopt;
 }
 
-TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
-                           const features::FrameFeatures& features) {
+TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
   TrackResult result;
   if (map.keyframe_count() == 0) {
     result.state = TrackState::kInitialising;
-    remember(frame, features, result);
+    result.features = features;
+    remember(frame, *features, result);
     return result;
   }
   // After a while without a pose the last one says little: surfaces near it fit by chance, so the picture
   // goes first.
   constexpr int kStaleFrames = 5;
   const bool stale = lost_frames_ >= kStaleFrames;
-  std::optional<TrackResult> found =
-      stale ? by_picture(map, frame, features) : by_motion(map, frame, features);
-  if (!found) found = stale ? by_motion(map, frame, features) : by_picture(map, frame, features);
+  const Features still = without_shutter(features, turning());
+  std::optional<TrackResult> found = stale ? by_picture(map, frame, *still) : by_motion(map, frame, *still);
+  if (!found) found = stale ? by_motion(map, frame, *still) : by_picture(map, frame, *still);
   if (!found) {
     result.state = TrackState::kLost;
     result.camera_from_world = predict(frame.stamp);
@@ -324,8 +326,38 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     velocity_ *= 0.8;
     return result;
   }
-  remember(frame, features, *found);
+  found->features = still;
+  settle_shutter(map, frame, features, *found);
+  remember(frame, *found->features, *found);
   return *std::move(found);
+}
+
+Tracker::Features Tracker::without_shutter(const Features& features, const Eigen::Vector3d& turn_rate) const {
+  if (options_.readout_s == 0.0 || turn_rate.isZero(0.0)) return features;
+  auto still = std::make_shared<features::FrameFeatures>(*features);
+  features::undo_rolling_shutter(*still, camera_, turn_rate, options_.readout_s);
+  return still;
+}
+
+/// The motion model lags behind a turn that changes. Now that the pose is known, so is the turn: where the
+/// difference can be seen, the pose is estimated once more.
+void Tracker::settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
+                             TrackResult& found) const {
+  constexpr double kVisible_px = 1.0;  // at the first and the last row
+  const double dt = frame.stamp - last_.stamp;
+  if (options_.readout_s == 0.0 || !last_.valid || lost_frames_ > 0 || dt < 1e-4 || dt > 0.5) return;
+  const Eigen::Vector3d mean =
+      geometry::log_so3((found.camera_from_world * last_.camera_from_world.inverse()).rotation) / dt;
+  // Both are means of their steps: half a step on.
+  const Eigen::Vector3d before = turning();
+  const Eigen::Vector3d now = before.isZero(0.0) ? mean : Eigen::Vector3d(mean + 0.5 * (mean - before));
+  if ((now - before).norm() * 0.5 * options_.readout_s * camera_.fx < kVisible_px) return;
+  const Features still = without_shutter(features, now);
+  TrackResult again = estimate(map, frame, *still, found.camera_from_world, kSecondRadius);
+  if (again.state != TrackState::kTracked) return;
+  again.relocalised = found.relocalised;
+  again.features = still;
+  found = std::move(again);
 }
 
 void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,

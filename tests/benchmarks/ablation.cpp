@@ -66,12 +66,13 @@ struct PreparedFrame {
 /// One family set on its way through a recording.
 class Run {
  public:
-  Run(const FamilySet& set, mapping::SlamOptions options, const sensor::Pinhole& camera)
+  Run(const FamilySet& set, mapping::SlamOptions options, const sensor::Camera& camera)
       : set_(set), log_(core::null_log()) {
     options.tracker.points = set.points;
     options.tracker.lines = set.lines;
     options.tracker.depth = set.depth;
-    slam_ = std::make_unique<mapping::Slam>(options, camera, 0, executor_, *log_);
+    slam_ = std::make_unique<mapping::Slam>(options, camera.color, 0, executor_, *log_);
+    slam_->set_shutter(camera.readout_s);
   }
   void process(const PreparedFrame& prepared) {
     if (!prepared.readable) return;
@@ -176,7 +177,7 @@ core::Result<void> ablate(const std::string& input, const std::string& pipelines
     extractors[kind_of(set)] = std::make_unique<features::FeatureExtractor>(o, camera);
   }
   std::vector<std::unique_ptr<Run>> runs;
-  for (const FamilySet& set : sets) runs.push_back(std::make_unique<Run>(set, options, camera));
+  for (const FamilySet& set : sets) runs.push_back(std::make_unique<Run>(set, options, (*source)->camera()));
   const std::size_t frames = (*source)->size();
   for (std::size_t begin = 0; begin < frames; begin += kChunk) {
     std::vector<PreparedFrame> chunk(std::min(kChunk, frames - begin));

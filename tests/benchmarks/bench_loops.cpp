@@ -122,10 +122,12 @@ void print_row(const std::string& input, const std::string& name, double tracked
 /// One set of options on its way through a recording.
 class Run {
  public:
-  Run(std::string name, const mapping::SlamOptions& options, const sensor::Pinhole& camera)
+  Run(std::string name, const mapping::SlamOptions& options, const sensor::Camera& camera)
       : name_(std::move(name)),
         log_(core::null_log()),
-        slam_(std::make_unique<mapping::Slam>(options, camera, 0, executor_, *log_)) {}
+        slam_(std::make_unique<mapping::Slam>(options, camera.color, 0, executor_, *log_)) {
+    slam_->set_shutter(camera.readout_s);
+  }
   void process(const Prepared& prepared) {
     if (!prepared.readable) return;
     const double start = thread_ms();
@@ -215,7 +217,7 @@ core::Result<void> measure(const std::string& input, const Settings& settings,
     if (!loops && settings.on_only) continue;
     const auto options = options_of(settings.overrides, loops);
     if (!options) return tl::unexpected<core::Error>(options.error());
-    runs.push_back(std::make_unique<Run>(loops ? "on" : "off", *options, camera));
+    runs.push_back(std::make_unique<Run>(loops ? "on" : "off", *options, (*source)->camera()));
   }
   const std::size_t frames =
       settings.frames > 0 ? std::min(settings.frames, (*source)->size()) : (*source)->size();

@@ -202,14 +202,16 @@ BENCHMARK(align_thumbnails)->Unit(benchmark::kMicrosecond);
 void track_frame(benchmark::State& state) {
   const Room& room = Room::get();
   const maps::Map& map = room.slam->map();
+  const auto previous = std::make_shared<const features::FrameFeatures>(room.previous_features);
+  const auto features = std::make_shared<const features::FrameFeatures>(room.frame_features);
   tracking::TrackResult result;
   for (auto _ : state) {
     state.PauseTiming();
     tracking::Tracker tracker({}, room.camera);
-    tracker.track(maps::Map{}, room.previous, room.previous_features);  // remembers the picture
+    tracker.track(maps::Map{}, room.previous, previous);  // remembers the picture
     tracker.map_changed(map, room.local_map.reference, room.camera_from_world);
     state.ResumeTiming();
-    result = tracker.track(map, room.frame, room.frame_features);
+    result = tracker.track(map, room.frame, features);
   }
   if (result.state != tracking::TrackState::kTracked) state.SkipWithError("lost");
   state.counters["points"] = result.estimate.points.inliers;

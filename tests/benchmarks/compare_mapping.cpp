@@ -101,8 +101,10 @@ struct Prepared {
 
 /// One variant on its way through a recording.
 struct Run {
-  Run(const mapping::SlamOptions& options, const sensor::Pinhole& camera)
-      : log(core::null_log()), slam(options, camera, 0, executor, *log) {}
+  Run(const mapping::SlamOptions& options, const sensor::Camera& camera)
+      : log(core::null_log()), slam(options, camera.color, 0, executor, *log) {
+    slam.set_shutter(camera.readout_s);
+  }
   void process(std::size_t number, const Prepared& prepared) {
     if (!prepared.readable) return;
     const mapping::FrameReport report = slam.process(prepared.frame, prepared.features);
@@ -202,7 +204,9 @@ class Comparison {
         camera_(source.camera().color),
         extractor_({}, camera_) {}
 
-  void add(const mapping::SlamOptions& options) { runs_.push_back(std::make_unique<Run>(options, camera_)); }
+  void add(const mapping::SlamOptions& options) {
+    runs_.push_back(std::make_unique<Run>(options, source_.camera()));
+  }
 
   void run(const core::Executor& executor) {
     seen_.resize(frames_);

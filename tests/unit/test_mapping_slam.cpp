@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 
@@ -84,10 +85,12 @@ std::vector<double> landmarks_of(const maps::Map& map) {
   return numbers;
 }
 
-SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& options = {}) {
+SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& options = {},
+            std::optional<double> readout_s = {}) {
   const core::Executor executor(threads);
   const auto log = core::null_log();
   Slam slam(options, Recording::get().camera, 0, executor, *log);
+  slam.set_shutter(readout_s);
   SlamRun result;
   for (const Shot& shot : shots) {
     result.reports.push_back(slam.process(shot.frame, shot.features));
@@ -204,6 +207,15 @@ TEST(Slam, ALaterPutBackIsAsGoodAsOneOnTheSpot) {
     EXPECT_EQ(result.count(TrackState::kTracked), 36) << lag;
     EXPECT_LT(ate(result.trajectory, recording.truth), 0.005) << lag;
   }
+}
+
+TEST(Slam, NoTurnIsTooFastForAShutterThatTakesAllRowsAtOnce) {
+  SlamOptions options;
+  options.bundle_lag = 6;
+  options.mapper.bundle_max_turn_rate = 1e-6;
+  EXPECT_EQ(run(Recording::get().shots, 1, options).bundles, 0) << "any picture may be sheared";
+  EXPECT_EQ(run(Recording::get().shots, 1, options, 0.01).bundles, 0);
+  EXPECT_GE(run(Recording::get().shots, 1, options, 0.0).bundles, 2);
 }
 
 TEST(Slam, BlackBlindAndRepeatedFramesAreSurvived) {

@@ -72,11 +72,14 @@ TEST_F(CameraFile, TextReadsBackTheSame) {
   ASSERT_TRUE(camera);
   camera->name = "a: \"strange\" name";
   camera->color.fx = 517.306408 / 3.0;
+  EXPECT_FALSE(camera->readout_s) << "not known is not 0";
+  camera->readout_s = 0.021;
   camera->color_from_depth->rotation = geometry::exp_so3({0.01, -0.02, 0.03});
   const auto again = read_camera(write(to_yaml(*camera), "again.yaml"));
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->name, camera->name);
   EXPECT_EQ(again->color.fx, camera->color.fx);
+  EXPECT_EQ(again->readout_s, camera->readout_s);
   EXPECT_EQ(again->distortion, camera->distortion);
   EXPECT_EQ(again->depth->fx, camera->depth->fx);
   EXPECT_LT((again->color_from_depth->rotation - camera->color_from_depth->rotation).norm(), 1e-14);

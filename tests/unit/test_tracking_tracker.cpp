@@ -93,7 +93,7 @@ class TwoPlaces : public testing::Test {
   TrackResult track(const TrackerOptions& options, const Look& seen) {
     Tracker tracker(options, kTestCamera);
     tracker.map_changed(map_, here_, {});
-    return tracker.track(map_, seen.frame, seen.features);
+    return tracker.track(map_, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
   }
 
   cv::Mat first_ = blocks(4);
@@ -155,7 +155,8 @@ TEST_F(TwoPlaces, APlaceThatTheJudgeRefusesIsNotTaken) {
       EXPECT_LT(tests::distance(pose, moved * away_), 0.005);
       return believed;
     });
-    const TrackResult result = tracker.track(map_, seen.frame, seen.features);
+    const TrackResult result =
+        tracker.track(map_, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
     EXPECT_GE(asked, 1);
     EXPECT_EQ(result.state, believed ? TrackState::kTracked : TrackState::kLost);
   }

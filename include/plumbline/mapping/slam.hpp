@@ -5,6 +5,7 @@
 // is the same for any number of threads.
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -58,10 +59,15 @@ class Slam {
   Slam(const Slam&) = delete;  // the tracker asks this one for places
   Slam& operator=(const Slam&) = delete;
 
-  /// Goes on where another Slam stopped when it had just made a keyframe: with its map and frame_poses(). To be
-  /// called before the first frame. What ran beside the tracker is begun again; landmarks are watched, and
+  /// Goes on where another Slam stopped when it had just made a keyframe: with its map and frame_poses(). To
+  /// be called before the first frame. What ran beside the tracker is begun again; landmarks are watched, and
   /// places known, as the map tells. A map without keyframes is no place to go on from: nothing happens.
   void restore(maps::Map map, std::vector<maps::FramePose> frames);
+
+  /// What the camera's file says of its shutter (sensor::Camera::readout_s); to be called before the first
+  /// frame. The option `readout` goes before. Turns shear no picture that is taken all at once: with a
+  /// readout of 0 keyframes speak however fast the camera turned.
+  void set_shutter(std::optional<double> readout_s);
 
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
   FrameReport process(const sensor::RgbdFrame& frame,
@@ -91,6 +97,7 @@ class Slam {
   void make_keyframe(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   void put_back_bundle(BundleReport& report);
+  [[nodiscard]] double shear_rate() const;
   void settle_bundles();
   void close_loops(core::KeyframeId keyframe);
   [[nodiscard]] bool is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
@@ -107,6 +114,7 @@ class Slam {
   KeyframeRule rule_;
   LocalMapper mapper_;
   BackgroundBundle bundle_;
+  bool all_rows_at_once_ = false;  ///< the shutter is known to be a global one
   LoopCloser closer_;
   std::int64_t clock_ = 0;                   ///< frames so far: logical time
   geometry::Rigid3 last_camera_from_world_;  ///< of the last tracked frame, in the map as it is now

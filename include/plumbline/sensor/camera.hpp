@@ -44,6 +44,8 @@ struct Camera {
   Distortion distortion{};      ///< of the colour image; all 0 = none
   double depth_scale = 5000.0;  ///< raw units per metre
   double fps = 30.0;
+  /// Rolling shutter: from the first row of a colour picture to the last, seconds; 0: all rows at once.
+  std::optional<double> readout_s;  ///< none: not known
   /// When present, depth is not registered to colour: the reader does that.
   std::optional<geometry::Rigid3> color_from_depth;
   std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
@@ -56,7 +58,7 @@ struct Camera {
   }
 };
 
-/// Reads a camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps
+/// Reads a camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
 /// [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told together with
 /// file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);

@@ -4,6 +4,7 @@
 // Pose of every frame against the map: predict, guess, associate, estimate points, lines and depth together
 // (METHOD sections 1 and 2). Sees a const map; what changes the map is in mapping.
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,8 +30,9 @@ struct TrackerOptions {
   bool lines = true;
   bool depth = true;
   bool align_stamps = true;
-  /// Time from the first to the last row of a picture, s; 0: all at once. What it shears is put right with
-  /// the motion model before a frame is tracked (features::undo_rolling_shutter).
+  /// Time from the first to the last row of a picture, s; 0: all at once. What it shears is put right before
+  /// a frame is tracked (features::undo_rolling_shutter), with the motion model's turn, and again with the
+  /// turn that was found where that differs.
   double readout_s = 0.0;
   int min_inliers = 15;
   int min_surface = 300;
@@ -55,9 +57,11 @@ struct TrackResult {
   /// Of the information matrix of the families that are trusted, 1/m^2, rotations scaled by the scene's
   /// depth.
   double min_eigenvalue = 0.0;
-  int weak_directions = 0;  ///< of six, that no trusted family holds, but the motion model at best
+  int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
   bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
   bool relocalised = false;
+  /// The frame's features, freed of the rolling shutter: what was matched, and what a keyframe should keep.
+  std::shared_ptr<const features::FrameFeatures> features;
 };
 
 class Tracker {
@@ -66,8 +70,11 @@ class Tracker {
 
   /// The frame is localised against `map`; `reference` is the keyframe whose surroundings are expected in
   /// view. An empty map gives kInitialising.
-  TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame,
-                    const features::FrameFeatures& features);
+  using Features = std::shared_ptr<const features::FrameFeatures>;
+  TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
+
+  /// Replaces the option; before the first frame.
+  void set_readout(double readout_s) { options_.readout_s = readout_s; }
 
   /// The map has changed (keyframe added, poses corrected). `corrected_from_old`: where the last pose went.
   void map_changed(const maps::Map& map, core::KeyframeId reference,
@@ -132,6 +139,9 @@ class Tracker {
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] bool uses_features() const { return options_.points || options_.lines; }
   [[nodiscard]] bool beyond_doubt(const TrackResult& result) const;
+  [[nodiscard]] Features without_shutter(const Features& features, const Eigen::Vector3d& turn_rate) const;
+  void settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
+                      TrackResult& found) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;
   void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                 const TrackResult& result);
