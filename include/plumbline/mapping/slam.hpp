@@ -29,7 +29,7 @@ struct SlamOptions {
   tracking::TrackerOptions tracker;
   KeyframeRuleOptions keyframe;
   LocalMapperOptions mapper;
-  int bundle_lag = 12;  ///< frames
+  int bundle_lag = 8;  ///< frames
   LoopOptions loops;
   void declare(core::OptionTable& table);
 };
