@@ -20,6 +20,7 @@
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/synth/source.hpp"
+#include "slam_overrides.hpp"
 
 namespace {
 
@@ -202,19 +203,6 @@ std::vector<std::string> names_of(const std::array<FamilySet, 7>& sets) {
   return names;
 }
 
-/// "key=value" for the options that the pipeline's track stage has.
-core::Result<void> override_options(const std::vector<std::string>& texts, core::OptionTable& table) {
-  core::ConfigProblems problems;
-  for (const std::string& text : texts) {
-    const std::size_t equals = std::min(text.find('='), text.size());
-    const auto value = core::parse_yaml(equals < text.size() ? text.substr(equals + 1) : "", text);
-    if (!value) return tl::unexpected<core::Error>(value.error());
-    table.set(text.substr(0, equals), *value, "--set " + text, problems);
-  }
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
-  return {};
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -243,10 +231,8 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "ablation: %s\n", error.message.c_str());
     return static_cast<int>(error.kind);
   };
-  mapping::SlamOptions options;
-  core::OptionTable table;
-  options.declare(table);
-  if (auto set = override_options(overrides, table); !set) return fail(set.error());
+  const auto options = benchmarks::slam_options(overrides);
+  if (!options) return fail(options.error());
   std::vector<FamilySet> sets;
   for (const FamilySet& set : kSets) {
     if (only.empty() || std::find(only.begin(), only.end(), set.name) != only.end()) sets.push_back(set);
@@ -254,7 +240,7 @@ int main(int argc, char** argv) {
   const core::Executor executor(threads);
   print_header(csv);
   for (const std::string& input : inputs) {
-    if (auto done = ablate(input, pipelines, options, sets, executor, csv); !done) return fail(done.error());
+    if (auto done = ablate(input, pipelines, *options, sets, executor, csv); !done) return fail(done.error());
   }
   return 0;
 }

@@ -25,6 +25,7 @@
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/synth/source.hpp"
+#include "slam_overrides.hpp"
 
 namespace {
 
@@ -176,18 +177,8 @@ struct Settings {
 };
 
 core::Result<mapping::SlamOptions> options_of(const std::vector<std::string>& overrides, bool loops) {
-  mapping::SlamOptions options;
-  core::OptionTable table;
-  options.declare(table);
-  core::ConfigProblems problems;
-  for (const std::string& text : overrides) {
-    const std::size_t equals = std::min(text.find('='), text.size());
-    const auto value = core::parse_yaml(equals < text.size() ? text.substr(equals + 1) : "", text);
-    if (!value) return tl::unexpected<core::Error>(value.error());
-    table.set(text.substr(0, equals), *value, "--set " + text, problems);
-  }
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
-  options.loops.enabled = loops;
+  auto options = benchmarks::slam_options(overrides);
+  if (options) options->loops.enabled = loops;
   return options;
 }
 

@@ -25,6 +25,7 @@
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/synth/source.hpp"
+#include "slam_overrides.hpp"
 
 namespace {
 
@@ -38,21 +39,6 @@ constexpr double kMaxDepth = 6.0;   // m
 /// Factors on what the plain rule allows between keyframes.
 constexpr std::array<double, 4> kOff{0.75, 1.0, 1.35, 1.8};
 constexpr std::array<double, 6> kOn{0.75, 1.0, 1.35, 1.8, 2.4, 3.2};
-
-core::Result<mapping::SlamOptions> options_of(const Texts& texts) {
-  mapping::SlamOptions options;
-  core::OptionTable table;
-  options.declare(table);
-  core::ConfigProblems problems;
-  for (const std::string& text : texts) {
-    const std::size_t equals = std::min(text.find('='), text.size());
-    const auto value = core::parse_yaml(equals < text.size() ? text.substr(equals + 1) : "", text);
-    if (!value) return tl::unexpected<core::Error>(value.error());
-    table.set(text.substr(0, equals), *value, "--set " + text, problems);
-  }
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
-  return options;
-}
 
 /// Rarer or denser keyframes by the plain rule.
 mapping::SlamOptions at_density(mapping::SlamOptions options, double factor) {
@@ -332,11 +318,11 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "compare_mapping: %s\n", error.message.c_str());
     return static_cast<int>(error.kind);
   };
-  const auto on = options_of(overrides);
+  const auto on = benchmarks::slam_options(overrides);
   if (!on) return fail(on.error());
   Texts without = overrides;
   without.insert(without.end(), off.begin(), off.end());
-  const auto plain = options_of(without);
+  const auto plain = benchmarks::slam_options(without);
   if (!plain) return fail(plain.error());
   const core::Executor executor(threads);
   std::printf(

@@ -19,6 +19,7 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/slam.hpp"
+#include "slam_overrides.hpp"
 
 namespace {
 
@@ -38,25 +39,10 @@ double resident_mb() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-core::Result<mapping::SlamOptions> options_of(const std::vector<std::string>& texts) {
-  mapping::SlamOptions options;
-  core::OptionTable table;
-  options.declare(table);
-  core::ConfigProblems problems;
-  for (const std::string& text : texts) {
-    const std::size_t equals = std::min(text.find('='), text.size());
-    const auto value = core::parse_yaml(equals < text.size() ? text.substr(equals + 1) : "", text);
-    if (!value) return tl::unexpected<core::Error>(value.error());
-    table.set(text.substr(0, equals), *value, "--set " + text, problems);
-  }
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
-  return options;
-}
-
 core::Result<void> run(const std::string& input, const std::string& pipelines,
                        const std::vector<std::string>& overrides) {
   const auto log = core::stderr_log(core::LogLevel::kWarning);
-  const auto options = options_of(overrides);
+  const auto options = benchmarks::slam_options(overrides);
   if (!options) return tl::unexpected<core::Error>(options.error());
   dataset::OpenOptions open;
   open.cameras_folder = pipelines + "/cameras";
