@@ -42,13 +42,75 @@ struct NearViews {
   std::vector<NearView> looks;
 };
 
-void count(const Eigen::Vector3f& position, const std::vector<NearView>& views, Votes& votes) {
+/// The sheets of one brick, and a ball that holds their positions.
+struct Cluster {
+  Eigen::Vector3f centre{0, 0, 0};
+  float radius = 0.0F;
+  std::vector<std::uint32_t> sheets;
+};
+
+std::vector<Cluster> clusters_of(const Sheets& sheets, const std::vector<Eigen::Vector3f>& positions) {
+  std::vector<Cluster> clusters(sheets.brick_count());
+  for (std::size_t b = 0; b < clusters.size(); ++b) {
+    Cluster& cluster = clusters[b];
+    const Eigen::Vector3i low = sheets.brick(b) * Sheets::kBrick;
+    const Eigen::Vector3i high = low + Eigen::Vector3i::Constant(Sheets::kBrick - 1);
+    Eigen::AlignedBox3f box;
+    sheets.visit_in_brick(b, low, high, [&](std::uint32_t s) {
+      cluster.sheets.push_back(s);
+      box.extend(positions[s]);
+    });
+    cluster.centre = box.center();
+    for (const std::uint32_t s : cluster.sheets) {
+      cluster.radius = std::max(cluster.radius, (positions[s] - cluster.centre).norm());
+    }
+  }
+  return clusters;
+}
+
+/// Whether the view can say anything about places within `radius` of `centre` (camera frame): the picture
+/// less its outermost cells, up to what it measured.
+class Frustum {
+ public:
+  explicit Frustum(const DepthRaster& raster) : furthest_(raster.furthest_m + 0.5F) {
+    constexpr auto kCell = static_cast<float>(DepthRaster::kCell_px);
+    const auto fx = static_cast<float>(raster.camera.fx), fy = static_cast<float>(raster.camera.fy);
+    const auto cx = static_cast<float>(raster.camera.cx), cy = static_cast<float>(raster.camera.cy);
+    const float right = kCell * static_cast<float>(raster.width - 1);
+    const float low = kCell * static_cast<float>(raster.height - 1);
+    sides_.row(0) << fx, 0.0F, cx - kCell;
+    sides_.row(1) << -fx, 0.0F, right - cx;
+    sides_.row(2) << 0.0F, fy, cy - kCell;
+    sides_.row(3) << 0.0F, -fy, low - cy;
+    sides_.rowwise().normalize();
+  }
+  [[nodiscard]] bool reaches(const Eigen::Vector3f& centre, float radius) const {
+    constexpr float kRounding_m = 1e-3F;
+    const float reach = radius + kRounding_m;
+    if (centre.z() < -reach || centre.z() > furthest_ + reach) return false;
+    return (sides_ * centre).minCoeff() >= -reach;
+  }
+
+ private:
+  float furthest_;
+  Eigen::Matrix<float, 4, 3> sides_;  ///< normals of the planes through the camera, inwards
+};
+
+/// What the views say about each sheet of the clusters.
+void count(const std::vector<Cluster>& clusters, const std::vector<Eigen::Vector3f>& positions,
+           const std::vector<NearView>& views, std::vector<Votes>& votes) {
   for (const NearView& view : views) {
-    const Evidence found = evidence(*view.raster, view.raster->camera,
-                                    Eigen::Vector3f(view.rotation * position + view.translation));
-    votes.free += found == Evidence::kFree ? 1 : 0;
-    votes.surface += found == Evidence::kSurface ? 1 : 0;
-    votes.hidden += found == Evidence::kHidden ? 1 : 0;
+    const Frustum frustum(*view.raster);
+    for (const Cluster& cluster : clusters) {
+      if (!frustum.reaches(view.rotation * cluster.centre + view.translation, cluster.radius)) continue;
+      for (const std::uint32_t s : cluster.sheets) {
+        const Evidence found = evidence(*view.raster, view.raster->camera,
+                                        Eigen::Vector3f(view.rotation * positions[s] + view.translation));
+        votes[s].free += found == Evidence::kFree ? 1 : 0;
+        votes[s].surface += found == Evidence::kSurface ? 1 : 0;
+        votes[s].hidden += found == Evidence::kHidden ? 1 : 0;
+      }
+    }
   }
 }
 
@@ -60,37 +122,91 @@ Verdict judge(const Votes& v) {
   return v.free > 0 ? Verdict::kDoubtful : Verdict::kStays;
 }
 
-Verdict judge(const Eigen::Vector3f& position, const NearViews& views) {
-  Votes votes;
-  count(position, views.clouds, votes);
-  const Verdict of_clouds = judge(votes);
-  const bool clear = of_clouds == Verdict::kGoes || (votes.free == 0 && votes.surface >= kSolid);
-  if (clear || views.looks.empty()) return of_clouds;
-  count(position, views.looks, votes);
-  return judge(votes);
+/// Of every sheet. Looks are asked only where clouds leave a doubt.
+std::vector<Verdict> judge(const Sheets& sheets, const NearViews& views) {
+  std::vector<Eigen::Vector3f> positions;
+  positions.reserve(sheets.all().size());
+  for (const Sheet& sheet : sheets.all()) positions.push_back(sheets.position(sheet).cast<float>());
+  std::vector<Cluster> clusters = clusters_of(sheets, positions);
+  std::vector<Votes> votes(positions.size());
+  count(clusters, positions, views.clouds, votes);
+  const auto clear = [&](std::uint32_t s) {
+    return judge(votes[s]) == Verdict::kGoes || (votes[s].free == 0 && votes[s].surface >= kSolid);
+  };
+  for (Cluster& cluster : clusters) {
+    auto& open = cluster.sheets;
+    open.erase(std::remove_if(open.begin(), open.end(), clear), open.end());
+  }
+  clusters.erase(
+      std::remove_if(clusters.begin(), clusters.end(), [](const Cluster& c) { return c.sheets.empty(); }),
+      clusters.end());
+  count(clusters, positions, views.looks, votes);
+  std::vector<Verdict> verdicts;
+  verdicts.reserve(votes.size());
+  for (const Votes& v : votes) verdicts.push_back(judge(v));
+  return verdicts;
 }
 
-/// Whether at least half of the points around that are no matter of doubt go.
-bool among_what_goes(const Sheets& sheets, std::size_t sheet, const std::vector<Verdict>& verdicts) {
-  const Eigen::Vector3d position = sheets.position(sheets.all()[sheet]);
-  const int reach = std::max(1, static_cast<int>(kAround_m / sheets.block_m()));
-  const double radius = std::max(kAround_m, sheets.block_m());
-  std::size_t going = 0;
-  std::size_t staying = 0;
-  const Eigen::Vector3i& block = sheets.all()[sheet].block;
-  for (int x = -reach; x <= reach; ++x) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int z = -reach; z <= reach; ++z) {
-        sheets.visit_block(block + Eigen::Vector3i(x, y, z), [&](std::uint32_t s) {
-          if ((sheets.position(sheets.all()[s]) - position).norm() > radius) return;
-          if (verdicts[s] == Verdict::kGoes) going += sheets.all()[s].points;
-          if (verdicts[s] == Verdict::kStays) staying += sheets.all()[s].points;
-        });
+/// What goes with what is around it.
+class Surroundings {
+ public:
+  explicit Surroundings(const Sheets& sheets)
+      : sheets_(sheets), reach_(std::max(1, static_cast<int>(kAround_m / sheets.block_m()))) {}
+
+  /// Notes where something goes: nothing else can go with it far away.
+  void look(const std::vector<Verdict>& verdicts) {
+    near_.assign(sheets_.brick_count(), 0);
+    Eigen::Vector3i last(0, 0, 0);
+    bool any = false;
+    for (std::size_t s = 0; s < verdicts.size(); ++s) {
+      if (verdicts[s] != Verdict::kGoes) continue;
+      const Eigen::Vector3i& block = sheets_.all()[s].block;
+      if (any && block == last) continue;
+      any = true;
+      last = block;
+      visit_bricks(block, [&](std::uint32_t brick) { near_[brick] = 1; });
+    }
+  }
+
+  /// Whether at least half of the points around that are no matter of doubt go.
+  [[nodiscard]] bool go(std::size_t sheet, const std::vector<Verdict>& verdicts) const {
+    const Eigen::Vector3i& block = sheets_.all()[sheet].block;
+    if (near_[sheets_.brick_at(Sheets::brick_of(block))] == 0) return false;
+    const Eigen::Vector3d position = sheets_.position(sheets_.all()[sheet]);
+    const double radius = std::max(kAround_m, sheets_.block_m());
+    std::size_t going = 0;
+    std::size_t staying = 0;
+    visit_bricks(block, [&](std::uint32_t brick) {
+      const Eigen::Vector3i reach = Eigen::Vector3i::Constant(reach_);
+      sheets_.visit_in_brick(brick, block - reach, block + reach, [&](std::uint32_t s) {
+        if (verdicts[s] != Verdict::kGoes && verdicts[s] != Verdict::kStays) return;
+        if ((sheets_.position(sheets_.all()[s]) - position).norm() > radius) return;
+        (verdicts[s] == Verdict::kGoes ? going : staying) += sheets_.all()[s].points;
+      });
+    });
+    return going > 0 && going >= staying;
+  }
+
+ private:
+  /// The bricks that hold something of what is around a block.
+  template <typename Visit>
+  void visit_bricks(const Eigen::Vector3i& block, const Visit& visit) const {
+    const Eigen::Vector3i reach = Eigen::Vector3i::Constant(reach_);
+    const Eigen::Vector3i low = Sheets::brick_of(block - reach), high = Sheets::brick_of(block + reach);
+    for (int x = low.x(); x <= high.x(); ++x) {
+      for (int y = low.y(); y <= high.y(); ++y) {
+        for (int z = low.z(); z <= high.z(); ++z) {
+          const std::uint32_t brick = sheets_.brick_at({x, y, z});
+          if (brick != Sheets::kNone) visit(brick);
+        }
       }
     }
   }
-  return going > 0 && going >= staying;
-}
+
+  const Sheets& sheets_;
+  int reach_;                       ///< blocks
+  std::vector<std::uint8_t> near_;  ///< by brick: something near it goes
+};
 
 NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
                      const std::vector<std::uint8_t>& is_look,
@@ -223,16 +339,15 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
   for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
   if (sheets.all().empty()) return goes;
   const NearViews views = views_near(box, rasters, is_look, world_from_camera);
-  std::vector<Verdict> verdicts(goes.size());
-  for (std::size_t s = 0; s < goes.size(); ++s) {
-    verdicts[s] = judge(sheets.position(sheets.all()[s]).cast<float>(), views);
-  }
+  std::vector<Verdict> verdicts = judge(sheets, views);
+  Surroundings around(sheets);
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<Verdict> before = verdicts;
+    around.look(before);
     for (std::size_t s = 0; s < goes.size(); ++s) {
       // Only what is hardly seen goes with what was itself a doubt: else good surfaces would go one by one.
       const bool asked = before[s] == Verdict::kHardlySeen || (pass == 0 && before[s] == Verdict::kDoubtful);
-      if (asked && among_what_goes(sheets, s, before)) verdicts[s] = Verdict::kGoes;
+      if (asked && around.go(s, before)) verdicts[s] = Verdict::kGoes;
     }
   }
   for (std::size_t s = 0; s < goes.size(); ++s) goes[s] = verdicts[s] == Verdict::kGoes ? 1 : 0;

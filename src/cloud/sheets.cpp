@@ -35,50 +35,56 @@ void gather(const Sheet& from, const Eigen::Vector3f& offset, Sheet& sums) {
 Sheets::Sheets(const FusedCloud& points, double block_m) : block_m_(block_m) {
   const std::size_t count = points.cloud->size();
   sheet_of_.assign(count, kNone);
-  table_.resize(1024);
-  for (std::size_t i = 0; i < count; ++i) add(points, i);
+  table_.assign(1024, kNone);
+  Cursor cursor;
+  for (std::size_t i = 0; i < count; ++i) add(points, i, cursor);
 }
 
-std::uint32_t Sheets::first_of(const Eigen::Vector3i& block) const {
-  const std::uint64_t key = pack_cell(block);
+std::uint32_t Sheets::brick_at(const Eigen::Vector3i& place) const {
   const std::size_t mask = table_.size() - 1;
-  for (std::size_t at = mix(key) & mask; table_[at].first != kNone; at = (at + 1) & mask) {
-    if (table_[at].key == key) return table_[at].first;
+  for (std::size_t at = mix(pack_cell(place)) & mask; table_[at] != kNone; at = (at + 1) & mask) {
+    if (bricks_[table_[at]].place == place) return table_[at];
   }
   return kNone;
 }
 
-/// Where the first sheet of a block is noted; kNone there for a new block, to be filled in at once.
-std::uint32_t& Sheets::slot(const Eigen::Vector3i& block) {
-  if ((blocks_ + 1) * 2 > table_.size()) {
-    std::vector<Entry> old(table_.size() * 2);
-    old.swap(table_);
-    const std::size_t mask = table_.size() - 1;
-    for (const Entry& entry : old) {
-      if (entry.first == kNone) continue;
-      std::size_t at = mix(entry.key) & mask;
-      while (table_[at].first != kNone) at = (at + 1) & mask;
-      table_[at] = entry;
-    }
-  }
-  const std::uint64_t key = pack_cell(block);
+void Sheets::note(std::uint32_t brick) {
   const std::size_t mask = table_.size() - 1;
-  std::size_t at = mix(key) & mask;
-  while (table_[at].first != kNone && table_[at].key != key) at = (at + 1) & mask;
-  if (table_[at].first == kNone) {
-    table_[at].key = key;
-    ++blocks_;
-  }
-  return table_[at].first;
+  std::size_t at = mix(pack_cell(bricks_[brick].place)) & mask;
+  while (table_[at] != kNone) at = (at + 1) & mask;
+  table_[at] = brick;
 }
 
-void Sheets::add(const FusedCloud& points, std::size_t i) {
+std::uint32_t Sheets::first_of(const Eigen::Vector3i& block, Cursor& cursor) const {
+  const Eigen::Vector3i place = brick_of(block);
+  if (!cursor.valid || cursor.place != place) cursor = {place, brick_at(place), true};
+  return cursor.brick == kNone ? kNone : bricks_[cursor.brick].first[cell_of(block)];
+}
+
+std::uint32_t& Sheets::slot(const Eigen::Vector3i& block, Cursor& cursor) {
+  const Eigen::Vector3i place = brick_of(block);
+  if (!cursor.valid || cursor.place != place) cursor = {place, brick_at(place), true};
+  if (cursor.brick == kNone) {
+    cursor.brick = static_cast<std::uint32_t>(bricks_.size());
+    bricks_.emplace_back();
+    bricks_.back().place = place;
+    bricks_.back().first.fill(kNone);
+    if (bricks_.size() * 2 > table_.size()) {
+      table_.assign(table_.size() * 2, kNone);
+      for (std::uint32_t b = 0; b < cursor.brick; ++b) note(b);
+    }
+    note(cursor.brick);
+  }
+  return bricks_[cursor.brick].first[cell_of(block)];
+}
+
+void Sheets::add(const FusedCloud& points, std::size_t i, Cursor& cursor) {
   const Point& p = (*points.cloud)[i];
   const Eigen::Vector3f normal = p.getNormalVector3fMap();
   if (!normal.allFinite()) return;
   const Eigen::Vector3d position = p.getVector3fMap().cast<double>();
   const Eigen::Vector3i block = (position / block_m_).array().floor().cast<int>();
-  std::uint32_t& first = slot(block);
+  std::uint32_t& first = slot(block, cursor);
   std::uint32_t at = first;
   std::uint32_t last = kNone;
   for (; at != kNone; last = at, at = next_[at]) {
@@ -110,9 +116,9 @@ Eigen::Vector3d Sheets::position(const Sheet& sheet) const {
 }
 
 template <typename Visit>
-void Sheets::visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal,
+void Sheets::visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal, Cursor& cursor,
                          const Visit& visit) const {
-  for (std::uint32_t at = first_of(block); at != kNone; at = next_[at]) {
+  for (std::uint32_t at = first_of(block, cursor); at != kNone; at = next_[at]) {
     const Eigen::Vector3f& sum = sheets_[at].normal_sum;
     if (sum.dot(normal) > kAlike * sum.norm()) visit(sheets_[at]);
   }
@@ -150,6 +156,7 @@ void Sheets::measure_noise() {
 }
 
 void Sheets::fit_planes() {
+  Cursor cursor;
   for (Sheet& sheet : sheets_) {
     const Eigen::Vector3f own = sheet.normal_sum.normalized();
     Sheet sums;
@@ -158,7 +165,8 @@ void Sheets::fit_planes() {
         for (int dx = -1; dx <= 1; ++dx) {
           const Eigen::Vector3i step(dx, dy, dz);
           const Eigen::Vector3f offset = step.cast<float>() * static_cast<float>(block_m_);
-          visit_alike(sheet.block + step, own, [&](const Sheet& other) { gather(other, offset, sums); });
+          visit_alike(sheet.block + step, own, cursor,
+                      [&](const Sheet& other) { gather(other, offset, sums); });
         }
       }
     }
@@ -175,6 +183,7 @@ void Sheets::fit_planes() {
 
 void Sheets::settle(FusedCloud& points) const {
   constexpr float kMostSigmas = 3.0F;
+  Cursor cursor;
   for (std::size_t i = 0; i < sheet_of_.size(); ++i) {
     if (sheet_of_[i] == kNone || !sheets_[sheet_of_[i]].flat) continue;
     Point& p = (*points.cloud)[i];
@@ -193,7 +202,7 @@ void Sheets::settle(FusedCloud& points) const {
       float share = 1.0F;
       for (int axis = 0; axis < 3; ++axis) share *= step[axis] == 1 ? part[axis] : 1.0F - part[axis];
       const Eigen::Vector3f from_centre = (position - centre(block)).cast<float>();
-      visit_alike(block, own, [&](const Sheet& sheet) {
+      visit_alike(block, own, cursor, [&](const Sheet& sheet) {
         if (!sheet.flat) return;
         const float weight = share * sheet.weight;
         const float along = sheet.normal.dot(own);

@@ -164,7 +164,8 @@ class FuseStage : public Stage {
     const cloud::ReadView read = [&](std::size_t i) { return spool_->read(places[i]); };
     auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report);
     if (fused && map.robots.size() > 1) {
-      auto seen_by = robots_of_points(*fused->cloud, poses, robots, read, options_.voxels.voxel_m);
+      auto seen_by =
+          robots_of_points(*fused->cloud, poses, robots, read, options_.voxels.voxel_m, *context_->executor);
       if (!seen_by) return tl::unexpected<core::Error>(seen_by.error());
       fused->columns.robot = std::move(*seen_by);
     }
