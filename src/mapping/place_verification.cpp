@@ -263,11 +263,10 @@ Matrix6d with_floor(const Matrix6d& information) {
   return 0.5 * (result + result.transpose());
 }
 
-void ask_surfaces(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& around,
+/// What depth says of each other's surface. `near`: the match and those around it.
+void ask_surfaces(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& near,
                   PlaceVerification& result) {
   const maps::Keyframe& q = query.map->keyframe(query.keyframe);
-  const std::vector<KeyframeId> near(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(std::min(
-                                                                          around.size(), kSurfaceKeyframes)));
   SurfaceVotes votes;
   const Rigid3& match_from_world = match.map->camera_from_world(match.keyframe);
   for (const KeyframeId id : near) {
@@ -282,6 +281,12 @@ void ask_surfaces(const PlaceView& query, const PlaceView& match, const std::vec
   }
   result.overlap = votes.overlap();
   result.contradiction = votes.contradiction();
+}
+
+/// The pose as the surfaces say too.
+void align(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& near,
+           PlaceVerification& result) {
+  const maps::Keyframe& q = query.map->keyframe(query.keyframe);
   if (q.surface.empty()) return;
   const AlignmentOptions options;
   const SurfaceIndex theirs(gather_surface(*match.map, near, match.keyframe), options.distance_m);
@@ -366,10 +371,13 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
   result.rms_px = growth.summary.points.rms;
   // The information of xi at the left of camera_from_world is that of query_from_match.
   result.information = growth.summary.information;
-  ask_surfaces(query, match, around, result);
-  result.information = with_floor(result.information);
+  const std::vector<KeyframeId> near(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                                          around.size(), kSurfaceKeyframes)));
+  ask_surfaces(query, match, near, result);
   result.refused = judge(result, options);
   result.accepted = result.refused.empty();
+  if (result.accepted) align(query, match, near, result);
+  result.information = with_floor(result.information);
   return result;
 }
 

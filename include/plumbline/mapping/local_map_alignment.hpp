@@ -64,10 +64,17 @@ class SurfaceIndex {
     std::uint32_t begin = 0;
     std::uint32_t end = 0;
   };
+  /// A sample as the search reads it.
+  struct Place {
+    Eigen::Vector3f point;
+    std::uint32_t sample = 0;
+  };
+  void make_cells();
   [[nodiscard]] const Cell* find(std::uint64_t key) const;
 
   float cell_m_;
-  CoarseSurface samples_;  ///< by cell
+  CoarseSurface samples_;      ///< by boxes of twice the reach
+  std::vector<Place> places_;  ///< by cell
   std::vector<Cell> cells_;
   std::vector<std::uint32_t> table_;  ///< open addressing: index into cells_ + 1, 0 = free
 };

@@ -52,7 +52,7 @@ struct PlaceVerification {
   double rms_px = 0.0;   ///< of the points, in standard deviations (1 px at octave 0)
   double overlap = 0.0;  ///< of the surfaces, both ways
   double contradiction = 0.0;
-  double surface_shift_m = 0.0;  ///< how far the alignment of the surfaces moved the pose
+  double surface_shift_m = 0.0;  ///< how far the alignment of the surfaces moved the pose; of accepted ones
   double surface_rms = 0.0;      ///< standard deviations
   bool surface_aligned = false;
 };
