@@ -44,6 +44,10 @@ class FuseStage : public Stage {
                      "as the first camera was held, or the frame of the poses as they are");
     table.boolean("keyframe_clouds", keyframe_clouds_,
                   "Write the cloud of every keyframe to keyframes/, in the frame of the results");
+    table.boolean("depth_field", find_depth_field_,
+                  "Find out from overlapping views what the depth camera gets wrong everywhere alike, and "
+                  "correct it");
+    depth_field_.declare(table);
     filters_.declare(table, "Filter chain for the merged cloud; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
@@ -103,6 +107,7 @@ class FuseStage : public Stage {
   }
 
  private:
+    summary.depth_fields = told_fields_;
   /// Those of the run that this one goes on from.
   core::Result<void> read_clouds(const ResumedRun& run) {
     const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
@@ -145,12 +150,14 @@ class FuseStage : public Stage {
       const auto way = ways.find(between.robot);
       const geometry::Trajectory& poses_of_robot =
           way != ways.end() ? way->second
+    std::vector<double> stamps;
                             : ways.emplace(between.robot, trajectory_of(map, between.robot)).first->second;
       const auto found =
           std::lower_bound(poses_of_robot.begin(), poses_of_robot.end(), between.stamp,
                            [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
       if (found == poses_of_robot.end() || found->stamp != between.stamp) continue;  // a frame that was lost
       poses.push_back(found->world_from_camera);
+      stamps.push_back(keyframe.stamp);
       places.push_back(between.place);
       robots.push_back(between.robot);
     }
@@ -161,10 +168,15 @@ class FuseStage : public Stage {
       }
     }
     cloud::FusionReport report;
-    const cloud::ReadView read = [&](std::size_t i) { return spool_->read(places[i]); };
+    const cloud::ReadView read_raw = [&](std::size_t i) { return spool_->read(places[i]); };
+    if (auto found = find_fields(map, poses, stamps, robots, cameras, read_raw); !found) {
+      return tl::unexpected<core::Error>(found.error());
+    }
+    const cloud::ReadView read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
     auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report);
     if (fused && map.robots.size() > 1) {
       auto seen_by =
+      stamps.push_back(between.stamp);
           robots_of_points(*fused->cloud, poses, robots, read, options_.voxels.voxel_m, *context_->executor);
       if (!seen_by) return tl::unexpected<core::Error>(seen_by.error());
       fused->columns.robot = std::move(*seen_by);
@@ -191,6 +203,43 @@ class FuseStage : public Stage {
     context.columns = &fused.columns;
     context.made_columns = &dense.columns;
     auto filtered = filters_.chain().apply(fused.cloud, context, &reports);
+  /// One depth field for each robot's camera.
+  core::Result<void> find_fields(const MapResult& map, const std::vector<geometry::Rigid3>& poses,
+                                 const std::vector<double>& stamps, const std::vector<std::int32_t>& robots,
+                                 const std::vector<sensor::Pinhole>& cameras, const cloud::ReadView& read) {
+    if (!find_depth_field_) return {};
+    std::map<std::int32_t, std::vector<std::size_t>> views;
+    for (std::size_t i = 0; i < poses.size(); ++i) views[robots[i]].push_back(i);
+    for (auto& [robot, own] : views) {
+      std::stable_sort(own.begin(), own.end(),
+                       [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
+      const sensor::Pinhole& camera = cameras[own.front()];
+      cloud::DepthFieldReport report;
+      const auto field =
+          cloud::find_depth_field(own, poses, read, camera, depth_field_, *context_->executor, &report);
+      if (!field) return tl::unexpected<core::Error>(field.error());
+      fields_[robot] = *field;
+      std::string name;
+      for (const RobotInfo& info : map.robots) {
+        if (info.number == robot) name = info.name;
+      }
+      told_fields_.push_back({name, report, *field});
+      context_->log->debug(fmt::format(
+          "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
+          "explains: {}",
+          name.empty() ? "" : " of ", name, report.samples, report.before, report.after,
+          report.used ? fmt::format("up to {:.0f} mm at 2 m", 1e3 * report.most_at_2m) : "not used"));
+    }
+    return {};
+  }
+
+  [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
+    auto cloud = spool_->read(place);
+    const auto field = fields_.find(robot);
+    if (cloud && field != fields_.end()) field->second.correct(**cloud);
+    return cloud;
+  }
+
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
     context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
     dense.cloud = std::move(*filtered);
@@ -206,7 +255,7 @@ class FuseStage : public Stage {
     for (const KeyframePose& keyframe : map.keyframes) {
       const auto found = places_.find(keyframe.id);
       if (found == places_.end()) continue;
-      const auto cloud = spool_->read(found->second);
+      const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
       move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera);
       const std::string name = keyframe.id.robot == 0
@@ -234,6 +283,8 @@ class FuseStage : public Stage {
   UpFrame frame_;
   std::size_t points_ = 0;
 };
+  bool find_depth_field_ = true;
+  cloud::DepthFieldOptions depth_field_;
 
 }  // namespace
 
@@ -246,4 +297,6 @@ StageType fuse_stage() {
           [] { return std::make_unique<FuseStage>(); }};
 }
 
+  std::map<std::int32_t, cloud::DepthField> fields_;  ///< by robot
+  std::vector<RunSummary::DepthField> told_fields_;
 }  // namespace plumbline::pipeline

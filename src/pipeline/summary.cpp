@@ -80,6 +80,24 @@ nlohmann::ordered_json laid(const mapping::LaidOver& fit) {
           {"seen_through", fit.contradicted}};
 }
 
+nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::DepthField& found : summary.depth_fields) {
+    nlohmann::ordered_json entry = {{"robot", found.robot},
+                                    {"used", found.report.used},
+                                    {"samples", found.report.samples},
+                                    {"before", rounded(found.report.before)},
+                                    {"after", rounded(found.report.after)}};
+    if (found.report.used) {
+      const auto& c = found.field.coefficients();
+      entry["most_at_2m"] = rounded(found.report.most_at_2m);
+      entry["coefficients"] = std::vector<double>(c.data(), c.data() + c.size());
+    }
+    list.push_back(entry);
+  }
+  return list;
+}
+
 nlohmann::ordered_json merges_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::Merge& merge : summary.merges) {
@@ -222,6 +240,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"robots", traffic_of(s)},
       {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},
       {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
+      {"depth_fields", depth_fields_of(s)},
       {"timing",
        {{"wall_s", rounded(s.wall_s)},
         {"map_s", rounded(s.map_s)},

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/rigid3.hpp"
@@ -50,6 +51,13 @@ struct RunSummary {
     double mean_shift_m = 0.0;  ///< how far keyframes moved
     double max_shift_m = 0.0;
   } refine;
+  /// What was found of a depth camera's systematic error.
+  struct DepthField {
+    std::string robot;  ///< empty: the only one
+    cloud::DepthFieldReport report;
+    cloud::DepthField field;
+  };
+  std::vector<DepthField> depth_fields;
   /// Two maps that were held against each other.
   struct Merge {
     std::string a;

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/depth_field.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr int kCell_px = 8;
+constexpr float kReach_m = 3.5F;   // farther away noise is larger than what is looked for
+constexpr float kApart_m = 0.06F;  // farther apart are two surfaces
+constexpr float kSameWay = 0.95F;  // cosine between the normals of one surface
+constexpr float kSteep = 0.5F;     // cosine: along grazing rays depth says little
+constexpr double kFarthestPartner_m = 1.5;
+constexpr double kLeastAxisCosine = 0.64;  // 50 degrees between the views
+constexpr std::size_t kLeastSamples = 5000;
+constexpr std::size_t kBlocks = 8;  // of consecutive views, dealt out to the parts
+constexpr std::size_t kParts = 4;
+constexpr std::size_t kLeastViews = 6;
+constexpr int kRounds = 8;
+constexpr double kRobust = 2.0;        // standard deviations
+constexpr double kPrior_per_m = 0.02;  // of beta: 8 cm at 2 m
+constexpr double kCorrelation = 0.01;  // samples count by this much against the prior: neighbours err alike
+
+struct Sample {
+  Eigen::Vector3f point = Eigen::Vector3f::Zero();  // z = 0: none
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+};
+
+/// One sample per cell of 8 x 8 pixels: the point nearest to its middle.
+struct View {
+  int width = 0;
+  int height = 0;
+  std::vector<Sample> cells;
+
+  [[nodiscard]] const Sample* at(const Eigen::Vector2d& pixel) const {
+    const int i = static_cast<int>(std::floor((pixel.x() + 0.5) / kCell_px));
+    const int j = static_cast<int>(std::floor((pixel.y() + 0.5) / kCell_px));
+    if (i < 0 || j < 0 || i >= width || j >= height) return nullptr;
+    const Sample& sample =
+        cells[static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)];
+    return sample.point.z() > 0.0F ? &sample : nullptr;
+  }
+};
+
+View sampled(const Cloud& cloud, const sensor::Pinhole& camera) {
+  View view;
+  view.width = (camera.width + kCell_px - 1) / kCell_px;
+  view.height = (camera.height + kCell_px - 1) / kCell_px;
+  view.cells.resize(static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height));
+  std::vector<double> best(view.cells.size(), 1e9);
+  for (const Point& p : cloud.points) {
+    if (!(p.z > 0.0F) || p.z > kReach_m || !std::isfinite(p.normal_x)) continue;
+    if (std::abs(p.getNormalVector3fMap().dot(p.getVector3fMap().normalized())) < kSteep) continue;
+    const Eigen::Vector2d pixel = camera.project(p.getVector3fMap().cast<double>());
+    const int i = static_cast<int>(std::floor((pixel.x() + 0.5) / kCell_px));
+    const int j = static_cast<int>(std::floor((pixel.y() + 0.5) / kCell_px));
+    if (i < 0 || j < 0 || i >= view.width || j >= view.height) continue;
+    const Eigen::Vector2d middle((i + 0.5) * kCell_px - 0.5, (j + 0.5) * kCell_px - 0.5);
+    const double off = (pixel - middle).squaredNorm();
+    const std::size_t cell =
+        static_cast<std::size_t>(j) * static_cast<std::size_t>(view.width) + static_cast<std::size_t>(i);
+    if (off >= best[cell]) continue;
+    best[cell] = off;
+    view.cells[cell] = {p.getVector3fMap(), p.getNormalVector3fMap()};
+  }
+  return view;
+}
+
+/// One surface point as two views saw it: residual + (gain_a B(ray_a) + gain_b B(ray_b)) . coefficients.
+struct Row {
+  std::array<float, 2> a;  // slopes of the ray
+  std::array<float, 2> b;
+  float gain_a;  // m^2
+  float gain_b;
+  float residual;  // m, along the normal
+  float sigma;     // m
+};
+using Rows = std::vector<Row>;
+
+Rows compared(const View& a, const View& b, const geometry::Rigid3& b_from_a, const sensor::Pinhole& camera) {
+  Rows rows;
+  const Eigen::Matrix3d turn = b_from_a.rotation;
+  for (const Sample& sample : a.cells) {
+    if (!(sample.point.z() > 0.0F)) continue;
+    const Eigen::Vector3d p = b_from_a * sample.point.cast<double>();
+    if (p.z() < 0.2) continue;
+    const Sample* other = b.at(camera.project(p));
+    if (other == nullptr) continue;
+    const Eigen::Vector3d q = other->point.cast<double>();
+    const Eigen::Vector3d normal = other->normal.cast<double>();
+    if (normal.dot(turn * sample.normal.cast<double>()) < kSameWay) continue;
+    const double residual = normal.dot(p - q);
+    if (std::abs(residual) > kApart_m) continue;
+    const double z_a = sample.point.z();
+    const Eigen::Vector3d ray_a = sample.point.cast<double>() / z_a;
+    const Eigen::Vector3d ray_b = q / q.z();
+    const double sigma_a = sensor::depth_sigma(z_a);
+    const double sigma_b = sensor::depth_sigma(q.z());
+    rows.push_back({{static_cast<float>(ray_a.x()), static_cast<float>(ray_a.y())},
+                    {static_cast<float>(ray_b.x()), static_cast<float>(ray_b.y())},
+                    static_cast<float>(-z_a * z_a * normal.dot(turn * ray_a)),
+                    static_cast<float>(q.z() * q.z() * normal.dot(ray_b)),
+                    static_cast<float>(residual),
+                    static_cast<float>(std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b))});
+  }
+  return rows;
+}
+
+DepthField::Terms jacobian(const Row& row) {
+  return row.gain_a * DepthField::monomials(row.a[0], row.a[1]) +
+         row.gain_b * DepthField::monomials(row.b[0], row.b[1]);
+}
+
+/// Robust least squares over the pairs that `use` names.
+DepthField fitted(const std::vector<const Rows*>& use, const sensor::Pinhole& camera,
+                  const core::Executor& executor) {
+  using Matrix = Eigen::Matrix<double, DepthField::kTerms, DepthField::kTerms>;
+  struct Sum {
+    Matrix h = Matrix::Zero();
+    DepthField::Terms g = DepthField::Terms::Zero();
+  };
+  // Monomials at the rim of the picture: a coefficient is held near zero by what it does there.
+  const DepthField::Terms rim =
+      DepthField::monomials(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy);
+  DepthField::Terms c = DepthField::Terms::Zero();
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<Sum> sums(use.size());
+    executor.parallel_for(use.size(), [&](std::size_t k) {
+      for (const Row& row : *use[k]) {
+        const DepthField::Terms j = jacobian(row);
+        const double e = (row.residual + j.dot(c)) / row.sigma;
+        const double pull = 1.0 + e * e / (kRobust * kRobust);
+        const double weight = 1.0 / (pull * pull * row.sigma * row.sigma);
+        sums[k].h.noalias() += weight * j * j.transpose();
+        sums[k].g.noalias() -= weight * row.residual * j;
+      }
+    });
+    Sum all;
+    for (const Sum& sum : sums) {
+      all.h += sum.h;
+      all.g += sum.g;
+    }
+    for (int i = 0; i < DepthField::kTerms; ++i) {
+      const double held = rim[i] / kPrior_per_m;
+      all.h(i, i) += held * held / kCorrelation;
+    }
+    c = all.h.ldlt().solve(all.g);
+  }
+  return DepthField(c);
+}
+
+/// In standard deviations, of every row.
+void add_disagreement(const std::vector<const Rows*>& of, const DepthField& field, std::vector<double>& all) {
+  for (const Rows* rows : of) {
+    for (const Row& row : *rows) {
+      all.push_back(std::abs(row.residual + jacobian(row).dot(field.coefficients())) / row.sigma);
+    }
+  }
+}
+
+double median(std::vector<double>& values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The largest change of a depth of 2 m along any ray that was compared, metres.
+double most_at_2m(const std::vector<const Rows*>& of, const DepthField& field) {
+  double most = 0.0;
+  for (const Rows* rows : of) {
+    for (const Row& row : *rows)
+      most = std::max(most, std::abs(1.0 / (0.5 + field.beta(row.a[0], row.a[1])) - 2.0));
+  }
+  return most;
+}
+
+std::size_t count_of(const std::vector<const Rows*>& of) {
+  std::size_t count = 0;
+  for (const Rows* rows : of) count += rows->size();
+  return count;
+}
+
+/// Which views each is compared with: near ones that look the same way, from hardly turned to far turned.
+std::vector<std::pair<std::size_t, std::size_t>> partners(const std::vector<geometry::Rigid3>& poses,
+                                                          int most) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    std::vector<std::pair<double, std::size_t>> near;  // by how far off
+    for (std::size_t j = 0; j < poses.size(); ++j) {
+      if (j == i) continue;
+      const geometry::Rigid3 apart = poses[j].inverse() * poses[i];
+      const double cosine = (apart.rotation * Eigen::Vector3d::UnitZ()).z();
+      if (apart.translation.norm() > kFarthestPartner_m || cosine < kLeastAxisCosine) continue;
+      near.emplace_back(apart.translation.norm() / kFarthestPartner_m + std::acos(std::min(1.0, cosine)), j);
+    }
+    std::sort(near.begin(), near.end());
+    const std::size_t count = std::min(near.size(), static_cast<std::size_t>(most));
+    for (std::size_t k = 0; k < count; ++k)
+      pairs.emplace_back(i, near[(k + 1) * near.size() / count - 1].second);
+  }
+  return pairs;
+}
+
+}  // namespace
+
+DepthField::Terms DepthField::monomials(double x, double y) {
+  const double xx = x * x;
+  const double xy = x * y;
+  const double yy = y * y;
+  Terms terms;
+  terms << xx, xy, yy, xx * x, xx * y, x * yy, yy * y, xx * xx, xx * xy, xx * yy, xy * yy, yy * yy;
+  return terms;
+}
+
+void DepthField::correct(Cloud& camera_cloud) const {
+  if (identity()) return;
+  constexpr double kStep = 1e-3;
+  for (Point& p : camera_cloud.points) {
+    if (!(p.z > 0.0F)) continue;
+    const double z = p.z;
+    const double x = p.x / z;
+    const double y = p.y / z;
+    const double b = std::clamp(beta(x, y), -0.5 / z, 0.5 / z);
+    const auto scale = static_cast<float>(1.0 / (1.0 + b * z));
+    if (std::isfinite(p.normal_x)) {
+      // A plane is a x + b y + c = 1 / z; its normal lies along (a, b, c).
+      Eigen::Vector3d n = p.getNormalVector3fMap().cast<double>();
+      const double along = n.dot(p.getVector3fMap().cast<double>());
+      if (std::abs(along) > 1e-3 * z) {
+        const double bx = (beta(x + kStep, y) - beta(x - kStep, y)) / (2.0 * kStep);
+        const double by = (beta(x, y + kStep) - beta(x, y - kStep)) / (2.0 * kStep);
+        const Eigen::Vector3d turned = n / along + Eigen::Vector3d(bx, by, b - x * bx - y * by);
+        n = turned.normalized() * (along > 0.0 ? 1.0 : -1.0);
+        p.getNormalVector3fMap() = n.cast<float>();
+      }
+    }
+    p.getVector3fMap() *= scale;
+  }
+}
+
+void DepthFieldOptions::declare(core::OptionTable& table) {
+  table.integer("depth_field.views", views, {kLeastViews, 10000}, "", "Views that are compared at most");
+  table.integer("depth_field.partners", partners, {1, 100}, "", "Views that each is compared with");
+  table.number("depth_field.least_gain", least_gain, {0.0, 1.0}, "",
+               "Share of the disagreement between views that a correction must take away to be used");
+}
+
+core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
+                                          const std::vector<geometry::Rigid3>& world_from_camera,
+                                          const ReadView& read, const sensor::Pinhole& camera,
+                                          const DepthFieldOptions& options, const core::Executor& executor,
+                                          DepthFieldReport* report) {
+  DepthFieldReport unused;
+  DepthFieldReport& told = report == nullptr ? unused : *report;
+  told = {};
+  const std::size_t count = std::min(views.size(), static_cast<std::size_t>(options.views));
+  std::vector<View> sampled_views(count);
+  std::vector<geometry::Rigid3> poses(count);
+  std::vector<core::Result<void>> done(count);
+  executor.parallel_for(count, [&](std::size_t i) {
+    const std::size_t view = views[i * views.size() / count];
+    poses[i] = world_from_camera[view];
+    const auto cloud = read(view);
+    if (!cloud) {
+      done[i] = tl::unexpected<core::Error>(cloud.error());
+    } else if (!is_look(**cloud, camera)) {
+      sampled_views[i] = sampled(**cloud, camera);
+    }
+  });
+  for (const auto& result : done) {
+    if (!result) return tl::unexpected<core::Error>(result.error());
+  }
+  if (count < kLeastViews) return DepthField();
+
+  const auto pairs = partners(poses, options.partners);
+  std::vector<Rows> rows(pairs.size());
+  executor.parallel_for(pairs.size(), [&](std::size_t k) {
+    const auto [a, b] = pairs[k];
+    rows[k] = compared(sampled_views[a], sampled_views[b], poses[b].inverse() * poses[a], camera);
+  });
+  std::vector<const Rows*> all;
+  for (const Rows& some : rows) all.push_back(&some);
+  told.samples = count_of(all);
+  if (told.samples < kLeastSamples) return DepthField();
+
+  // Each part of the run is asked what it makes of a field in which it had no say.
+  std::vector<double> before;
+  std::vector<double> after;
+  const auto part = [&](std::size_t view) { return view * kBlocks / count % kParts; };
+  for (std::size_t k = 0; k < kParts; ++k) {
+    std::vector<const Rows*> own;
+    std::vector<const Rows*> others;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const auto [a, b] = pairs[i];
+      if (part(a) == k) own.push_back(&rows[i]);
+      if (part(a) != k && part(b) != k) others.push_back(&rows[i]);
+    }
+    if (count_of(others) < kLeastSamples) return DepthField();
+    add_disagreement(own, DepthField(), before);
+    add_disagreement(own, fitted(others, camera, executor), after);
+  }
+  told.before = median(before);
+  told.after = median(after);
+  told.used = told.after <= (1.0 - options.least_gain) * told.before;
+  if (!told.used) return DepthField();
+  const DepthField field = fitted(all, camera, executor);
+  told.most_at_2m = most_at_2m(all, field);
+  return field;
+}
+
+}  // namespace plumbline::cloud
