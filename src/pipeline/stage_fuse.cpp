@@ -17,6 +17,7 @@
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
@@ -42,12 +43,12 @@ class FuseStage : public Stage {
                      "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own "
                      "up on average), z up "
                      "as the first camera was held, or the frame of the poses as they are");
-    table.boolean("keyframe_clouds", keyframe_clouds_,
-                  "Write the cloud of every keyframe to keyframes/, in the frame of the results");
     table.boolean("depth_field", find_depth_field_,
                   "Find out from overlapping views what the depth camera gets wrong everywhere alike, and "
                   "correct it");
     depth_field_.declare(table);
+    table.boolean("keyframe_clouds", keyframe_clouds_,
+                  "Write the cloud of every keyframe to keyframes/, in the frame of the results");
     filters_.declare(table, "Filter chain for the merged cloud; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
@@ -104,10 +105,10 @@ class FuseStage : public Stage {
     summary.voxel_m = options_.voxels.voxel_m;
     summary.up = frame_.up;
     summary.output_from_map = frame_.output_from_map;
+    summary.depth_fields = told_fields_;
   }
 
  private:
-    summary.depth_fields = told_fields_;
   /// Those of the run that this one goes on from.
   core::Result<void> read_clouds(const ResumedRun& run) {
     const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
@@ -138,28 +139,29 @@ class FuseStage : public Stage {
     std::vector<geometry::Rigid3> poses;
     std::vector<std::size_t> places;
     std::vector<std::int32_t> robots;
+    std::vector<double> stamps;
     for (const KeyframePose& keyframe : map.keyframes) {
       const auto found = places_.find(keyframe.id);
       if (found == places_.end()) continue;
       poses.push_back(keyframe.world_from_camera);
       places.push_back(found->second);
       robots.push_back(keyframe.id.robot);
+      stamps.push_back(keyframe.stamp);
     }
     std::map<std::int32_t, geometry::Trajectory> ways;
     for (const Between& between : between_) {
       const auto way = ways.find(between.robot);
       const geometry::Trajectory& poses_of_robot =
           way != ways.end() ? way->second
-    std::vector<double> stamps;
                             : ways.emplace(between.robot, trajectory_of(map, between.robot)).first->second;
       const auto found =
           std::lower_bound(poses_of_robot.begin(), poses_of_robot.end(), between.stamp,
                            [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
       if (found == poses_of_robot.end() || found->stamp != between.stamp) continue;  // a frame that was lost
       poses.push_back(found->world_from_camera);
-      stamps.push_back(keyframe.stamp);
       places.push_back(between.place);
       robots.push_back(between.robot);
+      stamps.push_back(between.stamp);
     }
     std::vector<sensor::Pinhole> cameras(poses.size(), context_->source->camera().color);
     for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -176,7 +178,6 @@ class FuseStage : public Stage {
     auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report);
     if (fused && map.robots.size() > 1) {
       auto seen_by =
-      stamps.push_back(between.stamp);
           robots_of_points(*fused->cloud, poses, robots, read, options_.voxels.voxel_m, *context_->executor);
       if (!seen_by) return tl::unexpected<core::Error>(seen_by.error());
       fused->columns.robot = std::move(*seen_by);
@@ -190,19 +191,6 @@ class FuseStage : public Stage {
     return fused;
   }
 
-  /// The largest thing in memory is not copied when there is nothing to filter.
-  core::Result<void> filter(cloud::FusedCloud fused, DenseCloud& dense) const {
-    if (filters_.chain().size() == 0) {
-      dense.cloud = std::move(fused.cloud);
-      dense.columns = std::move(fused.columns);
-      return {};
-    }
-    std::vector<cloud::FilterReport> reports;
-    cloud::FilterContext context;
-    context.executor = context_->executor;
-    context.columns = &fused.columns;
-    context.made_columns = &dense.columns;
-    auto filtered = filters_.chain().apply(fused.cloud, context, &reports);
   /// One depth field for each robot's camera.
   core::Result<void> find_fields(const MapResult& map, const std::vector<geometry::Rigid3>& poses,
                                  const std::vector<double>& stamps, const std::vector<std::int32_t>& robots,
@@ -240,6 +228,19 @@ class FuseStage : public Stage {
     return cloud;
   }
 
+  /// The largest thing in memory is not copied when there is nothing to filter.
+  core::Result<void> filter(cloud::FusedCloud fused, DenseCloud& dense) const {
+    if (filters_.chain().size() == 0) {
+      dense.cloud = std::move(fused.cloud);
+      dense.columns = std::move(fused.columns);
+      return {};
+    }
+    std::vector<cloud::FilterReport> reports;
+    cloud::FilterContext context;
+    context.executor = context_->executor;
+    context.columns = &fused.columns;
+    context.made_columns = &dense.columns;
+    auto filtered = filters_.chain().apply(fused.cloud, context, &reports);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
     context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
     dense.cloud = std::move(*filtered);
@@ -257,7 +258,7 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera);
+      move_cloud(**cloud,
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
@@ -269,10 +270,12 @@ class FuseStage : public Stage {
   const RunContext* context_ = nullptr;
   cloud::DenseFusionOptions options_;
   Up up_ = Up::kFloor;
+  bool find_depth_field_ = true;
+  cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
-  std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
+  std::optional<cloud::CloudSpool> spool_;           ///< the keyframes' clouds, camera frame
+  std::map<core::KeyframeId, std::size_t> places_;   ///< in the spool
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;
@@ -280,11 +283,11 @@ class FuseStage : public Stage {
     std::size_t place = 0;  ///< in the spool
   };
   std::vector<Between> between_;
+  std::map<std::int32_t, cloud::DepthField> fields_;  ///< by robot
+  std::vector<RunSummary::DepthField> told_fields_;
   UpFrame frame_;
   std::size_t points_ = 0;
 };
-  bool find_depth_field_ = true;
-  cloud::DepthFieldOptions depth_field_;
 
 }  // namespace
 
@@ -297,6 +300,4 @@ StageType fuse_stage() {
           [] { return std::make_unique<FuseStage>(); }};
 }
 
-  std::map<std::int32_t, cloud::DepthField> fields_;  ///< by robot
-  std::vector<RunSummary::DepthField> told_fields_;
 }  // namespace plumbline::pipeline
