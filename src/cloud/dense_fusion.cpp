@@ -148,32 +148,42 @@ class Fusion {
   /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
   /// for all of these tiles, and every tile takes the views in their order.
   core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) const {
-    constexpr std::size_t kViewsAtATime = 8;
+    constexpr std::size_t kViewsAtATime = 4;
     std::vector<std::uint32_t> views;
     for (std::size_t k = 0; k < voxels.size(); ++k) {
       views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
     }
     std::sort(views.begin(), views.end());
     views.erase(std::unique(views.begin(), views.end()), views.end());
-    for (std::size_t begin = 0; begin < views.size(); begin += kViewsAtATime) {
-      const std::size_t count = std::min(kViewsAtATime, views.size() - begin);
-      std::vector<core::Result<CloudPtr>> clouds(count);
-      executor_.parallel_for(count, [&](std::size_t i) {
-        clouds[i] = read_(views[begin + i]);
-        if (clouds[i] && !gains_.empty()) apply_gain(**clouds[i], gains_[views[begin + i]]);
-      });
-      if (const auto error = first_error(clouds)) return tl::unexpected<core::Error>(*error);
-      executor_.parallel_for(voxels.size(), [&](std::size_t k) {
-        const FusionTile& tile = tiles_[first + k];
-        const Eigen::AlignedBox3d region = with_margin(tile.box(kCell_m));
-        for (std::size_t i = 0; i < count; ++i) {
-          const std::uint32_t view = views[begin + i];
-          if (!std::binary_search(tile.views.begin(), tile.views.end(), view)) continue;
-          voxels[k].insert(**clouds[i], poses_[view], &region);
+    // The next views are read while the last ones are laid down.
+    std::vector<core::Result<CloudPtr>> clouds, next;
+    for (std::size_t begin = 0, end = 0; end < views.size() || !clouds.empty();) {
+      next.clear();
+      next.resize(std::min(kViewsAtATime, views.size() - end));
+      executor_.parallel_for(voxels.size() + next.size(), [&](std::size_t i) {
+        if (i < voxels.size()) {
+          lay_down(tiles_[first + i], views.data() + begin, clouds, voxels[i]);
+          return;
         }
+        i -= voxels.size();
+        next[i] = read_(views[end + i]);
+        if (next[i] && !gains_.empty()) apply_gain(**next[i], gains_[views[end + i]]);
       });
+      if (const auto error = first_error(next)) return tl::unexpected<core::Error>(*error);
+      begin = end;
+      end += next.size();
+      clouds.swap(next);
     }
     return {};
+  }
+
+  void lay_down(const FusionTile& tile, const std::uint32_t* views,
+                const std::vector<core::Result<CloudPtr>>& clouds, VoxelMap& voxels) const {
+    const Eigen::AlignedBox3d region = with_margin(tile.box(kCell_m));
+    for (std::size_t i = 0; i < clouds.size(); ++i) {
+      if (!std::binary_search(tile.views.begin(), tile.views.end(), views[i])) continue;
+      voxels.insert(**clouds[i], poses_[views[i]], &region);
+    }
   }
 
   static Eigen::AlignedBox3d with_margin(const Eigen::AlignedBox3d& box) {
