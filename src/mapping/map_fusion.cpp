@@ -102,7 +102,6 @@ bool take_back(const std::vector<optimize::EdgeVerdict>& verdicts, const std::ve
 
 MapFusionOptions::MapFusionOptions() {
   places.consistent = 1;  // pairs need not come in a row: they must agree
-  adjustment.bundle_options.max_iterations = 10;
 }
 
 void MapFusionOptions::declare_decision(core::OptionTable& table, const std::string& prefix) {
@@ -176,7 +175,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   adjustment.graph.robust =
       options.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
   adjustment.orb_scale_factor = options.verify.orb_scale_factor;
-  adjustment.bundle = false;
+  adjustment.bundle = false;  // before surfaces are aligned it bends a map that hangs on a narrow overlap
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
   std::vector<PoseEdge> believed;
@@ -186,9 +185,6 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   std::set<std::pair<KeyframeId, KeyframeId>> done;
   for (const PoseEdge& edge : believed) merge_doubles(edge, options, done, fused);
   set_loops(fused.map, believed);
-  adjustment.bundle = true;
-  adjustment.pose_graph = false;
-  adjust_map(fused.map, fused.cameras, believed, adjustment, ids.front());
   return fused;
 }
 

@@ -30,7 +30,7 @@ struct MapFusionOptions {
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
-  double rival = 0.1;      ///< a second answer with so many keyframes, as share of the best one, is a doubt
+  double rival = 0.1;       ///< a second answer with so many keyframes, as share of the best one, is a doubt
   double rival_fit = 0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
   double max_seen_through = 0.06;  ///< share of landmarks seen through that refutes such an answer
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
@@ -165,9 +165,10 @@ struct FusedMap {
   int rejected = 0;  ///< of these, taken for wrong
 };
 
-/// Lays all parts that hang together with `anchor` into its world, merges what is there twice and adjusts
-/// poses and landmarks of all together. Merges that the pose graph finds to contradict the rest are no longer
-/// accepted, and then the fusion is done without them.
+/// Lays all parts that hang together with `anchor` into its world by a pose graph and merges what is there
+/// twice. Poses and landmarks are not adjusted together here: that is done when surfaces are aligned too
+/// (stage refine). Merges that the pose graph finds to contradict the rest are no longer accepted, and then
+/// the fusion is done without them.
 FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
                    const MapFusionOptions& options);
 
