@@ -145,6 +145,7 @@ class Reader {
     return values;
   }
   [[nodiscard]] bool complete() const { return !failed_ && left_ == 0; }
+  [[nodiscard]] std::size_t left() const { return failed_ ? 0 : left_; }
 
  private:
   const std::uint8_t* at_;
@@ -204,6 +205,24 @@ void write_list(const Cloud& cloud, double step_m, Writer& writer) {
     writer.differences(values, 4);
   }
   write_looks(cloud, values.size(), writer);
+}
+
+/// Of the sensor, behind everything else; a pose that is none takes no bytes.
+constexpr std::size_t kPoseBytes = 7 * sizeof(float);
+
+void write_sensor_pose(const Cloud& cloud, Writer& writer) {
+  const Eigen::Quaternionf& turn = cloud.sensor_orientation_;
+  if (cloud.sensor_origin_.head<3>().isZero(0.0F) && turn.coeffs() == Eigen::Quaternionf::Identity().coeffs())
+    return;
+  writer.raw(cloud.sensor_origin_.data(), 3 * sizeof(float));
+  writer.raw(turn.coeffs().data(), 4 * sizeof(float));
+}
+
+void read_sensor_pose(Reader& reader, Cloud& cloud) {
+  if (reader.left() != kPoseBytes) return;
+  const std::uint8_t* bytes = reader.take(kPoseBytes);
+  std::memcpy(cloud.sensor_origin_.data(), bytes, 3 * sizeof(float));
+  std::memcpy(cloud.sensor_orientation_.coeffs().data(), bytes + 3 * sizeof(float), 4 * sizeof(float));
 }
 
 tl::unexpected<core::Error> damaged(const char* how) {
@@ -312,6 +331,7 @@ std::vector<std::uint8_t> encode_cloud(const Cloud& cloud, const CompactCloudOpt
     writer.raw(&head, sizeof(head));
     write_list(list, step_m, writer);
   }
+  write_sensor_pose(cloud, writer);
   const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, options.level);
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
@@ -345,6 +365,7 @@ core::Result<CloudPtr> decode_cloud(const std::uint8_t* bytes, std::size_t size)
   } else {
     read_list(reader, head, *cloud);
   }
+  read_sensor_pose(reader, *cloud);
   if (!reader.complete()) return damaged("its parts do not fit together");
   return cloud;
 }

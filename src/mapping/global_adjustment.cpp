@@ -251,7 +251,9 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
   GlobalBundle bundle = builder.take();
   summary.points = static_cast<int>(bundle.points.size());
   summary.lines = static_cast<int>(bundle.lines.size());
-  summary.bundle = optimize::adjust_bundle(bundle.problem, options.bundle_options);
+  optimize::BundleOptions bundle_options = options.bundle_options;
+  if (!extra.empty()) bundle_options.first_gate = options.first_gate;
+  summary.bundle = optimize::adjust_bundle(bundle.problem, bundle_options);
   summary.message = summary.bundle.message;
   if (!summary.bundle.usable) return;
   put_back(bundle, map);
@@ -275,6 +277,9 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
                 "Iterations of each round of the adjustment at most");
   table.integer("adjust.rounds", bundle_options.rounds, {1, 10}, "",
                 "Rounds of the adjustment; between them outliers are put aside");
+  table.number("adjust.first_gate", first_gate, {0.0, 1000.0}, "",
+               "Observations further off than so many standard deviations where the pose graph has put the "
+               "keyframes wait for the second round: those that caused a drift would restore it; 0: none");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");
   table.number("adjust.turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",

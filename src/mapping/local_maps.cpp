@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "surface_voxels.hpp"
@@ -133,13 +134,17 @@ void PairOptions::declare(core::OptionTable& table) {
 CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m) {
   CoarseSurface samples;
   samples.reserve(camera_cloud.size());
+  const Rigid3 camera_from_depth = cloud::sensor_pose(camera_cloud);
+  const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
+  const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
   for (const cloud::Point& p : camera_cloud.points) {
     const Eigen::Vector3f point = p.getVector3fMap();
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
     if (!point.allFinite() || !normal.allFinite() || !(p.z > 0.0F)) continue;
     // Half of the noise stays in the mean of a voxel; it acts along the ray.
     const double sigma = 0.5 * sensor::depth_sigma(static_cast<double>(p.z));
-    samples.push_back({point, normal, static_cast<float>(sigma) * std::max(0.3F, -normal.z())});
+    samples.push_back({rotation * point + translation, rotation * normal,
+                       static_cast<float>(sigma) * std::max(0.3F, -normal.z())});
   }
   return voxel_means(samples, voxel_m, false);
 }

@@ -125,6 +125,28 @@ void Slam::put_back_bundle(BundleReport& report) {
   tracker_.map_changed(map_, tracker_.reference(), last_camera_from_world_);
 }
 
+/// The motion between the last two frames, per second, as the tracker had it.
+static geometry::Vector6d last_motion(const std::vector<maps::FramePose>& frames, const maps::Map& map) {
+  if (frames.size() < 2) return geometry::Vector6d::Zero();
+  const maps::FramePose& now = frames[frames.size() - 1];
+  const maps::FramePose& before = frames[frames.size() - 2];
+  constexpr double kLongest_s = 0.5;
+  const double dt = now.stamp - before.stamp;
+  if (!now.tracked || !before.tracked || !(dt > 1e-4 && dt < kLongest_s)) return geometry::Vector6d::Zero();
+  const Rigid3 now_from_world = now.camera_from_reference * map.pose_of(now.reference);
+  const Rigid3 before_from_world = before.camera_from_reference * map.pose_of(before.reference);
+  return geometry::log_se3(now_from_world * before_from_world.inverse()) / dt;
+}
+
+/// How the camera moved from the colour to the depth image, with the motion that was found for this frame.
+static Rigid3 motion_to_depth(const sensor::RgbdFrame& frame, const std::vector<maps::FramePose>& frames,
+                              const maps::Map& map) {
+  constexpr double kMost_s = 0.05;
+  const double dt = frame.depth_stamp - frame.stamp;
+  if (dt == 0.0 || std::abs(dt) > kMost_s) return {};
+  return geometry::exp_se3(last_motion(frames, map) * dt);
+}
+
 FrameReport Slam::process(const sensor::RgbdFrame& frame,
                           std::shared_ptr<const features::FrameFeatures> features) {
   FrameReport report;
@@ -160,6 +182,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
                    {static_cast<int>(features->points.size()), bundle_.idle(), points_with_depth(*features)});
   if (report.decision.wanted) make_keyframe(frame, features, report);
   remember_pose(frame.stamp, last_camera_from_world_, true);
+  if (options_.tracker.align_stamps) report.depth_from_camera = motion_to_depth(frame, frames_, map_);
   return report;
 }
 
@@ -179,19 +202,6 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   if (!options_.mapper.bundle || shear_rate() > options_.mapper.bundle_max_turn_rate) return;
   bundle_.request(map_, report.keyframe, clock_);
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
-}
-
-/// The motion between the last two frames, per second, as the tracker had it.
-static geometry::Vector6d last_motion(const std::vector<maps::FramePose>& frames, const maps::Map& map) {
-  if (frames.size() < 2) return geometry::Vector6d::Zero();
-  const maps::FramePose& now = frames[frames.size() - 1];
-  const maps::FramePose& before = frames[frames.size() - 2];
-  constexpr double kLongest_s = 0.5;
-  const double dt = now.stamp - before.stamp;
-  if (!now.tracked || !before.tracked || !(dt > 1e-4 && dt < kLongest_s)) return geometry::Vector6d::Zero();
-  const Rigid3 now_from_world = now.camera_from_reference * map.pose_of(now.reference);
-  const Rigid3 before_from_world = before.camera_from_reference * map.pose_of(before.reference);
-  return geometry::log_se3(now_from_world * before_from_world.inverse()) / dt;
 }
 
 void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {

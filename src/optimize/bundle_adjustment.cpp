@@ -156,13 +156,14 @@ ceres::Solver::Summary solve_round(BundleProblem& problem, Blocks& blocks, const
   return summary;
 }
 
-void mark_outliers(BundleProblem& problem, Blocks& blocks, const BundleOptions& options) {
+/// Beyond these squared standard deviations an observation is an outlier.
+void mark_outliers(BundleProblem& problem, Blocks& blocks, double point_gate, double line_gate) {
   for (BundlePointObservation& o : problem.point_observations) {
     PointTerm term = to_term(o);
     term.world = Eigen::Map<const Eigen::Vector3d>(blocks.point(o.point));
     Eigen::Vector3d r;
     const int rows = point_residual(term, to_rigid(blocks.pose(o.pose)), problem.camera, r, nullptr);
-    o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= options.point_gate);
+    o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= point_gate);
   }
   const Eigen::Matrix3d projection =
       geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx, problem.camera.cy);
@@ -175,7 +176,7 @@ void mark_outliers(BundleProblem& problem, Blocks& blocks, const BundleOptions& 
     Eigen::Vector2d r;
     // A line through the camera's centre has no image: it cannot be what was seen there.
     const bool has_image = line_residual(term, to_rigid(blocks.pose(o.pose)), projection, r, nullptr);
-    o.outlier = !has_image || !(r.squaredNorm() <= options.line_gate);
+    o.outlier = !has_image || !(r.squaredNorm() <= line_gate);
   }
 }
 
@@ -203,6 +204,10 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
     return summary;
   }
   Blocks blocks(problem);
+  if (options.first_gate > 0.0) {
+    const double gate = options.first_gate * options.first_gate;
+    mark_outliers(problem, blocks, gate, gate);
+  }
   for (int round = 0; round < options.rounds; ++round) {
     const ceres::Solver::Summary ceres_summary = solve_round(problem, blocks, options);
     if (round == 0) summary.initial_cost = ceres_summary.initial_cost;
@@ -213,7 +218,7 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
     summary.final_cost = ceres_summary.final_cost;
     summary.iterations += static_cast<int>(ceres_summary.iterations.size());
     summary.message = ceres_summary.message;
-    mark_outliers(problem, blocks, options);
+    mark_outliers(problem, blocks, options.point_gate, options.line_gate);
   }
   blocks.write_back(problem);
   summary.usable = true;

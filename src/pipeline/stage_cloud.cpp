@@ -8,6 +8,7 @@
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages.hpp"
@@ -57,6 +58,7 @@ class CloudStage : public Stage {
         gives_cloud ? filtered(*frame, camera, track->keyframe)
                     : cloud::depth_look(*frame, camera, options_.min_depth_m, options_.max_depth_m);
     if (!made) return tl::unexpected<core::Error>(made.error());
+    cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
     result->stamp = track->stamp;

@@ -18,6 +18,7 @@
 #include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
@@ -75,6 +76,7 @@ class FuseStage : public Stage {
     } else {
       between_.push_back({keyframe->robot, keyframe->stamp, spool_->size()});
     }
+    camera_from_depth_.push_back(cloud::sensor_pose(*keyframe->cloud));
     return spool_->append(*keyframe->compact);
   }
 
@@ -120,6 +122,7 @@ class FuseStage : public Stage {
       const auto bytes = store->cloud_bytes(id);
       if (!bytes) return fail(bytes.error());
       places_[id] = spool_->size();
+      if (auto noted = note_sensor(*bytes); !noted) return noted;
       if (auto kept = spool_->append(*bytes); !kept) return kept;
     }
     const auto frames = store->frame_cloud_ids();
@@ -130,8 +133,16 @@ class FuseStage : public Stage {
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
       between_.push_back({pose.reference.robot, pose.stamp, spool_->size()});
+      if (auto noted = note_sensor(*bytes); !noted) return noted;
       if (auto kept = spool_->append(*bytes); !kept) return kept;
     }
+    return {};
+  }
+
+  core::Result<void> note_sensor(const std::vector<std::uint8_t>& bytes) {
+    const auto cloud = cloud::decode_cloud(bytes.data(), bytes.size());
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    camera_from_depth_.push_back(cloud::sensor_pose(**cloud));
     return {};
   }
 
@@ -163,6 +174,7 @@ class FuseStage : public Stage {
       robots.push_back(between.robot);
       stamps.push_back(between.stamp);
     }
+    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * camera_from_depth_[places[i]];
     std::vector<sensor::Pinhole> cameras(poses.size(), context_->source->camera().color);
     for (std::size_t i = 0; i < poses.size(); ++i) {
       for (const RobotInfo& robot : map.robots) {
@@ -259,6 +271,7 @@ class FuseStage : public Stage {
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
       move_cloud(**cloud,
+                 frame_.output_from_map * keyframe.world_from_camera * camera_from_depth_[found->second]);
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
@@ -276,6 +289,7 @@ class FuseStage : public Stage {
   ChainOption filters_{"filters/map.yaml"};
   std::optional<cloud::CloudSpool> spool_;           ///< the keyframes' clouds, camera frame
   std::map<core::KeyframeId, std::size_t> places_;   ///< in the spool
+  std::vector<geometry::Rigid3> camera_from_depth_;  ///< of each cloud in the spool
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;

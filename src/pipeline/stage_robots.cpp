@@ -56,6 +56,7 @@ class RobotsStage : public Stage {
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->keyframe = report.keyframe;
     tracked->stamp = report.stamp;
+    tracked->depth_from_camera = report.depth_from_camera;
     tracked->row = rows_.back();
     if (!slam.frame_poses().empty()) tracked->pose = slam.frame_poses().back();
     io.output<TrackedFrame>("track", tracked);

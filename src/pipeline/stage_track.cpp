@@ -47,6 +47,7 @@ class TrackStage : public Stage {
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->keyframe = report.keyframe;
     tracked->stamp = report.stamp;
+    tracked->depth_from_camera = report.depth_from_camera;
     tracked->row = rows_.back();
     if (slam_->frame_poses().size() > poses) tracked->pose = slam_->frame_poses().back();
     if (keep_changes_ && report.keyframe.valid()) {

@@ -10,6 +10,7 @@
 #include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {
@@ -63,6 +64,21 @@ void expect_same(const Point& a, const Point& b, float tolerance) {
   EXPECT_EQ(std::isnan(a.normal_x), std::isnan(b.normal_x));
   if (std::isnan(a.normal_x)) return;
   EXPECT_GT(a.getNormalVector3fMap().dot(b.getNormalVector3fMap()), 0.9998F);
+}
+
+TEST(CompactCloud, KeepsThePoseOfTheSensor) {
+  const CloudPtr grid = grid_cloud();
+  const std::size_t without = encode_cloud(*grid).size();
+  const geometry::Rigid3 pose(geometry::exp_so3({0.01, -0.02, 0.005}), {0.001, 0.002, -0.003});
+  set_sensor_pose(*grid, pose);
+  EXPECT_GT(encode_cloud(*grid).size(), without);
+  Cloud list = list_cloud(50);
+  set_sensor_pose(list, pose);
+  for (const CloudPtr& back : {there_and_back(*grid), there_and_back(list)}) {
+    EXPECT_LT((sensor_pose(*back).rotation - pose.rotation).norm(), 1e-6);
+    EXPECT_LT((sensor_pose(*back).translation - pose.translation).norm(), 1e-8);
+  }
+  EXPECT_TRUE(sensor_pose(*there_and_back(list_cloud(50))).rotation.isIdentity(0.0));
 }
 
 TEST(CompactCloud, KeepsAGridOnItsRays) {

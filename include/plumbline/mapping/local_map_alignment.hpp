@@ -23,8 +23,9 @@ namespace plumbline::mapping {
 /// and direction.
 using CoarseSurface = std::vector<maps::SurfaceSample>;
 
-/// Thins a keyframe's cloud (camera frame, normals towards the camera; points without normal are passed over)
-/// to the mean of each voxel, apart for surfaces that face different ways. In order of voxels.
+/// Thins a keyframe's cloud (frame of the depth camera, normals towards it; points without normal are passed
+/// over) to the mean of each voxel, apart for surfaces that face different ways, in the frame that its sensor
+/// pose leads to: the colour camera's. In order of voxels.
 CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m);
 
 struct LocalMapOptions {

@@ -47,6 +47,7 @@ struct FrameReport {
   double min_eigenvalue = 0.0;
   int weak_directions = 0;
   bool relocalised = false;
+  geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
   KeyframeDecision decision;
   BundleReport bundle;  ///< put back before this frame was tracked (with a lag of 0: after)
 };

@@ -36,6 +36,7 @@ struct TrackedFrame {
   core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
   double stamp = 0.0;         ///< seconds
   FrameRow row;
+  geometry::Rigid3 depth_from_camera;               ///< motion between the stamps of colour and depth
   std::optional<maps::FramePose> pose;              ///< none before the map began, or where there is no map
   std::shared_ptr<const maps::MapChanges> changes;  ///< of the map since the last keyframe, with each
                                                     ///< keyframe, when somebody keeps the map
@@ -68,7 +69,8 @@ struct MapResult {
 };
 
 /// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame; or of such a frame what it
-/// sees through (cloud::depth_look).
+/// sees through (cloud::depth_look). Its points are those of the depth camera at the moment of the depth
+/// image: cloud::sensor_pose() leads from there to the camera of the poses.
 struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes
   double stamp = 0.0;   ///< seconds
