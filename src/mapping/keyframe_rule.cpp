@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <vector>
 
 namespace plumbline::mapping {
 namespace {
 
-constexpr int kDepthIsBack = 50;  // corners with depth
+constexpr int kDepthIsBack = 50;     // corners with depth
+constexpr double kWellWithin = 0.8;  // of the limits: else the next frame would ask again
 
 struct View {
   double overlap = 1.0;
@@ -69,6 +71,9 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                "More rotation makes a keyframe");
   table.integer("keyframe.min_features", min_features, {0, 10000}, "",
                 "With fewer features tracked a keyframe is urgent, if the scene has more to offer");
+  table.boolean("keyframe.reuse", reuse,
+                "Plain rule: where an older keyframe serves as well, track against that one again instead of "
+                "making another");
   table.integer("keyframe.cone_patience", cone_patience, {0, 10000}, "",
                 "Cone rule: after so many frames a bundle under way no longer holds a keyframe up");
   table.number("keyframe.cone_max_shared", cone_max_shared, {0.05, 1.0}, "",
@@ -147,6 +152,36 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
   return d;
+}
+
+core::KeyframeId KeyframeRule::known_ground(const maps::Map& map, core::KeyframeId reference,
+                                            const tracking::TrackResult& track,
+                                            const sensor::Pinhole& camera) const {
+  if (!options_.reuse || options_.rule != KeyframeRuleOptions::Rule::kPlain) return {};
+  std::map<core::KeyframeId, int> common;  // landmarks matched now that a keyframe saw
+  const auto count = [&](const std::vector<maps::Observation>& observations) {
+    for (const maps::Observation& o : observations) ++common[o.keyframe];
+  };
+  for (const auto& m : track.points) count(map.point(m.point).observations);
+  for (const auto& m : track.lines) count(map.line(m.line).observations);
+  const auto tracked = static_cast<double>(track.points.size() + track.lines.size());
+  core::KeyframeId best;
+  int most = 0;
+  for (const auto& [id, landmarks] : common) {
+    if (id == reference || landmarks <= most || landmarks < options_.min_shared * tracked) continue;
+    const geometry::Rigid3 camera_from_keyframe =
+        track.camera_from_world * map.camera_from_world(id).inverse();
+    const View view = view_of(map.keyframe(id), camera_from_keyframe, camera);
+    const double parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
+    if (parallax > kWellWithin * options_.max_parallax ||
+        geometry::rotation_angle(camera_from_keyframe.rotation) > kWellWithin * options_.max_rotation_rad ||
+        1.0 - view.overlap > kWellWithin * (1.0 - options_.min_surface_overlap)) {
+      continue;
+    }
+    best = id;
+    most = landmarks;
+  }
+  return best;
 }
 
 void KeyframeRule::keyframe_made() {

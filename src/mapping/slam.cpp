@@ -180,10 +180,20 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.decision =
       rule_.decide(map_, tracker_.reference(), track, camera_,
                    {static_cast<int>(features->points.size()), bundle_.idle(), points_with_depth(*features)});
+  if (report.decision.wanted && !report.decision.urgent) return_to_known_ground(report);
   if (report.decision.wanted) make_keyframe(frame, features, report);
   remember_pose(frame.stamp, last_camera_from_world_, true);
   if (options_.tracker.align_stamps) report.depth_from_camera = motion_to_depth(frame, frames_, map_);
   return report;
+}
+
+void Slam::return_to_known_ground(FrameReport& report) {
+  const core::KeyframeId known = rule_.known_ground(map_, tracker_.reference(), last_track_, camera_);
+  if (!known.valid()) return;
+  report.decision.wanted = false;
+  report.reference = known;
+  rule_.keyframe_made();
+  tracker_.map_changed(map_, known, last_camera_from_world_);
 }
 
 void Slam::make_keyframe(const sensor::RgbdFrame& frame,

@@ -116,6 +116,33 @@ TEST_F(Rule, LossOfFeaturesFires) {
   EXPECT_TRUE(d.wanted);
 }
 
+TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
+  auto second = std::make_shared<maps::Keyframe>(map_.keyframe({0, 0}));
+  second->id = {0, 1};
+  map_.add_keyframe(second, moved(0.5));
+  for (int i = 0; i < 200; ++i) map_.observe(core::PointId{0, i}, {0, 1}, i);
+  const auto known = [&](const Rigid3& pose, std::size_t points, const KeyframeRuleOptions& options = {}) {
+    return KeyframeRule(options).known_ground(map_, {0, 1}, track(pose, points, 10), kCamera);
+  };
+  EXPECT_EQ(known(moved(0.05), 100), (core::KeyframeId{0, 0}));
+  EXPECT_FALSE(known(moved(0.22), 100).valid());  // too near to its limit
+  EXPECT_FALSE(known(turned(0.24), 100).valid());
+  // It must have seen what the frame sees.
+  for (int i = 0; i < 60; ++i) {
+    maps::MapPoint point;
+    point.position = {0.01 * i, 0.0, 2.0};
+    map_.observe(map_.add_point(0, point), {0, 1}, 200 + i);
+  }
+  auto other = track(moved(0.05), 20, 0);
+  for (std::int32_t i = 300; i < 360; ++i) other.points.push_back({{0, i}, i, 0});
+  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 1}, other, kCamera).valid());
+  // The reference itself is no news, and who does not want it does not get it.
+  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 0}, track(moved(0.05), 100, 10), kCamera).valid());
+  KeyframeRuleOptions options;
+  options.reuse = false;
+  EXPECT_FALSE(known(moved(0.05), 100, options).valid());
+}
+
 TEST_F(Rule, LossOfSurfaceFires) {
   KeyframeRuleOptions options;
   options.max_rotation_rad = 3.0;  // only the overlap can speak

@@ -22,6 +22,7 @@ struct KeyframeRuleOptions {
   double max_parallax = 0.12;
   double max_rotation_rad = 0.26;
   int min_features = 60;
+  bool reuse = true;
   int cone_patience = 20;
   double cone_max_shared = 0.75;
   int cone_min_points = 50;
@@ -70,7 +71,15 @@ class KeyframeRule {
   KeyframeDecision decide(const maps::Map& map, core::KeyframeId reference,
                           const tracking::TrackResult& track, const sensor::Pinhole& camera,
                           const KeyframeCircumstances& circumstances);
+  /// A new keyframe was made, or another one became the reference.
   void keyframe_made();
+  /// A keyframe other than `reference` that makes a new one needless, as far as the plain rule goes: it saw
+  /// `min_shared` of the landmarks that the frame has matched, and the frame is well within the plain rule's
+  /// limits for movement and for its surface. Of several the one that saw most; invalid: none. Without it a
+  /// map would grow as long as the camera moves, however often it has been there.
+  [[nodiscard]] core::KeyframeId known_ground(const maps::Map& map, core::KeyframeId reference,
+                                              const tracking::TrackResult& track,
+                                              const sensor::Pinhole& camera) const;
 
  private:
   [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;

@@ -95,6 +95,8 @@ class Slam {
  private:
   void start_map(const sensor::RgbdFrame& frame,
                  const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
+  /// Instead of making a keyframe.
+  void return_to_known_ground(FrameReport& report);
   void make_keyframe(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   void put_back_bundle(BundleReport& report);
