@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "plumbline/features/depth_delay.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
+#include "plumbline/mapping/surface_edge.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -15,6 +17,32 @@ std::vector<core::KeyframeId> nearest(const maps::Map& map, core::KeyframeId id,
     if (static_cast<int>(result.size()) < count) result.push_back(other);
   }
   return result;
+}
+
+bool still(const geometry::Rigid3& motion) {
+  return motion.translation.isZero(0.0) && motion.rotation.isIdentity(0.0);
+}
+
+/// A keyframe's pose is that of its colour image. What its depth image measured a little later or earlier is
+/// carried there: left where it is, every keyframe would be a few milliseconds of motion off what the next
+/// ones see, all in the direction of travel.
+std::shared_ptr<const features::FrameFeatures> with_lines_of(
+    const std::shared_ptr<const features::FrameFeatures>& features, const cv::Mat& depth,
+    const sensor::Pinhole& camera, const geometry::Rigid3& depth_from_camera) {
+  if (still(depth_from_camera)) return features;
+  auto together = std::make_shared<features::FrameFeatures>(*features);
+  features::undo_line_depth_delay(*together, depth, camera, depth_from_camera);
+  return together;
+}
+
+void move(std::vector<maps::SurfaceSample>& surface, const geometry::Rigid3& camera_from_depth) {
+  if (still(camera_from_depth)) return;
+  const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
+  const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+  for (maps::SurfaceSample& s : surface) {
+    s.point = rotation * s.point + translation;
+    s.normal = rotation * s.normal;
+  }
 }
 
 }  // namespace
@@ -35,6 +63,11 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
       "bundle.max_turn_rate", bundle_max_turn_rate, {0.0, 100.0}, "rad/s",
       "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: they keep "
       "the pose of the tracker and move no landmark");
+  table.number("bundle.line_sigma", bundle_line_sigma_px, {0.01, 10.0}, "px",
+               "Standard deviation of a line's ends across it");
+  table.number(
+      "bundle.depth_factor", bundle_depth_factor, {0.1, 100.0}, "",
+      "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
   table.boolean("edges", edges,
                 "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
   table.integer("edges.keyframes", edge_keyframes, {1, 100}, "",
@@ -53,8 +86,9 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
   keyframe->frame_index = frame.index;
   keyframe->stamp = frame.stamp;
   keyframe->turn_rate = turn_rate;
-  keyframe->features = features;
+  keyframe->features = with_lines_of(features, frame.depth, camera_, track.depth_from_camera);
   keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
+  move(keyframe->surface, track.depth_from_camera.inverse());
   const core::KeyframeId id = map.add_keyframe(keyframe, track.camera_from_world);
   for (const tracking::PointMatch& m : track.points) {
     if (map.observe(m.point, id, m.feature)) map.refresh_point(m.point);
@@ -125,28 +159,12 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
   int made = 0;
   for (core::KeyframeId other : neighbours) {
     if (made >= options_.edge_keyframes) break;
-    if (other == id || map.keyframe(other).surface.empty()) continue;
-    std::vector<tracking::WorldSurface> surface;  // "world" is the other keyframe's camera here
-    for (const maps::SurfaceSample& s : map.keyframe(other).surface) {
-      surface.push_back({s.point.cast<double>(), s.normal.cast<double>(), static_cast<double>(s.sigma)});
-    }
-    geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
-    optimize::PoseProblem problem;
-    problem.camera = camera_;
-    optimize::PoseSolverOptions solver;
-    solver.max_iterations = 3;
-    optimize::PoseSummary summary;
-    for (const double distance : {0.08, 0.05, 0.03, 0.03}) {
-      tracking::SurfaceAssociationOptions association;
-      association.max_distance_m = distance;
-      problem.planes =
-          tracking::associate_surface(surface, depth, camera_, id_from_other, depth_from_camera, association);
-      summary = optimize::solve_pose(problem, id_from_other, solver);
-      id_from_other = summary.camera_from_world;
-    }
-    const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());
-    if (overlap < options_.edge_min_overlap) continue;
-    map.add_edge({other, id, id_from_other, summary.information, overlap, summary.planes.rms});
+    if (other == id) continue;
+    const geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
+    const auto edge = align_surface_edge(map.keyframe(other), id, depth, id_from_other, depth_from_camera,
+                                         camera_, {options_.edge_min_overlap});
+    if (!edge) continue;
+    map.add_edge(*edge);
     ++made;
   }
 }

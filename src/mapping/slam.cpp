@@ -45,7 +45,8 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       rule_(options.keyframe),
       mapper_(options.mapper, camera),
       bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate,
-               options.tracker.association.scale_factor},
+               options.tracker.association.scale_factor, options.mapper.bundle_line_sigma_px,
+               options.mapper.bundle_depth_factor},
               options.mapper.bundle_options, options.bundle_lag, camera, executor),
       closer_(options.loops, camera) {
   if (!options.loops.enabled) return;

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "held_directions.hpp"
-#include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/thumbnail_alignment.hpp"
 
@@ -316,7 +315,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   // goes first.
   constexpr int kStaleFrames = 5;
   const bool stale = lost_frames_ >= kStaleFrames;
-  const Features still = without_shutter(features, turning());
+  const Features still = at_one_moment(frame, features, turning());
   std::optional<TrackResult> found = stale ? by_picture(map, frame, *still) : by_motion(map, frame, *still);
   if (!found) found = stale ? by_motion(map, frame, *still) : by_picture(map, frame, *still);
   if (!found) {
@@ -332,13 +331,6 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   return *std::move(found);
 }
 
-Tracker::Features Tracker::without_shutter(const Features& features, const Eigen::Vector3d& turn_rate) const {
-  if (options_.readout_s == 0.0 || turn_rate.isZero(0.0)) return features;
-  auto still = std::make_shared<features::FrameFeatures>(*features);
-  features::undo_rolling_shutter(*still, camera_, turn_rate, options_.readout_s);
-  return still;
-}
-
 /// The motion model lags behind a turn that changes. Now that the pose is known, so is the turn: where the
 /// difference can be seen, the pose is estimated once more.
 void Tracker::settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
@@ -352,7 +344,7 @@ void Tracker::settle_shutter(const maps::Map& map, const sensor::RgbdFrame& fram
   const Eigen::Vector3d before = turning();
   const Eigen::Vector3d now = before.isZero(0.0) ? mean : Eigen::Vector3d(mean + 0.5 * (mean - before));
   if ((now - before).norm() * 0.5 * options_.readout_s * camera_.fx < kVisible_px) return;
-  const Features still = without_shutter(features, now);
+  const Features still = at_one_moment(frame, features, now);
   TrackResult again = estimate(map, frame, *still, found.camera_from_world, kSecondRadius);
   if (again.state != TrackState::kTracked) return;
   again.relocalised = found.relocalised;

@@ -33,6 +33,8 @@ struct LocalBundleOptions {
   int keyframes = 12;          ///< how many may move
   double max_turn_rate = 0.6;  ///< rad/s; keyframes taken while turning faster are held and silent
   double orb_scale_factor = 1.2;
+  double line_sigma_px = 0.25;  ///< of a line's ends, across it
+  double depth_factor = 2.0;    ///< of the depth noise, for the depth of corners and lines
 };
 
 /// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most

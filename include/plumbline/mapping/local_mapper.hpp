@@ -31,12 +31,18 @@ struct LocalMapperOptions {
   bool bundle = true;
   int bundle_keyframes = 12;
   double bundle_max_turn_rate = 0.6;
+  double bundle_line_sigma_px = 0.25;
+  double bundle_depth_factor = 2.0;
   bool edges = true;
   int edge_keyframes = 5;
   double edge_min_overlap = 0.4;
   optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
-  LocalMapperOptions() { bundle_options.tolerance = 1e-3; }  // the next keyframe's bundle goes on from here
+  LocalMapperOptions() {
+    bundle_options.tolerance = 1e-3;  // the next keyframe's bundle goes on from here
+    bundle_options.point_loss = 1.0;
+    bundle_options.line_loss = 1.0;
+  }
   void declare(core::OptionTable& table);
 };
 

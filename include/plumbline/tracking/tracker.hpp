@@ -60,7 +60,8 @@ struct TrackResult {
   int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
   bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
   bool relocalised = false;
-  /// The frame's features, freed of the rolling shutter: what was matched, and what a keyframe should keep.
+  /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
+  /// what was matched, and what a keyframe should keep.
   std::shared_ptr<const features::FrameFeatures> features;
 };
 
@@ -139,7 +140,8 @@ class Tracker {
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] bool uses_features() const { return options_.points || options_.lines; }
   [[nodiscard]] bool beyond_doubt(const TrackResult& result) const;
-  [[nodiscard]] Features without_shutter(const Features& features, const Eigen::Vector3d& turn_rate) const;
+  [[nodiscard]] Features at_one_moment(const sensor::RgbdFrame& frame, const Features& features,
+                                       const Eigen::Vector3d& turn_rate) const;
   void settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
                       TrackResult& found) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;

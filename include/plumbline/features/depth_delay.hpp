@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Colour and depth images stamped apart: a camera that moves meanwhile sees its corners' depth elsewhere.
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::features {
+
+/// Reads the depth of points anew where the depth camera, `depth_from_camera` beside the colour camera, saw
+/// them, and carries it back: as if both pictures had been taken at once. `depth` (CV_32FC1, metres) is an
+/// image of `camera`. Points without depth stay without; one that loses it there has none afterwards.
+void undo_point_depth_delay(FrameFeatures& features, const cv::Mat& depth, const sensor::Pinhole& camera,
+                            const geometry::Rigid3& depth_from_camera);
+/// The same for lines; dearer, and only keyframes need it.
+void undo_line_depth_delay(FrameFeatures& features, const cv::Mat& depth, const sensor::Pinhole& camera,
+                           const geometry::Rigid3& depth_from_camera, const LineDepthOptions& options = {});
+
+}  // namespace plumbline::features

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// How two keyframes lie to each other as their surfaces say: samples of one are aligned, point to plane, with
+// the depth image of the other (METHOD section 2), for local bundle adjustment.
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::mapping {
+
+struct SurfaceEdgeOptions {
+  double min_overlap = 0.4;  ///< share of a's samples that b's depth must confirm
+  double hold_m = 0.01;      ///< see align_surface_edge
+};
+
+/// `a` lies `b_from_a` before `b`, whose depth image (CV_32FC1, metres) is `depth_of_b`; `depth_from_camera`
+/// carries b's colour camera to its depth camera. The start is held to `hold_m` metres, and as much at the
+/// middle of what both see when turned: along what the surfaces leave open, a wall's length, they would
+/// otherwise slide by decimetres on noise alone, and an edge whose free directions have run away is wrong in
+/// those that are held, too. The edge itself is freed of this hold: where the surfaces say anything it is
+/// what they say. None when they overlap by less than min_overlap.
+std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, core::KeyframeId b,
+                                                    const cv::Mat& depth_of_b,
+                                                    const geometry::Rigid3& b_from_a,
+                                                    const geometry::Rigid3& depth_from_camera,
+                                                    const sensor::Pinhole& camera,
+                                                    const SurfaceEdgeOptions& options);
+
+}  // namespace plumbline::mapping

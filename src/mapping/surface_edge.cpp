@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/surface_edge.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <vector>
+
+#include "plumbline/optimize/pose_solver.hpp"
+#include "plumbline/tracking/association.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using geometry::Matrix6d;
+using geometry::Rigid3;
+using geometry::Vector6d;
+
+constexpr double kHeld = 2500.0;  // information of a standard deviation of 2 cm: less is no hold
+
+std::vector<tracking::WorldSurface> surface_of(const maps::Keyframe& keyframe) {
+  std::vector<tracking::WorldSurface> surface;  // "world" is the keyframe's camera
+  surface.reserve(keyframe.surface.size());
+  for (const maps::SurfaceSample& s : keyframe.surface) {
+    surface.push_back({s.point.cast<double>(), s.normal.cast<double>(), static_cast<double>(s.sigma)});
+  }
+  return surface;
+}
+
+/// Middle of the samples that b's camera sees, in its frame.
+Eigen::Vector3d middle_in_view(const std::vector<tracking::WorldSurface>& surface, const Rigid3& b_from_a,
+                               const sensor::Pinhole& camera) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const tracking::WorldSurface& s : surface) {
+    const Eigen::Vector3d p = b_from_a * s.point;
+    if (p.z() < 0.2 || !camera.contains(camera.project(p))) continue;
+    sum += p;
+    ++count;
+  }
+  return count > 0 ? Eigen::Vector3d(sum / count) : sum;
+}
+
+/// The start, known to hold_m at `middle` and to hold_m at a metre from it: xi = (rho, phi) moves the middle
+/// by rho + phi x middle.
+optimize::PosePrior hold(const Rigid3& start, const Eigen::Vector3d& middle, double hold_m) {
+  Matrix6d at_middle = Matrix6d::Identity();
+  at_middle.topRightCorner<3, 3>() = -geometry::skew(middle);
+  return {start, at_middle.transpose() * at_middle / (hold_m * hold_m)};
+}
+
+/// At the solution with the hold both pull alike: one step on, in what the surfaces hold, is without it.
+Rigid3 without_hold(const Rigid3& held, const optimize::PosePrior& prior, const Matrix6d& information) {
+  const Vector6d pull =
+      prior.information * geometry::log_se3(held * prior.camera_from_world.inverse());  // of the prior
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
+  Vector6d step = Vector6d::Zero();
+  for (int i = 0; i < 6; ++i) {
+    if (eigen.eigenvalues()(i) < kHeld) continue;
+    step += eigen.eigenvectors().col(i) * (eigen.eigenvectors().col(i).dot(pull) / eigen.eigenvalues()(i));
+  }
+  return geometry::exp_se3(step) * held;
+}
+
+}  // namespace
+
+std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, core::KeyframeId b,
+                                                    const cv::Mat& depth_of_b, const Rigid3& b_from_a,
+                                                    const Rigid3& depth_from_camera,
+                                                    const sensor::Pinhole& camera,
+                                                    const SurfaceEdgeOptions& options) {
+  if (a.surface.empty()) return std::nullopt;
+  const std::vector<tracking::WorldSurface> surface = surface_of(a);
+  optimize::PoseProblem problem;
+  problem.camera = camera;
+  problem.prior = hold(b_from_a, middle_in_view(surface, b_from_a, camera), options.hold_m);
+  optimize::PoseSolverOptions solver;
+  solver.max_iterations = 3;
+  optimize::PoseSummary summary;
+  Rigid3 pose = b_from_a;
+  for (const double distance : {0.08, 0.05, 0.03, 0.03, 0.03}) {
+    tracking::SurfaceAssociationOptions association;
+    association.max_distance_m = distance;
+    problem.planes =
+        tracking::associate_surface(surface, depth_of_b, camera, pose, depth_from_camera, association);
+    summary = optimize::solve_pose(problem, pose, solver);
+    pose = summary.camera_from_world;
+  }
+  const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());
+  if (overlap < options.min_overlap) return std::nullopt;
+  return maps::SurfaceEdge{a.id,
+                           b,
+                           without_hold(pose, *problem.prior, summary.information),
+                           summary.information,
+                           overlap,
+                           summary.planes.rms};
+}
+
+}  // namespace plumbline::mapping
