@@ -54,20 +54,9 @@ class Aligner {
 
   SurfaceAlignment run(const Rigid3& start) {
     result_.b_from_a = start;
-    choose_samples();
-    double distance = options_.distance_m;
-    for (result_.iterations = 1; result_.iterations <= options_.max_iterations; ++result_.iterations) {
-      match(distance);
-      if (matches_.size() < kFewest) return refuse("the surfaces do not meet");
-      narrow_ = distance <= 0.5 * options_.distance_m;
-      const Vector6d step = solve();
-      result_.b_from_a = geometry::exp_se3(step) * result_.b_from_a;
-      const double moved =
-          (step.head<3>() + step.tail<3>().cross(centre_)).norm() + lever_ * step.tail<3>().norm();
-      if (narrow_ && moved < kStill_m) break;
-      if (moved < 0.02 * options_.distance_m) distance = 0.5 * options_.distance_m;
-    }
-    if (result_.iterations > options_.max_iterations) return refuse("it did not converge");
+    if (!settle()) return result_;
+    // Of surfaces that lay far apart few samples were in reach. Now that they meet, more are.
+    if (moved_since(start) > kFar * options_.distance_m && !settle()) return result_;
     match(0.5 * options_.distance_m);
     if (matches_.size() < kFewest) return refuse("the surfaces do not meet");
     judge(start);
@@ -78,6 +67,34 @@ class Aligner {
   static constexpr std::size_t kFewest = 100;
   static constexpr std::size_t kTried = 3000;  ///< of each surface's samples, when samples are chosen
   static constexpr double kStill_m = 1e-4;
+  static constexpr double kFar = 0.3;  ///< of the distance between matches
+
+  /// ICP from where the surfaces lie now; false: refused.
+  bool settle() {
+    choose_samples();
+    double distance = options_.distance_m;
+    for (int round = 1; round <= options_.max_iterations; ++round) {
+      ++result_.iterations;
+      match(distance);
+      if (matches_.size() < kFewest) {
+        refuse("the surfaces do not meet");
+        return false;
+      }
+      narrow_ = distance <= 0.5 * options_.distance_m;
+      const Vector6d step = solve();
+      result_.b_from_a = geometry::exp_se3(step) * result_.b_from_a;
+      const double moved =
+          (step.head<3>() + step.tail<3>().cross(centre_)).norm() + lever_ * step.tail<3>().norm();
+      if (narrow_ && moved < kStill_m) return true;
+      if (moved < 0.02 * options_.distance_m) distance = 0.5 * options_.distance_m;
+    }
+    refuse("it did not converge");
+    return false;
+  }
+  /// How far the middle of the matched samples has moved.
+  [[nodiscard]] double moved_since(const Rigid3& start) const {
+    return (centre_ - start * (result_.b_from_a.inverse() * centre_)).norm();
+  }
 
   SurfaceAlignment refuse(const char* why) {
     result_.refused = why;

@@ -73,6 +73,17 @@ TEST(AlignSurfaces, FindsTheStepBetweenTwoViewsOfOneCorner) {
   }
 }
 
+TEST(AlignSurfaces, OverlapIsThatOfTheEndHoweverFarApartItBegan) {
+  Random random(7);
+  const SurfaceIndex a(dead_end(random), 0.1);
+  const SurfaceIndex b(dead_end(random), 0.1);
+  const SurfaceAlignment found =
+      align_surfaces(a, b, Rigid3(geometry::exp_so3({0.0, 0.0, 0.02}), {0.09, 0.11, 0.03}), {});
+  EXPECT_EQ(found.refused, "");
+  EXPECT_GT(found.overlap, 0.8);
+  EXPECT_LT(found.b_from_a.translation.norm(), 0.002);
+}
+
 TEST(AlignSurfaces, ACorridorDoesNotSlide) {
   Random random(2);
   const SurfaceIndex a(corridor(random), 0.1);
