@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "plumbline/mapping/local_bundle.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {
@@ -81,6 +82,18 @@ TEST(LocalBundle, PutsAKeyframeAndItsLandmarksBackInPlace) {
   for (core::PointId id : world.map.point_ids()) {
     if (id == world.single) continue;
     EXPECT_LT((world.map.point(id).position - world.points[static_cast<std::size_t>(id.index)]).norm(), 2e-3);
+  }
+}
+
+TEST(LocalBundle, DepthIsBelievedLessThanItsNoiseSays) {
+  SmallMap world;
+  LocalBundleOptions options;
+  options.depth_factor = 3.0;
+  const LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, options);
+  ASSERT_FALSE(bundle.problem.point_observations.empty());
+  for (const auto& seen : bundle.problem.point_observations) {
+    ASSERT_GT(seen.depth, 0.0);
+    EXPECT_DOUBLE_EQ(seen.depth_sigma, 3.0 * sensor::depth_sigma(seen.depth));
   }
 }
 
