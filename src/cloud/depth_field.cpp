@@ -228,27 +228,32 @@ DepthField::Terms DepthField::monomials(double x, double y) {
 
 void DepthField::correct(Cloud& camera_cloud) const {
   if (identity()) return;
-  constexpr double kStep = 1e-3;
+  const Eigen::Matrix<float, kTerms, 1> c = coefficients_.cast<float>();
   for (Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F)) continue;
-    const double z = p.z;
-    const double x = p.x / z;
-    const double y = p.y / z;
-    const double b = std::clamp(beta(x, y), -0.5 / z, 0.5 / z);
-    const auto scale = static_cast<float>(1.0 / (1.0 + b * z));
+    const float x = p.x / p.z;
+    const float y = p.y / p.z;
+    // The polynomial and its slopes, by powers of x.
+    const float of_1 = y * y * (c[2] + y * (c[6] + y * c[11]));
+    const float of_x = y * (c[1] + y * (c[5] + y * c[10]));
+    const float of_xx = c[0] + y * (c[4] + y * c[9]);
+    const float of_xxx = c[3] + y * c[8];
+    const float exact = of_1 + x * (of_x + x * (of_xx + x * (of_xxx + x * c[7])));
+    const float b = std::clamp(exact, -0.5F / p.z, 0.5F / p.z);
     if (std::isfinite(p.normal_x)) {
       // A plane is a x + b y + c = 1 / z; its normal lies along (a, b, c).
-      Eigen::Vector3d n = p.getNormalVector3fMap().cast<double>();
-      const double along = n.dot(p.getVector3fMap().cast<double>());
-      if (std::abs(along) > 1e-3 * z) {
-        const double bx = (beta(x + kStep, y) - beta(x - kStep, y)) / (2.0 * kStep);
-        const double by = (beta(x, y + kStep) - beta(x, y - kStep)) / (2.0 * kStep);
-        const Eigen::Vector3d turned = n / along + Eigen::Vector3d(bx, by, b - x * bx - y * by);
-        n = turned.normalized() * (along > 0.0 ? 1.0 : -1.0);
-        p.getNormalVector3fMap() = n.cast<float>();
+      const float along = p.getNormalVector3fMap().dot(p.getVector3fMap());
+      if (std::abs(along) > 1e-3F * p.z) {
+        const float slope_x = of_x + x * (2.0F * of_xx + x * (3.0F * of_xxx + x * 4.0F * c[7]));
+        const float slope_y =
+            y * (2.0F * c[2] + y * (3.0F * c[6] + y * 4.0F * c[11])) +
+            x * (c[1] + y * (2.0F * c[5] + y * 3.0F * c[10]) + x * (c[4] + y * 2.0F * c[9] + x * c[8]));
+        const Eigen::Vector3f turned = p.getNormalVector3fMap() / along +
+                                       Eigen::Vector3f(slope_x, slope_y, b - x * slope_x - y * slope_y);
+        p.getNormalVector3fMap() = turned * ((along > 0.0F ? 1.0F : -1.0F) / turned.norm());
       }
     }
-    p.getVector3fMap() *= scale;
+    p.getVector3fMap() *= 1.0F / (1.0F + b * p.z);
   }
 }
 
