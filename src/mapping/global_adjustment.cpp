@@ -118,6 +118,8 @@ class GlobalBuilder {
     const double ratio = map_.keyframe(id).turn_rate / options_.turn_rate;
     return std::hypot(1.0, ratio * ratio);
   }
+  /// The same for its depth.
+  [[nodiscard]] double depth_trust(KeyframeId id) const { return options_.depth_factor * unrest(id); }
   bool wanted(const std::vector<maps::Observation>& seen, int enough) {
     bool any = false;
     for (const maps::Observation& o : seen) {
@@ -149,7 +151,7 @@ class GlobalBuilder {
       seen.pixel_sigma = unrest(o.keyframe) * std::pow(options_.orb_scale_factor, f.octave);
       seen.pixel = pixel(o.keyframe, f.pixel, seen.pixel_sigma);
       seen.depth = static_cast<double>(f.depth);
-      seen.depth_sigma = f.depth > 0.0F ? unrest(o.keyframe) * sensor::depth_sigma(seen.depth) : 1.0;
+      seen.depth_sigma = f.depth > 0.0F ? depth_trust(o.keyframe) * sensor::depth_sigma(seen.depth) : 1.0;
       bundle_.problem.point_observations.push_back(seen);
       bundle_.point_seen.push_back(o.keyframe);
     }
@@ -164,7 +166,7 @@ class GlobalBuilder {
       optimize::BundleLineObservation seen;
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
-      seen.pixel_sigma = 0.6 * unrest(o.keyframe);
+      seen.pixel_sigma = options_.line_sigma_px * unrest(o.keyframe);
       double sigma = seen.pixel_sigma;
       seen.start = pixel(o.keyframe, f.segment.start, seen.pixel_sigma);
       seen.end = pixel(o.keyframe, f.segment.end, sigma);
@@ -172,10 +174,10 @@ class GlobalBuilder {
         seen.has_depth = true;
         seen.start_camera = f.line3->start;
         seen.end_camera = f.line3->end;
-        seen.start_sigma = unrest(o.keyframe) *
+        seen.start_sigma = depth_trust(o.keyframe) *
                            std::max(0.003, features::endpoint_sigma(f.line3->start, f.line3->start_noise));
-        seen.end_sigma =
-            unrest(o.keyframe) * std::max(0.003, features::endpoint_sigma(f.line3->end, f.line3->end_noise));
+        seen.end_sigma = depth_trust(o.keyframe) *
+                         std::max(0.003, features::endpoint_sigma(f.line3->end, f.line3->end_noise));
       }
       bundle_.problem.line_observations.push_back(seen);
       bundle_.line_seen.push_back(o.keyframe);
@@ -265,6 +267,8 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
 GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
+  bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
+  bundle_options.line_loss = 1.0;
 }
 
 void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
@@ -280,6 +284,11 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
   table.number("adjust.first_gate", first_gate, {0.0, 1000.0}, "",
                "Observations further off than so many standard deviations where the pose graph has put the "
                "keyframes wait for the second round: those that caused a drift would restore it; 0: none");
+  table.number("adjust.line_sigma", line_sigma_px, {0.01, 10.0}, "px",
+               "Standard deviation of a line's ends across it");
+  table.number(
+      "adjust.depth_factor", depth_factor, {0.1, 100.0}, "",
+      "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");
   table.number("adjust.turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",

@@ -66,6 +66,8 @@ struct GlobalAdjustmentOptions {
   /// it.
   double turn_rate = 0.4;
   double orb_scale_factor = 1.2;
+  double line_sigma_px = 0.25;  ///< of a line's ends, across it
+  double depth_factor = 2.0;    ///< of the depth noise, for the depth of corners and lines
   double surface_weight = 0.3;  ///< of the map's surface edges: their samples are alike from one to the next
   /// Standard deviations. Where a tracker slid along a wall, it is the landmarks of that moment that agree on
   /// it, all alike: in a bundle they would undo what edges from elsewhere have corrected. What is further off
