@@ -40,7 +40,9 @@ struct LandmarkWorld {
   /// Feature i is point i, line feature i is line i; nothing is observed yet.
   core::KeyframeId add_keyframe(const geometry::Rigid3& camera_from_world, double turn_rate = 0.0) {
     auto features = std::make_shared<features::FrameFeatures>();
-    const auto noise = [&] { return Eigen::Vector2d(random_.normal(), random_.normal()) * pixel_noise; };
+    const auto noise = [&]() -> Eigen::Vector2d {
+      return Eigen::Vector2d(random_.normal(), random_.normal()) * pixel_noise;
+    };
     for (const Eigen::Vector3d& p : points) {
       const Eigen::Vector3d c = camera_from_world * p;
       features::PointFeature f;
