@@ -8,8 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <optional>
 #include <utility>
 
 #include "plumbline/cloud/free_space.hpp"

@@ -69,9 +69,9 @@ class Tracker {
  public:
   Tracker(const TrackerOptions& options, const sensor::Pinhole& camera);
 
+  using Features = std::shared_ptr<const features::FrameFeatures>;
   /// The frame is localised against `map`; `reference` is the keyframe whose surroundings are expected in
   /// view. An empty map gives kInitialising.
-  using Features = std::shared_ptr<const features::FrameFeatures>;
   TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
 
   /// Replaces the option; before the first frame.
