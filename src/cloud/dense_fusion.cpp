@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -17,19 +18,28 @@
 namespace plumbline::cloud {
 namespace {
 
-constexpr double kCell_m = 0.1;  ///< of plans and colours; also the margin of tiles
-constexpr std::size_t kTilesAtATime = 4;
+constexpr double kCell_m = 0.1;            ///< of plans and colours; also the margin of tiles
+constexpr std::size_t kTilesAtATime = 64;  ///< at most: a bit each
 
 /// Edge of the blocks of sheets: wide enough for a plane through noise, narrow enough for furniture.
 double block_m(double voxel_m) { return std::max(0.02, 2.0 * voxel_m); }
 
-/// Occupied cells that a tile of `tile_mb` may hold.
-std::size_t cells_per_tile(const DenseFusionOptions& options) {
-  constexpr double kBytesPerSide = 220.0;  // in the voxel map, extracted, and in sheets
-  constexpr double kLayers = 1.2;          // occupied voxels per voxel of a cell's side
+/// Occupied cells that `megabytes` hold at so many bytes for one side of a voxel.
+std::size_t cells_within(double megabytes, double bytes_per_side, const DenseFusionOptions& options) {
+  constexpr double kLayers = 1.2;  // occupied voxels per voxel of a cell's side
   const double per_axis = std::max(1.0, kCell_m / options.voxels.voxel_m);
-  const double bytes_per_cell = kLayers * per_axis * per_axis * kBytesPerSide;
-  return static_cast<std::size_t>(std::max(64.0, options.tile_mb * 1e6 / bytes_per_cell));
+  return static_cast<std::size_t>(
+      std::max(64.0, megabytes * 1e6 / (kLayers * per_axis * per_axis * bytes_per_side)));
+}
+
+/// Of a tile that is being finished: in the voxel map, extracted, and in sheets.
+std::size_t cells_per_tile(const DenseFusionOptions& options) {
+  return cells_within(options.tile_mb, 220.0, options);
+}
+
+/// Of the tiles that are filled together, in the voxel maps.
+std::size_t cells_at_a_time(const DenseFusionOptions& options) {
+  return cells_within(4.0 * options.tile_mb, 110.0, options);
 }
 
 /// The first error in the order of the items, if any.
@@ -54,6 +64,9 @@ FusedCloud chosen(const FusedCloud& points, const Keep& keep) {
     result.spread_m.push_back(points.spread_m[i]);
     result.weight.push_back(points.weight[i]);
     result.noise_m.push_back(points.noise_m[i]);
+    if (points.robot_lead.empty()) continue;
+    result.columns.robot.push_back(points.columns.robot[i]);
+    result.robot_lead.push_back(points.robot_lead[i]);
   }
   return result;
 }
@@ -76,6 +89,8 @@ FusedCloud joined(std::vector<FusedCloud>&& parts) {
   };
   join([](FusedCloud & f) -> auto& { return f.columns.observations; });
   join([](FusedCloud & f) -> auto& { return f.columns.confidence; });
+  join([](FusedCloud & f) -> auto& { return f.columns.robot; });
+  join([](FusedCloud & f) -> auto& { return f.robot_lead; });
   join([](FusedCloud & f) -> auto& { return f.spread_m; });
   join([](FusedCloud & f) -> auto& { return f.weight; });
   join([](FusedCloud & f) -> auto& { return f.noise_m; });
@@ -89,15 +104,28 @@ FusedCloud joined(std::vector<FusedCloud>&& parts) {
 class Fusion {
  public:
   Fusion(const std::vector<geometry::Rigid3>& world_from_camera, const ReadView& read,
-         const std::vector<sensor::Pinhole>& cameras, const DenseFusionOptions& options,
-         const core::Executor& executor)
-      : poses_(world_from_camera), read_(read), cameras_(cameras), options_(options), executor_(executor) {}
+         const std::vector<sensor::Pinhole>& cameras, const std::vector<std::uint8_t>& robots,
+         const DenseFusionOptions& options, const core::Executor& executor)
+      : poses_(world_from_camera),
+        read_(read),
+        cameras_(cameras),
+        robots_(robots),
+        options_(options),
+        executor_(executor) {
+    options_.voxels.robots = !robots.empty();
+  }
 
   core::Result<FusedCloud> run(FusionReport& report) {
     if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
     std::vector<FusedCloud> all;
-    for (std::size_t first = 0; first < tiles_.size(); first += kTilesAtATime) {
-      const std::size_t count = std::min(kTilesAtATime, tiles_.size() - first);
+    const std::size_t most_cells = cells_at_a_time(options_);
+    for (std::size_t first = 0, count = 0; first < tiles_.size(); first += count) {
+      count = 1;
+      std::size_t cells = tiles_[first].occupied;
+      while (count < kTilesAtATime && first + count < tiles_.size() &&
+             cells + tiles_[first + count].occupied <= most_cells) {
+        cells += tiles_[first + count++].occupied;
+      }
       std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
       if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
       std::vector<FusedCloud> parts(count);
@@ -145,6 +173,18 @@ class Fusion {
     return {};
   }
 
+  /// A view on its way into voxels: samples, and the tiles that runs of them belong to.
+  struct Run {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+    std::uint64_t tiles = 0;  ///< a bit each
+  };
+  struct LaidView {
+    ViewSamples view;
+    std::vector<Run> runs;
+    std::optional<core::Error> error;
+  };
+
   /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
   /// for all of these tiles, and every tile takes the views in their order.
   core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) const {
@@ -156,39 +196,97 @@ class Fusion {
     std::sort(views.begin(), views.end());
     views.erase(std::unique(views.begin(), views.end()), views.end());
     // The next views are read while the last ones are laid down.
-    std::vector<core::Result<CloudPtr>> clouds, next;
-    for (std::size_t begin = 0, end = 0; end < views.size() || !clouds.empty();) {
-      next.clear();
-      next.resize(std::min(kViewsAtATime, views.size() - end));
+    std::vector<LaidView> laid, next;
+    for (std::size_t at = 0; at < views.size() || !laid.empty();) {
+      next = std::vector<LaidView>(std::min(kViewsAtATime, views.size() - at));
       executor_.parallel_for(voxels.size() + next.size(), [&](std::size_t i) {
         if (i < voxels.size()) {
-          lay_down(tiles_[first + i], views.data() + begin, clouds, voxels[i]);
-          return;
+          lay_down(i, laid, voxels[i]);
+        } else {
+          next[i - voxels.size()] = laid_view(views[at + i - voxels.size()], first, voxels.size());
         }
-        i -= voxels.size();
-        next[i] = read_(views[end + i]);
-        if (next[i] && !gains_.empty()) apply_gain(**next[i], gains_[views[end + i]]);
       });
-      if (const auto error = first_error(next)) return tl::unexpected<core::Error>(*error);
-      begin = end;
-      end += next.size();
-      clouds.swap(next);
+      for (const LaidView& view : next) {
+        if (view.error) return tl::unexpected<core::Error>(*view.error);
+      }
+      at += next.size();
+      laid.swap(next);
     }
     return {};
   }
 
-  void lay_down(const FusionTile& tile, const std::uint32_t* views,
-                const std::vector<core::Result<CloudPtr>>& clouds, VoxelMap& voxels) const {
-    const Eigen::AlignedBox3d region = with_margin(tile.box(kCell_m));
-    for (std::size_t i = 0; i < clouds.size(); ++i) {
-      if (!std::binary_search(tile.views.begin(), tile.views.end(), views[i])) continue;
-      voxels.insert(**clouds[i], poses_[views[i]], &region);
+  [[nodiscard]] LaidView laid_view(std::uint32_t v, std::size_t first, std::size_t tiles) const {
+    LaidView laid;
+    const auto cloud = read_(v);
+    if (!cloud) {
+      laid.error = cloud.error();
+      return laid;
     }
+    if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
+    laid.view = VoxelMap::sampled(**cloud, poses_[v], options_.voxels, robots_.empty() ? 0 : robots_[v]);
+    std::uint64_t reached = 0;
+    for (std::size_t k = 0; k < tiles; ++k) {
+      const std::vector<std::uint32_t>& of_tile = tiles_[first + k].views;
+      if (std::binary_search(of_tile.begin(), of_tile.end(), v)) reached |= std::uint64_t{1} << k;
+    }
+    // Neighbours in a picture mostly share their cell.
+    const double per_m = 1.0 / kCell_m;
+    Eigen::Vector3i last = Eigen::Vector3i::Constant(std::numeric_limits<int>::min());
+    std::uint64_t bits = 0;
+    const std::vector<VoxelSample>& samples = laid.view.samples;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const Eigen::Vector3d at =
+          (((VoxelMap::voxel_of(samples[i]).cast<double>().array() + 0.5) * options_.voxels.voxel_m)
+               .matrix() +
+           samples[i].offset.cast<double>()) *
+          per_m;
+      const Eigen::Vector3i cell = whole(at);
+      if (cell != last) {
+        last = cell;
+        bits = tiles_around(cell, first, reached);
+      }
+      if (laid.runs.empty() || laid.runs.back().tiles != bits) laid.runs.push_back({i, i, bits});
+      laid.runs.back().end = i + 1;
+    }
+    return laid;
   }
 
-  static Eigen::AlignedBox3d with_margin(const Eigen::AlignedBox3d& box) {
-    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCell_m);
-    return {box.min() - margin, box.max() + margin};
+  static Eigen::Vector3i whole(const Eigen::Vector3d& at) {
+    Eigen::Vector3i cell = at.cast<int>();
+    for (int axis = 0; axis < 3; ++axis) cell[axis] -= at[axis] < static_cast<double>(cell[axis]) ? 1 : 0;
+    return cell;
+  }
+
+  /// Of the tiles from `first` on that `reached` names, those that hold the cell or have it in their margin.
+  [[nodiscard]] std::uint64_t tiles_around(const Eigen::Vector3i& cell, std::size_t first,
+                                           std::uint64_t reached) const {
+    std::uint64_t bits = 0;
+    for (std::size_t k = 0; reached >> k != 0; ++k) {
+      if ((reached >> k & 1U) == 0) continue;
+      const Eigen::AlignedBox3i& box = tiles_[first + k].cells;
+      const bool inside = ((cell - box.min()).array() >= -1).all() && ((cell - box.max()).array() <= 1).all();
+      if (inside) bits |= std::uint64_t{1} << k;
+      if (k == 63) break;
+    }
+    return bits;
+  }
+
+  static void lay_down(std::size_t tile, const std::vector<LaidView>& laid, VoxelMap& voxels) {
+    for (const LaidView& view : laid) {
+      voxels.begin_view();
+      const VoxelSample* samples = view.view.samples.data();
+      std::size_t begin = 0;
+      std::size_t end = 0;  // of runs that follow one another
+      for (const Run& run : view.runs) {
+        if ((run.tiles >> tile & 1U) == 0) continue;
+        if (run.begin != end) {
+          voxels.add(samples + begin, end - begin);
+          begin = run.begin;
+        }
+        end = run.end;
+      }
+      voxels.add(samples + begin, end - begin);
+    }
   }
 
   /// The points of a tile; `voxels` is used up.
@@ -233,7 +331,8 @@ class Fusion {
   const std::vector<geometry::Rigid3>& poses_;
   const ReadView& read_;
   const std::vector<sensor::Pinhole>& cameras_;
-  const DenseFusionOptions& options_;
+  const std::vector<std::uint8_t>& robots_;  ///< by view; empty: one robot
+  DenseFusionOptions options_;
   const core::Executor& executor_;
   std::vector<FusionTile> tiles_;
   std::vector<DepthRaster> rasters_;    ///< by view
@@ -253,8 +352,9 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
   table.boolean("exposure", exposure, "Even out colours between keyframes");
   table.integer("min_support", min_support, {0, 1000}, "",
                 "Points with fewer others around that face the same way are dust and go; 0: none");
-  table.number("tile_mb", tile_mb, {16.0, 100000.0}, "",
-               "Memory that one tile of the map may take, MB; four are worked on at a time");
+  table.number(
+      "tile_mb", tile_mb, {16.0, 100000.0}, "",
+      "Memory that one tile of the map may take, MB; as many as fill four times that are filled together");
 }
 
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
@@ -268,9 +368,9 @@ core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_f
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
                                     const ReadView& read, const std::vector<sensor::Pinhole>& cameras,
                                     const DenseFusionOptions& options, const core::Executor& executor,
-                                    FusionReport* report) {
+                                    FusionReport* report, const std::vector<std::uint8_t>& robots) {
   FusionReport unused;
-  return Fusion(world_from_camera, read, cameras, options, executor)
+  return Fusion(world_from_camera, read, cameras, robots, options, executor)
       .run(report == nullptr ? unused : *report);
 }
 

@@ -22,7 +22,7 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, std::size_t m
   const Eigen::Vector3i size = box.sizes();
   size.maxCoeff(&axis);
   if (count <= most_cells || size[axis] == 0) {
-    tiles.push_back({box, {}});
+    tiles.push_back({box, count, {}});
     return;
   }
   const auto by_axis = [axis](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {

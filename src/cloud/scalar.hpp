@@ -106,7 +106,7 @@ inline std::optional<std::uint64_t> parse_count(const std::string& word) {
 /// Nearest byte; NaN becomes 0.
 inline std::uint8_t to_byte(double value) {
   if (!(value > 0.0)) return 0;
-  return value >= 255.0 ? std::uint8_t{255} : static_cast<std::uint8_t>(std::lround(value));
+  return value >= 255.0 ? std::uint8_t{255} : static_cast<std::uint8_t>(value + 0.5);
 }
 
 }  // namespace plumbline::cloud

@@ -11,14 +11,12 @@
 #include "plumbline/sensor/depth_noise.hpp"
 #include "scalar.hpp"
 #include "voxel_key.hpp"
+#include "voxel_sample.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
-constexpr int kAxisBits = 21;
-constexpr std::int64_t kHalf = std::int64_t{1} << (kAxisBits - 1);
 constexpr std::size_t kFirstTable = 1024;
-constexpr float kOpposed = -0.2F;  // a fold of up to 100 degrees is still one side
 
 /// The bits of a key that tell the voxels of a block of 2 x 2 x 2 and their sides apart.
 constexpr std::uint64_t kBlockBits =
@@ -41,19 +39,6 @@ void VoxelExtractOptions::declare(core::OptionTable& table) {
   table.integer("min_observations", min_observations, {1, 1000}, "", "Views that must have seen a voxel");
 }
 
-/// One measurement, or one fused side of another map, in this map's frame.
-struct VoxelMap::Sample {
-  std::uint64_t key = 0;
-  Eigen::Vector3f offset{0, 0, 0};  ///< from the voxel's centre
-  Eigen::Vector3f normal{0, 0, 0};  ///< unit: the normal, or the direction to the camera
-  Eigen::Vector3f color{0, 0, 0};
-  float weight = 0.0F;
-  float scatter = 0.0F;            ///< within the sample itself
-  float variance = 0.0F;           ///< weight times the sensor's variance
-  std::uint32_t observations = 1;  ///< views it stands for
-  bool normal_known = false;
-};
-
 VoxelMap::VoxelMap(const VoxelMapOptions& options) : options_(options), table_(kFirstTable, 0) {}
 
 void VoxelMap::clear() {
@@ -65,22 +50,6 @@ void VoxelMap::clear() {
 
 std::size_t VoxelMap::bytes() const {
   return sides_.capacity() * sizeof(Side) + table_.capacity() * sizeof(std::uint32_t);
-}
-
-bool VoxelMap::locate(const Eigen::Vector3d& position, Sample& sample) {
-  sample.key = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double cell = std::floor(position[axis] / options_.voxel_m);
-    if (!(cell >= static_cast<double>(-kHalf) && cell < static_cast<double>(kHalf))) {
-      ++dropped_;
-      return false;
-    }
-    sample.offset[axis] = static_cast<float>(position[axis] - (cell + 0.5) * options_.voxel_m);
-    sample.key =
-        sample.key << kAxisBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + kHalf);
-  }
-  sample.key <<= 1;  // the lowest bit is the side
-  return true;
 }
 
 /// Where the search for a key starts. The voxels of a block share a cache line of the table.
@@ -114,13 +83,13 @@ VoxelMap::Side* VoxelMap::find_or_add(std::uint64_t key) {
   return &sides_.back();
 }
 
-void VoxelMap::add_all(const std::vector<Sample>& samples) {
+void VoxelMap::add(const VoxelSample* samples, std::size_t count) {
   // A large map lies outside the caches: ask for table and voxels a few samples ahead.
   constexpr std::size_t kTableAhead = 24;
   constexpr std::size_t kSideAhead = 12;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (i + kTableAhead < samples.size()) __builtin_prefetch(&table_[home(samples[i + kTableAhead].key)]);
-    if (i + kSideAhead < samples.size()) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i + kTableAhead < count) __builtin_prefetch(&table_[home(samples[i + kTableAhead].key)]);
+    if (i + kSideAhead < count) {
       const std::uint32_t side = table_[home(samples[i + kSideAhead].key)];
       if (side != 0) __builtin_prefetch(&sides_[side - 1]);
     }
@@ -128,9 +97,10 @@ void VoxelMap::add_all(const std::vector<Sample>& samples) {
   }
 }
 
-void VoxelMap::add(const Sample& sample) {
+void VoxelMap::add(const VoxelSample& sample) {
   Side* side = find_or_add(sample.key);
-  if (side->weight > 0.0F && side->normal.dot(sample.normal) < kOpposed * side->normal.norm()) {
+  if (side->weight > 0.0F &&
+      side->normal.dot(sample.normal) < kOpposed * side->normal.norm() * sample.normal.norm()) {
     side = find_or_add(sample.key | 1U);
   }
   const float total = side->weight + sample.weight;
@@ -142,17 +112,18 @@ void VoxelMap::add(const Sample& sample) {
     const float distance = before.dot(side->normal);
     if (squared > 0.0F) side->scatter += distance * distance / squared * side->weight * share;
   }
-  if (side->weight == 0.0F || (sample.normal_known && side->normal_known == 0)) {
-    side->normal = sample.weight * sample.normal;
-    side->normal_known = sample.normal_known ? 1U : 0U;
-  } else if (sample.normal_known) {
-    side->normal += sample.weight * sample.normal;
+  if (side->weight == 0.0F || (sample.normal_known != 0 && side->normal_known == 0)) {
+    side->normal = sample.normal;
+    side->normal_known = sample.normal_known;
+  } else if (sample.normal_known != 0) {
+    side->normal += sample.normal;
   }
   side->scatter += sample.scatter;
   side->variance += sample.variance;
   side->mean += share * before;
   side->color += share * (sample.color - side->color);
   side->weight = total;
+  vote(sample.robot, sample.robot_lead, *side);
   // Several samples of one view are one observation (of a merged map: those of its most seen voxel).
   if (side->last_view != view_) side->last_observations = 0;
   side->last_view = view_;
@@ -162,50 +133,47 @@ void VoxelMap::add(const Sample& sample) {
   }
 }
 
+Eigen::Vector3i VoxelMap::voxel_of(const VoxelSample& sample) {
+  constexpr std::uint64_t kMask = (std::uint64_t{1} << kAxisBits) - 1;
+  const std::uint64_t cells = sample.key >> 1;
+  const auto axis = [&](int shift) {
+    return static_cast<int>(static_cast<std::int64_t>(cells >> shift & kMask) - kHalf);
+  };
+  return {axis(2 * kAxisBits), axis(kAxisBits), axis(0)};
+}
+
 void VoxelMap::insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud,
                       const Eigen::AlignedBox3d* region) {
-  ++view_;
-  const double unit = sensor::depth_sigma(1.0);
-  std::vector<Sample> samples;
-  samples.reserve(camera_cloud.size());
-  for (const Point& p : camera_cloud.points) {
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !(p.z > 0.0F) || !std::isfinite(p.z)) continue;
-    const Eigen::Vector3d point(p.x, p.y, p.z);
-    const Eigen::Vector3d in_world = world_from_cloud * point;
-    if (region != nullptr && !region->contains(in_world)) continue;
-    const Eigen::Vector3d to_camera = -point.normalized();
-    Eigen::Vector3d normal(p.normal_x, p.normal_y, p.normal_z);
-    Sample sample;
-    sample.normal_known = normal.allFinite() && normal.squaredNorm() > 0.25;
-    double cosine = 0.5;
-    if (sample.normal_known) {
-      normal.normalize();
-      cosine = std::abs(normal.dot(to_camera));
-      if (cosine < options_.min_cos_incidence) continue;
-    }
-    if (!locate(in_world, sample)) continue;
-    const double sigma = sensor::depth_sigma(point.z());
-    const double ratio = unit / sigma;
-    sample.normal = (world_from_cloud.rotation * (sample.normal_known ? normal : to_camera)).cast<float>();
-    sample.color = Eigen::Vector3f(p.r, p.g, p.b);
-    sample.weight = static_cast<float>(std::max(cosine, 1e-3) * ratio * ratio);
-    sample.variance = sample.weight * static_cast<float>(sigma * sigma);
-    samples.push_back(sample);
+  ViewSamples view = sampled(camera_cloud, world_from_cloud, options_);
+  std::vector<VoxelSample>& samples = view.samples;
+  if (region != nullptr) {
+    const auto outside = [&](const VoxelSample& s) {
+      const Eigen::Vector3d centre = (voxel_of(s).cast<double>().array() + 0.5) * options_.voxel_m;
+      return !region->contains(centre + s.offset.cast<double>());
+    };
+    samples.erase(std::remove_if(samples.begin(), samples.end(), outside), samples.end());
   }
-  add_all(samples);
+  dropped_ += view.dropped;
+  begin_view();
+  add(samples.data(), samples.size());
 }
 
 void VoxelMap::merge(const VoxelMap& other, const geometry::Rigid3& this_from_other) {
   const Eigen::Matrix3f rotation = this_from_other.rotation.cast<float>();
   ++view_;
-  std::vector<Sample> samples;
+  std::vector<VoxelSample> samples;
   samples.reserve(other.sides_.size());
   for (const Side& side : other.sides_) {
     if (!(side.weight > 0.0F)) continue;
-    Sample sample;
-    if (!locate(this_from_other * other.position(side), sample)) continue;
-    sample.normal = rotation * side.normal.normalized();
-    sample.normal_known = side.normal_known != 0;
+    VoxelSample sample;
+    if (!locate(this_from_other * other.position(side), options_.voxel_m, sample)) {
+      ++dropped_;
+      continue;
+    }
+    sample.normal = side.weight * (rotation * side.normal.normalized());
+    sample.normal_known = side.normal_known;
+    sample.robot = side.robot;
+    sample.robot_lead = side.robot_lead;
     sample.color = side.color;
     sample.weight = side.weight;
     sample.scatter = side.scatter;
@@ -213,20 +181,29 @@ void VoxelMap::merge(const VoxelMap& other, const geometry::Rigid3& this_from_ot
     sample.observations = side.observations;
     samples.push_back(sample);
   }
-  add_all(samples);
+  add(samples.data(), samples.size());
 }
 
 void VoxelMap::merge(const FusedCloud& points) {
   ++view_;
   const Cloud& cloud = *points.cloud;
-  std::vector<Sample> samples;
+  std::vector<VoxelSample> samples;
   samples.reserve(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    Sample sample;
-    if (!locate(cloud[i].getVector3fMap().cast<double>(), sample)) continue;
+    VoxelSample sample;
+    if (!locate(cloud[i].getVector3fMap().cast<double>(), options_.voxel_m, sample)) {
+      ++dropped_;
+      continue;
+    }
     const Eigen::Vector3f normal = cloud[i].getNormalVector3fMap();
-    sample.normal_known = normal.allFinite();
-    if (sample.normal_known) sample.normal = normal;
+    if (normal.allFinite()) {
+      sample.normal_known = 1;
+      sample.normal = points.weight[i] * normal;
+    }
+    if (!points.robot_lead.empty()) {
+      sample.robot = points.columns.robot[i];
+      sample.robot_lead = points.robot_lead[i] & 0x7FFFFFU;
+    }
     sample.color = Eigen::Vector3f(cloud[i].r, cloud[i].g, cloud[i].b);
     sample.weight = points.weight[i];
     sample.scatter = points.weight[i] * points.spread_m[i] * points.spread_m[i];
@@ -234,7 +211,7 @@ void VoxelMap::merge(const FusedCloud& points) {
     sample.observations = points.columns.observations[i];
     samples.push_back(sample);
   }
-  add_all(samples);
+  add(samples.data(), samples.size());
 }
 
 Eigen::Vector3d VoxelMap::position(const Side& side) const {
@@ -267,6 +244,10 @@ FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
   fused.spread_m.reserve(order.size());
   fused.weight.reserve(order.size());
   fused.noise_m.reserve(order.size());
+  if (options_.robots) {
+    fused.columns.robot.reserve(order.size());
+    fused.robot_lead.reserve(order.size());
+  }
   for (const auto& [key, index] : order) {
     const Side& side = sides_[index];
     const Eigen::Vector3f position = this->position(side).cast<float>();
@@ -291,6 +272,9 @@ FusedCloud VoxelMap::extract(const VoxelExtractOptions& options) const {
     fused.spread_m.push_back(std::sqrt(side.scatter / side.weight));
     fused.weight.push_back(side.weight);
     fused.noise_m.push_back(std::sqrt(side.variance / side.weight));
+    if (!options_.robots) continue;
+    fused.columns.robot.push_back(static_cast<std::uint8_t>(side.robot));
+    fused.robot_lead.push_back(side.robot_lead);
   }
   fused.cloud->width = static_cast<std::uint32_t>(fused.cloud->size());
   fused.cloud->height = 1;

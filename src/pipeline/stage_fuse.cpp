@@ -22,7 +22,6 @@
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
-#include "robot_columns.hpp"
 #include "stages.hpp"
 #include "up_frame.hpp"
 
@@ -187,13 +186,13 @@ class FuseStage : public Stage {
       return tl::unexpected<core::Error>(found.error());
     }
     const cloud::ReadView read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
-    auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report);
-    if (fused && map.robots.size() > 1) {
-      auto seen_by =
-          robots_of_points(*fused->cloud, poses, robots, read, options_.voxels.voxel_m, *context_->executor);
-      if (!seen_by) return tl::unexpected<core::Error>(seen_by.error());
-      fused->columns.robot = std::move(*seen_by);
+    std::vector<std::uint8_t> whose;
+    if (map.robots.size() > 1) {
+      constexpr std::int32_t kMostRobots = 254;
+      for (const std::int32_t robot : robots)
+        whose.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
+    auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report, whose);
     context_->log->debug(
         fmt::format("{} clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
                     "dust; colour "

@@ -27,7 +27,7 @@ struct DenseFusionOptions {
   bool free_space = true;    ///< what other views look through goes
   bool exposure = true;      ///< colours are evened out between views
   int min_support = 6;       ///< points with fewer like them within about 3 blocks are dust; 0: none is
-  double tile_mb = 100.0;    ///< memory that one tile may take; four are worked on at a time
+  double tile_mb = 100.0;    ///< memory that one tile may take; tiles of four times that are filled together
 
   void declare(core::OptionTable& table);
 };
@@ -43,19 +43,21 @@ struct FusionReport {
 /// Gives the cloud of view `i`, in its camera frame; may be called for several views at a time.
 using ReadView = std::function<core::Result<CloudPtr>(std::size_t)>;
 
-/// Fuses the views. Reads each once to plan and once for every tile it reaches into. `camera` is the one that
-/// the clouds were taken with. Points come tile by tile, in a fixed order; the same for any number of
-/// threads. Errors are those of `read`. `report` may be null.
+/// Fuses the views. Reads each once to plan and once for all tiles that are filled together. `camera` is the
+/// one that the clouds were taken with. Points come tile by tile, in a fixed order; the same for any number
+/// of threads. Errors are those of `read`. `report` may be null.
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
                                     const ReadView& read, const sensor::Pinhole& camera,
                                     const DenseFusionOptions& options, const core::Executor& executor,
                                     FusionReport* report = nullptr);
 
-/// The same for views of several cameras: one camera a view.
+/// The same for views of several cameras: one camera a view. `robots`: whose view each is (0-254); then
+/// columns.robot tells who measured each point most. Empty: it is left out.
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
                                     const ReadView& read, const std::vector<sensor::Pinhole>& cameras,
                                     const DenseFusionOptions& options, const core::Executor& executor,
-                                    FusionReport* report = nullptr);
+                                    FusionReport* report = nullptr,
+                                    const std::vector<std::uint8_t>& robots = {});
 
 /// A cloud and its columns again in larger voxels, weighted by confidence when that is known.
 FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m);

@@ -19,6 +19,7 @@ namespace plumbline::cloud {
 struct VoxelMapOptions {
   double voxel_m = 0.01;           ///< edge length
   double min_cos_incidence = 0.1;  ///< measurements seen more obliquely are not inserted
+  bool robots = false;             ///< keep count of whose measurements they are; no option of a stage
 
   void declare(core::OptionTable& table);
 };
@@ -36,6 +37,32 @@ struct FusedCloud {
   std::vector<float> spread_m;  ///< standard deviation of the measurements along the normal
   std::vector<float> weight;    ///< sum over the measurements, see VoxelMap
   std::vector<float> noise_m;   ///< standard deviation that the sensor's noise lets one measurement have
+  /// Of columns.robot (empty: one robot): by how many measurements it is ahead of the others.
+  std::vector<std::uint32_t> robot_lead;
+};
+
+/// What one view measured in one side of a voxel, or a fused side of another map, in the frame of the map
+/// that it goes to.
+struct VoxelSample {
+  std::uint64_t key = 0;            ///< of its voxel
+  Eigen::Vector3f offset{0, 0, 0};  ///< metres from the voxel's centre
+  Eigen::Vector3f normal{0, 0, 0};  ///< weighted sum of normals, or of directions to the camera
+  Eigen::Vector3f color{0, 0, 0};   ///< 0-255
+  float weight = 0.0F;
+  float scatter = 0.0F;            ///< weighted sum of squared distances along the normal within it
+  float variance = 0.0F;           ///< weighted sum of the sensor's variance
+  std::uint32_t observations = 1;  ///< views it stands for
+  std::uint32_t robot_lead : 23;   ///< measurements it stands for, less those of other robots
+  std::uint32_t robot : 8;         ///< that measured it
+  std::uint32_t normal_known : 1;
+
+  VoxelSample() : robot_lead(1), robot(0), normal_known(0) {}
+};
+
+/// A view's measurements as voxels take them, in the order in which its points come to them.
+struct ViewSamples {
+  std::vector<VoxelSample> samples;
+  std::size_t dropped = 0;  ///< points beyond +-2^20 voxels of the origin
 };
 
 /// A voxel keeps the weighted means of position, normal and colour of its measurements; the weight is
@@ -52,6 +79,15 @@ class VoxelMap {
   /// Points outside of `region` (world; null: everywhere) are passed over.
   void insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud,
               const Eigen::AlignedBox3d* region = nullptr);
+
+  /// The same in two steps, for views that go to several maps of the same voxels: what insert() makes of the
+  /// points of `robot` (0-254), voxel by voxel, and its taking them up. One call of begin_view() is one view.
+  static ViewSamples sampled(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud,
+                             const VoxelMapOptions& options, std::uint8_t robot = 0);
+  void begin_view() { ++view_; }
+  void add(const VoxelSample* samples, std::size_t count);
+  /// Of a sample's voxel among voxels, each axis.
+  [[nodiscard]] static Eigen::Vector3i voxel_of(const VoxelSample& sample);
 
   /// Fuses a finished map, weights and observations included: local maps into the global one.
   void merge(const VoxelMap& other, const geometry::Rigid3& this_from_other);
@@ -84,15 +120,13 @@ class VoxelMap {
     std::uint32_t last_view = 0;
     std::uint32_t last_observations : 31;  ///< what the last view added
     std::uint32_t normal_known : 1;
+    std::uint32_t robot_lead : 23;  ///< measurements of `robot`, less those of all others
+    std::uint32_t robot : 8;        ///< the majority's, where there is one (Boyer and Moore's vote)
 
-    Side() : last_observations(0), normal_known(0) {}
+    Side() : last_observations(0), normal_known(0), robot_lead(0), robot(0) {}
   };
-  struct Sample;
 
-  /// Finds the sample's voxel; false (and counted) when it is out of reach.
-  bool locate(const Eigen::Vector3d& position, Sample& sample);
-  void add_all(const std::vector<Sample>& samples);
-  void add(const Sample& sample);
+  void add(const VoxelSample& sample);
   [[nodiscard]] std::size_t home(std::uint64_t key) const;
   Side* find_or_add(std::uint64_t key);
   void grow();
