@@ -52,6 +52,7 @@ class PosesStage : public Stage {
     }
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->stamp = frame->stamp;
+    tracked->depth_from_camera = depth_from_camera(*frame, *pose);
     map_.trajectory.push_back({frame->stamp, *pose});
     if (map_.keyframes.empty() || is_new_view(map_.keyframes.back().world_from_camera, *pose)) {
       tracked->keyframe = {0, static_cast<std::int32_t>(map_.keyframes.size())};
@@ -74,6 +75,13 @@ class PosesStage : public Stage {
   }
 
  private:
+  /// Between the moments of both images; identity where no pose is near that of the depth image.
+  [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame,
+                                                   const geometry::Rigid3& world_from_camera) const {
+    if (frame.depth_stamp == frame.stamp) return {};
+    const auto world_from_depth = geometry::pose_at(poses_, frame.depth_stamp, max_gap_s_);
+    return world_from_depth ? world_from_depth->inverse() * world_from_camera : geometry::Rigid3{};
+  }
   [[nodiscard]] bool is_new_view(const geometry::Rigid3& last, const geometry::Rigid3& now) const {
     const geometry::Rigid3 step = last.inverse() * now;
     return step.translation.norm() > keyframe_distance_m_ ||

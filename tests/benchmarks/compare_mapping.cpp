@@ -284,7 +284,7 @@ core::Result<Scores> compare(const std::string& input, const std::string& pipeli
   };
   for (std::size_t d = 0; d < kOff.size(); ++d) scores.off[d] = next(fmt::format("off at {}", kOff[d]));
   for (std::size_t d = 0; d < kOn.size(); ++d) scores.on[d] = next(fmt::format("on at {}", kOn[d]));
-  scores.cone = next("on, cone rule");
+  scores.cone = next("cone rule");
   return scores;
 }
 

@@ -69,6 +69,32 @@ TEST_F(Dense, KeyframeCloudsLevelsAndTurntable) {
   EXPECT_GT(cv::norm(first, cv::imread(pictures[1]), cv::NORM_L1), 10000.0);
 }
 
+TEST_F(Dense, KnownPosesAreTakenAtTheMomentOfTheDepthImage) {
+  // The same depth images, stamped 10 ms later: the camera that took them was further on.
+  write_wall(path("together"));
+  WallRecording later;
+  later.depth_offset_s = 0.01;
+  write_wall(path("later"), later);
+  const auto box_at = [&](const std::string& name) {
+    const Outcome mapped =
+        run("map " + name + " -o out -p known_poses -q --force --set output.views= --set fuse.up=none");
+    EXPECT_EQ(mapped.code, 0) << mapped;
+    const cloud::PlyData map = ply("out/map.ply");
+    const auto &x = *map.floats("x"), &z = *map.floats("z");
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (std::abs(z[i] - static_cast<float>(kBox_m)) > 0.05F) continue;
+      sum += static_cast<double>(x[i]);
+      ++count;
+    }
+    EXPECT_GT(count, 500U);
+    return sum / static_cast<double>(std::max<std::size_t>(1, count));
+  };
+  const double speed = kStep_px * kWall_m / kFocal * 30.0;  // m/s
+  EXPECT_NEAR(box_at("later") - box_at("together"), speed * later.depth_offset_s, 0.002);
+}
+
 TEST_F(Dense, WhoWalksThroughLeavesNoGhost) {
   write("cell.yaml",
         "name: cell\nobjects:\n  - floor: {from: [-2, -3], to: [2, 2.1]}\n"
