@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "fused_parts.hpp"
 #include "fusion_tiles.hpp"
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
@@ -51,68 +52,11 @@ std::optional<core::Error> first_error(const std::vector<core::Result<T>>& resul
   return std::nullopt;
 }
 
-/// The points that `keep` says, columns and all.
-template <typename Keep>
-FusedCloud chosen(const FusedCloud& points, const Keep& keep) {
-  FusedCloud result;
-  result.cloud = std::make_shared<Cloud>();
-  for (std::size_t i = 0; i < points.cloud->size(); ++i) {
-    if (!keep(i)) continue;
-    result.cloud->points.push_back((*points.cloud)[i]);
-    result.columns.observations.push_back(points.columns.observations[i]);
-    result.columns.confidence.push_back(points.columns.confidence[i]);
-    result.spread_m.push_back(points.spread_m[i]);
-    result.weight.push_back(points.weight[i]);
-    result.noise_m.push_back(points.noise_m[i]);
-    if (points.robot_lead.empty()) continue;
-    result.columns.robot.push_back(points.columns.robot[i]);
-    result.robot_lead.push_back(points.robot_lead[i]);
-  }
-  return result;
-}
-
-/// All parts one after the other. Room is taken once and each part given back when it is copied: what has
-/// been joined and what has not is never in memory twice.
-FusedCloud joined(std::vector<FusedCloud>&& parts) {
-  FusedCloud all;
-  all.cloud = std::make_shared<Cloud>();
-  std::size_t count = 0;
-  for (const FusedCloud& part : parts) count += part.cloud->size();
-  const auto join = [&](const auto& column_of) {
-    auto& whole = column_of(all);
-    whole.reserve(count);
-    for (FusedCloud& part : parts) {
-      auto& column = column_of(part);
-      whole.insert(whole.end(), column.begin(), column.end());
-      column = {};
-    }
-  };
-  join([](FusedCloud & f) -> auto& { return f.columns.observations; });
-  join([](FusedCloud & f) -> auto& { return f.columns.confidence; });
-  join([](FusedCloud & f) -> auto& { return f.columns.robot; });
-  join([](FusedCloud & f) -> auto& { return f.robot_lead; });
-  join([](FusedCloud & f) -> auto& { return f.spread_m; });
-  join([](FusedCloud & f) -> auto& { return f.weight; });
-  join([](FusedCloud & f) -> auto& { return f.noise_m; });
-  join([](FusedCloud & f) -> auto& { return f.cloud->points; });
-  all.cloud->width = static_cast<std::uint32_t>(count);
-  all.cloud->height = 1;
-  all.cloud->is_dense = true;
-  return all;
-}
-
 class Fusion {
  public:
-  Fusion(const std::vector<geometry::Rigid3>& world_from_camera, const ReadView& read,
-         const std::vector<sensor::Pinhole>& cameras, const std::vector<std::uint8_t>& robots,
-         const DenseFusionOptions& options, const core::Executor& executor)
-      : poses_(world_from_camera),
-        read_(read),
-        cameras_(cameras),
-        robots_(robots),
-        options_(options),
-        executor_(executor) {
-    options_.voxels.robots = !robots.empty();
+  Fusion(const FusionViews& views, const DenseFusionOptions& options, const core::Executor& executor)
+      : views_(views), poses_(views.world_from_camera), options_(options), executor_(executor) {
+    options_.voxels.robots = !views.robots.empty();
   }
 
   core::Result<FusedCloud> run(FusionReport& report) {
@@ -145,21 +89,22 @@ class Fusion {
   }
 
  private:
-  /// Reads every view once: where it reaches, what it looks through, its colours.
+  /// Asks every view: where it reaches, what it looks through, its colours.
   core::Result<void> look(FusionReport& report) {
     std::vector<std::vector<ColorCell>> cells(poses_.size());
     std::vector<core::Result<void>> done(poses_.size());
     rasters_.resize(poses_.size());
     is_look_.assign(poses_.size(), 0);
     executor_.parallel_for(poses_.size(), [&](std::size_t v) {
-      const auto cloud = read_(v);
-      if (!cloud) {
-        done[v] = tl::unexpected<core::Error>(cloud.error());
+      auto summary = summary_of(v);
+      if (!summary) {
+        done[v] = tl::unexpected<core::Error>(summary.error());
         return;
       }
-      is_look_[v] = is_look(**cloud, cameras_[v]) ? 1 : 0;
-      if (is_look_[v] == 0) cells[v] = color_cells(**cloud, poses_[v], kCell_m);
-      if (options_.free_space) rasters_[v] = depth_raster(**cloud, cameras_[v]);
+      is_look_[v] = summary->look ? 1 : 0;
+      cells[v] = color_cells(summary->spots, poses_[v], kCell_m);
+      rasters_[v] = std::move(summary->raster);
+      if (is_look_[v] == 0) set_limits(rasters_[v]);
     });
     if (const auto error = first_error(done)) return tl::unexpected<core::Error>(*error);
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
@@ -171,6 +116,13 @@ class Fusion {
       report.most_gain = std::max(report.most_gain, static_cast<double>(gain.maxCoeff()));
     }
     return {};
+  }
+
+  [[nodiscard]] core::Result<ViewSummary> summary_of(std::size_t v) const {
+    if (views_.summary) return views_.summary(v);
+    const auto cloud = views_.read(v);
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    return summarise_view(**cloud, views_.cameras[v], options_);
   }
 
   /// A view on its way into voxels: samples, and the tiles that runs of them belong to.
@@ -217,13 +169,14 @@ class Fusion {
 
   [[nodiscard]] LaidView laid_view(std::uint32_t v, std::size_t first, std::size_t tiles) const {
     LaidView laid;
-    const auto cloud = read_(v);
+    const auto cloud = views_.read(v);
     if (!cloud) {
       laid.error = cloud.error();
       return laid;
     }
     if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
-    laid.view = VoxelMap::sampled(**cloud, poses_[v], options_.voxels, robots_.empty() ? 0 : robots_[v]);
+    laid.view =
+        VoxelMap::sampled(**cloud, poses_[v], options_.voxels, views_.robots.empty() ? 0 : views_.robots[v]);
     std::uint64_t reached = 0;
     for (std::size_t k = 0; k < tiles; ++k) {
       const std::vector<std::uint32_t>& of_tile = tiles_[first + k].views;
@@ -328,10 +281,8 @@ class Fusion {
     });
   }
 
+  const FusionViews& views_;
   const std::vector<geometry::Rigid3>& poses_;
-  const ReadView& read_;
-  const std::vector<sensor::Pinhole>& cameras_;
-  const std::vector<std::uint8_t>& robots_;  ///< by view; empty: one robot
   DenseFusionOptions options_;
   const core::Executor& executor_;
   std::vector<FusionTile> tiles_;
@@ -357,21 +308,30 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
       "Memory that one tile of the map may take, MB; as many as fill four times that are filled together");
 }
 
+ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,
+                           const DenseFusionOptions& options) {
+  ViewSummary summary;
+  summary.look = is_look(camera_cloud, camera);
+  if (!summary.look) summary.spots = color_spots(camera_cloud);
+  if (options.free_space) summary.raster = depth_raster(camera_cloud, camera);
+  return summary;
+}
+
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
                                     const ReadView& read, const sensor::Pinhole& camera,
                                     const DenseFusionOptions& options, const core::Executor& executor,
                                     FusionReport* report) {
-  const std::vector<sensor::Pinhole> cameras(world_from_camera.size(), camera);
-  return fuse_views(world_from_camera, read, cameras, options, executor, report);
+  FusionViews views;
+  views.world_from_camera = world_from_camera;
+  views.cameras.assign(world_from_camera.size(), camera);
+  views.read = read;
+  return fuse_views(views, options, executor, report);
 }
 
-core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
-                                    const ReadView& read, const std::vector<sensor::Pinhole>& cameras,
-                                    const DenseFusionOptions& options, const core::Executor& executor,
-                                    FusionReport* report, const std::vector<std::uint8_t>& robots) {
+core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
+                                    const core::Executor& executor, FusionReport* report) {
   FusionReport unused;
-  return Fusion(world_from_camera, read, cameras, robots, options, executor)
-      .run(report == nullptr ? unused : *report);
+  return Fusion(views, options, executor).run(report == nullptr ? unused : *report);
 }
 
 FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m) {

@@ -54,37 +54,100 @@ std::vector<std::vector<Sighting>> shared_cells(const std::vector<std::vector<Co
 
 Eigen::Array3f robust_weight(const Eigen::Array3f& residual) { return kRobust / residual.abs().max(kRobust); }
 
+/// Sums over small cubes, in a hash table.
+class SpotTable {
+ public:
+  struct Sum {
+    std::uint64_t key = 0;
+    Eigen::Vector3f point{0, 0, 0};
+    Eigen::Vector3f color{0, 0, 0};
+    float count = 0.0F;
+    float colored = 0.0F;
+  };
+  SpotTable() : table_(1U << 13U, 0) {}
+
+  [[nodiscard]] std::vector<Sum>& sums() { return sums_; }
+  /// Number of a cube's sum. Neighbours in a picture mostly share their cube.
+  std::size_t of(std::uint64_t key) {
+    if (last_ < sums_.size() && sums_[last_].key == key) return last_;
+    std::size_t slot = slot_of(key);
+    if (table_[slot] == 0) {
+      sums_.emplace_back();
+      sums_.back().key = key;
+      table_[slot] = static_cast<std::uint32_t>(sums_.size());
+      if (2 * sums_.size() > table_.size()) {
+        table_.assign(2 * table_.size(), 0);
+        for (std::size_t i = 0; i < sums_.size(); ++i)
+          table_[slot_of(sums_[i].key)] = static_cast<std::uint32_t>(i + 1);
+        slot = slot_of(key);
+      }
+    }
+    last_ = table_[slot] - 1;
+    return last_;
+  }
+
+ private:
+  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const {
+    const std::size_t mask = table_.size() - 1;
+    std::size_t slot = mix(key) & mask;
+    while (table_[slot] != 0 && sums_[table_[slot] - 1].key != key) slot = (slot + 1) & mask;
+    return slot;
+  }
+
+  std::vector<Sum> sums_;
+  std::vector<std::uint32_t> table_;  ///< open addressing: index into sums_ + 1, 0 = free
+  std::size_t last_ = 0;
+};
+
 }  // namespace
 
-std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Rigid3& world_from_camera,
-                                   double cell_m) {
+std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
+  constexpr float kSpot_m = 0.05F;
+  constexpr float kFar_m = 1e4F;
   constexpr int kDark = 12;
   constexpr int kBright = 245;
-  const Eigen::Matrix3f rotation = (world_from_camera.rotation / cell_m).cast<float>();
-  const Eigen::Vector3f translation = (world_from_camera.translation / cell_m).cast<float>();
-  // Neighbours in a picture mostly share their cube: runs of them are few enough to sort.
-  std::vector<ColorCell> runs;
+  SpotTable table;
+  std::vector<SpotTable::Sum>& sums = table.sums();
   for (const Point& p : camera_cloud.points) {
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
-    const Eigen::Vector3f at = rotation * p.getVector3fMap() + translation;
-    if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
-    const std::uint64_t key = pack_cell(at.array().floor().cast<int>());
-    if (runs.empty() || runs.back().cell != key) runs.push_back({key, Eigen::Vector3f::Zero(), 0.0F});
+    if (!(p.getVector3fMap().cwiseAbs().maxCoeff() < kFar_m)) continue;
+    const Eigen::Vector3f point = p.getVector3fMap();
+    SpotTable::Sum& sum = sums[table.of(pack_cell((point / kSpot_m).array().floor().cast<int>()))];
+    sum.point += point;
+    sum.count += 1.0F;
     const auto [dark, bright] = std::minmax({p.r, p.g, p.b});
     if (dark < kDark || bright > kBright) continue;
-    runs.back().color += Eigen::Vector3f(p.r, p.g, p.b);
-    runs.back().points += 1.0F;
+    sum.color += Eigen::Vector3f(p.r, p.g, p.b);
+    sum.colored += 1.0F;
   }
-  std::stable_sort(runs.begin(), runs.end(),
+  std::vector<ColorSpot> spots;
+  spots.reserve(sums.size());
+  for (const SpotTable::Sum& sum : sums) {
+    spots.push_back({sum.point / sum.count, sum.color / std::max(1.0F, sum.colored), sum.colored});
+  }
+  return spots;
+}
+
+std::vector<ColorCell> color_cells(const std::vector<ColorSpot>& spots,
+                                   const geometry::Rigid3& world_from_camera, double cell_m) {
+  const Eigen::Matrix3f rotation = (world_from_camera.rotation / cell_m).cast<float>();
+  const Eigen::Vector3f translation = (world_from_camera.translation / cell_m).cast<float>();
+  std::vector<ColorCell> all;
+  all.reserve(spots.size());
+  for (const ColorSpot& spot : spots) {
+    const Eigen::Vector3f at = rotation * spot.point + translation;
+    if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
+    all.push_back({pack_cell(at.array().floor().cast<int>()), spot.points * spot.color, spot.points});
+  }
+  std::stable_sort(all.begin(), all.end(),
                    [](const ColorCell& a, const ColorCell& b) { return a.cell < b.cell; });
   std::vector<ColorCell> cells;
-  for (const ColorCell& run : runs) {
-    if (cells.empty() || cells.back().cell != run.cell) {
-      cells.push_back(run);
+  for (const ColorCell& one : all) {
+    if (cells.empty() || cells.back().cell != one.cell) {
+      cells.push_back(one);
       continue;
     }
-    cells.back().color += run.color;
-    cells.back().points += run.points;
+    cells.back().color += one.color;
+    cells.back().points += one.points;
   }
   for (ColorCell& cell : cells) {
     if (cell.points > 0.0F) cell.color /= cell.points;

@@ -21,6 +21,31 @@ constexpr int kSolid = 4;          // clouds that see a surface where none looks
 constexpr double kAround_m = 0.1;  // no more than the margin of a tile
 constexpr int kPasses = 3;         // the side of a person is 0.3 m deep
 
+/// Of the 3 x 3 cells around (i, j), which all lie within the raster.
+DepthRaster::Limits limits_around(const DepthRaster& raster, int i, int j) {
+  int cells = 0;
+  std::uint16_t nearest = 65535;
+  std::uint16_t furthest = 0;
+  for (int y = j - 1; y <= j + 1; ++y) {
+    const std::uint16_t* row = raster.nearest.data() + static_cast<std::ptrdiff_t>(y) * raster.width;
+    for (int x = i - 1; x <= i + 1; ++x) {
+      const std::uint16_t depth = row[x];
+      cells += depth != 0 ? 1 : 0;
+      nearest = std::min(nearest, depth != 0 ? depth : nearest);
+      furthest = std::max(furthest, depth);
+    }
+  }
+  if (cells < kFewestCells) return {};
+  const auto margin_mm = [](std::uint16_t mm) {
+    const double sigma = sensor::depth_sigma(0.001 * static_cast<double>(mm));
+    return 1000.0F * (kSigmas * static_cast<float>(sigma) + kPose_m);
+  };
+  const float free_to = static_cast<float>(nearest) - margin_mm(nearest);
+  const float hidden_from = static_cast<float>(furthest) + margin_mm(furthest);
+  return {static_cast<std::uint16_t>(std::clamp(free_to, 1.0F, 65535.0F)),
+          static_cast<std::uint16_t>(std::clamp(hidden_from, 1.0F, 65535.0F))};
+}
+
 /// What of a view matters for a box: null transforms are never used.
 struct NearView {
   const DepthRaster* raster;
@@ -302,33 +327,38 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
   return raster;
 }
 
-Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point) {
-  if (!(point.z() > 0.05F) || point.z() > raster.furthest_m + 0.5F) return Evidence::kNone;
-  const float u = static_cast<float>(camera.fx) * point.x() / point.z() + static_cast<float>(camera.cx);
-  const float v = static_cast<float>(camera.fy) * point.y() / point.z() + static_cast<float>(camera.cy);
-  const int i = static_cast<int>(std::floor(u / DepthRaster::kCell_px));
-  const int j = static_cast<int>(std::floor(v / DepthRaster::kCell_px));
-  if (i < 1 || j < 1 || i + 1 >= raster.width || j + 1 >= raster.height) return Evidence::kNone;
-  int cells = 0;
-  std::uint16_t nearest = 65535;
-  std::uint16_t furthest = 0;
-  for (int y = j - 1; y <= j + 1; ++y) {
-    const std::uint16_t* row = raster.nearest.data() + static_cast<std::ptrdiff_t>(y) * raster.width;
-    for (int x = i - 1; x <= i + 1; ++x) {
-      if (row[x] == 0) continue;
-      ++cells;
-      nearest = std::min(nearest, row[x]);
-      furthest = std::max(furthest, row[x]);
+void set_limits(DepthRaster& raster) {
+  raster.limits.assign(raster.nearest.size(), {});
+  for (int j = 1; j + 1 < raster.height; ++j) {
+    for (int i = 1; i + 1 < raster.width; ++i) {
+      raster.limits[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.width) +
+                    static_cast<std::size_t>(i)] = limits_around(raster, i, j);
     }
   }
-  if (cells < kFewestCells) return Evidence::kNone;
-  const auto margin = [](float z) {
-    return kSigmas * static_cast<float>(sensor::depth_sigma(static_cast<double>(z))) + kPose_m;
-  };
-  const float near_m = 0.001F * static_cast<float>(nearest);
-  const float far_m = 0.001F * static_cast<float>(furthest);
-  if (point.z() < near_m - margin(near_m)) return Evidence::kFree;
-  return point.z() > far_m + margin(far_m) ? Evidence::kHidden : Evidence::kSurface;
+}
+
+Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point) {
+  constexpr float kCells_per_px = 1.0F / static_cast<float>(DepthRaster::kCell_px);
+  if (!(point.z() > 0.05F) || point.z() > raster.furthest_m + 0.5F) return Evidence::kNone;
+  const float per_m = 1.0F / point.z();
+  const float u = static_cast<float>(camera.fx) * point.x() * per_m + static_cast<float>(camera.cx);
+  const float v = static_cast<float>(camera.fy) * point.y() * per_m + static_cast<float>(camera.cy);
+  const float column = u * kCells_per_px;
+  const float row = v * kCells_per_px;
+  if (!(column >= 1.0F) || !(row >= 1.0F)) return Evidence::kNone;
+  if (column >= static_cast<float>(raster.width - 1) || row >= static_cast<float>(raster.height - 1))
+    return Evidence::kNone;
+  const int i = static_cast<int>(column);
+  const int j = static_cast<int>(row);
+  const DepthRaster::Limits limits =
+      raster.limits.empty()
+          ? limits_around(raster, i, j)
+          : raster.limits[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.width) +
+                          static_cast<std::size_t>(i)];
+  if (limits.free_to == 0) return Evidence::kNone;
+  const float z_mm = 1000.0F * point.z();
+  if (z_mm < static_cast<float>(limits.free_to)) return Evidence::kFree;
+  return z_mm > static_cast<float>(limits.hidden_from) ? Evidence::kHidden : Evidence::kSurface;
 }
 
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,

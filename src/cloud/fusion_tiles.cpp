@@ -13,8 +13,9 @@ constexpr std::size_t kFewestCells = 300;  // of a tile that is worth its margin
 
 using Cells = std::vector<Eigen::Vector3i>;
 
-void cut(const Cells::iterator& begin, const Cells::iterator& end, std::size_t most_cells,
-         std::vector<FusionTile>& tiles) {
+/// `space`: all cells that are this side of the cuts so far.
+void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::AlignedBox3i& space,
+         std::size_t most_cells, std::vector<FusionTile>& tiles) {
   Eigen::AlignedBox3i box;
   for (auto cell = begin; cell != end; ++cell) box.extend(*cell);
   const auto count = static_cast<std::size_t>(end - begin);
@@ -22,7 +23,9 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, std::size_t m
   const Eigen::Vector3i size = box.sizes();
   size.maxCoeff(&axis);
   if (count <= most_cells || size[axis] == 0) {
-    tiles.push_back({box, count, {}});
+    const Eigen::AlignedBox3i around(box.min() - Eigen::Vector3i::Ones(),
+                                     box.max() + Eigen::Vector3i::Ones());
+    tiles.push_back({around.intersection(space), count, {}});
     return;
   }
   const auto by_axis = [axis](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
@@ -34,8 +37,12 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, std::size_t m
   const int at = std::max((*middle)[axis], box.min()[axis] + 1);
   const auto border =
       std::partition(begin, end, [axis, at](const Eigen::Vector3i& cell) { return cell[axis] < at; });
-  cut(begin, border, most_cells, tiles);
-  cut(border, end, most_cells, tiles);
+  Eigen::AlignedBox3i low = space;
+  Eigen::AlignedBox3i high = space;
+  low.max()[axis] = at - 1;
+  high.min()[axis] = at;
+  cut(begin, border, low, most_cells, tiles);
+  cut(border, end, high, most_cells, tiles);
 }
 
 }  // namespace
@@ -54,11 +61,13 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   for (const std::uint64_t key : keys) cells.push_back(unpack_cell(key));
   // Several tiles even where one would do: they are worked on side by side.
   const std::size_t share = std::max(kFewestCells, cells.size() / kTiles + 1);
-  cut(cells.begin(), cells.end(), std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
+  const Eigen::Vector3i most = Eigen::Vector3i::Constant(1 << 21);
+  const Eigen::AlignedBox3i space(-most, most);
+  cut(cells.begin(), cells.end(), space, std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (FusionTile& tile : tiles) {
-      const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),
-                                            tile.cells.max() + Eigen::Vector3i::Ones());
+      const Eigen::Vector3i two = Eigen::Vector3i::Constant(2);
+      const Eigen::AlignedBox3i with_margin(tile.cells.min() - two, tile.cells.max() + two);
       const bool reaches = std::any_of(views[v].begin(), views[v].end(), [&](const ColorCell& cell) {
         return with_margin.contains(unpack_cell(cell.cell));
       });

@@ -14,7 +14,7 @@ namespace plumbline::cloud {
 /// Box of cells, both ends included, and the views that reach into it or its margin.
 struct FusionTile {
   Eigen::AlignedBox3i cells;
-  std::size_t occupied = 0;  ///< of its cells, the margin left out
+  std::size_t occupied = 0;          ///< of its cells, the margin left out
   std::vector<std::uint32_t> views;  ///< ascending
 
   /// Metres, the margin left out: [min, max).
@@ -25,8 +25,9 @@ struct FusionTile {
 };
 
 /// k-d cuts at medians until no box holds more than `most_cells` occupied cells, and about four boxes at
-/// least where there is enough for them. `views`: the cells of each, by cell. A view belongs to a tile when
-/// it reaches into it or one of the cells around it. In a fixed order.
+/// least where there is enough for them. Boxes take the cells around what is occupied along, as far as no
+/// other box has them. `views`: the cells of each, by cell; points may lie a cell further on. A view belongs
+/// to a tile when its points may lie in it or in one of the cells around it. In a fixed order.
 std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells);
 
 }  // namespace plumbline::cloud

@@ -178,37 +178,61 @@ class Runner {
   core::Result<void> finish(Clock::time_point start) {
     std::vector<std::vector<Value>> results(graph_.nodes.size());
     report_.map_s = ms_since(start) / 1000.0;
-    for (std::size_t n = 0; n < graph_.nodes.size(); ++n) {
-      Node& node = graph_.nodes[n];
-      StageIo io(report_.frames, node.type->inputs, node.type->outputs);
-      for (std::size_t i = 0; i < node.inputs.size(); ++i) {
-        if (node.type->inputs[i].type.rate != Rate::kEnd || !node.inputs[i]) continue;
-        io.input_values()[i] = results[node.inputs[i]->node][node.inputs[i]->port];
+    for (Node& node : graph_.nodes) node.stage->frames_have_ended();
+    for (std::size_t first = 0, count = 0; first < graph_.nodes.size(); first += count) {
+      count = 1;
+      while (first + count < graph_.nodes.size() && may_export_beside(first, first + count)) ++count;
+      const auto began = Clock::now();
+      std::vector<core::Result<void>> finished(count);
+      context_.executor->parallel_for(count,
+                                      [&](std::size_t k) { finished[k] = finish_stage(first + k, results); });
+      const double seconds = ms_since(began) / 1000.0;
+      (graph_.nodes[first].type->exports ? report_.export_s : report_.map_s) += seconds;
+      for (const auto& one : finished) {
+        if (!one) return one;
       }
-      const auto stage_start = Clock::now();
-      auto finished = guarded(node.name, [&]() -> core::Result<void> {
-        for (std::size_t i = 0; i < node.inputs.size(); ++i) {
-          const Port& port = node.type->inputs[i];
-          if (port.type.rate == Rate::kEnd && port.required && !io.input_values()[i]) {
-            throw std::logic_error("nothing came for its input " + port.name);
-          }
-        }
-        return node.stage->finish(io);
-      });
-      report_.stages[n].finish_ms = ms_since(stage_start);
-      (node.type->exports ? report_.export_s : report_.map_s) += report_.stages[n].finish_ms / 1000.0;
-      if (!finished) return finished;
-      results[n] = std::move(io.output_values());
       // What nobody will read any more is given back at once, to the system, too: the next stage may need it.
-      for (std::size_t m = 0; m <= n; ++m) {
-        if (last_use_[m] == n) results[m].clear();
+      for (std::size_t m = 0; m < first + count; ++m) {
+        if (last_use_[m] < first + count) results[m].clear();
       }
-      io.input_values().clear();
       give_back_memory();
-      context_.log->debug(fmt::format("{}: its end took {:.0f} ms; {:.0f} MB are held, {:.0f} MB at most",
-                                      node.name, report_.stages[n].finish_ms, rss_mb(), peak_rss_mb()));
+      for (std::size_t n = first; n < first + count; ++n) {
+        context_.log->debug(fmt::format("{}: its end took {:.0f} ms; {:.0f} MB are held, {:.0f} MB at most",
+                                        graph_.nodes[n].name, report_.stages[n].finish_ms, rss_mb(),
+                                        peak_rss_mb()));
+      }
     }
     return {};
+  }
+
+  /// Whether node `n` and those from `first` on only write results, none of which another one takes.
+  [[nodiscard]] bool may_export_beside(std::size_t first, std::size_t n) const {
+    if (!graph_.nodes[first].type->exports || !graph_.nodes[n].type->exports) return false;
+    const auto& inputs = graph_.nodes[n].inputs;
+    return std::none_of(inputs.begin(), inputs.end(),
+                        [&](const auto& input) { return input && input->node >= first; });
+  }
+
+  core::Result<void> finish_stage(std::size_t n, std::vector<std::vector<Value>>& results) {
+    Node& node = graph_.nodes[n];
+    StageIo io(report_.frames, node.type->inputs, node.type->outputs);
+    for (std::size_t i = 0; i < node.inputs.size(); ++i) {
+      if (node.type->inputs[i].type.rate != Rate::kEnd || !node.inputs[i]) continue;
+      io.input_values()[i] = results[node.inputs[i]->node][node.inputs[i]->port];
+    }
+    const auto start = Clock::now();
+    auto finished = guarded(node.name, [&]() -> core::Result<void> {
+      for (std::size_t i = 0; i < node.inputs.size(); ++i) {
+        const Port& port = node.type->inputs[i];
+        if (port.type.rate == Rate::kEnd && port.required && !io.input_values()[i]) {
+          throw std::logic_error("nothing came for its input " + port.name);
+        }
+      }
+      return node.stage->finish(io);
+    });
+    report_.stages[n].finish_ms = ms_since(start);
+    results[n] = std::move(io.output_values());
+    return finished;
   }
 
   Graph& graph_;

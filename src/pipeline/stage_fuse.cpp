@@ -14,12 +14,15 @@
 #include <vector>
 
 #include "chain_option.hpp"
+#include "idle_work.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
 #include "stages.hpp"
@@ -75,14 +78,41 @@ class FuseStage : public Stage {
     } else {
       between_.push_back({keyframe->robot, keyframe->stamp, spool_->size()});
     }
-    camera_from_depth_.push_back(cloud::sensor_pose(*keyframe->cloud));
+    const sensor::Pinhole camera = camera_of(keyframe->robot);
+    views_.push_back({keyframe->robot, {}, {}, {}});
+    if (keyframe->cloud != nullptr) look_at(*keyframe->cloud, camera, views_.back());
     return spool_->append(*keyframe->compact);
+  }
+  /// What has not been looked at while it came.
+  void frames_have_ended() override {
+    std::vector<std::size_t> open;
+    for (std::size_t place = 0; place < views_.size(); ++place) {
+      if (!views_[place].summary) open.push_back(place);
+    }
+    const auto look = [this, open](std::size_t i) {
+      View& view = views_[open[i]];
+      const auto cloud = spool_->read(open[i]);
+      if (cloud) {
+        look_at(**cloud, camera_of(view.robot), view);
+      } else {
+        view.damage = cloud.error();
+      }
+    };
+    looking_ = std::make_unique<IdleWork>(open.size(), look, *context_->executor);
   }
 
   /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
   /// keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
+    if (looking_ != nullptr) looking_->finish();
+    looking_.reset();
+    for (const View& view : views_) {
+      if (!view.damage) continue;
+      return tl::unexpected<core::Error>(context_->stored_maps != nullptr
+                                             ? context_->stored_maps->damaged(view.robot, *view.damage)
+                                             : *view.damage);
+    }
     auto fused = fuse(*map);
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
@@ -121,7 +151,7 @@ class FuseStage : public Stage {
       const auto bytes = store->cloud_bytes(id);
       if (!bytes) return fail(bytes.error());
       places_[id] = spool_->size();
-      if (auto noted = note_sensor(*bytes); !noted) return noted;
+      views_.push_back({id.robot, {}, {}, {}});
       if (auto kept = spool_->append(*bytes); !kept) return kept;
     }
     const auto frames = store->frame_cloud_ids();
@@ -132,17 +162,29 @@ class FuseStage : public Stage {
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
       between_.push_back({pose.reference.robot, pose.stamp, spool_->size()});
-      if (auto noted = note_sensor(*bytes); !noted) return noted;
+      views_.push_back({pose.reference.robot, {}, {}, {}});
       if (auto kept = spool_->append(*bytes); !kept) return kept;
     }
     return {};
   }
 
-  core::Result<void> note_sensor(const std::vector<std::uint8_t>& bytes) {
-    const auto cloud = cloud::decode_cloud(bytes.data(), bytes.size());
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    camera_from_depth_.push_back(cloud::sensor_pose(**cloud));
-    return {};
+  /// A cloud in the spool.
+  struct View {
+    std::int32_t robot = 0;
+    geometry::Rigid3 camera_from_depth;
+    std::optional<cloud::ViewSummary> summary;  ///< of the cloud as it was measured
+    std::optional<core::Error> damage;
+  };
+
+  [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
+    if (context_->stored_maps != nullptr) return context_->stored_maps->camera_of(robot);
+    if (context_->recordings != nullptr)
+      return context_->recordings->robots()[static_cast<std::size_t>(robot)].camera.color;
+    return context_->source->camera().color;
+  }
+  void look_at(const cloud::Cloud& cloud, const sensor::Pinhole& camera, View& view) const {
+    view.camera_from_depth = cloud::sensor_pose(cloud);
+    view.summary = cloud::summarise_view(cloud, camera, options_);
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
@@ -173,26 +215,25 @@ class FuseStage : public Stage {
       robots.push_back(between.robot);
       stamps.push_back(between.stamp);
     }
-    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * camera_from_depth_[places[i]];
-    std::vector<sensor::Pinhole> cameras(poses.size(), context_->source->camera().color);
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      for (const RobotInfo& robot : map.robots) {
-        if (robot.number == robots[i]) cameras[i] = robot.camera.color;
-      }
-    }
+    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * views_[places[i]].camera_from_depth;
+    std::vector<sensor::Pinhole> cameras;
+    for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
     cloud::FusionReport report;
     const cloud::ReadView read_raw = [&](std::size_t i) { return spool_->read(places[i]); };
     if (auto found = find_fields(map, poses, stamps, robots, cameras, read_raw); !found) {
       return tl::unexpected<core::Error>(found.error());
     }
-    const cloud::ReadView read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
-    std::vector<std::uint8_t> whose;
+    cloud::FusionViews views;
+    views.world_from_camera = poses;
+    views.cameras = cameras;
     if (map.robots.size() > 1) {
       constexpr std::int32_t kMostRobots = 254;
       for (const std::int32_t robot : robots)
-        whose.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
+        views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    auto fused = cloud::fuse_views(poses, read, cameras, options_, *context_->executor, &report, whose);
+    views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
+    views.summary = [&](std::size_t i) { return summary_of(places[i], robots[i]); };
+    auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(
         fmt::format("{} clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
                     "dust; colour "
@@ -232,6 +273,16 @@ class FuseStage : public Stage {
     return {};
   }
 
+  /// Used up.
+  [[nodiscard]] core::Result<cloud::ViewSummary> summary_of(std::size_t place, std::int32_t robot) {
+    std::optional<cloud::ViewSummary>& summary = views_[place].summary;
+    const auto field = fields_.find(robot);
+    if (summary && (field == fields_.end() || field->second.identity())) return std::move(*summary);
+    const auto cloud = read_corrected(place, robot);
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    return cloud::summarise_view(**cloud, camera_of(robot), options_);
+  }
+
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
     auto cloud = spool_->read(place);
     const auto field = fields_.find(robot);
@@ -269,8 +320,8 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(**cloud,
-                 frame_.output_from_map * keyframe.world_from_camera * camera_from_depth_[found->second]);
+      move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera *
+                              views_[found->second].camera_from_depth);
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
@@ -286,9 +337,9 @@ class FuseStage : public Stage {
   cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<cloud::CloudSpool> spool_;           ///< the keyframes' clouds, camera frame
-  std::map<core::KeyframeId, std::size_t> places_;   ///< in the spool
-  std::vector<geometry::Rigid3> camera_from_depth_;  ///< of each cloud in the spool
+  std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
+  std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
+  std::vector<View> views_;                         ///< by place in the spool
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;
@@ -300,6 +351,7 @@ class FuseStage : public Stage {
   std::vector<RunSummary::DepthField> told_fields_;
   UpFrame frame_;
   std::size_t points_ = 0;
+  std::unique_ptr<IdleWork> looking_;  ///< goes first: it uses the others
 };
 
 }  // namespace

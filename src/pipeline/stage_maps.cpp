@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // maps: finished maps of several robots, laid into one frame; their clouds come one after another.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <memory>
 #include <utility>
@@ -30,16 +28,15 @@ class MapsStage : public Stage {
     const StoredCloud& stored = maps_->clouds()[io.frame()];
     auto bytes = maps_->cloud_bytes(io.frame());
     if (!bytes) return tl::unexpected<core::Error>(bytes.error());
-    auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
-    if (!cloud) {
-      const std::string file = maps_->parts()[stored.part].file.string();
-      return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, cloud.error().message));
-    }
     auto result = std::make_shared<KeyframeCloud>();
     result->id = stored.id;
     result->stamp = stored.stamp;
     result->robot = stored.robot;
-    result->cloud = std::move(*cloud);
+    if (stored.id.valid()) {  // surfaces are wanted at once; what is only laid down at the end can wait
+      auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
+      if (!cloud) return tl::unexpected<core::Error>(maps_->damaged(stored.robot, cloud.error()));
+      result->cloud = std::move(*cloud);
+    }
     result->compact = std::make_shared<std::vector<std::uint8_t>>(std::move(*bytes));
     io.output<KeyframeCloud>("cloud", result);
     return {};
@@ -88,7 +85,7 @@ StageType maps_stage() {
   return {"maps",
           "Finds where finished maps of several robots overlap, lays them into one frame and adjusts them "
           "together",
-          Mode::kSerial,
+          Mode::kStateless,
           {},
           {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
           [] { return std::make_unique<MapsStage>(); }};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -38,7 +39,9 @@ class RefineStage : public Stage {
     if (!icp_ || !adjust_) return {};
     const auto keyframe = io.input<KeyframeCloud>("cloud");
     if (!keyframe->id.valid()) return {};
-    surfaces_[keyframe->id] = mapping::coarse_surface(*keyframe->cloud, local_maps_.voxel_m);
+    auto surface = mapping::coarse_surface(*keyframe->cloud, local_maps_.voxel_m);
+    const std::lock_guard<std::mutex> lock(one_at_a_time_);
+    surfaces_[keyframe->id] = std::move(surface);
     return {};
   }
 
@@ -125,7 +128,8 @@ class RefineStage : public Stage {
   mapping::PairOptions pairs_;
   mapping::AlignmentOptions alignment_;
   mapping::GlobalAdjustmentOptions adjustment_;
-  std::map<core::KeyframeId, mapping::CoarseSurface> surfaces_;
+  std::mutex one_at_a_time_;
+  std::map<core::KeyframeId, mapping::CoarseSurface> surfaces_;  ///< under the mutex while frames come
   RunSummary::Refine counts_;
 };
 
@@ -134,7 +138,7 @@ class RefineStage : public Stage {
 StageType refine_stage() {
   return {"refine",
           "Aligns local maps with each other and adjusts the whole map once more",
-          Mode::kSerial,
+          Mode::kStateless,
           {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
           {{"map", map_port()}},
           [] { return std::make_unique<RefineStage>(); }};

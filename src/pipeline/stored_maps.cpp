@@ -202,9 +202,26 @@ std::vector<mapping::MapPart> StoredMaps::map_parts() const {
 
 core::Result<std::vector<std::uint8_t>> StoredMaps::cloud_bytes(std::size_t index) const {
   const StoredCloud& cloud = clouds_.at(index);
+  const std::lock_guard<std::mutex> lock(one_at_a_time_);
   const maps::StoreReader& reader = *parts_[cloud.part].reader;
   return cloud.stored_id.valid() ? reader.cloud_bytes(cloud.stored_id)
                                  : reader.frame_cloud_bytes(cloud.frame);
+}
+
+sensor::Pinhole StoredMaps::camera_of(std::int32_t robot) const {
+  for (const StoredPart& part : parts_) {
+    const auto found = part.cameras.find(robot);
+    if (found != part.cameras.end()) return found->second;
+  }
+  return camera().color;
+}
+
+core::Error StoredMaps::damaged(std::int32_t robot, const core::Error& how) const {
+  std::string file = name_;
+  for (const StoredPart& part : parts_) {
+    if (part.cameras.count(robot) != 0) file = part.file.string();
+  }
+  return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, how.message)).value();
 }
 
 core::Result<std::size_t> StoredMaps::find_part(const std::string& name) const {

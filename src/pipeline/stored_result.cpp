@@ -195,7 +195,11 @@ core::Result<cloud::FusedCloud> StoredResult::lay_down(const cloud::DenseFusionO
     if (cloud) return cloud;
     return core::input_error(fmt::format("{}: {}", file_.string(), cloud.error().message));
   };
-  auto fused = cloud::fuse_views(views->world_from_camera, read, *cameras, options, executor, nullptr);
+  cloud::FusionViews all;
+  all.world_from_camera = views->world_from_camera;
+  all.cameras = *cameras;
+  all.read = read;
+  auto fused = cloud::fuse_views(all, options, executor);
   if (fused && map_.result.upright) move_cloud(*fused->cloud, map_.result.output_from_map);
   return fused;
 }

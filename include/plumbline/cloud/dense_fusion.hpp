@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/exposure.hpp"
+#include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/voxel_map.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
@@ -51,13 +53,30 @@ core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_f
                                     const DenseFusionOptions& options, const core::Executor& executor,
                                     FusionReport* report = nullptr);
 
-/// The same for views of several cameras: one camera a view. `robots`: whose view each is (0-254); then
-/// columns.robot tells who measured each point most. Empty: it is left out.
-core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
-                                    const ReadView& read, const std::vector<sensor::Pinhole>& cameras,
-                                    const DenseFusionOptions& options, const core::Executor& executor,
-                                    FusionReport* report = nullptr,
-                                    const std::vector<std::uint8_t>& robots = {});
+/// What of a view matters before it is laid down, wherever that will be: worked out while clouds come, or on
+/// the way.
+struct ViewSummary {
+  bool look = false;
+  DepthRaster raster;            ///< empty without free space
+  std::vector<ColorSpot> spots;  ///< none of a look
+};
+ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,
+                           const DenseFusionOptions& options);
+
+/// The views of a whole run. All vectors: one entry a view.
+struct FusionViews {
+  std::vector<geometry::Rigid3> world_from_camera;
+  std::vector<sensor::Pinhole> cameras;
+  std::vector<std::uint8_t> robots;  ///< whose view it is, 0-254; empty: of one robot, and no columns.robot
+  ReadView read;
+  /// Gives the summary of view `i`, once; may be called for several views at a time. Null: it is made of what
+  /// is read.
+  std::function<core::Result<ViewSummary>(std::size_t)> summary;
+};
+
+/// The same for views of several cameras and robots; columns.robot tells who measured each point most.
+core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
+                                    const core::Executor& executor, FusionReport* report = nullptr);
 
 /// A cloud and its columns again in larger voxels, weighted by confidence when that is known.
 FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m);

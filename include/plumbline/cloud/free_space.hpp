@@ -22,10 +22,20 @@ struct DepthRaster {
   std::vector<std::uint16_t> nearest;  ///< millimetres, 0: none
   float furthest_m = 0.0F;             ///< of all cells
   sensor::Pinhole camera;              ///< that took the view
+
+  /// What evidence() asks of the 3 x 3 cells around each cell.
+  struct Limits {
+    std::uint16_t free_to = 0;      ///< millimetres: nearer is free; 0: too little was measured around
+    std::uint16_t hidden_from = 0;  ///< further is hidden
+  };
+  std::vector<Limits> limits;  ///< by cell; empty until set_limits()
 };
 
 /// From a view's cloud, camera frame.
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera);
+
+/// Notes the limits, for views that will be asked often.
+void set_limits(DepthRaster& raster);
 
 /// A look: what a frame says of the space before it, and nothing else. The nearest depth of each cell of a
 /// raster, as an organised cloud (metres, camera frame) without normals and colours; cells without a
@@ -44,11 +54,12 @@ enum class Evidence { kNone, kSurface, kFree, kHidden };
 /// too little was measured.
 Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
 
-/// `is_look`: by view; looks are asked only where clouds alone do not let a sheet go: some cloud looks through, or fewer
-/// than four see a surface. For every sheet whether it is to go: at least half as many views look through it
-/// as see a surface there, two at least unless no more than one view sees it. Who walks towards the camera
-/// hides the place that he comes from: sheets that some view looks through, or that three times as many views
-/// cannot see as see them (three at least), go too where at least half of what is certain within 10 cm goes.
+/// `is_look`: by view; looks are asked only where clouds alone do not let a sheet go: some cloud looks
+/// through, or fewer than four see a surface. For every sheet whether it is to go: at least half as many
+/// views look through it as see a surface there, two at least unless no more than one view sees it. Who walks
+/// towards the camera hides the place that he comes from: sheets that some view looks through, or that three
+/// times as many views cannot see as see them (three at least), go too where at least half of what is certain
+/// within 10 cm goes.
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
                                        const std::vector<std::uint8_t>& is_look,
                                        const std::vector<geometry::Rigid3>& world_from_camera);

@@ -75,7 +75,7 @@ struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes
   double stamp = 0.0;   ///< seconds
   std::int32_t robot = 0;
-  cloud::CloudPtr cloud;
+  cloud::CloudPtr cloud;  ///< of stored maps only keyframes have it; null: what `compact` holds, not decoded
   std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it
 };
 

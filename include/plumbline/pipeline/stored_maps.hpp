@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,7 +57,12 @@ class StoredMaps : public dataset::FrameSource {
   [[nodiscard]] const std::vector<StoredPart>& parts() const { return parts_; }
   [[nodiscard]] std::vector<mapping::MapPart> map_parts() const;
   [[nodiscard]] const std::vector<StoredCloud>& clouds() const { return clouds_; }
+  /// May be called from several threads at a time.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(std::size_t index) const;
+  /// The camera of a robot, by this run's number.
+  [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const;
+  /// What to say of a cloud that cannot be used.
+  [[nodiscard]] core::Error damaged(std::int32_t robot, const core::Error& how) const;
   /// The part of that name, or that has a robot of that name. Errors (kUsage): none has.
   [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;
 
@@ -78,6 +84,7 @@ class StoredMaps : public dataset::FrameSource {
   std::string format_ = "map";
   std::vector<StoredPart> parts_;
   std::vector<StoredCloud> clouds_;
+  mutable std::mutex one_at_a_time_;  ///< a reader is one connection
 };
 
 }  // namespace plumbline::pipeline
