@@ -115,7 +115,7 @@ core::Result<std::vector<MergeEvidence>> FusionEnd::receive(const std::vector<st
                                                     std::max(robot, candidates[i].match_part)};
     std::vector<VerifiedPair>& pairs = verified_[parts];
     pairs.push_back(tried[i]);
-    if (merged_[parts] || static_cast<int>(pairs.size()) < options_.min_pairs) continue;
+    if (merged_[parts] || static_cast<int>(pairs.size()) < options_.few_pairs) continue;
     MergeEvidence merge = decide_overlap(parts_, parts.first, parts.second, pairs, options_, *executor_);
     if (!merge.accepted) continue;
     merged_[parts] = true;

@@ -107,6 +107,12 @@ MapFusionOptions::MapFusionOptions() {
 void MapFusionOptions::declare_decision(core::OptionTable& table, const std::string& prefix) {
   table.integer(prefix + "min_pairs", min_pairs, {2, 1000}, "",
                 "Keyframes of each of two maps that must agree on how the maps lie");
+  table.integer(prefix + "few_pairs", few_pairs, {1, 1000}, "",
+                "So few will do when they have few_inliers in common and nothing speaks for another answer");
+  table.integer(prefix + "few_inliers", few_inliers, {1, 10000}, "",
+                "Points and lines (counted twice) in common that each of so few keyframes needs");
+  table.number(prefix + "few_extent", few_extent_m, {0.0, 1000.0}, "m",
+               "How far both maps must extend: only then it is seen whether things repeat");
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
                "How far apart the keyframes that agree lie, at least");
   table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");

@@ -85,8 +85,15 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
     return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",
                        percent(merge.laid.seen_through()));
   }
-  // One keyframe may be mistaken; two that agree are an answer.
-  if (merge.rival >= 2 && merge.rival >= options.rival * merge.agreeing) {
+  const bool few = merge.agreeing < options.min_pairs;
+  if (few && !fits_too(merge.laid, merge.laid, options)) {
+    return fmt::format(
+        "only {} keyframes agree on how the maps lie, and laid over each other the maps have too little in "
+        "common: of {} landmarks {} match, {} were seen through",
+        merge.agreeing, merge.laid.expected, merge.laid.matched, merge.laid.contradicted);
+  }
+  // One keyframe may be mistaken; two that agree are an answer. Few have no such rivals at all.
+  if (merge.rival >= (few ? 1 : 2) && merge.rival >= options.rival * merge.agreeing) {
     return fmt::format(
         "two answers exclude each other: {} keyframes say one thing, {} another; places look "
         "alike here",

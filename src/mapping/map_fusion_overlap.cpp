@@ -2,8 +2,8 @@
 // Do two maps show the same place, and how do they lie to each other?
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -23,66 +23,6 @@ std::size_t part_of(const std::vector<MapPart>& parts, KeyframeId id) {
     if (parts[p].map->has_keyframe(id)) return p;
   }
   return parts.size();
-}
-
-/// The keyframe of `parts[a]` that should see most nearly what keyframe `id` of b sees; invalid: none does.
-KeyframeId nearest_view(const maps::Map& a, const Rigid3& a_from_b, const Rigid3& b_from_camera) {
-  constexpr double kNear_m = 0.7;
-  constexpr double kTurned_rad = 0.45;
-  constexpr double kMetresPerRadian = 1.0;
-  KeyframeId best;
-  double least = kNear_m + kTurned_rad;
-  const Rigid3 here = a_from_b * b_from_camera;
-  for (const KeyframeId id : a.keyframe_ids()) {
-    const Rigid3 camera_from_here = a.camera_from_world(id) * here;
-    const double turned = geometry::rotation_angle(camera_from_here.rotation);
-    const double apart = camera_from_here.translation.norm();
-    if (apart > kNear_m || turned > kTurned_rad) continue;
-    if (const double cost = apart + kMetresPerRadian * turned; cost < least) {
-      least = cost;
-      best = id;
-    }
-  }
-  return best;
-}
-
-/// Keyframes of b with a view of a, as `a_from_b` has it: those that were not asked yet are verified now.
-void ask_others(const std::vector<MapPart>& parts, const MapFusionOptions& options,
-                const core::Executor& executor, MergeEvidence& merge) {
-  constexpr std::size_t kMost = 60;
-  const maps::Map& a = *parts[merge.a].map;
-  const maps::Map& b = *parts[merge.b].map;
-  std::set<KeyframeId> agreed;
-  for (const VerifiedPair& pair : merge.pairs)
-    agreed.insert(b.has_keyframe(pair.query) ? pair.query : pair.match);
-  std::vector<OverlapFinder::Candidate> open;
-  for (const KeyframeId id : b.keyframe_ids()) {
-    const KeyframeId near = nearest_view(a, merge.a_from_b, b.camera_from_world(id).inverse());
-    if (!near.valid()) continue;
-    ++merge.expected;
-    if (agreed.count(id) != 0) {
-      ++merge.confirmed;
-    } else {
-      open.push_back({id, near, merge.b, merge.a, 0.0});
-    }
-  }
-  std::vector<OverlapFinder::Candidate> asked;
-  const std::size_t step = (open.size() + kMost - 1) / std::max<std::size_t>(kMost, 1);
-  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(step, 1)) asked.push_back(open[i]);
-  merge.expected -= static_cast<int>(open.size() - asked.size());
-  std::vector<VerifiedPair> verified(asked.size());
-  executor.parallel_for(asked.size(),
-                        [&](std::size_t i) { verified[i] = verify_candidate(parts, asked[i], options); });
-  const SortedPairs known = sort_pairs(a, b, merge.pairs);
-  const SortedPairs fresh = sort_pairs(a, b, verified);
-  for (std::size_t i = 0; i < fresh.places.size(); ++i) {
-    const auto agrees = [&](const PlacePair& other) {
-      return agree(a, b, fresh.places[i], other, options.consistency);
-    };
-    if (!std::all_of(known.places.begin(), known.places.end(), agrees)) continue;
-    ++merge.confirmed;
-    merge.pairs.push_back(verified[fresh.indices[i]]);
-  }
 }
 
 double turn_between(const maps::Map& map, const std::vector<PlacePair>& pairs) {
@@ -107,11 +47,39 @@ void sum_up(MergeEvidence& merge) {
   }
 }
 
-std::string judge(const MergeEvidence& merge, const MapFusionOptions& options) {
+/// How far apart the cameras of a map lie: the diagonal of the box around them, metres.
+double extent(const maps::Map& map) {
+  Eigen::AlignedBox3d box;
+  for (const KeyframeId id : map.keyframe_ids()) box.extend(map.camera_from_world(id).inverse().translation);
+  return box.isEmpty() ? 0.0 : box.diagonal().norm();
+}
+
+/// Few keyframes will do where each shows a whole picture of the same: not by chance, and what merely looks
+/// alike has less in common. That things repeat is seen by maps that reach farther than the place itself.
+bool few_suffice(const maps::Map& a, const maps::Map& b, const MergeEvidence& merge,
+                 const MapFusionOptions& options) {
+  if (extent(a) < options.few_extent_m || extent(b) < options.few_extent_m) return false;
+  std::set<KeyframeId> of_a;
+  std::set<KeyframeId> of_b;
+  for (const VerifiedPair& pair : merge.pairs) {
+    if (pair.evidence.points + 2 * pair.evidence.lines < options.few_inliers) continue;
+    const bool query_of_a = a.has_keyframe(pair.query);
+    of_a.insert(query_of_a ? pair.query : pair.match);
+    of_b.insert(query_of_a ? pair.match : pair.query);
+  }
+  return static_cast<int>(std::min(of_a.size(), of_b.size())) >= options.few_pairs;
+}
+
+std::string judge(const maps::Map& a, const maps::Map& b, const MergeEvidence& merge,
+                  const MapFusionOptions& options) {
   if (merge.verified == 0) return "no two keyframes were verified to show the same place";
   if (merge.agreeing < options.min_pairs) {
-    return fmt::format("only {} keyframes agree on how the maps lie ({} are needed)", merge.agreeing,
-                       options.min_pairs);
+    if (few_suffice(a, b, merge, options)) return {};
+    return fmt::format(
+        "only {} keyframes agree on how the maps lie ({} are needed, or {} with {} points and lines in "
+        "common "
+        "in maps of {} m and more)",
+        merge.agreeing, options.min_pairs, options.few_pairs, options.few_inliers, options.few_extent_m);
   }
   if (merge.span_m < options.min_span_m && merge.span_rad < options.min_span_rad) {
     return fmt::format(
@@ -170,16 +138,22 @@ VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFi
 }
 
 MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
-                             const std::vector<VerifiedPair>& pairs, const MapFusionOptions& options,
+                             const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor) {
   MergeEvidence merge;
   merge.a = a;
   merge.b = b;
   const maps::Map& map_a = *parts[a].map;
   const maps::Map& map_b = *parts[b].map;
-  const SortedPairs all = sort_pairs(map_a, map_b, pairs);
+  std::vector<VerifiedPair> pairs = found;
+  SortedPairs all = sort_pairs(map_a, map_b, pairs);
+  std::vector<ConsistentSet> sets = consistent_sets(map_a, map_b, all.places, options.consistency);
+  if (!sets.empty() && witnesses(sets.front()) < options.min_pairs) {
+    ask_neighbours(parts, all, sets, options, executor, merge, pairs);
+    all = sort_pairs(map_a, map_b, pairs);
+    sets = consistent_sets(map_a, map_b, all.places, options.consistency);
+  }
   merge.verified = static_cast<int>(all.places.size());
-  const std::vector<ConsistentSet> sets = consistent_sets(map_a, map_b, all.places, options.consistency);
   if (!sets.empty()) {
     merge.agreeing = witnesses(sets.front());
     merge.span_m = sets.front().span_m;
@@ -194,7 +168,7 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
     merge.covariance = mean.covariance;
     merge.spread_m = mean.spread_m;
   }
-  merge.refused = judge(merge, options);
+  merge.refused = judge(map_a, map_b, merge, options);
   if (merge.refused.empty()) merge.refused = doubts(parts, all, sets, options, merge);
   if (merge.refused.empty()) {
     ask_others(parts, options, executor, merge);

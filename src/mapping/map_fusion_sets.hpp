@@ -40,4 +40,16 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
                    const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
                    MergeEvidence& merge);
 
+/// More pairs of keyframes that should see the same if one of the first sets is right, verified; nothing that
+/// is in `pairs` already. Uses a and b of `merge`.
+void ask_neighbours(const std::vector<MapPart>& parts, const SortedPairs& all,
+                    const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
+                    const core::Executor& executor, const MergeEvidence& merge,
+                    std::vector<VerifiedPair>& pairs);
+
+/// Keyframes of b with a view of a, as a_from_b of `merge` has it: those that do not agree yet are verified.
+/// Fills expected, confirmed and more pairs.
+void ask_others(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                const core::Executor& executor, MergeEvidence& merge);
+
 }  // namespace plumbline::mapping

@@ -86,6 +86,22 @@ TEST(MapFusion, OneLookAtAPlaceIsNotEnough) {
   EXPECT_NE(merges[0].refused.find("are needed"), std::string::npos) << merges[0].refused;
 }
 
+TEST(MapFusion, OnePairLeadsToItsNeighbours) {
+  const maps::Map a = wall_map(5, 7, -0.35, Rigid3{});
+  const maps::Map b = renumbered(wall_map(5, 7, -0.3, kOtherWorld), {{0, 1}});
+  const std::vector<MapPart> parts{{&a, kCameraOf0}, {&b, kCameraOf1}};
+  const core::Executor executor(1);
+  const std::vector<VerifiedPair> one{
+      verify_candidate(parts, {b.keyframe_ids()[3], a.keyframe_ids()[3], 1, 0, 0.0}, {})};
+  ASSERT_TRUE(one[0].evidence.accepted) << one[0].evidence.refused;
+  const MergeEvidence merge = decide_overlap(parts, 0, 1, one, {}, executor);
+  EXPECT_TRUE(merge.accepted) << merge.refused;
+  EXPECT_GE(merge.agreeing, 5);
+  std::vector<VerifiedPair> wrong = one;
+  wrong[0].evidence.query_from_match.translation.x() += 5.0;
+  EXPECT_EQ(decide_overlap(parts, 0, 1, wrong, {}, executor).agreeing, 1) << "nothing to be seen there";
+}
+
 /// Keyframes without features in a row, `step` apart, and pairs of two such maps.
 maps::Map row(std::int32_t robot, int count) {
   maps::Map map;

@@ -45,15 +45,16 @@ cv::Mat repeating_wall() {
 }
 
 /// b's keyframes see what a's see, `shift` away from where the maps have them.
-MergeEvidence decide(const maps::Map& a, const maps::Map& b, const Rigid3& shift) {
+MergeEvidence decide(const maps::Map& a, const maps::Map& b, const Rigid3& shift,
+                     MapFusionOptions options = {}) {
   std::vector<VerifiedPair> pairs;
   for (int i = 0; i < 2 * kViews; ++i) {
     VerifiedPair pair{{0, i}, {1, i}, {}};
     pair.evidence.accepted = true;
     pair.evidence.query_from_match = shift;
+    pair.evidence.points = 150;
     pairs.push_back(pair);
   }
-  MapFusionOptions options;
   options.min_confirmed = 0.0;  // this is about the maps as a whole
   const core::Executor executor(1);
   return decide_overlap({{&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}}}, 0, 1, pairs, options, executor);
@@ -90,6 +91,28 @@ TEST(FusionDoubts, MapsThatContradictAreNotMerged) {
   EXPECT_NE(merge.refused.find("seen through"), std::string::npos) << merge.refused;
 }
 
+TEST(FusionDoubts, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
+  const maps::Map a = walk(tests::poster(1800, 5));
+  MapFusionOptions few;
+  few.min_pairs = 50;  // more than there are
+  few.few_extent_m = 0.3;
+  const MergeEvidence merge = decide(a, as_second(a), Rigid3{}, few);
+  EXPECT_TRUE(merge.accepted) << merge.refused;
+  EXPECT_LT(merge.agreeing, few.min_pairs);
+  const maps::Map repeats = walk(repeating_wall());
+  EXPECT_FALSE(decide(repeats, as_second(repeats), Rigid3{}, few).accepted);
+
+  MapFusionOptions other = few;
+  other.few_extent_m = 1.0;  // the maps are of 0.5 m
+  EXPECT_NE(decide(a, as_second(a), Rigid3{}, other).refused.find("are needed"), std::string::npos);
+  other = few;
+  other.few_inliers = 5000;
+  EXPECT_FALSE(decide(a, as_second(a), Rigid3{}, other).accepted);
+  other = few;
+  other.few_pairs = 49;
+  EXPECT_FALSE(decide(a, as_second(a), Rigid3{}, other).accepted);
+}
+
 TEST(FusionDoubts, MapsWithoutLandmarksTellNothing) {
   maps::Map a;
   for (int i = 0; i < 2 * kViews; ++i) {
@@ -102,6 +125,10 @@ TEST(FusionDoubts, MapsWithoutLandmarksTellNothing) {
   EXPECT_TRUE(merge.accepted) << merge.refused;
   EXPECT_EQ(merge.laid.expected, 0);
   EXPECT_EQ(merge.laid.seen_through(), 0.0);
+  MapFusionOptions few;
+  few.min_pairs = 50;
+  few.few_extent_m = 0.3;
+  EXPECT_NE(decide(a, as_second(a), Rigid3{}, few).refused.find("too little in common"), std::string::npos);
 }
 
 }  // namespace

@@ -27,6 +27,9 @@ namespace plumbline::mapping {
 
 struct MapFusionOptions {
   int min_pairs = 5;          ///< keyframes of each map that must agree
+  int few_pairs = 2;          ///< so few will do when each has
+  int few_inliers = 100;      ///< points and lines (twice) in common, and both maps extend
+  double few_extent_m = 3.0;  ///< so far, and nothing at all speaks for another answer
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
@@ -141,10 +144,10 @@ VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFi
                               const MapFusionOptions& options);
 
 /// Do these pairs, all between parts a and b, show that the maps overlap, and how do they lie? Fills all but
-/// candidates, tried and refused_pairs. When the pairs agree, more views that should show both maps are
-/// asked.
+/// candidates, tried and refused_pairs. When too few agree, keyframes near them are asked first; when enough
+/// do, more views that should show both maps.
 MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
-                             const std::vector<VerifiedPair>& pairs, const MapFusionOptions& options,
+                             const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor);
 
 /// All pairs of parts, by a, then b. The same for any number of threads.
