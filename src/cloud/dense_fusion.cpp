@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/cloud/dense_fusion.hpp"
 
+#include <malloc.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -40,7 +41,7 @@ std::size_t cells_per_tile(const DenseFusionOptions& options) {
 
 /// Of the tiles that are filled together, in the voxel maps.
 std::size_t cells_at_a_time(const DenseFusionOptions& options) {
-  return cells_within(4.0 * options.tile_mb, 110.0, options);
+  return cells_within(6.0 * options.tile_mb, 90.0, options);
 }
 
 /// The first error in the order of the items, if any.
@@ -50,6 +51,13 @@ std::optional<core::Error> first_error(const std::vector<core::Result<T>>& resul
     if (!result) return result.error();
   }
   return std::nullopt;
+}
+
+/// Pages that the allocator keeps for clouds and voxels that are gone: what comes next takes as much again.
+void give_back_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 class Fusion {
@@ -72,6 +80,7 @@ class Fusion {
       }
       std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
       if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
+      give_back_memory();
       std::vector<FusedCloud> parts(count);
       std::vector<FusionReport> reports(count);
       executor_.parallel_for(count, [&](std::size_t k) {
@@ -85,6 +94,7 @@ class Fusion {
       }
     }
     rasters_ = {};
+    give_back_memory();
     return joined(std::move(all));
   }
 
@@ -104,7 +114,9 @@ class Fusion {
       is_look_[v] = summary->look ? 1 : 0;
       cells[v] = color_cells(summary->spots, poses_[v], kCell_m);
       rasters_[v] = std::move(summary->raster);
-      if (is_look_[v] == 0) set_limits(rasters_[v]);
+      if (is_look_[v] != 0) return;
+      set_limits(rasters_[v]);
+      rasters_[v].nearest = {};  // limits are all that is asked
     });
     if (const auto error = first_error(done)) return tl::unexpected<core::Error>(*error);
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
@@ -140,7 +152,7 @@ class Fusion {
   /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
   /// for all of these tiles, and every tile takes the views in their order.
   core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) const {
-    constexpr std::size_t kViewsAtATime = 4;
+    constexpr std::size_t kViewsAtATime = 12;
     std::vector<std::uint32_t> views;
     for (std::size_t k = 0; k < voxels.size(); ++k) {
       views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
@@ -152,10 +164,10 @@ class Fusion {
     for (std::size_t at = 0; at < views.size() || !laid.empty();) {
       next = std::vector<LaidView>(std::min(kViewsAtATime, views.size() - at));
       executor_.parallel_for(voxels.size() + next.size(), [&](std::size_t i) {
-        if (i < voxels.size()) {
-          lay_down(i, laid, voxels[i]);
+        if (i < next.size()) {
+          next[i] = laid_view(views[at + i], first, voxels.size());
         } else {
-          next[i - voxels.size()] = laid_view(views[at + i - voxels.size()], first, voxels.size());
+          lay_down(i - next.size(), laid, voxels[i - next.size()]);
         }
       });
       for (const LaidView& view : next) {
@@ -305,7 +317,7 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
                 "Points with fewer others around that face the same way are dust and go; 0: none");
   table.number(
       "tile_mb", tile_mb, {16.0, 100000.0}, "",
-      "Memory that one tile of the map may take, MB; as many as fill four times that are filled together");
+      "Memory that one tile of the map may take, MB; as many as may take six times that are filled together");
 }
 
 ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,

@@ -76,11 +76,10 @@ VoxelMap::Side* VoxelMap::find_or_add(std::uint64_t key) {
     if (side.key == key) return &side;
     slot = (slot + 1) & mask;
   }
-  Side side;
+  Side& side = sides_.add();
   side.key = key;
-  sides_.push_back(side);
   table_[slot] = static_cast<std::uint32_t>(sides_.size());
-  return &sides_.back();
+  return &side;
 }
 
 void VoxelMap::add(const VoxelSample* samples, std::size_t count) {
@@ -163,7 +162,8 @@ void VoxelMap::merge(const VoxelMap& other, const geometry::Rigid3& this_from_ot
   ++view_;
   std::vector<VoxelSample> samples;
   samples.reserve(other.sides_.size());
-  for (const Side& side : other.sides_) {
+  for (std::size_t i = 0; i < other.sides_.size(); ++i) {
+    const Side& side = other.sides_[i];
     if (!(side.weight > 0.0F)) continue;
     VoxelSample sample;
     if (!locate(this_from_other * other.position(side), options_.voxel_m, sample)) {

@@ -281,6 +281,8 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
                 "Iterations of each round of the adjustment at most");
   table.integer("adjust.rounds", bundle_options.rounds, {1, 10}, "",
                 "Rounds of the adjustment; between them outliers are put aside");
+  table.number("adjust.tolerance", bundle_options.tolerance, {0.0, 0.1}, "",
+               "A round ends with an iteration that lowers the cost by a smaller share");
   table.number("adjust.first_gate", first_gate, {0.0, 1000.0}, "",
                "Observations further off than so many standard deviations where the pose graph has put the "
                "keyframes wait for the second round: those that caused a drift would restore it; 0: none");

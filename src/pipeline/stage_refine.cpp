@@ -94,9 +94,9 @@ class RefineStage : public Stage {
     if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
     log_->debug(
         fmt::format("refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "
-                    "moved by {:.1f} mm on average, {:.1f} mm at most",
+                    "{} iterations; moved by {:.1f} mm on average, {:.1f} mm at most",
                     summary.keyframes, summary.points, summary.lines, summary.surface_edges, alignments,
-                    loops.size(), 1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
+                    loops.size(), summary.bundle.iterations, 1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
   }
 
   std::vector<mapping::PoseEdge> align(const maps::Map& map) {

@@ -29,7 +29,7 @@ struct DenseFusionOptions {
   bool free_space = true;    ///< what other views look through goes
   bool exposure = true;      ///< colours are evened out between views
   int min_support = 6;       ///< points with fewer like them within about 3 blocks are dust; 0: none is
-  double tile_mb = 100.0;    ///< memory that one tile may take; tiles of four times that are filled together
+  double tile_mb = 100.0;    ///< memory that one tile may take; tiles of six times that are filled together
 
   void declare(core::OptionTable& table);
 };

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "plumbline/cloud/chunks.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/options.hpp"
@@ -133,7 +134,7 @@ class VoxelMap {
   [[nodiscard]] Eigen::Vector3d position(const Side& side) const;
 
   VoxelMapOptions options_;
-  std::vector<Side> sides_;
+  Chunks<Side> sides_;
   std::vector<std::uint32_t> table_;  ///< open addressing, linear probing: index into sides_ + 1, 0 = free
   std::uint32_t view_ = 0;
   std::size_t dropped_ = 0;
