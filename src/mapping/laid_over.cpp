@@ -247,6 +247,57 @@ void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_fro
   }
 }
 
+namespace {
+
+struct SurfaceCounts {
+  int there = 0;
+  int through = 0;
+};
+
+/// Surface samples of one map in the views of another.
+void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
+                  SurfaceCounts& sum) {
+  constexpr double kFacing = 0.25;  // cosine
+  const std::vector<View> views = views_of(fixed);
+  const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
+  std::size_t count = 0;
+  for (const KeyframeId id : ids) count += moved.map->keyframe(id).surface.size();
+  const std::size_t step = stride(count, kMostAsked);
+  std::size_t next = 0;  // of all samples, one keyframe's after the other's
+  for (const KeyframeId id : ids) {
+    const Rigid3 fixed_from_camera = fixed_from_moved * moved.map->camera_from_world(id).inverse();
+    const std::vector<maps::SurfaceSample>& samples = moved.map->keyframe(id).surface;
+    for (; next < samples.size(); next += step) {
+      const Eigen::Vector3d at = fixed_from_camera * samples[next].point.cast<double>();
+      const Eigen::Vector3d normal = fixed_from_camera.rotation * samples[next].normal.cast<double>();
+      bool there = false;
+      bool through = false;
+      for (const View& view : views) {
+        const Eigen::Vector3d in_camera = view.camera_from_world * at;
+        if (in_camera.z() < kNear_m || in_camera.z() > kFar_m) continue;
+        if (-(view.camera_from_world.rotation * normal).dot(in_camera) < kFacing * in_camera.norm()) continue;
+        const Seen what = seen(*view.depth, view.camera, in_camera);
+        there = there || what == Seen::kThere;
+        through = through || what == Seen::kThrough;
+      }
+      sum.there += there ? 1 : 0;
+      sum.through += through && !there ? 1 : 0;
+    }
+    next -= samples.size();
+  }
+}
+
+}  // namespace
+
+double LaidMaps::surfaces_seen_through(const Rigid3& a_from_b) const {
+  constexpr int kFew = 500;  // samples; tell nothing
+  SurfaceCounts sum;
+  lay_surfaces(b_.part, a_.part, a_from_b, sum);
+  lay_surfaces(a_.part, b_.part, a_from_b.inverse(), sum);
+  const int told = sum.there + sum.through;
+  return told >= kFew ? static_cast<double>(sum.through) / told : 0.0;
+}
+
 LaidOver LaidMaps::fit(const Rigid3& a_from_b) const {
   LaidOver sum;
   lay(b_, a_, a_from_b, sum);

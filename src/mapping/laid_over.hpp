@@ -20,6 +20,10 @@ class LaidMaps {
   /// The fit of b laid over a.
   [[nodiscard]] LaidOver fit(const geometry::Rigid3& a_from_b) const;
 
+  /// Share of the surfaces of each map, at their place in the other, that lie where its cameras saw through;
+  /// of those of which they saw anything, that face them. 0 when that are too few.
+  [[nodiscard]] double surfaces_seen_through(const geometry::Rigid3& a_from_b) const;
+
   /// Other ways to lay b over a, a step of `least_m` or more away from `a_from_b`, that most landmarks seen
   /// by the keyframes of `pairs` speak for.
   [[nodiscard]] std::vector<geometry::Rigid3> steps(const geometry::Rigid3& a_from_b,

@@ -17,6 +17,7 @@ constexpr double kApart_m = 1.0;     // another place: more than maps drift with
 constexpr double kTurned_rad = 0.3;  // ... or so far turned
 constexpr int kFewLandmarks = 30;    // tell nothing
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
+constexpr double kNoRival = 0.2;     // share of surfaces seen through where no landmark speaks against it
 
 /// How far apart two answers put the camera of b's keyframes that agree, and how far they turn it.
 struct Difference {
@@ -61,8 +62,9 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
   const maps::Map& b = *parts[merge.b].map;
   const LaidMaps maps(parts[merge.a], parts[merge.b]);
   merge.laid = maps.fit(merge.a_from_b);
-  const auto weigh = [&](const LaidOver& fit, const Difference& apart) {
+  const auto weigh = [&](const Rigid3& other, const LaidOver& fit, const Difference& apart) {
     if (!fits_too(fit, merge.laid, options) || fit.share() <= merge.rival_laid.share()) return;
+    if (maps.surfaces_seen_through(other) > kNoRival) return;
     merge.rival_laid = fit;
     merge.rival_m = apart.metres;
   };
@@ -73,13 +75,13 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
     const Difference apart = between(b, pairs.front().b, merge.a_from_b, other);
     if (!apart.elsewhere()) continue;
     const LaidOver fit = maps.fit(other);
-    if (refuted(fit, options)) continue;
+    if (refuted(fit, options) || maps.surfaces_seen_through(other) > kNoRival) continue;
     merge.rival = std::max(merge.rival, witnesses(sets[i]));
-    weigh(fit, apart);
+    weigh(other, fit, apart);
   }
   const core::KeyframeId at = all.places[sets.front().members.front()].b;
   for (const Rigid3& other : maps.steps(merge.a_from_b, merge.pairs, kApart_m)) {
-    weigh(maps.fit(other), between(b, at, merge.a_from_b, other));
+    weigh(other, maps.fit(other), between(b, at, merge.a_from_b, other));
   }
   if (merge.laid.expected + merge.laid.contradicted >= kFewLandmarks && merge.laid.seen_through() > kWrong) {
     return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",

@@ -12,12 +12,18 @@
 namespace plumbline::tests {
 
 /// A wall with a poster, seen straight from 2 m, rendered at `pose`. The map believes the camera at
-/// `believed`. Every feature with depth becomes a landmark of its own.
+/// `believed`. Every feature with depth becomes a landmark of its own. `boards` of one grey may stand before
+/// it.
 inline core::KeyframeId add_view(maps::Map& map, const cv::Mat& poster, const geometry::Rigid3& pose,
-                                 const geometry::Rigid3& believed, double stamp) {
+                                 const geometry::Rigid3& believed, double stamp,
+                                 const std::vector<WorldPlane>& boards = {}) {
   sensor::RgbdFrame frame;
   frame.gray = render_wall(poster, 300.0, 2.0, pose);
-  frame.depth = render_depth({{{0.0, 0.0, 2.0}, {0.0, 0.0, -1.0}, 0.0}}, pose);
+  std::vector<WorldPlane> planes{{{0.0, 0.0, 2.0}, {0.0, 0.0, -1.0}, 0.0}};
+  planes.insert(planes.end(), boards.begin(), boards.end());
+  cv::Mat plane;
+  frame.depth = render_depth(planes, pose, &plane);
+  frame.gray.setTo(cv::Scalar(128), plane > 0);
   auto features =
       std::make_shared<features::FrameFeatures>(features::FeatureExtractor({}, kTestCamera).extract(frame));
   auto keyframe = std::make_shared<maps::Keyframe>();

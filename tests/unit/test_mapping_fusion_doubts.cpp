@@ -18,9 +18,10 @@ constexpr int kViews = 6;
 constexpr double kStep_m = 0.1;
 
 /// Every landmark is seen twice, as those are that maps keep.
-void add_landmarks_seen_twice(maps::Map& map, const cv::Mat& wall, const Rigid3& camera_from_world) {
-  const KeyframeId first = tests::add_view(map, wall, camera_from_world, camera_from_world, 1.0);
-  const KeyframeId second = tests::add_view(map, wall, camera_from_world, camera_from_world, 1.5);
+void add_landmarks_seen_twice(maps::Map& map, const cv::Mat& wall, const Rigid3& camera_from_world,
+                              const std::vector<tests::WorldPlane>& boards) {
+  const KeyframeId first = tests::add_view(map, wall, camera_from_world, camera_from_world, 1.0, boards);
+  const KeyframeId second = tests::add_view(map, wall, camera_from_world, camera_from_world, 1.5, boards);
   const std::vector<core::PointId> kept = map.points_of(first);
   const std::vector<core::PointId> gone = map.points_of(second);
   for (std::size_t i = 0; i < kept.size() && i < gone.size(); ++i) {
@@ -29,10 +30,11 @@ void add_landmarks_seen_twice(maps::Map& map, const cv::Mat& wall, const Rigid3&
 }
 
 /// A robot that looks at a wall 2 m away and goes along it.
-maps::Map walk(const cv::Mat& wall) {
+maps::Map walk(const cv::Mat& wall, const std::vector<tests::WorldPlane>& boards = {}) {
   maps::Map map;
   for (int i = 0; i < kViews; ++i) {
-    add_landmarks_seen_twice(map, wall, Rigid3(Eigen::Matrix3d::Identity(), {-kStep_m * i, 0.0, 0.0}));
+    add_landmarks_seen_twice(map, wall, Rigid3(Eigen::Matrix3d::Identity(), {-kStep_m * i, 0.0, 0.0}),
+                             boards);
   }
   return map;
 }
@@ -81,6 +83,17 @@ TEST(FusionDoubts, WhatRepeatsHasSeveral) {
   EXPECT_NEAR(merge.rival_m, 1.2, 0.1);
   EXPECT_GT(merge.rival_laid.matched, 30);
   EXPECT_NE(merge.refused.find("look alike"), std::string::npos) << merge.refused;
+}
+
+TEST(FusionDoubts, WhatStandsBeforeItOnlyOnceTellsThatAStepIsWrong) {
+  cv::Mat wall;  // repeats along the way only
+  cv::repeat(tests::poster(1440, 5).colRange(0, 360), 1, 6, wall);
+  const maps::Map bare = walk(wall);
+  EXPECT_NEAR(decide(bare, as_second(bare), Rigid3{}).rival_m, 1.2, 0.1);
+  const maps::Map a = walk(wall, {{{0.25, 0.0, 1.5}, {0.0, 0.0, -1.0}, 0.5}});
+  const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
+  EXPECT_TRUE(merge.accepted) << merge.refused;
+  EXPECT_EQ(merge.rival_m, 0.0);
 }
 
 TEST(FusionDoubts, MapsThatContradictAreNotMerged) {
