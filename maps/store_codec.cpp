@@ -206,6 +206,8 @@ void encode(const sensor::Camera& camera, ByteWriter& to) {
   if (camera.color_from_depth) to.put(*camera.color_from_depth);
   to.flag(camera.depth.has_value());
   if (camera.depth) write(*camera.depth, to);
+  to.flag(camera.readout_s.has_value());
+  if (camera.readout_s) to.put(*camera.readout_s);
 }
 sensor::Camera decode_camera(const Bytes& bytes) {
   ByteReader from(bytes);
@@ -217,6 +219,7 @@ sensor::Camera decode_camera(const Bytes& bytes) {
   from.get(camera.fps);
   if (from.flag()) from.get(camera.color_from_depth.emplace());
   if (from.flag()) read(from, camera.depth.emplace());
+  if (!from.at_end() && from.flag()) from.get(camera.readout_s.emplace());  // stores of old do not tell
   from.expect_end();
   return camera;
 }
