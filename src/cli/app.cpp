@@ -98,6 +98,7 @@ int run(int argc, char** argv) {
   Session session;
   add_map(app, session);
   add_fuse(app, session);
+  add_calibrate(app, session);
   add_info(app, session);
   add_render(app, session);
   add_export(app, session);

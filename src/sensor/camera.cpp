@@ -174,6 +174,9 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   double readout_s = 0.0;
   table.number("readout", readout_s, {0.0, 0.1}, "s",
                "From the first row of a picture to the last; 0: all at once");
+  std::vector<double> slope(2, 0.0);
+  table.numbers("depth_slope", slope, 2, {-0.2, 0.2}, "1/m",
+                "Along x and y: what to add to 1 / depth on the ray (x, y, 1)");
   if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
 
   check_pinhole(*root, camera.color, "", problems);
@@ -184,6 +187,7 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
     std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   }
   if (root->find("readout") != nullptr) camera.readout_s = readout_s;
+  if (slope.size() == camera.depth_slope.size()) std::copy_n(slope.begin(), 2, camera.depth_slope.begin());
   read_depth_camera(*root, camera, problems);
 
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
@@ -256,6 +260,10 @@ std::string to_yaml(const Camera& camera) {
   if (camera.readout_s) {
     text += fmt::format("readout: {}  # s from the first row of a picture to the last; 0: all at once\n",
                         *camera.readout_s);
+  }
+  if (camera.depth_slope != std::array<double, 2>{}) {
+    text += fmt::format("depth_slope: [{}, {}]  # 1/m along x, y: added to 1 / depth on the ray (x, y, 1)\n",
+                        camera.depth_slope[0], camera.depth_slope[1]);
   }
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();

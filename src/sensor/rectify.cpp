@@ -19,6 +19,19 @@ float metres(std::uint16_t raw, float scale) {
   return raw == kNoReading || raw == kSaturated ? 0.0F : static_cast<float>(raw) / scale;
 }
 
+/// 1 / z = 1 / z_measured + slope . (x, y); what would come to lie behind the camera is no reading.
+void correct_slope(const Pinhole& camera, const std::array<double, 2>& slope, cv::Mat& depth) {
+  if (slope[0] == 0.0 && slope[1] == 0.0) return;
+  for (int v = 0; v < depth.rows; ++v) {
+    const double row = slope[1] * (v - camera.cy) / camera.fy;
+    auto* z = depth.ptr<float>(v);
+    for (int u = 0; u < depth.cols; ++u) {
+      const double shrink = 1.0 + static_cast<double>(z[u]) * (slope[0] * (u - camera.cx) / camera.fx + row);
+      z[u] = shrink > 0.1 ? static_cast<float>(static_cast<double>(z[u]) / shrink) : 0.0F;
+    }
+  }
+}
+
 }  // namespace
 
 struct Rectifier::Maps {
@@ -138,8 +151,11 @@ cv::Mat Rectifier::depth(const cv::Mat& raw16) const {
   if (raw16.type() != CV_16UC1 || raw16.cols != p.width || raw16.rows != p.height) {
     throw std::invalid_argument("Rectifier::depth: a 16-bit image of the depth camera's size is needed");
   }
-  if (own_camera) return maps_->registered(raw16);
-  return camera.distorted() ? maps_->undistorted(raw16) : maps_->converted(raw16);
+  cv::Mat metres = own_camera           ? maps_->registered(raw16)
+                   : camera.distorted() ? maps_->undistorted(raw16)
+                                        : maps_->converted(raw16);
+  correct_slope(camera.color, camera.depth_slope, metres);
+  return metres;
 }
 
 }  // namespace plumbline::sensor

@@ -74,12 +74,15 @@ TEST_F(CameraFile, TextReadsBackTheSame) {
   camera->color.fx = 517.306408 / 3.0;
   EXPECT_FALSE(camera->readout_s) << "not known is not 0";
   camera->readout_s = 0.021;
+  EXPECT_EQ(camera->depth_slope, (std::array<double, 2>{}));
+  camera->depth_slope = {0.0125, -1.0 / 300.0};
   camera->color_from_depth->rotation = geometry::exp_so3({0.01, -0.02, 0.03});
   const auto again = read_camera(write(to_yaml(*camera), "again.yaml"));
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->name, camera->name);
   EXPECT_EQ(again->color.fx, camera->color.fx);
   EXPECT_EQ(again->readout_s, camera->readout_s);
+  EXPECT_EQ(again->depth_slope, camera->depth_slope);
   EXPECT_EQ(again->distortion, camera->distortion);
   EXPECT_EQ(again->depth->fx, camera->depth->fx);
   EXPECT_LT((again->color_from_depth->rotation - camera->color_from_depth->rotation).norm(), 1e-14);
@@ -118,6 +121,11 @@ TEST_F(CameraFile, ImpossibleValues) {
   EXPECT_THAT(error_of(with("depth_scale: 1000", "depth_scale: 0")), HasSubstr("depth_scale"));
   EXPECT_THAT(error_of(with("model: pinhole", "model: fisheye")), HasSubstr("pinhole"));
   EXPECT_THAT(error_of(with("0.002, 0.05]", "0.002, 0.05, 1]")), HasSubstr("k1, k2, p1, p2, k3"));
+}
+
+TEST_F(CameraFile, DepthSlopeIsTwoSmallNumbers) {
+  EXPECT_THAT(error_of(std::string(kGood) + "depth_slope: [0.01]\n"), HasSubstr("depth_slope"));
+  EXPECT_THAT(error_of(std::string(kGood) + "depth_slope: [0.01, 0.5]\n"), HasSubstr("depth_slope"));
 }
 
 TEST_F(CameraFile, DepthCameraMustBeRigidAndComplete) {

@@ -50,6 +50,20 @@ TEST(Rectifier, WithoutDistortionOnlyUnitsChange) {
   EXPECT_EQ(cv::norm(rectifier.color(color), color, cv::NORM_INF), 0.0);
 }
 
+TEST(Rectifier, DepthSlopeIsTakenOut) {
+  Camera camera = small_camera();
+  camera.depth_slope = {0.1, -0.05};
+  const cv::Mat raw(48, 64, CV_16UC1, cv::Scalar(10000));
+  const cv::Mat depth = Rectifier(camera).depth(raw);
+  for (const auto& [u, v] : {std::pair{0, 0}, std::pair{63, 5}, std::pair{31, 47}}) {
+    const Eigen::Vector3d ray = camera.color.unproject(u, v, 1.0);
+    EXPECT_NEAR(1.0 / static_cast<double>(depth.at<float>(v, u)), 0.5 + 0.1 * ray.x() - 0.05 * ray.y(), 1e-6);
+  }
+  cv::Mat holes = raw.clone();
+  holes.at<std::uint16_t>(3, 4) = 0;
+  EXPECT_EQ(Rectifier(camera).depth(holes).at<float>(3, 4), 0.0F);
+}
+
 // A smooth picture whose value is the raw x coordinate: after undistortion, a pixel's value must be the
 // x coordinate that OpenCV's own inverse (undistortPoints) maps back to that pixel.
 TEST(Rectifier, AgreesWithUndistortPoints) {

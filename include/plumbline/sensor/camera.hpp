@@ -49,6 +49,9 @@ struct Camera {
   /// When present, depth is not registered to colour: the reader does that.
   std::optional<geometry::Rigid3> color_from_depth;
   std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
+  /// What depth gets wrong across the picture, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
+  /// ray (x, y, 1) of the undistorted colour camera. A depth camera whose axis is not where its maker thinks.
+  std::array<double, 2> depth_slope{};
 
   [[nodiscard]] bool distorted() const {
     for (double k : distortion) {
@@ -59,7 +62,7 @@ struct Camera {
 };
 
 /// Reads a camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
-/// [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told together with
+/// depth_slope [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told together with
 /// file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
 

@@ -20,7 +20,7 @@ class Rectifier {
   [[nodiscard]] cv::Mat color(const cv::Mat& raw) const;
   /// Raw 16-bit depth -> CV_32FC1 metres in the undistorted colour camera. 0 and 65535 become 0. Registers
   /// with color_from_depth (z-buffered splat, no holes torn by the change of resolution) when present;
-  /// undistorts by nearest neighbour (depth is never mixed across borders).
+  /// undistorts by nearest neighbour (depth is never mixed across borders); then takes out the depth_slope.
   [[nodiscard]] cv::Mat depth(const cv::Mat& raw16) const;
 
  private:

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The camera from its own recordings: what focal length, readout, depth slope, centre and distortion explain
+// best what the keyframes of finished maps saw. Something is believed only when it also explains parts of
+// the runs that it was not found from.
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/optimize/camera_calibration.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::mapping {
+
+/// A map of one recording whose features were taken as the given camera shows them, rolling shutter not
+/// undone. Both must outlive the call.
+struct CalibrationRun {
+  const maps::Map* map = nullptr;
+  const std::vector<maps::FramePose>* frames = nullptr;  ///< every frame: how fast the camera moved
+};
+
+struct CalibrationOptions {
+  int keyframes = 120;        ///< of all runs, at most: stretches spread over the runs
+  double least_gain = 0.002;  ///< share of the cost of parts held out that must go
+  double least_sigmas = 3.0;  ///< by which what is found must differ from what was given
+  double focal_prior = 0.02;  ///< standard deviation of the given focal length, share
+  double centre_prior_px = 10.0;
+  double readout_prior_s = 0.02;
+  double slope_prior = 0.02;      ///< 1/m
+  double distortion_prior = 0.1;  ///< of k1 and of k2
+};
+
+/// One number of the camera.
+struct CameraFinding {
+  std::string name;  ///< as in camera.yaml
+  double given = 0.0;
+  double found = 0.0;
+  double sigma = 0.0;  ///< by leaving parts of the runs out, one at a time (jackknife)
+  double gain = 0.0;   ///< share of the cost of parts held out that it takes away
+  bool used = false;   ///< it is in `camera`
+};
+
+struct CameraCalibration {
+  sensor::Camera camera;  ///< the given one with what is believed
+  std::vector<CameraFinding> findings;
+  int keyframes = 0;
+  int observations = 0;
+  double gain = 0.0;  ///< share of the cost of parts held out that all together take away
+};
+
+/// `given`: the camera that the runs' features were read with. The same for any number of threads. Errors
+/// (kInput): the runs hold too few keyframes or points seen together to tell anything.
+core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRun>& runs,
+                                                 const sensor::Camera& given,
+                                                 const CalibrationOptions& options,
+                                                 const core::Executor& executor);
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline calibrate RECORDING... [-o camera.yaml]
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app.hpp"
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/mapping/camera_calibration.hpp"
+#include "plumbline/mapping/slam.hpp"
+#include "plumbline/pipeline/input.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+struct CalibrateRequest {
+  std::vector<std::string> inputs;
+  std::filesystem::path output;
+  dataset::OpenOptions open;
+  mapping::CalibrationOptions options;
+};
+
+/// Keyframes close together, whose features lie where the camera showed them: what the shutter does to them
+/// is to be found.
+mapping::SlamOptions slam_options() {
+  mapping::SlamOptions options;
+  options.keyframe.max_frames = 3;
+  options.keyframe.reuse = false;
+  options.loops.enabled = false;
+  return options;
+}
+
+/// The recordings mapped one after another.
+class Mapped {
+ public:
+  core::Result<void> add(const std::string& input, const CalibrateRequest& request, Session& session) {
+    const auto pipelines = session.pipelines_folder();
+    if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+    dataset::OpenOptions open = request.open;
+    open.cameras_folder = *pipelines / "cameras";
+    Console& console = session.console();
+    auto source = pipeline::open_input(input, open, *pipelines / "scenes", session.executor(), console);
+    if (!source) return tl::unexpected<core::Error>(source.error());
+    const sensor::Camera& camera = (*source)->camera();
+    if (runs_.empty()) {
+      camera_ = camera;
+    } else if (!same(camera, camera_)) {
+      return core::usage_error(fmt::format(
+          "{}: its camera is not that of the recordings before it; calibrate one camera at a time, or name "
+          "the camera of all with --camera",
+          input));
+    }
+    runs_.push_back(
+        std::make_unique<mapping::Slam>(slam_options(), camera.color, 0, session.executor(), console));
+    track(**source, session);
+    return {};
+  }
+
+  [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
+  [[nodiscard]] std::vector<mapping::CalibrationRun> runs() const {
+    std::vector<mapping::CalibrationRun> runs;
+    for (const auto& slam : runs_) runs.push_back({&slam->map(), &slam->frame_poses()});
+    return runs;
+  }
+
+ private:
+  /// Whether both files say the same of one camera, whatever they call it.
+  static bool same(sensor::Camera a, sensor::Camera b) {
+    a.name.clear();
+    b.name.clear();
+    return sensor::to_yaml(a) == sensor::to_yaml(b);
+  }
+
+  void track(const dataset::FrameSource& source, Session& session) {
+    struct Read {
+      std::shared_ptr<const sensor::RgbdFrame> frame;
+      std::shared_ptr<const features::FrameFeatures> features;
+    };
+    const features::FeatureExtractor extractor({}, source.camera().color);
+    constexpr std::size_t kChunk = 16;  // frames in memory
+    for (std::size_t begin = 0; begin < source.size(); begin += kChunk) {
+      std::vector<Read> chunk(std::min(kChunk, source.size() - begin));
+      session.executor().parallel_for(chunk.size(), [&](std::size_t i) {
+        auto frame = source.read(begin + i);
+        if (!frame) return;  // the next one will do
+        chunk[i].features = std::make_shared<features::FrameFeatures>(extractor.extract(*frame));
+        chunk[i].frame = std::make_shared<sensor::RgbdFrame>(std::move(*frame));
+      });
+      for (const Read& read : chunk) {
+        if (read.frame != nullptr) runs_.back()->process(*read.frame, read.features);
+      }
+      session.console().progress(begin + chunk.size(), source.size(), "frames");
+    }
+    session.console().end_progress();
+    runs_.back()->finish();
+  }
+
+  sensor::Camera camera_;
+  std::vector<std::unique_ptr<mapping::Slam>> runs_;
+};
+
+void print(const mapping::CameraCalibration& calibration) {
+  fmt::print("{} keyframes, {} sightings of points\n", calibration.keyframes, calibration.observations);
+  fmt::print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "gain");
+  for (const mapping::CameraFinding& f : calibration.findings) {
+    fmt::print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,
+               100.0 * f.gain, f.used ? "used" : "not used");
+  }
+  fmt::print("the camera explains {:.1f} % of what was left unexplained in parts it was not found from\n",
+             100.0 * calibration.gain);
+}
+
+core::Result<void> calibrate(const CalibrateRequest& request, Session& session) {
+  Mapped mapped;
+  for (const std::string& input : request.inputs) {
+    if (auto added = mapped.add(input, request, session); !added) return added;
+  }
+  const auto calibration =
+      mapping::calibrate_camera(mapped.runs(), mapped.camera(), request.options, session.executor());
+  if (!calibration) return tl::unexpected<core::Error>(calibration.error());
+  if (!session.quiet) print(*calibration);
+  const auto& findings = calibration->findings;
+  const bool any = std::any_of(findings.begin(), findings.end(), [](const auto& f) { return f.used; });
+  if (!any && !session.quiet) fmt::print("the camera that was given fits; nothing better can be told\n");
+  if (request.output.empty()) return {};
+  core::OutputFile file(request.output);
+  file.write("# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera));
+  if (auto written = file.commit(); !written) return written;
+  if (!session.quiet) fmt::print("written        {}\n", request.output.string());
+  return {};
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<CalibrateRequest>();
+  CLI::App* command =
+      add_command(app, session, "calibrate",
+                  "Find focal length, rolling shutter and depth slope of the camera from its recordings",
+                  [&session, request] {
+                    const auto done = calibrate(*request, session);
+                    return done ? 0 : session.fail(done.error());
+                  });
+  command->add_option("RECORDING", request->inputs, "Recordings of one camera, or synth:SCENE?...")
+      ->required();
+  command->add_option("-o,--output", request->output, "camera.yaml to write")->type_name("FILE");
+  command->add_option("--camera", request->open.camera, "Shipped calibration or file to begin with")
+      ->type_name("NAME|FILE");
+  command->add_option("--from", request->open.from_s, "Start this many seconds after the first frame")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--to", request->open.to_s, "End this many seconds after the first frame")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--keyframes", request->options.keyframes, "Keyframes that are adjusted at most")
+      ->check(CLI::Range(16, 2000));
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/optimize/camera_calibration.hpp"
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace plumbline::optimize {
+namespace {
+
+/// Radial-tangential distortion of (x, y), OpenCV's.
+template <typename T>
+void distort(const T& x, const T& y, const T& k1, const T& k2, const sensor::Distortion& k, T& xd, T& yd) {
+  const T r2 = x * x + y * y;
+  const T radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k[4]));
+  xd = x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x);
+  yd = y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y;
+}
+
+/// A point in the camera when a row was read; the pose is that of the problem, turned and moved by `step`.
+class RowPoint {
+ public:
+  RowPoint(const CalibrationPose& pose, double share) : pose_(pose), share_(share) {}
+
+  template <typename T>
+  void operator()(const T* change, const T* step, const T* point, T* p) const {
+    const Eigen::Matrix3d& r = pose_.camera_from_world.rotation;
+    T turned[3];
+    for (int i = 0; i < 3; ++i) turned[i] = r(i, 0) * point[0] + r(i, 1) * point[1] + r(i, 2) * point[2];
+    T still[3];
+    ceres::AngleAxisRotatePoint(step, turned, still);
+    for (int i = 0; i < 3; ++i) still[i] += pose_.camera_from_world.translation(i) + step[3 + i];
+    const T seconds = change[kReadout] * share_;
+    const geometry::Vector6d& v = pose_.velocity;
+    p[0] = still[0] + seconds * (v(0) + v(4) * still[2] - v(5) * still[1]);
+    p[1] = still[1] + seconds * (v(1) + v(5) * still[0] - v(3) * still[2]);
+    p[2] = still[2] + seconds * (v(2) + v(3) * still[1] - v(4) * still[0]);
+  }
+
+ private:
+  CalibrationPose pose_;
+  double share_;  ///< of the readout, from the middle row to this one
+};
+
+/// e = (u - K distort(pi(p))) / sigma.
+class PixelCost {
+ public:
+  PixelCost(const CalibrationObservation& seen, const RowPoint& in_camera, const sensor::Camera& camera)
+      : seen_(seen), in_camera_(in_camera), camera_(&camera) {}
+
+  template <typename T>
+  bool operator()(const T* change, const T* step, const T* point, T* residual) const {
+    T p[3];
+    in_camera_(change, step, point, p);
+    if (p[2] < 0.05) return false;
+    T x;
+    T y;
+    const sensor::Distortion& k = camera_->distortion;
+    distort<T>(p[0] / p[2], p[1] / p[2], k[0] + change[kK1], k[1] + change[kK2], k, x, y);
+    const sensor::Pinhole& c = camera_->color;
+    const T longer = 1.0 + change[kFocal];
+    residual[0] = (seen_.pixel.x() - (c.fx * longer * x + c.cx + change[kCentreX])) / seen_.pixel_sigma;
+    residual[1] = (seen_.pixel.y() - (c.fy * longer * y + c.cy + change[kCentreY])) / seen_.pixel_sigma;
+    return true;
+  }
+
+ private:
+  CalibrationObservation seen_;
+  RowPoint in_camera_;
+  const sensor::Camera* camera_;
+};
+
+/// e = (z - p_z / (1 - p_z slope.(x, y))) / sigma: what the depth camera says of a point that lies at p.
+class DepthCost {
+ public:
+  DepthCost(const CalibrationObservation& seen, const RowPoint& in_camera)
+      : seen_(seen), in_camera_(in_camera) {}
+
+  template <typename T>
+  bool operator()(const T* change, const T* step, const T* point, T* residual) const {
+    T p[3];
+    in_camera_(change, step, point, p);
+    const T grow = 1.0 - p[2] * (change[kSlopeX] * seen_.ray.x() + change[kSlopeY] * seen_.ray.y());
+    if (grow < 0.1) return false;
+    residual[0] = (seen_.depth - p[2] / grow) / seen_.depth_sigma;
+    return true;
+  }
+
+ private:
+  CalibrationObservation seen_;
+  RowPoint in_camera_;
+};
+
+class PriorCost {
+ public:
+  PriorCost(const CameraChange& mean, const CameraChange& sigma) : mean_(mean), sigma_(sigma) {}
+  template <typename T>
+  bool operator()(const T* change, T* residual) const {
+    for (std::size_t i = 0; i < kCameraUnknowns; ++i) residual[i] = (change[i] - mean_[i]) / sigma_[i];
+    return true;
+  }
+
+ private:
+  CameraChange mean_;
+  CameraChange sigma_;
+};
+
+constexpr std::size_t kStep = 6;  // turn, then shift
+using ResidualIds = std::vector<ceres::ResidualBlockId>;
+
+/// All unknowns in one buffer, for the order of Ceres' sums hangs on addresses.
+class Unknowns {
+ public:
+  explicit Unknowns(const CalibrationProblem& problem) : poses_(problem.poses.size()) {
+    numbers_.assign(kCameraUnknowns + kStep * poses_ + 3 * problem.points.size(), 0.0);
+    std::copy(problem.change.begin(), problem.change.end(), numbers_.begin());
+    for (std::size_t i = 0; i < problem.points.size(); ++i)
+      std::copy_n(problem.points[i].data(), 3, point(static_cast<int>(i)));
+  }
+  double* change() { return numbers_.data(); }
+  double* step(int i) { return numbers_.data() + kCameraUnknowns + kStep * static_cast<std::size_t>(i); }
+  double* point(int i) {
+    return numbers_.data() + kCameraUnknowns + kStep * poses_ + 3 * static_cast<std::size_t>(i);
+  }
+
+ private:
+  std::size_t poses_;
+  std::vector<double> numbers_;
+};
+
+/// Observations and what their residual blocks are called.
+ResidualIds add_observations(const CalibrationProblem& problem, Unknowns& unknowns,
+                             ceres::LossFunction* pixel_loss, ceres::LossFunction* depth_loss,
+                             ceres::Problem& to) {
+  ResidualIds ids;
+  const double height = problem.camera.color.height;
+  for (const CalibrationObservation& o : problem.observations) {
+    const CalibrationPose& pose = problem.poses[static_cast<std::size_t>(o.pose)];
+    const RowPoint in_camera(pose, o.pixel.y() / height - 0.5);
+    double* step = unknowns.step(o.pose);
+    double* point = unknowns.point(o.point);
+    auto* pixel = new ceres::AutoDiffCostFunction<PixelCost, 2, kCameraUnknowns, kStep, 3>(
+        new PixelCost(o, in_camera, problem.camera));
+    ids.push_back(to.AddResidualBlock(pixel, pixel_loss, unknowns.change(), step, point));
+    if (!(o.depth > 0.0)) continue;
+    auto* depth =
+        new ceres::AutoDiffCostFunction<DepthCost, 1, kCameraUnknowns, kStep, 3>(new DepthCost(o, in_camera));
+    ids.push_back(to.AddResidualBlock(depth, depth_loss, unknowns.change(), step, point));
+  }
+  return ids;
+}
+
+void hold(const CalibrationProblem& problem, Unknowns& unknowns, ceres::Problem& to) {
+  std::vector<int> held;
+  for (std::size_t i = 0; i < kCameraUnknowns; ++i) {
+    if (!problem.free[i]) held.push_back(static_cast<int>(i));
+  }
+  if (held.size() == kCameraUnknowns) {
+    to.SetParameterBlockConstant(unknowns.change());
+  } else if (!held.empty()) {
+    to.SetManifold(unknowns.change(), new ceres::SubsetManifold(static_cast<int>(kCameraUnknowns), held));
+  }
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    double* step = unknowns.step(static_cast<int>(i));
+    if (problem.poses[i].fixed && to.HasParameterBlock(step)) to.SetParameterBlockConstant(step);
+  }
+}
+
+void write_back(CalibrationProblem& problem, Unknowns& unknowns) {
+  std::copy_n(unknowns.change(), kCameraUnknowns, problem.change.begin());
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    if (problem.poses[i].fixed) continue;
+    const Eigen::Map<const geometry::Vector6d> step(unknowns.step(static_cast<int>(i)));
+    geometry::Rigid3& pose = problem.poses[i].camera_from_world;
+    pose = {Eigen::Quaterniond(geometry::exp_so3(step.head<3>()) * pose.rotation),
+            pose.translation + step.tail<3>()};
+  }
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    std::copy_n(unknowns.point(static_cast<int>(i)), 3, problem.points[i].data());
+}
+
+}  // namespace
+
+Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vector2d& undistorted) {
+  const sensor::Pinhole& c = camera.color;
+  double x = 0.0;
+  double y = 0.0;
+  distort<double>((undistorted.x() - c.cx) / c.fx, (undistorted.y() - c.cy) / c.fy, camera.distortion[0],
+                  camera.distortion[1], camera.distortion, x, y);
+  return {c.fx * x + c.cx, c.fy * y + c.cy};
+}
+
+sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& change) {
+  sensor::Camera camera = given;
+  camera.color.fx *= 1.0 + change[kFocal];
+  camera.color.fy *= 1.0 + change[kFocal];
+  camera.color.cx += change[kCentreX];
+  camera.color.cy += change[kCentreY];
+  camera.distortion[0] += change[kK1];
+  camera.distortion[1] += change[kK2];
+  camera.depth_slope[0] += change[kSlopeX];
+  camera.depth_slope[1] += change[kSlopeY];
+  if (given.readout_s || change[kReadout] != 0.0) camera.readout_s = change[kReadout];
+  return camera;
+}
+
+double adjust_with_camera(CalibrationProblem& problem, int max_iterations) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (problem.observations.empty()) return kNone;
+  Unknowns unknowns(problem);
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::HuberLoss pixel_loss(1.0);
+  ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of what is behind
+  ceres::Problem ceres_problem(options);
+  ceres_problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost, kCameraUnknowns, kCameraUnknowns>(
+                                     new PriorCost(problem.prior_mean, problem.prior_sigma)),
+                                 nullptr, unknowns.change());
+  const ResidualIds ids = add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
+  hold(problem, unknowns, ceres_problem);
+  auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
+  ordering->AddElementToGroup(unknowns.change(), 1);
+  for (const CalibrationObservation& o : problem.observations) {
+    ordering->AddElementToGroup(unknowns.point(o.point), 0);
+    ordering->AddElementToGroup(unknowns.step(o.pose), 1);
+  }
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  solver.linear_solver_ordering.reset(ordering);
+  solver.num_threads = 1;  // sums in a fixed order
+  solver.max_num_iterations = max_iterations;
+  solver.function_tolerance = 1e-6;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &ceres_problem, &summary);
+  if (!summary.IsSolutionUsable()) return kNone;
+  ceres::Problem::EvaluateOptions all;
+  all.residual_blocks = ids;
+  double cost = kNone;
+  if (!ceres_problem.Evaluate(all, &cost, nullptr, nullptr, nullptr)) return kNone;
+  write_back(problem, unknowns);
+  return cost;
+}
+
+}  // namespace plumbline::optimize

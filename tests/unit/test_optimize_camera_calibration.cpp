@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <random>
+
+#include "plumbline/optimize/camera_calibration.hpp"
+
+namespace plumbline::optimize {
+namespace {
+
+using geometry::Rigid3;
+using geometry::Vector6d;
+
+sensor::Camera kinect() {
+  sensor::Camera camera;
+  camera.color = {640, 480, 520.0, 518.0, 318.0, 243.0};
+  camera.distortion = {0.2, -0.5, 0.001, -0.002, 0.3};
+  return camera;
+}
+
+/// Pixel and depth of a point as the true camera measures them: the row that shows it was read when the
+/// camera had moved on.
+bool see(const sensor::Camera& camera, const CalibrationPose& pose, const Eigen::Vector3d& point,
+         CalibrationObservation& seen) {
+  Eigen::Vector3d p = pose.camera_from_world * point;
+  for (int i = 0; i < 10; ++i) {
+    // Far outside, the distortion's polynomial folds back into the picture.
+    if (p.z() < 0.3 || !camera.color.contains(camera.color.project(p))) return false;
+    seen.pixel = distorted_pixel(camera, camera.color.project(p));
+    const double seconds = camera.readout_s.value_or(0.0) * (seen.pixel.y() / camera.color.height - 0.5);
+    p = geometry::exp_se3(seconds * pose.velocity) * (pose.camera_from_world * point);
+  }
+  seen.ray = p.head<2>() / p.z();
+  seen.depth =
+      p.z() / (1.0 - p.z() * (camera.depth_slope[0] * seen.ray.x() + camera.depth_slope[1] * seen.ray.y()));
+  seen.depth_sigma = 0.01;
+  return camera.color.contains(seen.pixel);
+}
+
+/// A camera that looks about in a room and swings while it does.
+CalibrationProblem room(const sensor::Camera& truth, const sensor::Camera& given, double noise_px) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  std::normal_distribution<double> normal;
+  CalibrationProblem problem;
+  problem.camera = given;
+  problem.prior_sigma = {0.05, 0.02, 0.05, 0.05, 20.0, 20.0, 0.2, 0.2};
+  for (int i = 0; i < 14; ++i) {
+    CalibrationPose pose;
+    Vector6d xi;
+    xi << 0.5 * uniform(random), 0.3 * uniform(random), 0.5 * uniform(random), 0.3 * uniform(random),
+        0.5 * uniform(random), 0.3 * uniform(random);
+    pose.camera_from_world = geometry::exp_se3(xi);
+    for (int k = 0; k < 6; ++k) pose.velocity(k) = 0.6 * uniform(random);
+    pose.fixed = i == 0;
+    problem.poses.push_back(pose);
+  }
+  while (problem.points.size() < 160) {
+    const Eigen::Vector3d point(2.0 * uniform(random), 1.5 * uniform(random), 2.5 + uniform(random));
+    for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+      CalibrationObservation seen;
+      if (!see(truth, problem.poses[i], point, seen)) continue;
+      seen.pose = static_cast<int>(i);
+      seen.point = static_cast<int>(problem.points.size());
+      seen.pixel += noise_px * Eigen::Vector2d(normal(random), normal(random));
+      seen.depth += 0.01 * noise_px * normal(random);
+      problem.observations.push_back(seen);
+    }
+    problem.points.push_back(point);
+  }
+  return problem;
+}
+
+TEST(CameraCalibration, FindsWhatIsWrong) {
+  sensor::Camera given = kinect();
+  sensor::Camera truth = given;
+  truth.color.fx *= 1.02;
+  truth.color.fy *= 1.02;
+  truth.color.cx += 4.0;
+  truth.distortion[0] += 0.05;
+  truth.readout_s = 0.018;
+  truth.depth_slope = {0.02, -0.01};
+  CalibrationProblem problem = room(truth, given, 0.3);
+  problem.free.fill(true);
+  const double cost = adjust_with_camera(problem);
+  EXPECT_LT(cost, 0.2 * static_cast<double>(problem.observations.size()));
+  const sensor::Camera found = changed_camera(given, problem.change);
+  EXPECT_NEAR(found.color.fx, truth.color.fx, 1.5);
+  EXPECT_NEAR(found.color.cx, truth.color.cx, 1.5);
+  EXPECT_NEAR(found.distortion[0], truth.distortion[0], 0.01);
+  EXPECT_NEAR(*found.readout_s, 0.018, 0.001);
+  EXPECT_NEAR(found.depth_slope[0], 0.02, 0.002);
+  EXPECT_NEAR(found.depth_slope[1], -0.01, 0.002);
+}
+
+TEST(CameraCalibration, WhatIsNotFreeStays) {
+  sensor::Camera truth = kinect();
+  truth.readout_s = 0.02;
+  truth.color.fx *= 1.01;
+  CalibrationProblem problem = room(truth, kinect(), 0.3);
+  problem.free[kReadout] = true;
+  const Rigid3 anchor = problem.poses[0].camera_from_world;
+  const double with = adjust_with_camera(problem);
+  EXPECT_NEAR(problem.change[kReadout], 0.02, 0.002);
+  for (const CameraUnknown u : {kFocal, kSlopeX, kSlopeY, kCentreX, kCentreY, kK1, kK2}) {
+    EXPECT_EQ(problem.change[u], 0.0);
+  }
+  EXPECT_EQ(problem.poses[0].camera_from_world.translation, anchor.translation);
+  CalibrationProblem none = room(truth, kinect(), 0.3);
+  EXPECT_GT(adjust_with_camera(none), 1.2 * with);
+}
+
+TEST(CameraCalibration, NothingSeenIsNoSolution) {
+  CalibrationProblem problem;
+  problem.camera = kinect();
+  problem.prior_sigma.fill(1.0);
+  EXPECT_TRUE(std::isnan(adjust_with_camera(problem)));
+}
+
+// All points in one place seen by one pose: nothing holds the camera but the prior.
+TEST(CameraCalibration, PriorHoldsWhatNothingTells) {
+  CalibrationProblem problem = room(kinect(), kinect(), 0.0);
+  problem.poses.resize(1);
+  std::vector<CalibrationObservation> kept;
+  for (const CalibrationObservation& o : problem.observations) {
+    if (o.pose == 0 && o.point < 3) kept.push_back(o);
+  }
+  ASSERT_FALSE(kept.empty());
+  problem.observations = kept;
+  problem.free.fill(true);
+  EXPECT_TRUE(std::isfinite(adjust_with_camera(problem)));
+  EXPECT_NEAR(problem.change[kFocal], 0.0, 1e-6);
+  EXPECT_NEAR(problem.change[kReadout], 0.0, 1e-6);
+}
+
+TEST(CameraCalibration, DistortsAsOpenCv) {
+  const sensor::Camera camera = kinect();
+  const sensor::Pinhole& c = camera.color;
+  const Eigen::Vector3d ray = c.unproject(500.0, 90.0, 1.0);
+  std::vector<cv::Point2d> expected;
+  cv::projectPoints(std::vector<cv::Point3d>{{ray.x(), ray.y(), 1.0}}, cv::Vec3d(), cv::Vec3d(),
+                    cv::Matx33d(c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1),
+                    std::vector<double>(camera.distortion.begin(), camera.distortion.end()), expected);
+  const Eigen::Vector2d pixel = distorted_pixel(camera, {500.0, 90.0});
+  EXPECT_NEAR(pixel.x(), expected[0].x, 1e-9);
+  EXPECT_NEAR(pixel.y(), expected[0].y, 1e-9);
+}
+
+}  // namespace
+}  // namespace plumbline::optimize
