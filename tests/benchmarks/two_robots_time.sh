@@ -3,14 +3,16 @@
 # Until when is a world mapped, by one robot that drives all of a path, and by two that drive half of it each?
 # The recording is played at 30 Hz; what is left to do after the last frame counts, and so does fusion.
 #   two_robots_time.sh PLUMBLINE RECORDING WORK [SHARED_S] [MAP OPTION...]
-# RECORDING: a folder in TUM layout; it is cut in the middle, both halves hold the SHARED_S seconds (4) around the
-# cut. WORK: a folder for the halves and the maps. A run counts as long as its frames take at 30 Hz, or as mapping
-# took where that is longer, plus what its stages do after the last frame. Of the two robots that is the longer one's
-# tracker and store, then all that plumbline fuse does: what they do for pictures and clouds of their own is not
-# needed. Seconds mean something on an idle machine only. Maps that are in WORK already are taken as they are.
+# RECORDING: a folder in TUM layout; it is cut in the middle, both halves hold the SHARED_S seconds (0) around the
+# cut: halves of a path of laps have enough in common without. WORK: a folder for the halves and the maps. Nothing is
+# paced: recordings are mapped as fast as that goes, and a run counts as long as its frames take at 30 Hz, or as mapping
+# took where that is longer, plus what its stages did after the last frame. Of the two robots that is the longer one's
+# tracker and store, then all that plumbline fuse does from opening the maps on: what they do for pictures and clouds of
+# their own is not needed. Programs are taken as started. Seconds mean something on an idle machine only. Maps that are
+# in WORK already are taken as they are.
 set -euo pipefail
-[ $# -ge 3 ] || { sed -n '3,11s/^# //p' "$0" >&2; exit 2; }
-plumbline=$1 recording=$(realpath "$2") work=$3 shared=${4:-4}
+[ $# -ge 3 ] || { sed -n '3,13s/^# //p' "$0" >&2; exit 2; }
+plumbline=$1 recording=$(realpath "$2") work=$3 shared=${4:-0}
 shift $(($# < 4 ? 3 : 4))
 options=(-q --force --set output.views= --set output.pcd=off "$@")
 
@@ -49,10 +51,17 @@ def finish(summary, *stages):
     return sum(times[stage]["finish"] for stage in times if not stages or stage in stages) / 1e3
 
 
+EXPORTS = ("store", "keep", "output")  # they run side by side: their time is export_s
+
+
+def before_exports(summary):
+    stages = [stage for stage in summary["timing"]["stages_ms"] if stage not in EXPORTS]
+    return finish(summary, *stages)
+
+
 def driving(summary, folder):
     frames = sum(1 for line in open(f"{folder}/rgb.txt") if not line.startswith("#"))
-    mapping = summary["timing"]["map_s"] - finish(summary)
-    return max(frames / 30, mapping)
+    return max(frames / 30, summary["timing"]["map_s"] - before_exports(summary))
 
 
 one, a, b, two = (load(name) for name in ("one", "map_a", "map_b", "two"))
@@ -60,12 +69,11 @@ print("| robots | driven s | until the map s | until the cloud s |")
 print("|---|---|---|---|")
 alone = driving(one, recording)
 alone_map = alone + finish(one, "track", "refine")
-alone_all = alone + finish(one)
+alone_all = alone + before_exports(one) + one["timing"]["export_s"]
 print(f"| 1 | {alone:.1f} | {alone_map:.1f} | {alone_all:.1f} |")
 longer = max(driving(s, f"{work}/{f}") + finish(s, "track", "store") for s, f in ((a, "a"), (b, "b")))
-cloud = finish(two) - finish(two, "maps", "refine")
 both_all = longer + two["timing"]["wall_s"]
-both_map = both_all - cloud - two["timing"]["export_s"]
+both_map = both_all - finish(two, "fuse") - two["timing"]["export_s"]
 print(f"| 2 | {longer:.1f} | {both_map:.1f} | {both_all:.1f} |")
 print(f"ratio: map {both_map / alone_map:.3f}, with the dense cloud {both_all / alone_all:.3f}")
 print("merged" if all(merge["accepted"] for merge in two["merges"]) else "NOT MERGED")
