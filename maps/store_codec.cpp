@@ -208,6 +208,7 @@ void encode(const sensor::Camera& camera, ByteWriter& to) {
   if (camera.depth) write(*camera.depth, to);
   to.flag(camera.readout_s.has_value());
   if (camera.readout_s) to.put(*camera.readout_s);
+  for (const double slope : camera.depth_slope) to.put(slope);
 }
 sensor::Camera decode_camera(const Bytes& bytes) {
   ByteReader from(bytes);
@@ -219,7 +220,11 @@ sensor::Camera decode_camera(const Bytes& bytes) {
   from.get(camera.fps);
   if (from.flag()) from.get(camera.color_from_depth.emplace());
   if (from.flag()) read(from, camera.depth.emplace());
-  if (!from.at_end() && from.flag()) from.get(camera.readout_s.emplace());  // stores of old do not tell
+  // Stores of old do not tell these.
+  if (!from.at_end() && from.flag()) from.get(camera.readout_s.emplace());
+  if (!from.at_end()) {
+    for (double& slope : camera.depth_slope) from.get(slope);
+  }
   from.expect_end();
   return camera;
 }

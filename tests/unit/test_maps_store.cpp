@@ -104,6 +104,7 @@ TEST(MapStore, KeepsHeaderAndAttachments) {
   camera.depth_scale = 1000.0;
   camera.fps = 29.97;
   camera.readout_s = 0.0;
+  camera.depth_slope = {0.0125, -0.005};
   camera.color_from_depth = tests::Random(3).pose(1.0, 1.0);
   camera.depth = sensor::Pinhole{320, 240, 262.0, 263.0, 160.0, 120.0};
   const std::vector<std::uint8_t> vocabulary(5000, 17);
