@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline calibrate
+#include <string>
+
+#include "program.hpp"
+#include "wall_recording.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+class Calibrate : public ProgramTest {};
+
+// A generated camera is what its file says.
+TEST_F(Calibrate, LeavesACameraThatFitsAlone) {
+  const Outcome o = run("calibrate \"synth:room?frames=40&texture=full&fps=15\" -o found.yaml");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_NE(o.out.find("fx"), std::string::npos) << o;
+  EXPECT_NE(o.out.find("nothing better can be told"), std::string::npos) << o;
+  const std::string found = slurp(path("found.yaml"));
+  EXPECT_NE(found.find("fx: 535.4\n"), std::string::npos) << found;
+  EXPECT_NE(found.find("readout: 0 "), std::string::npos) << found;
+  EXPECT_EQ(found.find("depth_slope"), std::string::npos) << found;
+}
+
+TEST_F(Calibrate, TooLittleToTellIsSaid) {
+  write_wall(path("wall"));
+  const Outcome o = run("calibrate wall -o found.yaml");
+  EXPECT_EQ(o.code, 3) << o;
+  EXPECT_TRUE(o.told("film a place with texture")) << o;
+  EXPECT_FALSE(fs::exists(path("found.yaml")));
+}
+
+TEST_F(Calibrate, OneCameraAtATime) {
+  write_wall(path("wall"));
+  write_wall(path("other"));
+  write("other/camera.yaml", slurp(path("other/camera.yaml")) + "readout: 0.02\n");
+  const Outcome o = run("calibrate wall other");
+  EXPECT_EQ(o.code, 2) << o;
+  EXPECT_TRUE(o.told("one camera at a time")) << o;
+  EXPECT_EQ(run("calibrate").code, 2);
+  EXPECT_EQ(run("calibrate nothing").code, 3);
+}
+
+}  // namespace
+}  // namespace plumbline::integration
