@@ -196,6 +196,45 @@ TEST(VoxelMap, MergeMovesAndNeverCountsAViewTwice) {
   EXPECT_NEAR((*fused.cloud)[0].normal_z, 1.0F, 1e-4F);
 }
 
+TEST(VoxelMap, TellsWhoMeasuredAPointMost) {
+  VoxelMapOptions options = voxels(0.1);
+  options.robots = true;
+  VoxelMap map(options);
+  const auto seen_by = [&](std::uint8_t robot, int views) {
+    for (int i = 0; i < views; ++i) {
+      const ViewSamples view =
+          VoxelMap::sampled(single(point(0.01F, 0.01F, 1.02F, {0, 0, -1}, 40)), looking(1.0), options, robot);
+      map.begin_view();
+      map.add(view.samples.data(), view.samples.size());
+    }
+  };
+  seen_by(0, 2);
+  seen_by(3, 4);
+  seen_by(1, 1);
+  const auto fused = map.extract();
+  ASSERT_EQ(fused.columns.robot.size(), 1U);
+  EXPECT_EQ(fused.columns.robot[0], 3);
+  EXPECT_EQ(fused.columns.observations[0], 7U);
+  VoxelMap settled(options);
+  settled.merge(fused);
+  EXPECT_EQ(settled.extract().columns.robot, fused.columns.robot);
+  EXPECT_TRUE(random_map(1).extract().columns.robot.empty()) << "nobody asked";
+}
+
+TEST(VoxelMap, AViewIsSummedByVoxelBeforeItIsTakenUp) {
+  Cloud cloud = single(point(0.01F, 0.01F, 1.02F, {0, 0, -1}, 40));
+  cloud.push_back(point(0.02F, 0.03F, 1.06F, {0, 0, -1}, 80));
+  cloud.push_back(point(0.02F, 0.03F, 1.06F, {0, 0, 1}, 80));  // the other side
+  cloud.push_back(point(0.31F, 0.01F, 1.02F, {0, 0, -1}, 40));
+  const ViewSamples view = VoxelMap::sampled(cloud, looking(1.0), voxels(0.1));
+  ASSERT_EQ(view.samples.size(), 3U);
+  const double first = weight(1.02);
+  const double second = weight(1.06);
+  EXPECT_NEAR(view.samples[0].color.x(), (first * 40 + second * 80) / (first + second), 1.0);
+  EXPECT_EQ(view.samples[0].robot_lead, 2U);
+  EXPECT_EQ(VoxelMap::voxel_of(view.samples[2]), Eigen::Vector3i(3, 0, 0));
+}
+
 TEST(VoxelMap, ClearForgetsEverything) {
   VoxelMap map = random_map(1);
   EXPECT_GT(map.size(), 1000U);
