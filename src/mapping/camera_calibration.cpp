@@ -9,7 +9,7 @@
 #include <map>
 #include <numeric>
 
-#include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/geometry/velocity.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
@@ -28,19 +28,6 @@ constexpr int kLeastViews = 3;
 constexpr int kLeastObservations = 300;
 constexpr double kScaleFactor = 1.2;  // of ORB's octaves
 constexpr double kDepthFactor = 2.0;  // depth is alike in neighbouring views
-
-/// How a camera moved at `stamp`, by its frames before and after.
-geometry::Vector6d velocity_at(const geometry::Trajectory& path, double stamp) {
-  constexpr double kLongest_s = 0.3;
-  const auto later = [](const geometry::StampedPose& pose, double s) { return pose.stamp < s; };
-  const auto here = std::lower_bound(path.begin(), path.end(), stamp - 1e-4, later);
-  if (here == path.end()) return geometry::Vector6d::Zero();
-  const auto before = here == path.begin() ? here : std::prev(here);
-  const auto after = std::next(here) == path.end() ? here : std::next(here);
-  const double seconds = after->stamp - before->stamp;
-  if (!(seconds > 0.0) || seconds > kLongest_s) return geometry::Vector6d::Zero();
-  return geometry::log_se3(after->world_from_camera.inverse() * before->world_from_camera) / seconds;
-}
 
 /// Everything that was seen; problems are made of parts of it.
 struct Sightings {
@@ -75,7 +62,7 @@ void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Ca
     index[id] = static_cast<int>(to.poses.size());
     optimize::CalibrationPose pose;
     pose.camera_from_world = run.map->camera_from_world(id);
-    pose.velocity = velocity_at(path, run.map->keyframe(id).stamp);
+    pose.velocity = geometry::velocity_at(path, run.map->keyframe(id).stamp);
     to.poses.push_back(pose);
     to.part.push_back(part);
     to.run.push_back(number);
@@ -243,6 +230,17 @@ std::vector<CameraFinding> findings_of(CameraUnknown unknown, const sensor::Came
   }
 }
 
+/// In the place of what an earlier trial said of the same number.
+void note(const CameraFinding& finding, std::vector<CameraFinding>& findings) {
+  const auto same = [&](const CameraFinding& f) { return f.name == finding.name; };
+  const auto place = std::find_if(findings.begin(), findings.end(), same);
+  if (place != findings.end()) {
+    *place = finding;
+  } else {
+    findings.push_back(finding);
+  }
+}
+
 }  // namespace
 
 core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRun>& runs,
@@ -265,7 +263,8 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
         "to tell the camera by; film a place with texture for 10 s or more, turning and moving",
         result.keyframes, result.observations));
   }
-  // What matters most first; each has to explain what those before it leave.
+  // What matters most first; each has to explain what those before it leave. What one hides of another (a
+  // wrong distortion hides a wrong focal length) shows when the others are tried again after it was found.
   const std::vector<std::vector<CameraUnknown>> groups = {{optimize::kReadout},
                                                           {optimize::kSlopeX},
                                                           {optimize::kSlopeY},
@@ -274,7 +273,11 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                                                           {optimize::kK1, optimize::kK2}};
   const double at_first = best.cost();
   FreeUnknowns believed{};
-  for (const auto& group : groups) {
+  std::size_t in_vain = 0;  // tried since something was believed
+  for (std::size_t g = 0; in_vain < groups.size(); g = (g + 1) % groups.size()) {
+    ++in_vain;
+    const std::vector<CameraUnknown>& group = groups[g];
+    if (believed[group.front()]) continue;
     FreeUnknowns free = believed;
     for (const CameraUnknown u : group) free[u] = true;
     const Trial trial = calibrator.try_out(free);
@@ -284,12 +287,13 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
       for (CameraFinding& f : findings_of(u, given, found, trial.sigma(u))) {
         f.gain = (best.cost() - trial.cost()) / at_first;
         f.used = used;
-        result.findings.push_back(f);
+        note(f, result.findings);
       }
     }
     if (!used) continue;
     believed = free;
     best = trial;
+    in_vain = 0;
   }
   const CameraChange change = calibrator.find(believed, {});
   result.camera = optimize::changed_camera(given, change);
