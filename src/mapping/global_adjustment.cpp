@@ -267,7 +267,6 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
 GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
-  bundle_options.tolerance = 1e-3;  // what follows moves nothing that truth would know of
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;
 }
