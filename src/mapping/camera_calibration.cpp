@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "plumbline/geometry/velocity.hpp"
-#include "plumbline/sensor/depth_noise.hpp"
+#include "plumbline/mapping/sighting_noise.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -26,8 +26,6 @@ constexpr int kParts = 4;
 constexpr int kLeastKeyframes = 8;
 constexpr int kLeastViews = 3;
 constexpr int kLeastObservations = 300;
-constexpr double kScaleFactor = 1.2;  // of ORB's octaves
-constexpr double kDepthFactor = 2.0;  // depth is alike in neighbouring views
 
 /// Everything that was seen; problems are made of parts of it.
 struct Sightings {
@@ -57,6 +55,7 @@ std::vector<std::pair<core::KeyframeId, int>> chosen(const maps::Map& map, int w
 
 void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Camera& camera, Sightings& to) {
   const geometry::Trajectory path = maps::trajectory(*run.frames, *run.map);
+  const SightingNoise noise;
   std::map<core::KeyframeId, int> index;
   for (const auto& [id, part] : chosen(*run.map, wanted)) {
     index[id] = static_cast<int>(to.poses.size());
@@ -75,12 +74,13 @@ void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Ca
       if (pose == index.end()) continue;
       const features::PointFeature& f =
           run.map->keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
+      const optimize::BundlePointObservation in_bundle = noise.of(f);
       CalibrationObservation seen;
       seen.pose = pose->second;
-      seen.pixel = optimize::distorted_pixel(camera, f.pixel.cast<double>());
-      seen.pixel_sigma = std::pow(kScaleFactor, f.octave);
-      seen.depth = static_cast<double>(f.depth);
-      seen.depth_sigma = kDepthFactor * sensor::depth_sigma(seen.depth);
+      seen.pixel = optimize::distorted_pixel(camera, in_bundle.pixel);
+      seen.pixel_sigma = in_bundle.pixel_sigma;
+      seen.depth = in_bundle.depth;
+      seen.depth_sigma = in_bundle.depth_sigma;
       seen.ray =
           camera.color.unproject(static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), 1.0)
               .head<2>();

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "plumbline/geometry/plucker.hpp"
-#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -118,8 +117,6 @@ class GlobalBuilder {
     const double ratio = map_.keyframe(id).turn_rate / options_.turn_rate;
     return std::hypot(1.0, ratio * ratio);
   }
-  /// The same for its depth.
-  [[nodiscard]] double depth_trust(KeyframeId id) const { return options_.depth_factor * unrest(id); }
   bool wanted(const std::vector<maps::Observation>& seen, int enough) {
     bool any = false;
     for (const maps::Observation& o : seen) {
@@ -129,13 +126,18 @@ class GlobalBuilder {
     for (const maps::Observation& o : seen) ++tied_[static_cast<std::size_t>(index_.at(o.keyframe))];
     return true;
   }
-  /// Pixel and its standard deviation as the problem's camera would have it.
-  [[nodiscard]] Eigen::Vector2d pixel(KeyframeId id, const Eigen::Vector2f& seen, double& sigma) const {
+  /// A pixel as the problem's camera would have it.
+  [[nodiscard]] Eigen::Vector2d pixel(KeyframeId id, const Eigen::Vector2d& seen) const {
     const sensor::Pinhole& from = cameras_.at(id.robot);
     const sensor::Pinhole& to = bundle_.problem.camera;
-    const Eigen::Vector2d p = seen.cast<double>();
-    sigma *= std::sqrt(to.fx * to.fy / (from.fx * from.fy));
-    return {(p.x() - from.cx) * (to.fx / from.fx) + to.cx, (p.y() - from.cy) * (to.fy / from.fy) + to.cy};
+    return {(seen.x() - from.cx) * (to.fx / from.fx) + to.cx,
+            (seen.y() - from.cy) * (to.fy / from.fy) + to.cy};
+  }
+  /// How many of that camera's pixels one of the keyframe's is.
+  [[nodiscard]] double pixel_size(KeyframeId id) const {
+    const sensor::Pinhole& from = cameras_.at(id.robot);
+    const sensor::Pinhole& to = bundle_.problem.camera;
+    return std::sqrt(to.fx * to.fy / (from.fx * from.fy));
   }
 
   void add(const maps::MapPoint& point) {
@@ -145,13 +147,11 @@ class GlobalBuilder {
     for (const maps::Observation& o : point.observations) {
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen;
+      optimize::BundlePointObservation seen = options_.noise.of(f, unrest(o.keyframe));
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
-      seen.pixel_sigma = unrest(o.keyframe) * std::pow(options_.orb_scale_factor, f.octave);
-      seen.pixel = pixel(o.keyframe, f.pixel, seen.pixel_sigma);
-      seen.depth = static_cast<double>(f.depth);
-      seen.depth_sigma = f.depth > 0.0F ? depth_trust(o.keyframe) * sensor::depth_sigma(seen.depth) : 1.0;
+      seen.pixel = pixel(o.keyframe, seen.pixel);
+      seen.pixel_sigma *= pixel_size(o.keyframe);
       bundle_.problem.point_observations.push_back(seen);
       bundle_.point_seen.push_back(o.keyframe);
     }
@@ -163,22 +163,12 @@ class GlobalBuilder {
     for (const maps::Observation& o : line.observations) {
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
-      optimize::BundleLineObservation seen;
+      optimize::BundleLineObservation seen = options_.noise.of(f, unrest(o.keyframe));
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
-      seen.pixel_sigma = options_.line_sigma_px * unrest(o.keyframe);
-      double sigma = seen.pixel_sigma;
-      seen.start = pixel(o.keyframe, f.segment.start, seen.pixel_sigma);
-      seen.end = pixel(o.keyframe, f.segment.end, sigma);
-      if (f.line3) {
-        seen.has_depth = true;
-        seen.start_camera = f.line3->start;
-        seen.end_camera = f.line3->end;
-        seen.start_sigma = depth_trust(o.keyframe) *
-                           std::max(0.003, features::endpoint_sigma(f.line3->start, f.line3->start_noise));
-        seen.end_sigma = depth_trust(o.keyframe) *
-                         std::max(0.003, features::endpoint_sigma(f.line3->end, f.line3->end_noise));
-      }
+      seen.start = pixel(o.keyframe, seen.start);
+      seen.end = pixel(o.keyframe, seen.end);
+      seen.pixel_sigma *= pixel_size(o.keyframe);
       bundle_.problem.line_observations.push_back(seen);
       bundle_.line_seen.push_back(o.keyframe);
     }
@@ -286,11 +276,7 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
   table.number("adjust.first_gate", first_gate, {0.0, 1000.0}, "",
                "Observations further off than so many standard deviations where the pose graph has put the "
                "keyframes wait for the second round: those that caused a drift would restore it; 0: none");
-  table.number("adjust.line_sigma", line_sigma_px, {0.01, 10.0}, "px",
-               "Standard deviation of a line's ends across it");
-  table.number(
-      "adjust.depth_factor", depth_factor, {0.1, 100.0}, "",
-      "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
+  noise.declare(table, "adjust.");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");
   table.number("adjust.turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",

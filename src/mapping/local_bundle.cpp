@@ -2,11 +2,8 @@
 #include "plumbline/mapping/local_bundle.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
-
-#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -173,21 +170,12 @@ class Builder {
       if (!has(o.keyframe) || !calm(o.keyframe)) continue;
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen;
+      optimize::BundlePointObservation seen = options_.noise.of(f);
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
-      seen.pixel = f.pixel.cast<double>();
-      seen.pixel_sigma = std::pow(options_.orb_scale_factor, f.octave);
-      seen.depth = static_cast<double>(f.depth);
-      seen.depth_sigma = f.depth > 0.0F ? options_.depth_factor * sensor::depth_sigma(seen.depth) : 1.0;
       bundle_.problem.point_observations.push_back(seen);
       bundle_.point_seen.push_back({index, o});
     }
-  }
-
-  [[nodiscard]] double line_depth_sigma(const Eigen::Vector3d& end,
-                                        const features::EndpointNoise& noise) const {
-    return options_.depth_factor * std::max(0.003, features::endpoint_sigma(end, noise));
   }
 
   void add_line(core::LineId id) {
@@ -199,19 +187,9 @@ class Builder {
       if (!has(o.keyframe) || !calm(o.keyframe)) continue;
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
-      optimize::BundleLineObservation seen;
+      optimize::BundleLineObservation seen = options_.noise.of(f);
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
-      seen.start = f.segment.start.cast<double>();
-      seen.end = f.segment.end.cast<double>();
-      seen.pixel_sigma = options_.line_sigma_px;
-      if (f.line3) {
-        seen.has_depth = true;
-        seen.start_camera = f.line3->start;
-        seen.end_camera = f.line3->end;
-        seen.start_sigma = line_depth_sigma(f.line3->start, f.line3->start_noise);
-        seen.end_sigma = line_depth_sigma(f.line3->end, f.line3->end_noise);
-      }
       bundle_.problem.line_observations.push_back(seen);
       bundle_.line_seen.push_back({index, o});
     }

@@ -63,11 +63,7 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
       "bundle.max_turn_rate", bundle_max_turn_rate, {0.0, 100.0}, "rad/s",
       "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: they keep "
       "the pose of the tracker and move no landmark");
-  table.number("bundle.line_sigma", bundle_line_sigma_px, {0.01, 10.0}, "px",
-               "Standard deviation of a line's ends across it");
-  table.number(
-      "bundle.depth_factor", bundle_depth_factor, {0.1, 100.0}, "",
-      "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
+  bundle_noise.declare(table, "bundle.");
   table.boolean("edges", edges,
                 "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
   table.integer("edges.keyframes", edge_keyframes, {1, 100}, "",

@@ -233,7 +233,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   if (options_.bundle) {
     GlobalAdjustmentOptions adjustment;
     adjustment.graph = graph;
-    adjustment.orb_scale_factor = options_.verify.orb_scale_factor;
+    adjustment.noise.orb_scale_factor = options_.verify.orb_scale_factor;
     const KeyframeId anchor{};
     adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment, anchor);
   }

@@ -180,7 +180,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   GlobalAdjustmentOptions adjustment = options.adjustment;
   adjustment.graph.robust =
       options.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
-  adjustment.orb_scale_factor = options.verify.orb_scale_factor;
+  adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
   adjustment.bundle = false;  // before surfaces are aligned it bends a map that hangs on a narrow overlap
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);

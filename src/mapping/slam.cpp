@@ -35,6 +35,12 @@ static int points_with_depth(const features::FrameFeatures& features) {
                                         [](const features::PointFeature& f) { return f.depth > 0.0F; }));
 }
 
+static SightingNoise noise_of(const SlamOptions& options) {
+  SightingNoise noise = options.mapper.bundle_noise;
+  noise.orb_scale_factor = options.tracker.association.scale_factor;
+  return noise;
+}
+
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
            const core::Executor& executor, core::Log& log)
     : options_(options),
@@ -44,9 +50,7 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       tracker_(options.tracker, camera),
       rule_(options.keyframe),
       mapper_(options.mapper, camera),
-      bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate,
-               options.tracker.association.scale_factor, options.mapper.bundle_line_sigma_px,
-               options.mapper.bundle_depth_factor},
+      bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate, noise_of(options)},
               options.mapper.bundle_options, options.bundle_lag, camera, executor),
       closer_(options.loops, camera) {
   if (!options.loops.enabled) return;

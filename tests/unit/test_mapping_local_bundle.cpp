@@ -88,13 +88,37 @@ TEST(LocalBundle, PutsAKeyframeAndItsLandmarksBackInPlace) {
 TEST(LocalBundle, DepthIsBelievedLessThanItsNoiseSays) {
   SmallMap world;
   LocalBundleOptions options;
-  options.depth_factor = 3.0;
+  options.noise.depth_factor = 3.0;
   const LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, options);
   ASSERT_FALSE(bundle.problem.point_observations.empty());
   for (const auto& seen : bundle.problem.point_observations) {
     ASSERT_GT(seen.depth, 0.0);
     EXPECT_DOUBLE_EQ(seen.depth_sigma, 3.0 * sensor::depth_sigma(seen.depth));
   }
+}
+
+TEST(SightingNoise, UnrestMultipliesEveryStandardDeviation) {
+  features::PointFeature corner;
+  corner.depth = 2.0F;
+  corner.octave = 3;
+  features::LineFeature line;
+  line.line3 = features::Line3{};
+  line.line3->start = {0.0, 0.0, 2.0};
+  line.line3->end = {0.5, 0.0, 2.5};
+  const SightingNoise noise;
+  const auto calm = noise.of(corner);
+  const auto turning = noise.of(corner, 3.0);
+  EXPECT_DOUBLE_EQ(calm.pixel_sigma, 1.2 * 1.2 * 1.2);
+  EXPECT_DOUBLE_EQ(turning.pixel_sigma, 3.0 * calm.pixel_sigma);
+  EXPECT_DOUBLE_EQ(turning.depth_sigma, 3.0 * calm.depth_sigma);
+  const auto calm_line = noise.of(line);
+  const auto turning_line = noise.of(line, 3.0);
+  EXPECT_TRUE(calm_line.has_depth);
+  EXPECT_DOUBLE_EQ(calm_line.pixel_sigma, noise.line_sigma_px);
+  EXPECT_DOUBLE_EQ(turning_line.pixel_sigma, 3.0 * calm_line.pixel_sigma);
+  EXPECT_DOUBLE_EQ(turning_line.end_sigma, 3.0 * calm_line.end_sigma);
+  line.line3.reset();
+  EXPECT_FALSE(noise.of(line).has_depth);
 }
 
 TEST(LocalBundle, WhatOnlyOneKeyframeSeesMovesWithIt) {

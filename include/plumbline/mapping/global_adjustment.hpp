@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "plumbline/core/options.hpp"
+#include "plumbline/mapping/sighting_noise.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/optimize/pose_graph.hpp"
@@ -65,9 +66,7 @@ struct GlobalAdjustmentOptions {
   /// depth is stamped apart: what they say counts for half at this rate and fades with the fourth power of
   /// it.
   double turn_rate = 0.4;
-  double orb_scale_factor = 1.2;
-  double line_sigma_px = 0.25;  ///< of a line's ends, across it
-  double depth_factor = 2.0;    ///< of the depth noise, for the depth of corners and lines
+  SightingNoise noise;
   double surface_weight = 0.3;  ///< of the map's surface edges: their samples are alike from one to the next
   /// Standard deviations. Where a tracker slid along a wall, it is the landmarks of that moment that agree on
   /// it, all alike: in a bundle they would undo what edges from elsewhere have corrected. What is further off

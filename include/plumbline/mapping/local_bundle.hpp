@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "plumbline/mapping/sighting_noise.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/camera.hpp"
@@ -32,9 +33,7 @@ struct LocalBundle {
 struct LocalBundleOptions {
   int keyframes = 12;          ///< how many may move
   double max_turn_rate = 0.6;  ///< rad/s; keyframes taken while turning faster are held and silent
-  double orb_scale_factor = 1.2;
-  double line_sigma_px = 0.25;  ///< of a line's ends, across it
-  double depth_factor = 2.0;    ///< of the depth noise, for the depth of corners and lines
+  SightingNoise noise;
 };
 
 /// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most

@@ -11,6 +11,7 @@
 #include "plumbline/mapping/landmark_culling.hpp"
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/landmark_triangulation.hpp"
+#include "plumbline/mapping/sighting_noise.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/frame.hpp"
@@ -31,8 +32,7 @@ struct LocalMapperOptions {
   bool bundle = true;
   int bundle_keyframes = 12;
   double bundle_max_turn_rate = 0.6;
-  double bundle_line_sigma_px = 0.25;
-  double bundle_depth_factor = 2.0;
+  SightingNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
   bool edges = true;
   int edge_keyframes = 5;
   double edge_min_overlap = 0.4;

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a keyframe's features say of landmarks in bundles, of a few keyframes or of the whole map, and how
+// much they are believed: standard deviations as they were found at true poses (docs/mapping.md).
+#include <string>
+
+#include "plumbline/core/options.hpp"
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/optimize/bundle_adjustment.hpp"
+
+namespace plumbline::mapping {
+
+struct SightingNoise {
+  double orb_scale_factor = 1.2;  ///< from octave to octave; corners are good to a pixel of theirs
+  double line_sigma_px = 0.25;    ///< of a line's ends, across it
+  double depth_factor = 2.0;      ///< of the depth noise, for the depth of corners and lines
+
+  /// All but the scale factor, which is that of the features.
+  void declare(core::OptionTable& table, const std::string& prefix);
+
+  /// As a bundle's camera of the same intrinsics saw it; which pose and which landmark is left to the caller.
+  /// `unrest`: all standard deviations are so many times as large.
+  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner,
+                                                    double unrest = 1.0) const;
+  [[nodiscard]] optimize::BundleLineObservation of(const features::LineFeature& line,
+                                                   double unrest = 1.0) const;
+};
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/sighting_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/features/line_depth.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::mapping {
+
+void SightingNoise::declare(core::OptionTable& table, const std::string& prefix) {
+  table.number(prefix + "line_sigma", line_sigma_px, {0.01, 10.0}, "px",
+               "Standard deviation of a line's ends across it");
+  table.number(
+      prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
+      "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
+}
+
+optimize::BundlePointObservation SightingNoise::of(const features::PointFeature& corner,
+                                                   double unrest) const {
+  optimize::BundlePointObservation seen;
+  seen.pixel = corner.pixel.cast<double>();
+  seen.pixel_sigma = unrest * std::pow(orb_scale_factor, corner.octave);
+  seen.depth = static_cast<double>(corner.depth);
+  seen.depth_sigma = corner.depth > 0.0F ? depth_factor * unrest * sensor::depth_sigma(seen.depth) : 1.0;
+  return seen;
+}
+
+optimize::BundleLineObservation SightingNoise::of(const features::LineFeature& line, double unrest) const {
+  constexpr double kLeast_m = 0.003;  // of an end's depth
+  optimize::BundleLineObservation seen;
+  seen.start = line.segment.start.cast<double>();
+  seen.end = line.segment.end.cast<double>();
+  seen.pixel_sigma = line_sigma_px * unrest;
+  if (!line.line3) return seen;
+  const auto sigma = [&](const Eigen::Vector3d& end, const features::EndpointNoise& noise) {
+    return depth_factor * unrest * std::max(kLeast_m, features::endpoint_sigma(end, noise));
+  };
+  seen.has_depth = true;
+  seen.start_camera = line.line3->start;
+  seen.end_camera = line.line3->end;
+  seen.start_sigma = sigma(line.line3->start, line.line3->start_noise);
+  seen.end_sigma = sigma(line.line3->end, line.line3->end_noise);
+  return seen;
+}
+
+}  // namespace plumbline::mapping
