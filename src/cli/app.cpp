@@ -83,6 +83,15 @@ void add_plugin_option(CLI::App& command, Session& session) {
       ->allow_extra_args(false);
 }
 
+void add_time_range(CLI::App& command, dataset::OpenOptions& open) {
+  command.add_option("--from", open.from_s, "Start this many seconds after the first frame")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--to", open.to_s, "End this many seconds after the first frame")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+}
+
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help) {
   CLI::App* group = parent.add_subcommand(name, help);
   group->set_version_flag("--version", version_text());

@@ -13,6 +13,7 @@
 #include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
+#include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::cli {
@@ -49,6 +50,8 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
                       std::function<int()> run);
 /// --plugin FILE.so, for commands that use filters.
 void add_plugin_option(CLI::App& command, Session& session);
+/// --from S and --to S, for commands that read recordings.
+void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 /// A word that only groups commands, like `evaluate`.
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);
 

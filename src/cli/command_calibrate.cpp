@@ -152,12 +152,7 @@ void add_calibrate(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->output, "camera.yaml to write")->type_name("FILE");
   command->add_option("--camera", request->open.camera, "Shipped calibration or file to begin with")
       ->type_name("NAME|FILE");
-  command->add_option("--from", request->open.from_s, "Start this many seconds after the first frame")
-      ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--to", request->open.to_s, "End this many seconds after the first frame")
-      ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+  add_time_range(*command, request->open);
   command->add_option("--keyframes", request->options.keyframes, "Keyframes that are adjusted at most")
       ->check(CLI::Range(16, 2000));
 }

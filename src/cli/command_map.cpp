@@ -60,12 +60,7 @@ void add_map(CLI::App& app, Session& session) {
       ->allow_extra_args(false);
   command->add_option("--format", request->open.format, "Layout of INPUT (default: auto)")
       ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
-  command->add_option("--from", request->open.from_s, "Start this many seconds after the first frame")
-      ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--to", request->open.to_s, "End this many seconds after the first frame")
-      ->type_name("S")
-      ->check(CLI::NonNegativeNumber);
+  add_time_range(*command, request->open);
   command->add_option("--every", request->open.every, "Use every N-th frame")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/cloud/sum_table.hpp"
 #include "scalar.hpp"
 #include "voxel_key.hpp"
 
@@ -54,49 +55,13 @@ std::vector<std::vector<Sighting>> shared_cells(const std::vector<std::vector<Co
 
 Eigen::Array3f robust_weight(const Eigen::Array3f& residual) { return kRobust / residual.abs().max(kRobust); }
 
-/// Sums over small cubes, in a hash table.
-class SpotTable {
- public:
-  struct Sum {
-    std::uint64_t key = 0;
-    Eigen::Vector3f point{0, 0, 0};
-    Eigen::Vector3f color{0, 0, 0};
-    float count = 0.0F;
-    float colored = 0.0F;
-  };
-  SpotTable() : table_(1U << 13U, 0) {}
-
-  [[nodiscard]] std::vector<Sum>& sums() { return sums_; }
-  /// Number of a cube's sum. Neighbours in a picture mostly share their cube.
-  std::size_t of(std::uint64_t key) {
-    if (last_ < sums_.size() && sums_[last_].key == key) return last_;
-    std::size_t slot = slot_of(key);
-    if (table_[slot] == 0) {
-      sums_.emplace_back();
-      sums_.back().key = key;
-      table_[slot] = static_cast<std::uint32_t>(sums_.size());
-      if (2 * sums_.size() > table_.size()) {
-        table_.assign(2 * table_.size(), 0);
-        for (std::size_t i = 0; i < sums_.size(); ++i)
-          table_[slot_of(sums_[i].key)] = static_cast<std::uint32_t>(i + 1);
-        slot = slot_of(key);
-      }
-    }
-    last_ = table_[slot] - 1;
-    return last_;
-  }
-
- private:
-  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const {
-    const std::size_t mask = table_.size() - 1;
-    std::size_t slot = mix(key) & mask;
-    while (table_[slot] != 0 && sums_[table_[slot] - 1].key != key) slot = (slot + 1) & mask;
-    return slot;
-  }
-
-  std::vector<Sum> sums_;
-  std::vector<std::uint32_t> table_;  ///< open addressing: index into sums_ + 1, 0 = free
-  std::size_t last_ = 0;
+/// Of a small cube.
+struct SpotSum {
+  std::uint64_t key = 0;
+  Eigen::Vector3f point{0, 0, 0};
+  Eigen::Vector3f color{0, 0, 0};
+  float count = 0.0F;
+  float colored = 0.0F;
 };
 
 }  // namespace
@@ -106,12 +71,11 @@ std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
   constexpr float kFar_m = 1e4F;
   constexpr int kDark = 12;
   constexpr int kBright = 245;
-  SpotTable table;
-  std::vector<SpotTable::Sum>& sums = table.sums();
+  SumTable<SpotSum> table;
   for (const Point& p : camera_cloud.points) {
     if (!(p.getVector3fMap().cwiseAbs().maxCoeff() < kFar_m)) continue;
     const Eigen::Vector3f point = p.getVector3fMap();
-    SpotTable::Sum& sum = sums[table.of(pack_cell((point / kSpot_m).array().floor().cast<int>()))];
+    SpotSum& sum = table.of(pack_cell((point / kSpot_m).array().floor().cast<int>()));
     sum.point += point;
     sum.count += 1.0F;
     const auto [dark, bright] = std::minmax({p.r, p.g, p.b});
@@ -120,8 +84,8 @@ std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
     sum.colored += 1.0F;
   }
   std::vector<ColorSpot> spots;
-  spots.reserve(sums.size());
-  for (const SpotTable::Sum& sum : sums) {
+  spots.reserve(table.sums().size());
+  for (const SpotSum& sum : table.sums()) {
     spots.push_back({sum.point / sum.count, sum.color / std::max(1.0F, sum.colored), sum.colored});
   }
   return spots;

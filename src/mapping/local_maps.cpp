@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/sum_table.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "surface_voxels.hpp"
@@ -18,66 +19,23 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-/// Sums over voxels, in a hash table. Neighbouring samples mostly share their voxel.
-class VoxelSums {
- public:
-  struct Sum {
-    std::uint64_t key = 0;
-    Eigen::Vector3f point{0, 0, 0};
-    Eigen::Vector3f normal{0, 0, 0};
-    float weight = 0.0F;
-    float count = 0.0F;
-  };
-  VoxelSums() : table_(1024, 0) {}
-
-  /// Of a voxel; until the next call.
-  Sum& of(std::uint64_t key) {
-    if (last_ < sums_.size() && sums_[last_].key == key) return sums_[last_];
-    std::size_t slot = slot_of(key);
-    if (table_[slot] == 0) {
-      sums_.emplace_back();
-      sums_.back().key = key;
-      table_[slot] = static_cast<std::uint32_t>(sums_.size());
-      if (2 * sums_.size() > table_.size()) {
-        grow();
-        slot = slot_of(key);
-      }
-    }
-    last_ = table_[slot] - 1;
-    return sums_[last_];
-  }
-  /// In the order of their keys; used up.
-  [[nodiscard]] std::vector<Sum> sorted() {
-    std::sort(sums_.begin(), sums_.end(), [](const Sum& a, const Sum& b) { return a.key < b.key; });
-    return std::move(sums_);
-  }
-
- private:
-  [[nodiscard]] std::size_t slot_of(std::uint64_t key) const {
-    const std::size_t mask = table_.size() - 1;
-    std::size_t slot = static_cast<std::size_t>(key * 0x9E3779B97F4A7C15ULL >> 32) & mask;
-    while (table_[slot] != 0 && sums_[table_[slot] - 1].key != key) slot = (slot + 1) & mask;
-    return slot;
-  }
-  void grow() {
-    table_.assign(2 * table_.size(), 0);
-    for (std::size_t i = 0; i < sums_.size(); ++i)
-      table_[slot_of(sums_[i].key)] = static_cast<std::uint32_t>(i + 1);
-  }
-
-  std::vector<Sum> sums_;
-  std::vector<std::uint32_t> table_;  ///< open addressing: index into sums_ + 1, 0 = free
-  std::size_t last_ = 0;
+/// Of a voxel and the way its surface faces.
+struct VoxelSum {
+  std::uint64_t key = 0;
+  Eigen::Vector3f point{0, 0, 0};
+  Eigen::Vector3f normal{0, 0, 0};
+  float weight = 0.0F;
+  float count = 0.0F;
 };
 
 /// Means of the samples of each voxel and facing, weighted by 1 / sigma^2, in order of voxels. `combined`:
 /// the samples are independent measurements, so that their mean is better than each; else it is as good as
 /// they are.
 CoarseSurface voxel_means(const CoarseSurface& samples, double voxel_m, bool combined) {
-  VoxelSums sums;
+  cloud::SumTable<VoxelSum> sums;
   for (const maps::SurfaceSample& s : samples) {
     const std::uint64_t voxel = voxel_key(s.point, static_cast<float>(voxel_m));
-    VoxelSums::Sum& sum = sums.of(voxel << 3 | facing(s.normal));
+    VoxelSum& sum = sums.of(voxel << 3 | facing(s.normal));
     const float w = 1.0F / (s.sigma * s.sigma);
     sum.point += w * s.point;
     sum.normal += w * s.normal;
@@ -85,7 +43,7 @@ CoarseSurface voxel_means(const CoarseSurface& samples, double voxel_m, bool com
     sum.count += 1.0F;
   }
   CoarseSurface means;
-  for (const VoxelSums::Sum& sum : sums.sorted()) {
+  for (const VoxelSum& sum : sums.sorted()) {
     const float sigma = 1.0F / std::sqrt(combined ? sum.weight : sum.weight / sum.count);
     if (sum.normal.norm() > 0.5F * sum.weight)
       means.push_back({sum.point / sum.weight, sum.normal.normalized(), sigma});

@@ -62,9 +62,10 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
   const maps::Map& b = *parts[merge.b].map;
   const LaidMaps maps(parts[merge.a], parts[merge.b]);
   merge.laid = maps.fit(merge.a_from_b);
-  const auto weigh = [&](const Rigid3& other, const LaidOver& fit, const Difference& apart) {
-    if (!fits_too(fit, merge.laid, options) || fit.share() <= merge.rival_laid.share()) return;
-    if (maps.surfaces_seen_through(other) > kNoRival) return;
+  const auto fits_best = [&](const LaidOver& fit) {
+    return fits_too(fit, merge.laid, options) && fit.share() > merge.rival_laid.share();
+  };
+  const auto keep = [&](const LaidOver& fit, const Difference& apart) {
     merge.rival_laid = fit;
     merge.rival_m = apart.metres;
   };
@@ -77,11 +78,13 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
     const LaidOver fit = maps.fit(other);
     if (refuted(fit, options) || maps.surfaces_seen_through(other) > kNoRival) continue;
     merge.rival = std::max(merge.rival, witnesses(sets[i]));
-    weigh(other, fit, apart);
+    if (fits_best(fit)) keep(fit, apart);
   }
   const core::KeyframeId at = all.places[sets.front().members.front()].b;
   for (const Rigid3& other : maps.steps(merge.a_from_b, merge.pairs, kApart_m)) {
-    weigh(other, maps.fit(other), between(b, at, merge.a_from_b, other));
+    const LaidOver fit = maps.fit(other);
+    if (!fits_best(fit) || maps.surfaces_seen_through(other) > kNoRival) continue;
+    keep(fit, between(b, at, merge.a_from_b, other));
   }
   if (merge.laid.expected + merge.laid.contradicted >= kFewLandmarks && merge.laid.seen_through() > kWrong) {
     return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",

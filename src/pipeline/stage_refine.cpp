@@ -92,11 +92,11 @@ class RefineStage : public Stage {
     counts_.mean_shift_m = summary.mean_shift_m;
     counts_.max_shift_m = summary.max_shift_m;
     if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
-    log_->debug(
-        fmt::format("refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "
-                    "{} iterations; moved by {:.1f} mm on average, {:.1f} mm at most",
-                    summary.keyframes, summary.points, summary.lines, summary.surface_edges, alignments,
-                    loops.size(), summary.bundle.iterations, 1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
+    log_->debug(fmt::format(
+        "refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "
+        "{} iterations; moved by {:.1f} mm on average, {:.1f} mm at most",
+        summary.keyframes, summary.points, summary.lines, summary.surface_edges, alignments, loops.size(),
+        summary.bundle.iterations, 1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
   }
 
   std::vector<mapping::PoseEdge> align(const maps::Map& map) {

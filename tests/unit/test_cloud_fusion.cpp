@@ -288,7 +288,8 @@ TEST(Exposure, ViewsAgreeOnColours) {
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 2), 0.1, cv::Scalar(100, 100, 100));
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 3), 0.2, cv::Scalar(140, 120, 100));
   std::vector<std::vector<ColorCell>> cells;
-  for (std::size_t v = 0; v < 3; ++v) cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
+  for (std::size_t v = 0; v < 3; ++v)
+    cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
   const auto gains = color_gains(cells);
   ASSERT_EQ(gains.size(), 3U);
   EXPECT_NEAR(gains[0].z() / gains[2].z(), 1.4F, 0.03F);  // blue
@@ -302,7 +303,8 @@ TEST(Exposure, WithoutAnythingSharedNothingChanges) {
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 1), 0.0, cv::Scalar(50, 50, 50));
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 2), 50.0, cv::Scalar(200, 200, 200));
   std::vector<std::vector<ColorCell>> cells;
-  for (std::size_t v = 0; v < 2; ++v) cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
+  for (std::size_t v = 0; v < 2; ++v)
+    cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
   for (const Eigen::Vector3f& gain : color_gains(cells)) EXPECT_EQ(gain, Eigen::Vector3f(1, 1, 1));
   EXPECT_TRUE(color_gains({}).empty());
 }
