@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "clones.hpp"
+#include "plumbline/core/clones.hpp"
 #include "plumbline/features/line_segment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 

@@ -12,7 +12,7 @@
 #include <optional>
 #include <vector>
 
-#include "clones.hpp"
+#include "plumbline/core/clones.hpp"
 
 namespace plumbline::features {
 namespace {
