@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "ceres_bundle.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "random_world.hpp"
 
@@ -410,27 +411,82 @@ TEST(AdjustBundle, EdgesAloneHoldPosesAndFreeDirectionsStay) {
   EXPECT_NEAR(after(0), before(0), 0.01);
 }
 
-TEST(AdjustBundle, SameBytesTwice) {
+TEST(AdjustBundle, SameBytesForAnyNumberOfThreads) {
   Scenario s = noisy();
-  s.keyframes = 8;
-  s.points = 300;
-  s.lines = 40;
-  World a = make_world(s);
-  World b = make_world(s);
-  const BundleSummary summary_a = adjust_bundle(a.problem, {});
-  const BundleSummary summary_b = adjust_bundle(b.problem, {});
-  EXPECT_EQ(std::memcmp(&summary_a.final_cost, &summary_b.final_cost, sizeof(double)), 0);
-  for (std::size_t i = 0; i < a.problem.poses.size(); ++i) {
-    const Rigid3& x = a.problem.poses[i].camera_from_world;
-    const Rigid3& y = b.problem.poses[i].camera_from_world;
-    EXPECT_EQ(std::memcmp(x.rotation.data(), y.rotation.data(), 9 * sizeof(double)), 0);
-    EXPECT_EQ(std::memcmp(x.translation.data(), y.translation.data(), 3 * sizeof(double)), 0);
+  s.keyframes = 70;
+  s.points = 700;
+  s.lines = 60;
+  World first = make_world(s);
+  const BundleSummary summary = adjust_bundle(first.problem, {});
+  ASSERT_TRUE(summary.usable);
+  for (const int threads : {1, 2, 3}) {
+    const core::Executor executor(threads);
+    World again = make_world(s);
+    const BundleSummary other = adjust_bundle(again.problem, {}, &executor);
+    EXPECT_EQ(std::memcmp(&summary.final_cost, &other.final_cost, sizeof(double)), 0);
+    for (std::size_t i = 0; i < first.problem.poses.size(); ++i) {
+      const Rigid3& x = first.problem.poses[i].camera_from_world;
+      const Rigid3& y = again.problem.poses[i].camera_from_world;
+      EXPECT_EQ(std::memcmp(x.rotation.data(), y.rotation.data(), 9 * sizeof(double)), 0);
+      EXPECT_EQ(std::memcmp(x.translation.data(), y.translation.data(), 3 * sizeof(double)), 0);
+    }
+    for (std::size_t i = 0; i < first.problem.points.size(); ++i)
+      EXPECT_EQ(first.problem.points[i], again.problem.points[i]);
+    for (std::size_t i = 0; i < first.problem.lines.size(); ++i)
+      EXPECT_EQ(first.problem.lines[i].n, again.problem.lines[i].n);
   }
-  for (std::size_t i = 0; i < a.problem.lines.size(); ++i)
-    EXPECT_EQ(a.problem.lines[i].n, b.problem.lines[i].n);
 }
 
-TEST(AdjustBundle, MoreThanSixtyKeyframesTakeTheSparsePath) {
+TEST(AdjustBundle, TheMinimumIsTheOneThatCeresFinds) {
+  for (const bool with_edges : {false, true}) {
+    Scenario s = noisy();
+    s.keyframes = 9;
+    s.points = 150;
+    s.lines = 40;
+    s.seed = 5;
+    World world = make_world(s);
+    world.problem.poses[4].fixed = true;
+    for (std::size_t i = 0; with_edges && i + 1 < world.problem.poses.size(); ++i) {
+      const Rigid3 b_from_a =
+          world.truth.poses[i + 1].camera_from_world * world.truth.poses[i].camera_from_world.inverse();
+      geometry::Vector6d information;
+      information << 1e4, 2e4, 3e4, 1e5, 0.0, 2e5;
+      world.problem.edges.push_back(
+          {static_cast<int>(i), static_cast<int>(i + 1), b_from_a, information.asDiagonal()});
+    }
+    BundleOptions options;
+    options.rounds = 1;
+    options.max_iterations = 200;
+    options.tolerance = 0.0;
+    BundleProblem ceres_problem = world.problem;
+    const tests::CeresCosts expected = tests::solve_with_ceres(ceres_problem, options);
+    const BundleSummary summary = adjust_bundle(world.problem, options);
+    ASSERT_TRUE(summary.usable);
+    EXPECT_NEAR(summary.initial_cost, expected.initial, 1e-9 * expected.initial);
+    EXPECT_NEAR(summary.final_cost, expected.final, 1e-8 * expected.final);
+    for (std::size_t i = 0; i < world.problem.poses.size(); ++i) {
+      const Rigid3& ours = world.problem.poses[i].camera_from_world;
+      EXPECT_LT(tests::distance(ours, ceres_problem.poses[i].camera_from_world), 1e-5);
+      EXPECT_LT(tests::angle(ours, ceres_problem.poses[i].camera_from_world), 1e-5);
+    }
+  }
+}
+
+TEST(AdjustBundle, ANumberThatIsNoneIsTold) {
+  Scenario s;
+  s.keyframes = 3;
+  s.points = 30;
+  s.lines = 3;
+  World world = make_world(s);
+  world.problem.point_observations[3].pixel.x() = std::nan("");
+  const BundleProblem before = world.problem;
+  const BundleSummary summary = adjust_bundle(world.problem, {});
+  EXPECT_FALSE(summary.usable);
+  EXPECT_NE(summary.message.find("not a number"), std::string::npos) << summary.message;
+  EXPECT_EQ(world.problem.points[0], before.points[0]);
+}
+
+TEST(AdjustBundle, ManyKeyframes) {
   Scenario s = noisy();
   s.keyframes = 64;
   s.points = 150;

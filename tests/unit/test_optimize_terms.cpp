@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Analytic Jacobians of every residual against central differences; for Ceres' cost functions through the
-// manifolds that the solver uses.
+// Analytic Jacobians of every residual against central differences.
 #include <gtest/gtest.h>
 
+#include "bundle_terms.hpp"
 #include "cost_edge.hpp"
-#include "cost_line.hpp"
-#include "cost_point.hpp"
 #include "manifolds.hpp"
 #include "numeric_jacobian.hpp"
 #include "plumbline/optimize/pose_terms.hpp"
@@ -142,55 +140,6 @@ TEST(PlaneResidual, ValueAndJacobian) {
   }
 }
 
-/// Both local Jacobians of a cost over (pose, block): analytic ones (first columns of the lifted Jacobian)
-/// and numeric ones through Plus.
-template <int kRows, int kAmbient, int kTangent>
-void expect_local_jacobians(const ceres::CostFunction& cost, const double* pose, const double* block,
-                            const ceres::Manifold* manifold, double tolerance = 1e-6) {
-  const PoseManifold pose_manifold;
-  const double* parameters[2] = {pose, block};
-  Eigen::Matrix<double, kRows, 1> r;
-  Eigen::Matrix<double, kRows, 7, Eigen::RowMajor> by_pose;
-  Eigen::Matrix<double, kRows, kAmbient, Eigen::RowMajor> by_block;
-  double* jacobians[2] = {by_pose.data(), by_block.data()};
-  ASSERT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
-  Eigen::Matrix<double, 7, 6, Eigen::RowMajor> lift;
-  pose_manifold.PlusJacobian(pose, lift.data());
-  const auto numeric_pose = numeric_jacobian<kRows, 6>([&](const Vector6d& delta) {
-    PoseBlock moved;
-    pose_manifold.Plus(pose, delta.data(), moved.data());
-    const double* p[2] = {moved.data(), block};
-    Eigen::Matrix<double, kRows, 1> e;
-    cost.Evaluate(p, e.data(), nullptr);
-    return e;
-  });
-  EXPECT_LT(relative((by_pose * lift).eval(), numeric_pose), tolerance);
-
-  Eigen::Matrix<double, kAmbient, kTangent, Eigen::RowMajor> block_lift;
-  block_lift.setIdentity();
-  if (manifold != nullptr) manifold->PlusJacobian(block, block_lift.data());
-  const auto numeric_block =
-      numeric_jacobian<kRows, kTangent>([&](const Eigen::Matrix<double, kTangent, 1>& delta) {
-        std::array<double, kAmbient> moved;
-        if (manifold != nullptr) {
-          manifold->Plus(block, delta.data(), moved.data());
-        } else {
-          for (int i = 0; i < kTangent; ++i) moved[static_cast<std::size_t>(i)] = block[i] + delta(i);
-        }
-        const double* p[2] = {pose, moved.data()};
-        Eigen::Matrix<double, kRows, 1> e;
-        cost.Evaluate(p, e.data(), nullptr);
-        return e;
-      });
-  EXPECT_LT(relative((by_block * block_lift).eval(), numeric_block), tolerance);
-
-  // One Jacobian alone is the same one; none is allowed.
-  Eigen::Matrix<double, kRows, kAmbient, Eigen::RowMajor> alone;
-  double* second_only[2] = {nullptr, alone.data()};
-  ASSERT_TRUE(cost.Evaluate(parameters, r.data(), second_only));
-  EXPECT_EQ(alone, by_block);
-}
-
 TEST(Manifolds, PlusZeroIsTheSameAndBlocksRoundTrip) {
   Random random(4);
   for (int i = 0; i < 20; ++i) {
@@ -202,46 +151,7 @@ TEST(Manifolds, PlusZeroIsTheSameAndBlocksRoundTrip) {
     PoseManifold().Plus(block.data(), zero.data(), same.data());
     EXPECT_LT(tests::angle(to_rigid(same.data()), pose), 1e-7);
     EXPECT_LT((to_rigid(same.data()).translation - pose.translation).norm(), 1e-13);
-
-    const geometry::OrthonormalLine line =
-        geometry::to_orthonormal(geometry::line_through(random.vector(2.0), random.vector(2.0)));
-    LineBlock lines;
-    from_line(line, lines.data());
-    EXPECT_LT((to_line(lines.data()).u - line.u).norm(), 1e-12);
-    EXPECT_EQ(to_line(lines.data()).w1, line.w1);
   }
-}
-
-TEST(PointCost, LocalJacobians) {
-  Random random(5);
-  for (int i = 0; i < 20; ++i) {
-    const Rigid3 pose = random.pose(3.0, 2.0);
-    const Eigen::Vector3d point = pose.inverse() * in_front(random);
-    PointTerm term;
-    term.pixel = {random.uniform(0, 640), random.uniform(0, 480)};
-    term.pixel_sigma = 1.4;
-    term.depth = i % 2 == 0 ? 2.0 : 0.0;
-    term.depth_sigma = 0.02;
-    PoseBlock block;
-    from_rigid(pose, block.data());
-    expect_local_jacobians<3, 3, 3>(PointCost(term, kCamera), block.data(), point.data(), nullptr);
-  }
-}
-
-TEST(PointCost, BehindTheCameraIsALargeConstant) {
-  PoseBlock block;
-  from_rigid({}, block.data());
-  const Eigen::Vector3d point(0.1, 0.1, -1.0);
-  const PointCost cost(PointTerm{}, kCamera);
-  const double* parameters[2] = {block.data(), point.data()};
-  Eigen::Vector3d r;
-  Eigen::Matrix<double, 3, 7, Eigen::RowMajor> by_pose;
-  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_point;
-  double* jacobians[2] = {by_pose.data(), by_point.data()};
-  ASSERT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
-  EXPECT_GT(r.norm(), 100.0);
-  EXPECT_TRUE(by_pose.isZero());
-  EXPECT_TRUE(by_point.isZero());
 }
 
 BundleLineObservation line_observation(Random& random, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -257,45 +167,52 @@ BundleLineObservation line_observation(Random& random, const Eigen::Vector3d& a,
   return seen;
 }
 
-TEST(LineCost, LocalJacobiansWithAndWithoutDepth) {
+/// Both Jacobians of a line's residuals against central differences.
+void expect_line_jacobians(const BundleLineObservation& seen, const Rigid3& pose,
+                           const geometry::OrthonormalLine& line) {
+  const LineView view(seen, kCamera);
+  LineDerivatives j;
+  const Eigen::Vector4d r = line_rows(view, kProjection, pose, line, &j);
+  EXPECT_EQ(r, line_rows(view, kProjection, pose, line, nullptr));
+  const auto by_pose = numeric_jacobian<4, 6>([&](const Vector6d& xi) {
+    return line_rows(view, kProjection, geometry::exp_se3(xi) * pose, line, nullptr);
+  });
+  EXPECT_LT(relative(j.by_pose, by_pose), 1e-5);
+  const auto by_line = numeric_jacobian<4, 4>([&](const Eigen::Vector4d& delta) {
+    return line_rows(view, kProjection, pose, geometry::update(line, delta), nullptr);
+  });
+  EXPECT_LT(relative(j.by_line, by_line), 1e-5);
+}
+
+TEST(LineRows, JacobiansWithAndWithoutDepth) {
   Random random(6);
   for (int i = 0; i < 30; ++i) {
     const Rigid3 pose = random.pose(3.0, 2.0);
+    const Rigid3 world_from_camera = pose.inverse();
     const Eigen::Vector3d a = in_front(random);
     const Eigen::Vector3d b = in_front(random);
     BundleLineObservation seen = line_observation(random, a, b);
     seen.has_depth = i % 2 == 0;
-    PoseBlock block;
-    from_rigid(pose, block.data());
-    LineBlock line;
-    const Rigid3 world_from_camera = pose.inverse();
-    from_line(geometry::to_orthonormal(geometry::line_through(world_from_camera * a, world_from_camera * b)),
-              line.data());
-    const LineManifold manifold;
-    expect_local_jacobians<4, 6, 4>(LineCost(seen, kCamera), block.data(), line.data(), &manifold, 1e-5);
+    expect_line_jacobians(
+        seen, pose,
+        geometry::to_orthonormal(geometry::line_through(world_from_camera * a, world_from_camera * b)));
   }
 }
 
-TEST(LineCost, LocalJacobiansWhereTheDirectionHasTurnedRound) {  // w2 < 0: the far side of infinity
+TEST(LineRows, JacobiansWhereTheDirectionHasTurnedRound) {  // w2 < 0: the far side of infinity
   Random random(7);
   for (int i = 0; i < 10; ++i) {
     const Eigen::Vector3d a = in_front(random);
     const Eigen::Vector3d b = in_front(random);
-    geometry::OrthonormalLine orthonormal = geometry::to_orthonormal(geometry::line_through(a, b));
-    orthonormal.u.col(1) *= -1.0;
-    orthonormal.u.col(2) *= -1.0;
-    orthonormal.w2 *= -1.0;
-    PoseBlock block;
-    from_rigid(random.pose(0.05, 0.05), block.data());
-    LineBlock line;
-    from_line(orthonormal, line.data());
-    const LineManifold manifold;
-    expect_local_jacobians<4, 6, 4>(LineCost(line_observation(random, a, b), kCamera), block.data(),
-                                    line.data(), &manifold, 1e-5);
+    geometry::OrthonormalLine line = geometry::to_orthonormal(geometry::line_through(a, b));
+    line.u.col(1) *= -1.0;
+    line.u.col(2) *= -1.0;
+    line.w2 *= -1.0;
+    expect_line_jacobians(line_observation(random, a, b), random.pose(0.05, 0.05), line);
   }
 }
 
-TEST(LineCost, DepthRowsMeasureAlongTheRayOnly) {
+TEST(LineRows, DepthIsMeasuredAlongTheRayOnly) {
   // A horizontal line at depth 2; measured endpoints 4 cm too far away, and off the line across it in the
   // image.
   const Eigen::Vector3d a(-0.5, 0.0, 2.0);
@@ -308,20 +225,15 @@ TEST(LineCost, DepthRowsMeasureAlongTheRayOnly) {
   seen.end_camera = b + Eigen::Vector3d(0.2, 0.0, 0.04);  // along the line costs nothing
   seen.start_sigma = 0.02;
   seen.end_sigma = 0.04;
-  PoseBlock pose;
-  from_rigid({}, pose.data());
-  LineBlock line;
-  from_line(geometry::to_orthonormal(geometry::line_through(a, b)), line.data());
-  const double* parameters[2] = {pose.data(), line.data()};
-  Eigen::Vector4d r;
-  ASSERT_TRUE(LineCost(seen, kCamera).Evaluate(parameters, r.data(), nullptr));
+  const geometry::OrthonormalLine line = geometry::to_orthonormal(geometry::line_through(a, b));
+  const Eigen::Vector4d r = line_rows(LineView(seen, kCamera), kProjection, {}, line, nullptr);
   EXPECT_NEAR(r(0), 0.0, 1e-9);
   EXPECT_NEAR(r(1), 0.0, 1e-9);
   EXPECT_NEAR(std::abs(r(2)), 2.0, 1e-9);
   EXPECT_NEAR(std::abs(r(3)), 1.0, 1e-9);
 }
 
-TEST(EdgeCost, LocalJacobians) {
+TEST(EdgeRows, Jacobians) {
   Random random(8);
   for (int i = 0; i < 20; ++i) {
     const Rigid3 a = random.pose(3.0, 2.0);
@@ -331,17 +243,35 @@ TEST(EdgeCost, LocalJacobians) {
     const geometry::Matrix6d half = geometry::Matrix6d::Random();
     edge.information = half * half.transpose();
     if (i % 2 == 0) edge.information.col(2).setZero(), edge.information.row(2).setZero();
+    const EdgeView view(edge);
+    EdgeDerivatives j;
+    const Vector6d r = edge_rows(view, a, b, &j);
+    // J_l^-1 is taken to first order: right up to the square of the residual.
+    const auto by_a = numeric_jacobian<6, 6>(
+        [&](const Vector6d& xi) { return edge_rows(view, geometry::exp_se3(xi) * a, b, nullptr); });
+    EXPECT_LT(relative(j.by_a, by_a), 1e-5);
+    const auto by_b = numeric_jacobian<6, 6>(
+        [&](const Vector6d& xi) { return edge_rows(view, a, geometry::exp_se3(xi) * b, nullptr); });
+    EXPECT_LT(relative(j.by_b, by_b), 1e-5);
+
+    // Ceres sees the same; one Jacobian alone is the same one, and none is allowed.
     PoseBlock block_a;
     PoseBlock block_b;
     from_rigid(a, block_a.data());
     from_rigid(b, block_b.data());
-    const PoseManifold manifold;
-    // J_l^-1 is taken to first order: right up to the square of the residual.
-    expect_local_jacobians<6, 7, 6>(EdgeCost(edge), block_a.data(), block_b.data(), &manifold, 1e-5);
+    const double* parameters[2] = {block_a.data(), block_b.data()};
+    Vector6d residual;
+    Eigen::Matrix<double, 6, 7, Eigen::RowMajor> alone;
+    double* second_only[2] = {nullptr, alone.data()};
+    ASSERT_TRUE(EdgeCost(edge).Evaluate(parameters, residual.data(), second_only));
+    EXPECT_LT((residual - r).norm(), 1e-9 * (1.0 + r.norm()));
+    EXPECT_LT(relative(alone.leftCols<6>().eval(), j.by_b), 1e-9);
+    EXPECT_TRUE(alone.col(6).isZero());
+    ASSERT_TRUE(EdgeCost(edge).Evaluate(parameters, residual.data(), nullptr));
   }
 }
 
-TEST(EdgeCost, CostIsTheInformationOfTheError) {
+TEST(EdgeRows, CostIsTheInformationOfTheError) {
   Random random(9);
   const Rigid3 a = random.pose(3.0, 2.0);
   const Rigid3 b = random.pose(3.0, 2.0);
@@ -352,13 +282,7 @@ TEST(EdgeCost, CostIsTheInformationOfTheError) {
   edge.information = geometry::Matrix6d::Identity();
   edge.information(0, 0) = 100.0;
   edge.information(4, 4) = 0.0;  // free
-  PoseBlock block_a;
-  PoseBlock block_b;
-  from_rigid(a, block_a.data());
-  from_rigid(b, block_b.data());
-  const double* parameters[2] = {block_a.data(), block_b.data()};
-  Vector6d r;
-  ASSERT_TRUE(EdgeCost(edge).Evaluate(parameters, r.data(), nullptr));
+  const Vector6d r = edge_rows(EdgeView(edge), a, b, nullptr);
   EXPECT_NEAR(r.squaredNorm(), xi.dot(edge.information * xi), 1e-9);
 }
 

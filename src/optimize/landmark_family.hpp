@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What the solver knows of all landmarks of one kind (points: 3 unknowns, lines: 4) at one linearisation, and
+// their elimination from the normal equations (Schur complement). Poses are slots: free ones first, at their
+// places in the elimination, then those that are fixed. Sightings lie in the order of their poses.
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::optimize {
+
+/// J^T J of parameters: what damping adds to it, and the scale it is told in. As Ceres does it: Marquardt's
+/// diagonal, of a Jacobian whose columns have been scaled once, by what they were at first.
+template <int kUnknowns>
+struct Damping {
+  using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+  Vector scale_sq = Vector::Ones();
+  Vector diagonal = Vector::Zero();  ///< clamped; divided by the trust region's radius
+
+  void set_scale(const Vector& of) { scale_sq = (1.0 + of.array().sqrt()).square().inverse(); }
+  void set_diagonal(const Vector& of) {
+    diagonal = (of.array() * scale_sq.array()).max(1e-6).min(1e32) / scale_sq.array();
+  }
+};
+
+template <int kUnknowns>
+struct LandmarkFamily {
+  using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+  using Square = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+  using Cross = Eigen::Matrix<double, 6, kUnknowns>;
+
+  struct Sighting {
+    int slot;
+    int landmark;
+  };
+  std::vector<Sighting> sightings;
+  std::vector<std::size_t> slot_begin;      ///< of each slot, into sightings
+  std::vector<std::size_t> landmark_begin;  ///< of each landmark, into by_landmark
+  std::vector<int> by_landmark;             ///< sightings of each landmark, in the order of their slots
+
+  std::vector<Cross> cross;       ///< of each sighting: J_pose^T J_landmark
+  std::vector<Square> square;     ///< J_landmark^T J_landmark
+  std::vector<Vector> gradients;  ///< J_landmark^T r
+
+  std::vector<Damping<kUnknowns>> damping;  ///< of each landmark
+  std::vector<Square> hessian;
+  std::vector<Vector> gradient;
+  std::vector<Square> inverse;  ///< of the damped Hessian
+  std::vector<Vector> step;     ///< of the landmark alone, minus; then the step itself
+
+  /// `sightings` are there; the rest is made room for.
+  void prepare(std::size_t slots, std::size_t landmarks) {
+    slot_begin.assign(slots + 1, 0);
+    landmark_begin.assign(landmarks + 1, 0);
+    for (const Sighting& s : sightings) {
+      ++slot_begin[static_cast<std::size_t>(s.slot) + 1];
+      ++landmark_begin[static_cast<std::size_t>(s.landmark) + 1];
+    }
+    for (std::size_t i = 1; i <= slots; ++i) slot_begin[i] += slot_begin[i - 1];
+    for (std::size_t i = 1; i <= landmarks; ++i) landmark_begin[i] += landmark_begin[i - 1];
+    std::vector<std::size_t> next(landmark_begin.begin(), landmark_begin.end() - 1);
+    by_landmark.resize(sightings.size());
+    for (std::size_t i = 0; i < sightings.size(); ++i) {
+      by_landmark[next[static_cast<std::size_t>(sightings[i].landmark)]++] = static_cast<int>(i);
+    }
+    cross.resize(sightings.size());
+    square.resize(sightings.size());
+    gradients.resize(sightings.size());
+    damping.resize(landmarks);
+    hessian.resize(landmarks);
+    gradient.resize(landmarks);
+    inverse.resize(landmarks);
+    step.resize(landmarks);
+  }
+
+  void sum(std::size_t landmark) {
+    Square h = Square::Zero();
+    Vector g = Vector::Zero();
+    for (std::size_t i = landmark_begin[landmark]; i < landmark_begin[landmark + 1]; ++i) {
+      h += square[static_cast<std::size_t>(by_landmark[i])];
+      g += gradients[static_cast<std::size_t>(by_landmark[i])];
+    }
+    hessian[landmark] = h;
+    gradient[landmark] = g;
+  }
+
+  /// Of a landmark that its poses do not hold in some direction the inverse is taken in the others.
+  void invert(std::size_t landmark, double radius) {
+    Square h = hessian[landmark];
+    h.diagonal() += damping[landmark].diagonal / radius;
+    const Eigen::LLT<Square> llt(h);
+    if (llt.info() == Eigen::Success) {
+      inverse[landmark] = llt.solve(Square::Identity());
+    } else {
+      inverse[landmark] = h.completeOrthogonalDecomposition().pseudoInverse();
+    }
+    step[landmark].noalias() = inverse[landmark] * gradient[landmark];
+  }
+
+  /// The landmark's step, once those of the poses (by slot; 6 each) are known.
+  void substitute_back(std::size_t landmark, const double* pose_steps, int free_slots) {
+    Vector pull = Vector::Zero();
+    for (std::size_t i = landmark_begin[landmark]; i < landmark_begin[landmark + 1]; ++i) {
+      const auto n = static_cast<std::size_t>(by_landmark[i]);
+      if (sightings[n].slot >= free_slots) break;
+      pull.noalias() +=
+          cross[n].transpose() * Eigen::Map<const geometry::Vector6d>(pose_steps + 6 * sightings[n].slot);
+    }
+    step[landmark] = -(step[landmark] + inverse[landmark] * pull);
+  }
+};
+
+}  // namespace plumbline::optimize
