@@ -8,16 +8,14 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "plumbline/sensor/depth_noise.hpp"
+#include "place_bound.hpp"
+#include "place_p3p.hpp"
 
 namespace plumbline::mapping {
 namespace {
 
 using geometry::Rigid3;
 
-constexpr double kPointGate = 3.0;   // standard deviations of position
-constexpr double kPointSigma = 1.5;  // px at octave 0: the landmark's own error comes on top
-constexpr double kLineGatePx = 5.0;
 constexpr std::size_t kFewPoints = 60;
 
 class Inliers {
@@ -39,24 +37,24 @@ class Inliers {
  private:
   [[nodiscard]] bool fits(const PointPair& pair, const Rigid3& pose) const {
     const Eigen::Vector3d p = pose * pair.match;
-    if (p.z() < 0.1) return false;
-    if ((camera_.project(p) - pair.query).norm() > kPointGate * kPointSigma * pair.sigma) return false;
-    return !(pair.depth > 0.0) || std::abs(p.z() - pair.depth) < 0.03 + 4.0 * sensor::depth_sigma(pair.depth);
+    if (p.z() < pose_gate::kNear_m) return false;
+    if ((camera_.project(p) - pair.query).norm() > pose_gate::kPoint_px * pair.sigma) return false;
+    return !(pair.depth > 0.0) || std::abs(p.z() - pair.depth) < pose_gate::depth_m(pair.depth);
   }
   [[nodiscard]] bool fits(const LinePair& pair, const Rigid3& pose) const {
     const Eigen::Vector3d a = pose * pair.match_start;
     const Eigen::Vector3d b = pose * pair.match_end;
-    if (a.z() < 0.1 || b.z() < 0.1) return false;
+    if (a.z() < pose_gate::kNear_m || b.z() < pose_gate::kNear_m) return false;
     const Eigen::Vector2d pa = camera_.project(a);
     const Eigen::Vector2d d = (camera_.project(b) - pa).normalized();
     if (!d.allFinite()) return false;
     const Eigen::Vector2d s = pair.query.start.cast<double>();
     const Eigen::Vector2d e = pair.query.end.cast<double>();
-    if (d.dot((e - s).normalized()) < 0.9) return false;
+    if (d.dot((e - s).normalized()) < pose_gate::kLineCosine) return false;
     const auto across = [&](const Eigen::Vector2d& q) {
       return std::abs(d.x() * (q.y() - pa.y()) - d.y() * (q.x() - pa.x()));
     };
-    if (across(s) > kLineGatePx || across(e) > kLineGatePx) return false;
+    if (across(s) > pose_gate::kLine_px || across(e) > pose_gate::kLine_px) return false;
     if (!pair.in_space) return true;
     const Eigen::Vector3d middle = 0.5 * (pair.query_start + pair.query_end);
     const Eigen::Vector3d direction = (b - a).normalized();
@@ -67,9 +65,10 @@ class Inliers {
   const sensor::Pinhole& camera_;
 };
 
+using Sample = std::array<const PointPair*, 3>;
+
 /// Up to four poses from three points.
-std::vector<Rigid3> from_points(const std::array<const PointPair*, 3>& sample,
-                                const sensor::Pinhole& camera) {
+std::vector<Rigid3> from_points(const Sample& sample, const sensor::Pinhole& camera) {
   std::vector<cv::Point3d> space;
   std::vector<cv::Point2d> image;
   for (const PointPair* pair : sample) {
@@ -88,6 +87,21 @@ std::vector<Rigid3> from_points(const std::array<const PointPair*, 3>& sample,
     if (pose.rotation.allFinite() && pose.translation.allFinite()) poses.push_back(pose);
   }
   return poses;
+}
+
+/// Whether some pose from three points may have more than `count` inliers. OpenCV takes twenty times as long
+/// for the poses, and few samples are worth that.
+bool may_beat(std::size_t count, const Sample& sample, const sensor::Pinhole& camera,
+              const InlierBound& bound) {
+  std::array<Eigen::Vector3d, 3> space;
+  std::array<Eigen::Vector3d, 3> rays;
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    space[k] = sample[k]->match;
+    rays[k] = camera.unproject(sample[k]->query.x(), sample[k]->query.y(), 1.0).normalized();
+  }
+  const P3pPoses poses = poses_from_points(space, rays);
+  return std::any_of(poses.camera_from_world.begin(), poses.camera_from_world.begin() + poses.count,
+                     [&](const Rigid3& pose) { return bound.of(pose) > count; });
 }
 
 /// One pose from two lines in space that are not parallel: the directions give the rotation, the distances
@@ -158,6 +172,7 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
   const bool by_lines = in_space.size() >= 3 && pairs.points.size() < kFewPoints;
   if (!by_points && !by_lines) return std::nullopt;
   const Inliers inliers(pairs, camera);
+  const InlierBound bound(pairs, camera);
   Draw draw(seed);
   std::optional<RansacPose> best;
   std::size_t best_count = 0;
@@ -174,15 +189,16 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
       const std::size_t n = pairs.points.size();
       const std::array<std::size_t, 3> i{draw.below(n), draw.below(n), draw.below(n)};
       if (i[0] == i[1] || i[1] == i[2] || i[0] == i[2]) continue;
-      for (const Rigid3& pose :
-           from_points({&pairs.points[i[0]], &pairs.points[i[1]], &pairs.points[i[2]]}, camera)) {
-        try_pose(pose);
+      const Sample sample{&pairs.points[i[0]], &pairs.points[i[1]], &pairs.points[i[2]]};
+      if (may_beat(best_count, sample, camera, bound)) {
+        for (const Rigid3& pose : from_points(sample, camera)) try_pose(pose);
       }
     } else {
       const std::size_t i = draw.below(in_space.size());
       const std::size_t j = draw.below(in_space.size());
       if (i == j) continue;
-      if (const auto pose = from_lines(*in_space[i], *in_space[j])) try_pose(*pose);
+      const auto pose = from_lines(*in_space[i], *in_space[j]);
+      if (pose && bound.of(*pose) > best_count) try_pose(*pose);
     }
     const double share =
         static_cast<double>(best_count) / static_cast<double>(pairs.points.size() + pairs.lines.size());

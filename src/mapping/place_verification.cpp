@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "place_matches.hpp"
 #include "place_pose.hpp"
 #include "place_surface.hpp"
 #include "plumbline/features/line_match.hpp"
@@ -25,8 +26,6 @@ using features::FrameFeatures;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-constexpr int kMaxHamming = 72;
-constexpr double kRatio = 0.95;
 constexpr double kPointGate = 7.8;
 constexpr double kLineGate = 9.2;
 constexpr std::size_t kSurfaceKeyframes = 5;
@@ -36,49 +35,6 @@ const FrameFeatures& features_of(const PlaceView& view) {
   const auto& features = view.map->keyframe(view.keyframe).features;
   return features != nullptr ? *features : kNone;
 }
-
-/// Hamming distances of all descriptors of one picture to all of another.
-class DistanceTable {
- public:
-  DistanceTable(const FrameFeatures& a, const FrameFeatures& b)
-      : a_(a), b_(b), columns_(b.descriptors.size()) {
-    std::vector<int> all(columns_);
-    std::iota(all.begin(), all.end(), 0);
-    std::vector<int> row(columns_);
-    table_.reserve(a.descriptors.size() * columns_);
-    for (const features::Descriptor256& d : a.descriptors) {
-      features::hamming_distances(d, b.descriptors.data(), all.data(), all.size(), row.data());
-      for (const int distance : row) table_.push_back(static_cast<std::uint16_t>(distance));
-    }
-  }
-  /// Best of b for a's feature, when clearly better than any at another place; -1: none.
-  [[nodiscard]] int best_in_b(std::size_t i) const { return best(b_, table_.data() + i * columns_, 1); }
-  /// The other way round.
-  [[nodiscard]] int best_in_a(std::size_t j) const { return best(a_, table_.data() + j, columns_); }
-
- private:
-  [[nodiscard]] int best(const FrameFeatures& picture, const std::uint16_t* distances,
-                         std::size_t step) const {
-    const std::size_t count = picture.descriptors.size();
-    std::size_t k = 0;
-    for (std::size_t j = 1; j < count; ++j) {
-      if (distances[j * step] < distances[k * step]) k = j;
-    }
-    if (count == 0 || distances[k * step] > kMaxHamming) return -1;
-    const double limit = distances[k * step] / kRatio;
-    for (std::size_t j = 0; j < count; ++j) {
-      if (distances[j * step] < limit && (picture.points[j].pixel - picture.points[k].pixel).norm() > 5.0F) {
-        return -1;
-      }
-    }
-    return static_cast<int>(k);
-  }
-
-  const FrameFeatures& a_;
-  const FrameFeatures& b_;
-  std::size_t columns_;
-  std::vector<std::uint16_t> table_;  ///< a row for each of a
-};
 
 /// Where the match's features are in space, in its camera frame: its landmark, else its own depth.
 bool point_in_space(const PlaceView& view, std::size_t feature, Eigen::Vector3d& point) {
@@ -98,13 +54,10 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match, do
   const FrameFeatures& q = features_of(query);
   const FrameFeatures& m = features_of(match);
   PosePairs pairs;
-  const DistanceTable distances(m, q);
-  for (std::size_t i = 0; i < m.descriptors.size(); ++i) {
-    const int best = distances.best_in_b(i);
-    if (best < 0 || distances.best_in_a(static_cast<std::size_t>(best)) != static_cast<int>(i)) continue;
+  for (const auto& [i, best] : alike_both_ways(m, q)) {
     PointPair pair;
     if (!point_in_space(match, i, pair.match)) continue;
-    const features::PointFeature& f = q.points[static_cast<std::size_t>(best)];
+    const features::PointFeature& f = q.points[best];
     pair.query = f.pixel.cast<double>();
     pair.sigma = std::pow(scale_factor, f.octave);
     pair.depth = static_cast<double>(f.depth);
