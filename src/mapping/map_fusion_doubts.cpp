@@ -47,6 +47,26 @@ bool fits_too(const LaidOver& fit, const LaidOver& answer, const MapFusionOption
          fit.share() >= options.rival_fit * answer.share();
 }
 
+/// Another way to lay b over a.
+struct Rival {
+  Rigid3 a_from_b;
+  Difference apart;
+  int witnesses = 0;  ///< keyframes that stand for it; 0: landmarks alone
+  LaidOver fit;
+  bool refuted = false;
+};
+
+/// Held against the maps, side by side. Surfaces are asked where landmarks leave it open.
+void hold_against(const LaidMaps& maps, const LaidOver& answer, const MapFusionOptions& options,
+                  const core::Executor& executor, std::vector<Rival>& rivals) {
+  executor.parallel_for(rivals.size(), [&](std::size_t i) {
+    Rival& rival = rivals[i];
+    rival.fit = maps.fit(rival.a_from_b);
+    rival.refuted = rival.witnesses > 0 ? refuted(rival.fit, options) : !fits_too(rival.fit, answer, options);
+    if (!rival.refuted) rival.refuted = maps.surfaces_seen_through(rival.a_from_b) > kNoRival;
+  });
+}
+
 std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
 
 }  // namespace
@@ -57,34 +77,30 @@ int witnesses(const ConsistentSet& set) {
 
 std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
                    const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                   MergeEvidence& merge) {
+                   const core::Executor& executor, MergeEvidence& merge) {
   const maps::Map& a = *parts[merge.a].map;
   const maps::Map& b = *parts[merge.b].map;
   const LaidMaps maps(parts[merge.a], parts[merge.b]);
   merge.laid = maps.fit(merge.a_from_b);
-  const auto fits_best = [&](const LaidOver& fit) {
-    return fits_too(fit, merge.laid, options) && fit.share() > merge.rival_laid.share();
-  };
-  const auto keep = [&](const LaidOver& fit, const Difference& apart) {
-    merge.rival_laid = fit;
-    merge.rival_m = apart.metres;
-  };
+  std::vector<Rival> rivals;
   for (std::size_t i = 1; i < sets.size(); ++i) {
     std::vector<PlacePair> pairs;
     for (const std::size_t k : sets[i].members) pairs.push_back(all.places[k]);
     const Rigid3 other = mean_transform(a, b, pairs).a_from_b;
     const Difference apart = between(b, pairs.front().b, merge.a_from_b, other);
-    if (!apart.elsewhere()) continue;
-    const LaidOver fit = maps.fit(other);
-    if (refuted(fit, options) || maps.surfaces_seen_through(other) > kNoRival) continue;
-    merge.rival = std::max(merge.rival, witnesses(sets[i]));
-    if (fits_best(fit)) keep(fit, apart);
+    if (apart.elsewhere()) rivals.push_back({other, apart, witnesses(sets[i]), {}, false});
   }
   const core::KeyframeId at = all.places[sets.front().members.front()].b;
   for (const Rigid3& other : maps.steps(merge.a_from_b, merge.pairs, kApart_m)) {
-    const LaidOver fit = maps.fit(other);
-    if (!fits_best(fit) || maps.surfaces_seen_through(other) > kNoRival) continue;
-    keep(fit, between(b, at, merge.a_from_b, other));
+    rivals.push_back({other, between(b, at, merge.a_from_b, other), 0, {}, false});
+  }
+  hold_against(maps, merge.laid, options, executor, rivals);
+  for (const Rival& rival : rivals) {
+    if (rival.refuted) continue;
+    merge.rival = std::max(merge.rival, rival.witnesses);
+    if (!fits_too(rival.fit, merge.laid, options) || rival.fit.share() <= merge.rival_laid.share()) continue;
+    merge.rival_laid = rival.fit;
+    merge.rival_m = rival.apart.metres;
   }
   if (merge.laid.expected + merge.laid.contradicted >= kFewLandmarks && merge.laid.seen_through() > kWrong) {
     return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",

@@ -99,9 +99,14 @@ void OverlapFinder::add(const maps::Map& map, KeyframeId keyframe) {
 
 std::vector<OverlapFinder::Candidate> OverlapFinder::look(const std::vector<MapPart>& parts, std::size_t part,
                                                           KeyframeId keyframe, KeyframeId before) {
-  const maps::Map& map = *parts[part].map;
-  const auto& features = map.keyframe(keyframe).features;
+  const auto& features = parts[part].map->keyframe(keyframe).features;
   if (features == nullptr) return {};
+  return look(database_.query(*features), parts, part, keyframe, before);
+}
+
+std::vector<OverlapFinder::Candidate> OverlapFinder::look(const places::Database::Scores& scores,
+                                                          const std::vector<MapPart>& parts, std::size_t part,
+                                                          KeyframeId keyframe, KeyframeId before) {
   std::vector<Candidate> result;
   const auto neighbours = [&](KeyframeId id) {
     std::vector<KeyframeId> around;
@@ -118,11 +123,44 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look(const std::vector<MapP
     return where != part && where != parts.size();
   };
   const KeyframeId usual = before.valid() && database_.contains(before) ? before : KeyframeId{};
-  for (const places::Candidate& c :
-       recogniser_.look(database_, keyframe, *features, usual, allowed, neighbours)) {
+  for (const places::Candidate& c : recogniser_.look(scores, keyframe, usual, allowed, neighbours)) {
     result.push_back({keyframe, c.keyframe, part, part_of(parts, c.keyframe), c.score});
   }
   return result;
+}
+
+std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vector<MapPart>& parts,
+                                                                 const core::Executor& executor) {
+  struct Query {
+    std::size_t part;
+    KeyframeId keyframe;
+    KeyframeId before;
+  };
+  std::vector<Query> queries;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    KeyframeId before;
+    for (const KeyframeId id : parts[p].map->keyframe_ids()) {
+      if (parts[p].map->keyframe(id).features != nullptr) {
+        queries.push_back({p, id, before.robot == id.robot ? before : KeyframeId{}});
+      }
+      before = id;
+    }
+  }
+  constexpr std::size_t kAtATime = 256;  // scores of so many take memory at a time
+  std::vector<Candidate> candidates;
+  for (std::size_t first = 0; first < queries.size(); first += kAtATime) {
+    std::vector<places::Database::Scores> scores(std::min(kAtATime, queries.size() - first));
+    executor.parallel_for(scores.size(), [&](std::size_t i) {
+      const Query& q = queries[first + i];
+      scores[i] = database_.query(*parts[q.part].map->keyframe(q.keyframe).features);
+    });
+    for (std::size_t i = 0; i < scores.size(); ++i) {  // in order: who looks remembers what it saw
+      const Query& q = queries[first + i];
+      const std::vector<Candidate> found = look(scores[i], parts, q.part, q.keyframe, q.before);
+      candidates.insert(candidates.end(), found.begin(), found.end());
+    }
+  }
+  return candidates;
 }
 
 VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFinder::Candidate& candidate,
@@ -169,7 +207,7 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
     merge.spread_m = mean.spread_m;
   }
   merge.refused = judge(map_a, map_b, merge, options);
-  if (merge.refused.empty()) merge.refused = doubts(parts, all, sets, options, merge);
+  if (merge.refused.empty()) merge.refused = doubts(parts, all, sets, options, executor, merge);
   if (merge.refused.empty()) {
     ask_others(parts, options, executor, merge);
     if (merge.confirmed < options.min_confirmed * merge.expected) {
@@ -222,15 +260,7 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, cons
   for (const MapPart& part : parts) {
     for (const KeyframeId id : part.map->keyframe_ids()) finder.add(*part.map, id);
   }
-  std::vector<OverlapFinder::Candidate> candidates;
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    KeyframeId before;
-    for (const KeyframeId id : parts[p].map->keyframe_ids()) {
-      const auto found = finder.look(parts, p, id, before.robot == id.robot ? before : KeyframeId{});
-      candidates.insert(candidates.end(), found.begin(), found.end());
-      before = id;
-    }
-  }
+  const std::vector<OverlapFinder::Candidate> candidates = finder.look_at_all(parts, executor);
   const std::vector<OverlapFinder::Candidate> tried = chosen(candidates, options.verifications);
   std::vector<VerifiedPair> verified(tried.size());
   executor.parallel_for(tried.size(),

@@ -38,7 +38,7 @@ int witnesses(const ConsistentSet& set);
 /// Fills laid, rival, rival_laid and rival_m; empty: nothing.
 std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
                    const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                   MergeEvidence& merge);
+                   const core::Executor& executor, MergeEvidence& merge);
 
 /// More pairs of keyframes that should see the same if one of the first sets is right, verified; nothing that
 /// is in `pairs` already. Uses a and b of `merge`.

@@ -39,7 +39,12 @@ std::vector<Candidate> Recogniser::look(const Database& database, KeyframeId que
                                         const features::FrameFeatures& picture, KeyframeId neighbour,
                                         const std::function<bool(KeyframeId)>& allowed,
                                         const Neighbours& neighbours) {
-  const Database::Scores scores = database.query(picture);
+  return look(database.query(picture), query, neighbour, allowed, neighbours);
+}
+
+std::vector<Candidate> Recogniser::look(const Database::Scores& scores, KeyframeId query,
+                                        KeyframeId neighbour, const std::function<bool(KeyframeId)>& allowed,
+                                        const Neighbours& neighbours) {
   const double usual = neighbour.valid() ? scores.of(neighbour) : 0.0;
   const double threshold = std::max(options_.min_absolute, options_.min_score * usual);
   std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed);

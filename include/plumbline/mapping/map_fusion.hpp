@@ -131,9 +131,15 @@ class OverlapFinder {
   /// robot, or an invalid id.
   std::vector<Candidate> look(const std::vector<MapPart>& parts, std::size_t part, core::KeyframeId keyframe,
                               core::KeyframeId before);
+  /// The same for all keyframes of all parts, one after the other; the keyframe before each is that of the
+  /// lower id.
+  std::vector<Candidate> look_at_all(const std::vector<MapPart>& parts, const core::Executor& executor);
   [[nodiscard]] const MapFusionOptions& options() const { return options_; }
 
  private:
+  std::vector<Candidate> look(const places::Database::Scores& scores, const std::vector<MapPart>& parts,
+                              std::size_t part, core::KeyframeId keyframe, core::KeyframeId before);
+
   MapFusionOptions options_;
   places::Database database_;
   places::Recogniser recogniser_;

@@ -47,6 +47,11 @@ class Recogniser {
                               const features::FrameFeatures& picture, core::KeyframeId neighbour,
                               const std::function<bool(core::KeyframeId)>& allowed,
                               const Neighbours& neighbours);
+  /// The same with what `database.query` said of the picture.
+  std::vector<Candidate> look(const Database::Scores& scores, core::KeyframeId query,
+                              core::KeyframeId neighbour,
+                              const std::function<bool(core::KeyframeId)>& allowed,
+                              const Neighbours& neighbours);
 
   [[nodiscard]] const RecogniserOptions& options() const { return options_; }
 
