@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/mapping/sighting_noise.hpp"
 #include "plumbline/maps/map.hpp"
@@ -94,8 +95,10 @@ struct GlobalAdjustmentSummary {
 
 /// Moves all keyframes and landmarks of the map to where everything fits best, and takes observations that do
 /// not fit out of it. `anchor` stays where it is (an invalid id: the map's first keyframe). The same input
-/// gives the same bytes. Every robot of the map must have a camera (throws std::out_of_range).
+/// gives the same bytes, for any number of threads; without an executor the caller's thread does it all. Every robot
+/// of the map must have a camera (throws std::out_of_range).
 GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
-                                   const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {});
+                                   const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {},
+                                   const core::Executor* executor = nullptr);
 
 }  // namespace plumbline::mapping

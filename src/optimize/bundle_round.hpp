@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The inside of bundle_solver: what is seen by whom (bundle_round.cpp), the normal equations
+// (bundle_normal.cpp), steps (bundle_solver.cpp).
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "block_cholesky.hpp"
+#include "bundle_solver.hpp"
+#include "bundle_terms.hpp"
+#include "landmark_family.hpp"
+#include "plumbline/optimize/pose_terms.hpp"
+
+namespace plumbline::optimize {
+
+inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// What a squared error costs, and what its term weighs (Huber).
+struct Huber {
+  double threshold;
+  [[nodiscard]] double cost(double squared) const {
+    if (squared <= threshold * threshold) return 0.5 * squared;
+    return threshold * std::sqrt(squared) - 0.5 * threshold * threshold;
+  }
+  [[nodiscard]] double weight(double squared) const {
+    return squared <= threshold * threshold ? 1.0 : threshold / std::sqrt(squared);
+  }
+};
+
+/// A block of the matrix from which a product is subtracted, and the product's second factor (6 x unknowns).
+struct Target {
+  double* block;
+  const double* w;
+};
+
+/// Normal equations of one round, and what it steps through.
+class BundleRound {
+ public:
+  BundleRound(const BundleProblem& problem, const BundleOptions& options, const core::Executor* executor,
+              const BundleState& state);
+
+  RoundSummary run(BundleState& state);
+
+ private:
+  template <typename Body>
+  void each(std::size_t count, std::size_t grain, const Body& body) const {
+    if (executor_ == nullptr || count <= grain) {
+      for (std::size_t i = 0; i < count; ++i) body(i);
+      return;
+    }
+    executor_->parallel_for((count + grain - 1) / grain, [&](std::size_t chunk) {
+      const std::size_t end = std::min(count, (chunk + 1) * grain);
+      for (std::size_t i = chunk * grain; i < end; ++i) body(i);
+    });
+  }
+
+  void choose_sightings();
+  void choose_slots();
+  void add_sightings();
+  void add_edges(const BundleState& state);
+  void pair_poses();
+  double sum_costs() const;
+  [[nodiscard]] double cost(const BundleState& state);
+  double linearise(const BundleState& state);
+  void linearise_slot(std::size_t slot, const BundleState& state);
+  void linearise_edge(std::size_t edge, const BundleState& state);
+  void set_scales();
+  void set_damping();
+  [[nodiscard]] double largest_gradient() const;
+  bool solve(double radius);
+  template <typename Family>
+  void eliminate(const Family& family, std::size_t slot, const std::vector<std::size_t>& block_of,
+                 std::vector<Target>& targets, double* rhs);
+  void assemble_row(std::size_t slot, double radius);
+  void assemble_edges();
+  [[nodiscard]] double model_decrease(double radius) const;
+  void step(const BundleState& from, BundleState& to) const;
+  [[nodiscard]] bool tiny_step(const BundleState& state) const;
+
+  using Matrix6d = geometry::Matrix6d;
+  using Vector6d = geometry::Vector6d;
+  using Rigid3 = geometry::Rigid3;
+  using Points = LandmarkFamily<3>;
+  using Lines = LandmarkFamily<4>;
+  struct Edge {
+    int a;  ///< slot; -1: the world
+    int b;
+    EdgeView view;
+    bool robust;
+    Rigid3 world;  ///< of a, if that is the world
+    EdgeDerivatives j{};
+    Vector6d r = Vector6d::Zero();
+    double cost = 0.0;
+  };
+
+  const BundleProblem& problem_;
+  const BundleOptions& options_;
+  const core::Executor* executor_;
+  Eigen::Matrix3d projection_;
+  Huber point_loss_;
+  Huber line_loss_;
+  Huber edge_loss_;
+
+  std::vector<int> used_points_;  ///< observations, of the problem
+  std::vector<int> used_lines_;
+  std::vector<int> slot_of_;    ///< of each pose
+  std::vector<int> slot_pose_;  ///< pose of each slot
+  int free_ = 0;
+  std::vector<std::pair<int, int>> pairs_;  ///< of slots that share a block
+  Points points_;
+  Lines lines_;
+  std::vector<PointTerm> point_terms_;  ///< of each sighting
+  std::vector<LineView> line_views_;
+  std::vector<Edge> edges_;
+
+  std::vector<Matrix6d> normal_;  ///< of each free slot: J^T J
+  std::vector<Vector6d> gradient_;
+  std::vector<Damping<6>> damping_;
+  std::vector<double> pose_steps_;
+  std::vector<double> costs_;
+  std::optional<BlockCholesky> matrix_;
+};
+
+}  // namespace plumbline::optimize
