@@ -120,8 +120,8 @@ class Aligner {
     const std::size_t step = 1 + samples.size() / kTried;
     for (std::size_t i = 0; i < samples.size(); i += step) {
       const maps::SurfaceSample& s = samples[i];
-      if (other.nearest(rotation * s.point + translation, rotation * s.normal, static_cast<float>(reach_),
-                        static_cast<float>(options_.min_cosine)) != nullptr) {
+      if (other.any(rotation * s.point + translation, rotation * s.normal, static_cast<float>(reach_),
+                    static_cast<float>(options_.min_cosine))) {
         result.push_back(s);
       }
     }

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/sum_table.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "surface_voxels.hpp"
+#include "voxel_means.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -19,66 +19,14 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-/// Of a voxel and the way its surface faces.
-struct VoxelSum {
-  std::uint64_t key = 0;
-  Eigen::Vector3f point{0, 0, 0};
-  Eigen::Vector3f normal{0, 0, 0};
-  float weight = 0.0F;
-  float count = 0.0F;
-};
-
-/// Means of the samples of each voxel and facing, weighted by 1 / sigma^2, in order of voxels. `combined`:
-/// the samples are independent measurements, so that their mean is better than each; else it is as good as
-/// they are.
-CoarseSurface voxel_means(const CoarseSurface& samples, double voxel_m, bool combined) {
-  cloud::SumTable<VoxelSum> sums;
-  for (const maps::SurfaceSample& s : samples) {
-    const std::uint64_t voxel = voxel_key(s.point, static_cast<float>(voxel_m));
-    VoxelSum& sum = sums.of(voxel << 3 | facing(s.normal));
-    const float w = 1.0F / (s.sigma * s.sigma);
-    sum.point += w * s.point;
-    sum.normal += w * s.normal;
-    sum.weight += w;
-    sum.count += 1.0F;
-  }
-  CoarseSurface means;
-  for (const VoxelSum& sum : sums.sorted()) {
-    const float sigma = 1.0F / std::sqrt(combined ? sum.weight : sum.weight / sum.count);
-    if (sum.normal.norm() > 0.5F * sum.weight)
-      means.push_back({sum.point / sum.weight, sum.normal.normalized(), sigma});
-  }
-  return means;
-}
-
 /// Collects the members of one local map after another.
-class LocalMapMaker {
+class LocalMapCutter {
  public:
-  LocalMapMaker(const maps::Map& map, const std::map<KeyframeId, CoarseSurface>& surfaces,
-                const LocalMapOptions& options)
-      : map_(map), surfaces_(surfaces), options_(options) {}
+  LocalMapCutter(const maps::Map& map, const LocalMapOptions& options) : map_(map), options_(options) {}
 
   void add(KeyframeId id) {
     if (!members_.empty() && !fits(id)) finish();
     members_.push_back(id);
-  }
-  void finish() {
-    if (members_.empty()) return;
-    LocalMap made;
-    made.anchor = members_[members_.size() / 2];
-    made.members = std::exchange(members_, {});
-    CoarseSurface all;
-    for (const KeyframeId id : made.members) {
-      const Rigid3 anchor_from_member =
-          map_.camera_from_world(made.anchor) * map_.camera_from_world(id).inverse();
-      const Eigen::Matrix3f rotation = anchor_from_member.rotation.cast<float>();
-      const Eigen::Vector3f translation = anchor_from_member.translation.cast<float>();
-      for (const maps::SurfaceSample& s : surfaces_.at(id)) {
-        all.push_back({rotation * s.point + translation, rotation * s.normal, s.sigma});
-      }
-    }
-    made.surface = voxel_means(all, options_.voxel_m, true);
-    result_.push_back(std::move(made));
   }
   [[nodiscard]] std::vector<LocalMap> take() {
     finish();
@@ -86,6 +34,13 @@ class LocalMapMaker {
   }
 
  private:
+  void finish() {
+    if (members_.empty()) return;
+    LocalMap made;
+    made.anchor = members_[members_.size() / 2];
+    made.members = std::exchange(members_, {});
+    result_.push_back(std::move(made));
+  }
   [[nodiscard]] bool fits(KeyframeId id) const {
     if (id.robot != members_.front().robot) return false;
     if (static_cast<int>(members_.size()) >= options_.keyframes) return false;
@@ -95,11 +50,23 @@ class LocalMapMaker {
   }
 
   const maps::Map& map_;
-  const std::map<KeyframeId, CoarseSurface>& surfaces_;
   const LocalMapOptions& options_;
   std::vector<KeyframeId> members_;
   std::vector<LocalMap> result_;
 };
+
+/// Of the members of a local map, in its anchor's frame.
+CoarseSurface fused_surface(const maps::Map& map, const std::map<KeyframeId, CoarseSurface>& surfaces,
+                            const LocalMap& local, double voxel_m) {
+  VoxelMeans means(voxel_m);
+  for (const KeyframeId id : local.members) {
+    const Rigid3 anchor_from_member =
+        map.camera_from_world(local.anchor) * map.camera_from_world(id).inverse();
+    means.set_frame(anchor_from_member.rotation.cast<float>(), anchor_from_member.translation.cast<float>());
+    for (const maps::SurfaceSample& s : surfaces.at(id)) means.add(s.point, s.normal, s.sigma);
+  }
+  return means.take(true);
+}
 
 /// Coarse voxels that a local map fills, world, sorted.
 std::vector<std::uint64_t> filled_voxels(const maps::Map& map, const LocalMap& local, double voxel_m) {
@@ -107,14 +74,48 @@ std::vector<std::uint64_t> filled_voxels(const maps::Map& map, const LocalMap& l
   const Eigen::Matrix3f rotation = world_from_anchor.rotation.cast<float>();
   const Eigen::Vector3f translation = world_from_anchor.translation.cast<float>();
   std::vector<std::uint64_t> keys;
-  keys.reserve(local.surface.size());
   for (const maps::SurfaceSample& s : local.surface) {
-    keys.push_back(voxel_key(rotation * s.point + translation, static_cast<float>(voxel_m)) << 3 |
-                   facing(rotation * s.normal));
+    const std::uint64_t key = voxel_key(rotation * s.point + translation, static_cast<float>(voxel_m)) << 3 |
+                              facing(rotation * s.normal);
+    if (keys.empty() || keys.back() != key) keys.push_back(key);  // neighbours follow one another
   }
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   return keys;
+}
+
+struct Common {
+  std::uint32_t a;
+  std::uint32_t b;
+  std::uint32_t voxels;
+};
+
+/// How many voxels local maps have in common; a < b, by a, then b.
+std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>& keys,
+                                  const core::Executor& executor) {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> filled;  // voxel, local map
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    for (const std::uint64_t key : keys[i]) filled.emplace_back(key, static_cast<std::uint32_t>(i));
+  }
+  std::sort(filled.begin(), filled.end());
+  std::vector<std::vector<std::size_t>> places(keys.size());  // of each local map in `filled`
+  for (std::size_t i = 0; i < filled.size(); ++i) places[filled[i].second].push_back(i);
+  std::vector<std::vector<Common>> found(keys.size());
+  executor.parallel_for(keys.size(), [&](std::size_t a) {
+    std::vector<std::uint32_t> voxels(keys.size(), 0);
+    for (const std::size_t i : places[a]) {
+      for (std::size_t k = i + 1; k < filled.size() && filled[k].first == filled[i].first; ++k) {
+        ++voxels[filled[k].second];
+      }
+    }
+    for (std::size_t b = a + 1; b < keys.size(); ++b) {
+      if (voxels[b] > 0)
+        found[a].push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), voxels[b]});
+    }
+  });
+  std::vector<Common> result;
+  for (const std::vector<Common>& some : found) result.insert(result.end(), some.begin(), some.end());
+  return result;
 }
 
 }  // namespace
@@ -134,54 +135,44 @@ void PairOptions::declare(core::OptionTable& table) {
 }
 
 CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m) {
-  CoarseSurface samples;
-  samples.reserve(camera_cloud.size());
+  VoxelMeans means(voxel_m);
   const Rigid3 camera_from_depth = cloud::sensor_pose(camera_cloud);
-  const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
-  const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+  means.set_frame(camera_from_depth.rotation.cast<float>(), camera_from_depth.translation.cast<float>());
   for (const cloud::Point& p : camera_cloud.points) {
     const Eigen::Vector3f point = p.getVector3fMap();
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
     if (!point.allFinite() || !normal.allFinite() || !(p.z > 0.0F)) continue;
     // Half of the noise stays in the mean of a voxel; it acts along the ray.
     const double sigma = 0.5 * sensor::depth_sigma(static_cast<double>(p.z));
-    samples.push_back({rotation * point + translation, rotation * normal,
-                       static_cast<float>(sigma) * std::max(0.3F, -normal.z())});
+    means.add(point, normal, static_cast<float>(sigma) * std::max(0.3F, -normal.z()));
   }
-  return voxel_means(samples, voxel_m, false);
+  return means.take(false);
 }
 
 std::vector<LocalMap> make_local_maps(const maps::Map& map,
-                                      const std::map<KeyframeId, CoarseSurface>& surfaces,
-                                      const LocalMapOptions& options) {
-  LocalMapMaker maker(map, surfaces, options);
+                                      const std::map<core::KeyframeId, CoarseSurface>& surfaces,
+                                      const LocalMapOptions& options, const core::Executor& executor) {
+  LocalMapCutter cutter(map, options);
   for (const auto& [id, surface] : surfaces) {
-    if (map.has_keyframe(id) && !surface.empty()) maker.add(id);
+    if (map.has_keyframe(id) && !surface.empty()) cutter.add(id);
   }
-  return maker.take();
+  std::vector<LocalMap> local_maps = cutter.take();
+  executor.parallel_for(local_maps.size(), [&](std::size_t i) {
+    local_maps[i].surface = fused_surface(map, surfaces, local_maps[i], options.voxel_m);
+  });
+  return local_maps;
 }
 
 std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vector<LocalMap>& local_maps,
-                                            const PairOptions& options) {
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> filled;  // voxel, local map
-  std::vector<std::size_t> size;
-  for (std::size_t i = 0; i < local_maps.size(); ++i) {
-    const std::vector<std::uint64_t> keys = filled_voxels(map, local_maps[i], options.voxel_m);
-    size.push_back(keys.size());
-    for (const std::uint64_t key : keys) filled.emplace_back(key, static_cast<std::uint32_t>(i));
-  }
-  std::sort(filled.begin(), filled.end());
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> common;
-  for (std::size_t i = 0; i < filled.size(); ++i) {
-    for (std::size_t k = i + 1; k < filled.size() && filled[k].first == filled[i].first; ++k) {
-      ++common[{filled[i].second, filled[k].second}];
-    }
-  }
+                                            const PairOptions& options, const core::Executor& executor) {
+  std::vector<std::vector<std::uint64_t>> keys(local_maps.size());
+  executor.parallel_for(local_maps.size(),
+                        [&](std::size_t i) { keys[i] = filled_voxels(map, local_maps[i], options.voxel_m); });
   std::vector<LocalMapPair> candidates;
-  for (const auto& [pair, voxels] : common) {
+  for (const auto& [a, b, voxels] : common_voxels(keys, executor)) {
     const double overlap =
-        static_cast<double>(voxels) / static_cast<double>(std::min(size[pair.first], size[pair.second]));
-    if (overlap >= options.min_overlap) candidates.push_back({pair.first, pair.second, overlap});
+        static_cast<double>(voxels) / static_cast<double>(std::min(keys[a].size(), keys[b].size()));
+    if (overlap >= options.min_overlap) candidates.push_back({a, b, overlap});
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const LocalMapPair& a, const LocalMapPair& b) { return a.overlap > b.overlap; });

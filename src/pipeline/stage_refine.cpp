@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -39,9 +40,10 @@ class RefineStage : public Stage {
     if (!icp_ || !adjust_) return {};
     const auto keyframe = io.input<KeyframeCloud>("cloud");
     if (!keyframe->id.valid()) return {};
-    auto surface = mapping::coarse_surface(*keyframe->cloud, local_maps_.voxel_m);
+    auto surface = surface_of(*keyframe);
+    if (!surface) return tl::unexpected<core::Error>(surface.error());
     const std::lock_guard<std::mutex> lock(one_at_a_time_);
-    surfaces_[keyframe->id] = std::move(surface);
+    surfaces_[keyframe->id] = std::move(*surface);
     return {};
   }
 
@@ -62,6 +64,16 @@ class RefineStage : public Stage {
   void summarise(RunSummary& summary) const override { summary.refine = counts_; }
 
  private:
+  /// As it came, when it has our voxels.
+  [[nodiscard]] core::Result<mapping::CoarseSurface> surface_of(const KeyframeCloud& keyframe) const {
+    if (keyframe.surface != nullptr && keyframe.surface->voxel_m == local_maps_.voxel_m) {
+      return keyframe.surface->samples;
+    }
+    if (keyframe.cloud != nullptr) return mapping::coarse_surface(*keyframe.cloud, local_maps_.voxel_m);
+    const auto cloud = cloud::decode_cloud(keyframe.compact->data(), keyframe.compact->size());
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    return mapping::coarse_surface(**cloud, local_maps_.voxel_m);
+  }
   /// Of the keyframes of the run that this one goes on from.
   core::Result<void> read_surfaces(const ResumedRun& run) {
     if (!icp_ || !adjust_) return {};
@@ -85,7 +97,8 @@ class RefineStage : public Stage {
     mapping::Cameras cameras;
     for (const core::KeyframeId id : map.keyframe_ids()) cameras[id.robot] = camera_;
     for (const RobotInfo& robot : robots) cameras[robot.number] = robot.camera.color;
-    const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras, edges, adjustment_);
+    const mapping::GlobalAdjustmentSummary summary =
+        mapping::adjust_map(map, cameras, edges, adjustment_, {}, executor_);
     for (std::size_t i = 0; i < std::min(alignments, summary.extra.size()); ++i) {
       counts_.rejected += summary.extra[i].rejected ? 1U : 0U;
     }
@@ -100,8 +113,8 @@ class RefineStage : public Stage {
   }
 
   std::vector<mapping::PoseEdge> align(const maps::Map& map) {
-    const auto local_maps = mapping::make_local_maps(map, surfaces_, local_maps_);
-    const auto pairs = mapping::overlapping_pairs(map, local_maps, pairs_);
+    const auto local_maps = mapping::make_local_maps(map, surfaces_, local_maps_, *executor_);
+    const auto pairs = mapping::overlapping_pairs(map, local_maps, pairs_, *executor_);
     const auto alignments = mapping::align_pairs(map, local_maps, pairs, alignment_, *executor_);
     auto edges = mapping::to_edges(local_maps, pairs, alignments);
     counts_.local_maps = local_maps.size();

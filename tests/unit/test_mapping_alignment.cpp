@@ -210,7 +210,9 @@ TEST(LocalMaps, AreCutByWayAndFindEachOtherAgain) {
   const Walk walk;
   LocalMapOptions options;
   options.distance_m = 0.7;
-  const std::vector<LocalMap> local_maps = make_local_maps(walk.map, walk.surfaces, options);
+  const core::Executor one(1);
+  const core::Executor two(2);
+  const std::vector<LocalMap> local_maps = make_local_maps(walk.map, walk.surfaces, options, two);
   std::size_t members = 0;
   for (const LocalMap& local : local_maps) {
     members += local.members.size();
@@ -219,13 +221,11 @@ TEST(LocalMaps, AreCutByWayAndFindEachOtherAgain) {
   }
   EXPECT_EQ(members, 20U);
   EXPECT_GT(local_maps.size(), 4U);
-  const auto pairs = overlapping_pairs(walk.map, local_maps, {});
+  const auto pairs = overlapping_pairs(walk.map, local_maps, {}, two);
   const bool revisit = std::any_of(pairs.begin(), pairs.end(), [&](const LocalMapPair& p) {
     return p.a == 0 && p.b == local_maps.size() - 1;
   });
   EXPECT_TRUE(revisit);
-  const core::Executor one(1);
-  const core::Executor two(2);
   const auto first = align_pairs(walk.map, local_maps, pairs, {}, one);
   const auto second = align_pairs(walk.map, local_maps, pairs, {}, two);
   const auto edges = to_edges(local_maps, pairs, first);
@@ -242,8 +242,9 @@ TEST(LocalMaps, AreCutByWayAndFindEachOtherAgain) {
 
 TEST(LocalMaps, OfNothingAreNone) {
   const maps::Map empty;
-  EXPECT_TRUE(make_local_maps(empty, {}, {}).empty());
-  EXPECT_TRUE(overlapping_pairs(empty, {}, {}).empty());
+  const core::Executor executor(1);
+  EXPECT_TRUE(make_local_maps(empty, {}, {}, executor).empty());
+  EXPECT_TRUE(overlapping_pairs(empty, {}, {}, executor).empty());
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 // once, weighted with the depth noise. Directions that the surfaces do not hold (along a corridor, within a
 // wall) are neither moved nor claimed to be known.
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -42,10 +44,11 @@ struct LocalMap {
   CoarseSurface surface;                  ///< anchor's camera frame
 };
 
-/// Cuts each robot's keyframes, by id, into local maps. Keyframes without a surface are passed over.
+/// Cuts each robot's keyframes, by id, into local maps. Keyframes without a surface are passed over. Surfaces
+/// are fused side by side; the same for any number of threads.
 std::vector<LocalMap> make_local_maps(const maps::Map& map,
                                       const std::map<core::KeyframeId, CoarseSurface>& surfaces,
-                                      const LocalMapOptions& options);
+                                      const LocalMapOptions& options, const core::Executor& executor);
 
 /// Nearest neighbours among the samples of a surface.
 class SurfaceIndex {
@@ -59,25 +62,40 @@ class SurfaceIndex {
                                                    const Eigen::Vector3f& normal, float distance_m,
                                                    float min_cosine) const;
 
+  /// Whether there is one: told sooner than which.
+  [[nodiscard]] bool any(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, float distance_m,
+                         float min_cosine) const;
+
+  static constexpr std::size_t kLanes = 8;  ///< samples that are looked at together
+  static constexpr int kMostCells = 1
+                                    << 10;  ///< along each axis; what lies beyond is searched through as one
+
  private:
-  struct Cell {
-    std::uint64_t key = 0;
-    std::uint32_t begin = 0;
-    std::uint32_t end = 0;
+  /// Cells above each other, along z, from the first to the last that is filled.
+  struct Column {
+    int low = 0;
+    int cells = 0;
+    std::uint32_t first = 0;  ///< into begins_: where each cell begins, and the last one ends
   };
-  /// A sample as the search reads it.
-  struct Place {
-    Eigen::Vector3f point;
-    std::uint32_t sample = 0;
+  struct alignas(32) Block {
+    std::array<std::array<float, kLanes>, 3> point;  ///< x of all, y of all, z of all
+    std::array<std::array<float, kLanes>, 3> normal;
   };
-  void make_cells();
-  [[nodiscard]] const Cell* find(std::uint64_t key) const;
+  void place_grid(float cell_m);
+  [[nodiscard]] std::vector<Eigen::Vector3i> cells_of_samples(float cell_m) const;
+  void fill_cells();
+  [[nodiscard]] std::int32_t search(const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
+                                    float distance_m, float min_cosine, bool any) const;
 
   float cell_m_;
-  CoarseSurface samples_;      ///< by boxes of twice the reach
-  std::vector<Place> places_;  ///< by cell
-  std::vector<Cell> cells_;
-  std::vector<std::uint32_t> table_;  ///< open addressing: index into cells_ + 1, 0 = free
+  CoarseSurface samples_;                ///< by boxes of twice the reach
+  Eigen::Vector3f first_cell_{0, 0, 0};  ///< of the grid, in cells: a whole number
+  Eigen::Vector2i corner_{0, 0};         ///< of the columns, in cells of the grid
+  Eigen::Vector2i extent_{0, 0};
+  std::vector<Column> columns_;        ///< by x, then y
+  std::vector<std::uint32_t> begins_;  ///< places
+  std::vector<Block> blocks_;          ///< samples by cell: their places
+  std::vector<std::uint32_t> places_;  ///< the sample at each place
 };
 
 struct AlignmentOptions {
@@ -128,7 +146,7 @@ struct LocalMapPair {
 
 /// Which local maps overlap at their present poses, whenever they were made; by a, then b.
 std::vector<LocalMapPair> overlapping_pairs(const maps::Map& map, const std::vector<LocalMap>& local_maps,
-                                            const PairOptions& options);
+                                            const PairOptions& options, const core::Executor& executor);
 
 /// Alignments of `pairs`, in their order, from the present poses. Side by side; the same for any number of
 /// threads.
