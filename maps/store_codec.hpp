@@ -7,6 +7,7 @@
 
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/map.hpp"
+#include "plumbline/maps/store.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "store_bytes.hpp"
 
@@ -20,6 +21,10 @@ constexpr std::size_t kFramesPerPage = 256;
 void encode(const Keyframe& keyframe, ByteWriter& to);
 /// `picture` is what the look-up grid of the points is made for.
 std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& picture);
+
+/// Rounded: points to 0.2 mm, normals to 0.2 degrees, sigma to 0.005 mm.
+void encode(const StoredSurface& surface, ByteWriter& to);
+StoredSurface decode_surface(const Bytes& bytes);
 
 /// Pose and parent, which change as the map is refined.
 struct KeyframeState {

@@ -219,6 +219,23 @@ core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
   return impl_->decode(cloud_bytes(keyframe), "keyframe " + name_of(keyframe));
 }
 
+core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId keyframe) const {
+  return guarded(impl_->file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
+    if (impl_->header.format < 2) return {};
+    Statement row(*impl_->database, "SELECT data FROM surface WHERE robot = ? AND number = ?");
+    if (!row.bind(1, keyframe.robot).bind(2, keyframe.index).step()) return {};
+    return row.blob(0);
+  });
+}
+
+core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes) {
+  try {
+    return decode_surface(unpack(bytes.data(), bytes.size()));
+  } catch (const BadBytes& bad) {
+    return core::input_error(std::string("stored surface: ") + bad.what() + "; it cannot be used");
+  }
+}
+
 core::Result<std::vector<std::uint8_t>> StoreReader::frame_cloud_bytes(std::size_t frame) const {
   return impl_->blob("SELECT data FROM frame_cloud WHERE robot = ? AND number = ?", 0,
                      static_cast<std::int64_t>(frame), "frame " + std::to_string(frame));

@@ -10,6 +10,14 @@ namespace {
 
 constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line",
                                    "edge",     "frame", "log",     "cloud", "frame_cloud"};
+constexpr const char* kTablesOfFormat2[] = {"surface"};
+
+void create_table(Database& database, const char* name) {
+  database.run((std::string("CREATE TABLE ") + name +
+                " (robot INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL,"
+                " PRIMARY KEY (robot, number))")
+                   .c_str());
+}
 
 void put_text(Database& database, const char* key, const std::string& text) {
   Statement(database, "INSERT INTO header VALUES (?, ?)").bind(1, std::string(key)).bind(2, text).run();
@@ -25,15 +33,10 @@ std::string get_text(Database& database, const char* key) {
 
 void create_tables(Database& database, const StoreHeader& header) {
   database.run(("PRAGMA application_id = " + std::to_string(kStoreApplication)).c_str());
-  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
   database.run("CREATE TABLE header (key TEXT PRIMARY KEY, value NOT NULL)");
   database.run("CREATE TABLE attachment (name TEXT PRIMARY KEY, data BLOB NOT NULL)");
-  for (const char* table : kTables) {
-    database.run((std::string("CREATE TABLE ") + table +
-                  " (robot INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL,"
-                  " PRIMARY KEY (robot, number))")
-                     .c_str());
-  }
+  for (const char* table : kTables) create_table(database, table);
+  raise_format(database);
   put_text(database, "robot", header.robot);
   put_text(database, "input", header.input);
   put_text(database, "program", header.program_version);
@@ -42,6 +45,13 @@ void create_tables(Database& database, const StoreHeader& header) {
   encode(header.camera, camera);
   const Bytes packed = pack(camera.bytes());
   Statement(database, "INSERT INTO header VALUES ('camera', ?)").bind(1, packed).run();
+}
+
+void raise_format(Database& database) {
+  if (database.number("PRAGMA user_version") < 2) {
+    for (const char* table : kTablesOfFormat2) create_table(database, table);
+  }
+  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
 }
 
 bool is_blank(Database& database) {

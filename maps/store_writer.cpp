@@ -182,6 +182,15 @@ void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
       .bind(2, of_keyframe ? cloud.keyframe.index : static_cast<std::int64_t>(cloud.frame))
       .bind(3, *cloud.bytes)
       .run();
+  if (!of_keyframe || cloud.surface == nullptr) return;
+  ByteWriter bytes;
+  encode(*cloud.surface, bytes);
+  const Bytes packed = pack(bytes.bytes());
+  Statement(*database, "REPLACE INTO surface VALUES (?, ?, ?)")
+      .bind(1, cloud.keyframe.robot)
+      .bind(2, cloud.keyframe.index)
+      .bind(3, packed)
+      .run();
 }
 
 void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
@@ -264,6 +273,11 @@ core::Result<StoreWriter> StoreWriter::resume(const std::filesystem::path& file)
     auto database = std::make_unique<Database>(file, Database::Access::kWrite);
     check_store(*database);
     use_log(*database);
+    {
+      Transaction transaction(*database, true);
+      raise_format(*database);
+      transaction.commit();
+    }
     return StoreWriter(std::make_unique<Impl>(file, std::move(database)));
   });
 }

@@ -46,6 +46,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
                                           const Progress& progress) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
+  std::unique_ptr<StoredMaps> maps;  // goes last: stages may still be at work on it
   const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
   if (!pipeline_file) return fail(pipeline_file.error());
   StageRegistry registry;
@@ -60,24 +61,25 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
                     pipeline_file->string(), graph->source().type->name));
   }
   if (request.maps.size() < 2) return core::usage_error("name two maps at least");
-  const auto maps = StoredMaps::open(request.maps);
-  if (!maps) return fail(maps.error());
+  auto opened = StoredMaps::open(request.maps, executor);
+  if (!opened) return fail(opened.error());
+  maps = std::move(*opened);
   if (!request.anchor.empty()) {
-    if (const auto part = (*maps)->find_part(request.anchor); !part) return fail(part.error());
+    if (const auto part = maps->find_part(request.anchor); !part) return fail(part.error());
   }
   auto output = OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
 
   RunContext context;
-  context.source = maps->get();
-  context.stored_maps = maps->get();
+  context.source = maps.get();
+  context.stored_maps = maps.get();
   context.anchor = request.anchor;
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
   context.output_folder = output->path();
-  context.configuration = config_text(request, **maps, *graph);
-  context.input = names_of(**maps);
+  context.configuration = config_text(request, *maps, *graph);
+  context.input = names_of(*maps);
   if (auto written = write_text(output->path() / "config.yaml", context.configuration); !written) {
     return fail(written.error());
   }

@@ -10,6 +10,7 @@
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages.hpp"
 
@@ -64,6 +65,10 @@ class CloudStage : public Stage {
     result->stamp = track->stamp;
     result->robot = robot;
     result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**made));
+    if (result->id.valid()) {
+      result->surface = std::make_shared<maps::StoredSurface>(
+          maps::StoredSurface{kSurfaceVoxel_m, mapping::coarse_surface(**made, kSurfaceVoxel_m)});
+    }
     result->cloud = std::move(*made);
     io.output<KeyframeCloud>("cloud", result);
     return {};

@@ -19,8 +19,18 @@ class MapsStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
     maps_ = context.stored_maps;
-    if (maps_ != nullptr) return {};
-    return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
+    if (maps_ == nullptr) {
+      return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
+    }
+    std::size_t anchor = maps_->parts().size();
+    if (!context.anchor.empty()) {
+      const auto found = maps_->find_part(context.anchor);
+      if (!found) return tl::unexpected<core::Error>(found.error());
+      anchor = *found;
+    }
+    // Overlaps are looked for beside the reading of clouds, which they do not need.
+    merging_ = context.executor->submit([this, anchor] { merge(anchor); });
+    return {};
   }
   [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
 
@@ -33,9 +43,9 @@ class MapsStage : public Stage {
     result->stamp = stored.stamp;
     result->robot = stored.robot;
     if (stored.id.valid()) {  // surfaces are wanted at once; what is only laid down at the end can wait
-      auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
-      if (!cloud) return tl::unexpected<core::Error>(maps_->damaged(stored.robot, cloud.error()));
-      result->cloud = std::move(*cloud);
+      if (auto read = read_surface(io.frame(), *bytes, *result); !read) {
+        return tl::unexpected<core::Error>(maps_->damaged(stored.robot, read.error()));
+      }
     }
     result->compact = std::make_shared<std::vector<std::uint8_t>>(std::move(*bytes));
     io.output<KeyframeCloud>("cloud", result);
@@ -43,17 +53,7 @@ class MapsStage : public Stage {
   }
 
   core::Result<void> finish(StageIo& io) override {
-    std::vector<RobotPart> parts;
-    for (const StoredPart& part : maps_->parts()) {
-      parts.push_back({part.name, {&part.map, part.cameras}, part.robots, &part.frames});
-    }
-    std::size_t anchor = parts.size();
-    if (!context_->anchor.empty()) {
-      const auto found = maps_->find_part(context_->anchor);
-      if (!found) return tl::unexpected<core::Error>(found.error());
-      anchor = *found;
-    }
-    merged_ = merge_robots(parts, anchor, options_, *context_->executor, *context_->log);
+    merging_.wait();
     io.output<MapResult>("map", merged_.map);
     return {};
   }
@@ -73,10 +73,36 @@ class MapsStage : public Stage {
   }
 
  private:
+  /// Its surface as it was kept with the map, or else the cloud, which has it.
+  core::Result<void> read_surface(std::size_t index, const std::vector<std::uint8_t>& cloud_bytes,
+                                  KeyframeCloud& result) const {
+    const auto kept = maps_->surface_bytes(index);
+    if (!kept) return tl::unexpected<core::Error>(kept.error());
+    if (!kept->empty()) {
+      auto surface = maps::unpack_surface(*kept);
+      if (!surface) return tl::unexpected<core::Error>(surface.error());
+      result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
+      return {};
+    }
+    auto cloud = cloud::decode_cloud(cloud_bytes.data(), cloud_bytes.size());
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    result.cloud = std::move(*cloud);
+    return {};
+  }
+
+  void merge(std::size_t anchor) {
+    std::vector<RobotPart> parts;
+    for (const StoredPart& part : maps_->parts()) {
+      parts.push_back({part.name, {&part.map, part.cameras}, part.robots, &part.frames});
+    }
+    merged_ = merge_robots(parts, anchor, options_, *context_->executor, *context_->log);
+  }
+
   const RunContext* context_ = nullptr;
   const StoredMaps* maps_ = nullptr;
   mapping::MapFusionOptions options_;
   MergedRobots merged_;
+  core::Executor::Job merging_;  ///< goes first: it uses the others
 };
 
 }  // namespace

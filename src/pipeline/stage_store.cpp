@@ -86,9 +86,9 @@ class StoreStage : public Stage {
   /// A frame between keyframes that was lost lies nowhere: its cloud is of no use.
   void keep_cloud(const TrackedFrame& track, const KeyframeCloud& cloud) {
     if (cloud.id.valid()) {
-      step_.clouds.push_back({cloud.id, 0, cloud.compact});
+      step_.clouds.push_back({cloud.id, 0, cloud.compact, cloud.surface});
     } else if (track.pose && track.pose->tracked) {
-      step_.clouds.push_back({{}, frames_ + step_.frames.size() - 1, cloud.compact});
+      step_.clouds.push_back({{}, frames_ + step_.frames.size() - 1, cloud.compact, nullptr});
     }
   }
 

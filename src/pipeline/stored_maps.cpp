@@ -31,6 +31,17 @@ std::string free_name(const std::string& name, std::set<std::string>& taken) {
   return result;
 }
 
+/// Its robots' numbers in this run.
+void renumber(StoredPart& part) {
+  const auto stays = [](const auto& number) { return number.first == number.second; };
+  if (std::all_of(part.numbers.begin(), part.numbers.end(), stays)) return;
+  part.map = mapping::renumbered(part.map, part.numbers);
+  for (maps::FramePose& frame : part.frames) {
+    const auto found = part.numbers.find(frame.reference.robot);
+    if (frame.reference.valid() && found != part.numbers.end()) frame.reference.robot = found->second;
+  }
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> robots_to_bytes(const std::vector<RobotInfo>& robots) {
@@ -70,19 +81,26 @@ core::Result<std::vector<RobotInfo>> robots_from_bytes(const std::vector<std::ui
   return robots;
 }
 
-core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs::path>& maps) {
+core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs::path>& maps,
+                                                           const core::Executor& executor) {
   std::unique_ptr<StoredMaps> result(new StoredMaps);
-  for (const fs::path& map : maps) {
-    if (auto added = result->add(map); !added) return tl::unexpected<core::Error>(added.error());
+  std::vector<core::Result<StoredPart>> parts(maps.size());
+  executor.parallel_for(maps.size(), [&](std::size_t i) { parts[i] = read_part(maps[i]); });
+  for (core::Result<StoredPart>& part : parts) {
+    if (!part) return tl::unexpected<core::Error>(part.error());
+    result->parts_.push_back(std::move(*part));
   }
-  if (auto arranged = result->arrange(); !arranged) return tl::unexpected<core::Error>(arranged.error());
+  result->one_at_a_time_ = std::vector<std::mutex>(maps.size());
+  if (auto arranged = result->arrange(executor); !arranged) {
+    return tl::unexpected<core::Error>(arranged.error());
+  }
   for (std::size_t p = 0; p < result->parts_.size(); ++p) {
     if (auto listed = result->list_clouds(p); !listed) return tl::unexpected<core::Error>(listed.error());
   }
   return result;
 }
 
-core::Result<void> StoredMaps::add(const fs::path& map) {
+core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
   std::error_code ec;
   const fs::path file = fs::is_directory(map, ec) ? map / "map.db" : map;
   if (!fs::exists(file, ec)) {
@@ -111,16 +129,16 @@ core::Result<void> StoredMaps::add(const fs::path& map) {
   part.reader = std::make_unique<maps::StoreReader>(std::move(*reader));
   part.map = std::move(stored->map);
   part.frames = std::move(stored->frames);
-  parts_.push_back(std::move(part));
-  return {};
+  return part;
 }
 
 /// The order of parts, the numbers and names of robots: by content.
-core::Result<void> StoredMaps::arrange() {
-  std::vector<std::uint64_t> hashes;
+core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
+  std::vector<std::uint64_t> hashes(parts_.size());
+  executor.parallel_for(parts_.size(),
+                        [&](std::size_t p) { hashes[p] = mapping::content_hash(parts_[p].map); });
   std::set<std::string> files;
   for (const StoredPart& part : parts_) {
-    hashes.push_back(mapping::content_hash(part.map));
     std::error_code ec;
     if (!files.insert(fs::weakly_canonical(part.file, ec).string()).second) {
       return core::usage_error(fmt::format("{}: is given twice", part.file.string()));
@@ -153,16 +171,12 @@ core::Result<void> StoredMaps::arrange() {
                                              part.file.string(), id.robot));
       }
     }
-    part.map = mapping::renumbered(part.map, to);
-    for (maps::FramePose& frame : part.frames) {
-      const auto found = to.find(frame.reference.robot);
-      if (frame.reference.valid() && found != to.end()) frame.reference.robot = found->second;
-    }
   }
   constexpr std::int32_t kMostRobots = 255;  // a cloud file has a byte for it
   if (number > kMostRobots) {
     return core::usage_error(fmt::format("{} robots are too many; {} can be fused", number, kMostRobots));
   }
+  executor.parallel_for(parts_.size(), [&](std::size_t p) { renumber(parts_[p]); });
   return {};
 }
 
@@ -202,10 +216,17 @@ std::vector<mapping::MapPart> StoredMaps::map_parts() const {
 
 core::Result<std::vector<std::uint8_t>> StoredMaps::cloud_bytes(std::size_t index) const {
   const StoredCloud& cloud = clouds_.at(index);
-  const std::lock_guard<std::mutex> lock(one_at_a_time_);
+  const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
   const maps::StoreReader& reader = *parts_[cloud.part].reader;
   return cloud.stored_id.valid() ? reader.cloud_bytes(cloud.stored_id)
                                  : reader.frame_cloud_bytes(cloud.frame);
+}
+
+core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t index) const {
+  const StoredCloud& cloud = clouds_.at(index);
+  if (!cloud.stored_id.valid()) return std::vector<std::uint8_t>();
+  const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
+  return parts_[cloud.part].reader->surface_bytes(cloud.stored_id);
 }
 
 sensor::Pinhole StoredMaps::camera_of(std::int32_t robot) const {

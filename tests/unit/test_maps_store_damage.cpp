@@ -209,8 +209,8 @@ TEST(MapStoreDamage, ForeignAndNewerFilesAreRefused) {
   expect_no_store(file, "SQLite file, but no map store");
   std::filesystem::remove(file);
   write_store(file, 1);
-  run_sql(file, "PRAGMA user_version = 2");
-  expect_no_store(file, "format 2, this program reads up to 1; use a newer Plumbline");
+  run_sql(file, "PRAGMA user_version = 3");
+  expect_no_store(file, "format 3, this program reads up to 2; use a newer Plumbline");
 }
 
 TEST(MapStoreDamage, WritersRefuseWhatTheyMayNotWrite) {

@@ -18,8 +18,8 @@
 
 namespace plumbline::maps {
 
-/// Stores of this and of lower formats are read.
-constexpr int kStoreFormat = 1;
+/// Stores of this and of lower formats are read. 1: without surfaces.
+constexpr int kStoreFormat = 2;
 
 /// What is written once, when a store is made.
 struct StoreHeader {
@@ -63,11 +63,19 @@ struct StoreContents {
   std::vector<std::string> attachments;
 };
 
+/// What of a keyframe's cloud is wanted whenever its map is read: the cloud thinned to one sample per voxel
+/// and direction, in the frame of the keyframe's camera.
+struct StoredSurface {
+  double voxel_m = 0.0;
+  std::vector<SurfaceSample> samples;
+};
+
 /// A cloud on its way into a store: bytes of cloud::encode_cloud.
 struct StoreCloud {
   KeyframeId keyframe;    ///< whose cloud it is; invalid: a frame's
   std::size_t frame = 0;  ///< of a frame between keyframes: its place among the store's frames
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+  std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
 };
 
 /// What a run adds in one go.
@@ -84,7 +92,8 @@ class StoreWriter {
  public:
   /// Makes a new file. Errors (kOutput): it is there already, its folder is not there, disk full.
   static core::Result<StoreWriter> create(const std::filesystem::path& file, const StoreHeader& header);
-  /// Goes on in a file that a run left. Errors (kInput) as StoreReader::open; (kOutput): it is in use.
+  /// Goes on in a file that a run left, which gets today's format. Errors (kInput) as StoreReader::open;
+  /// (kOutput): it is in use.
   static core::Result<StoreWriter> resume(const std::filesystem::path& file);
   StoreWriter(StoreWriter&& other) noexcept;
   StoreWriter& operator=(StoreWriter&&) = delete;
@@ -136,6 +145,9 @@ class StoreReader {
   /// A keyframe's cloud, in its camera frame. Errors (kInput): it has none, damaged.
   [[nodiscard]] core::Result<cloud::CloudPtr> cloud(KeyframeId keyframe) const;
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(KeyframeId keyframe) const;
+  /// The coarse surface of a keyframe's cloud, for unpack_surface; empty: none was kept. Errors (kInput):
+  /// damaged.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> surface_bytes(KeyframeId keyframe) const;
   /// Frames between keyframes that have a cloud: their places among StoredMap::frames, ascending.
   [[nodiscard]] core::Result<std::vector<std::size_t>> frame_cloud_ids() const;
   [[nodiscard]] core::Result<cloud::CloudPtr> frame_cloud(std::size_t frame) const;
@@ -149,6 +161,9 @@ class StoreReader {
   explicit StoreReader(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
+
+/// A surface as it was kept, rounded. Errors (kInput): damaged.
+core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes);
 
 /// Whether a file is a store in whose first moment its run ended: nothing was ever committed. Errors
 /// (kInput): not there, no SQLite file.

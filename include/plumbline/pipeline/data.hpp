@@ -18,6 +18,7 @@
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
+#include "plumbline/maps/store.hpp"
 #include "plumbline/pipeline/stage.hpp"
 #include "plumbline/places/vocabulary.hpp"
 #include "plumbline/sensor/frame.hpp"
@@ -75,9 +76,14 @@ struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes
   double stamp = 0.0;   ///< seconds
   std::int32_t robot = 0;
-  cloud::CloudPtr cloud;  ///< of stored maps only keyframes have it; null: what `compact` holds, not decoded
+  cloud::CloudPtr cloud;                                     ///< null: what `compact` holds, not decoded
   std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it
+  /// Of a keyframe, mapping::coarse_surface of the cloud; null: none was kept.
+  std::shared_ptr<const maps::StoredSurface> surface;
 };
+
+/// Voxels of the surfaces of keyframes that are kept with their clouds: as the stage refine wants them.
+constexpr double kSurfaceVoxel_m = 0.03;
 
 /// The merged cloud in the output's frame, which output_from_map leads to: all results are written in it.
 struct DenseCloud {

@@ -52,13 +52,17 @@ class StoredMaps : public dataset::FrameSource {
  public:
   /// `maps`: result folders, or files map.db. Errors (kInput): not there, no map.db, damaged, not finished,
   /// without keyframes; (kUsage) the same map twice.
-  static core::Result<std::unique_ptr<StoredMaps>> open(const std::vector<std::filesystem::path>& maps);
+  static core::Result<std::unique_ptr<StoredMaps>> open(const std::vector<std::filesystem::path>& maps,
+                                                        const core::Executor& executor);
 
   [[nodiscard]] const std::vector<StoredPart>& parts() const { return parts_; }
   [[nodiscard]] std::vector<mapping::MapPart> map_parts() const;
   [[nodiscard]] const std::vector<StoredCloud>& clouds() const { return clouds_; }
   /// May be called from several threads at a time.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(std::size_t index) const;
+  /// What maps::unpack_surface makes the coarse surface of a keyframe's cloud of; empty: none was kept. May
+  /// be called from several threads at a time.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> surface_bytes(std::size_t index) const;
   /// The camera of a robot, by this run's number.
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const;
   /// What to say of a cloud that cannot be used.
@@ -76,15 +80,15 @@ class StoredMaps : public dataset::FrameSource {
 
  private:
   StoredMaps() = default;
-  core::Result<void> add(const std::filesystem::path& map);
-  core::Result<void> arrange();
+  static core::Result<StoredPart> read_part(const std::filesystem::path& map);
+  core::Result<void> arrange(const core::Executor& executor);
   core::Result<void> list_clouds(std::size_t part);
 
   std::string name_ = "fused maps";
   std::string format_ = "map";
   std::vector<StoredPart> parts_;
   std::vector<StoredCloud> clouds_;
-  mutable std::mutex one_at_a_time_;  ///< a reader is one connection
+  mutable std::vector<std::mutex> one_at_a_time_;  ///< by part: a reader is one connection
 };
 
 }  // namespace plumbline::pipeline
