@@ -65,6 +65,13 @@ void add_map(CLI::App& app, Session& session) {
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
   command
+      ->add_option(
+          "--pace", request->pace_hz,
+          "Play recordings as a live camera would: so many frames a second, at most (default: as fast "
+          "as that goes)")
+      ->type_name("HZ")
+      ->check(CLI::Range(0.0, 1000.0));
+  command
       ->add_option("--debug-video", request->debug_video,
                    "Also write a picture of every frame with what the tracker sees")
       ->type_name("DIR");

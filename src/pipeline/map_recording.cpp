@@ -207,6 +207,7 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   if (debug) context.debug_folder = debug->path();
   context.configuration = config_text(request, *graph, 0);
   context.input = input_text(**source);
+  context.pace_hz = request.pace_hz;
   context.keep_changes = keeps;
   if (resumed) context.resumed = &*resumed;
   const auto report = run_graph(*graph, context, progress);
@@ -217,6 +218,7 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   for (const std::string& other : request.others) summary.input += " " + other;
   summary.pipeline = pipeline;
   summary.threads = executor.threads();
+  summary.pace_hz = request.pace_hz;
   add_report(*report, summary);
   for (const Node& node : graph->nodes) node.stage->summarise(summary);
   judge(summary);

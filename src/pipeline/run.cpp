@@ -13,6 +13,7 @@
 #include <mutex>
 #include <optional>
 
+#include "pace.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "resumed_run.hpp"
 
@@ -97,7 +98,14 @@ class Runner {
     total_ = graph_.source().stage->frames();
     report_.frames_available = total_;
     const auto start = Clock::now();
-    context_.executor->run([this] { stream(); });
+    pace_.emplace(context_.pace_hz, before_, context_.recordings);
+    // A pipeline ends when the next frame is not due yet, and another one begins with that: whoever waits for
+    // a frame keeps no thread from what else there is to do.
+    while (!ended()) {
+      pace_->wait_for(started_, context_.stop);
+      context_.executor->run([this] { stream(); });
+    }
+    report_.behind_s = pace_->behind_s();
     if (failure_.any()) return tl::unexpected<core::Error>(failure_.error());
     report_.stopped = report_.frames < total_;
     if (auto finished = finish(start); !finished) return tl::unexpected<core::Error>(finished.error());
@@ -126,8 +134,12 @@ class Runner {
     tbb::parallel_pipeline(under_way, source & *stages & sink);
   }
 
+  [[nodiscard]] bool ended() const {
+    return started_ >= total_ || context_.stop.stop_requested() || failure_.any();
+  }
+
   TickPtr next(tbb::flow_control& control) {
-    if (started_ >= total_ || context_.stop.stop_requested() || failure_.any()) {
+    if (ended() || !pace_->is_due(started_)) {
       control.stop();
       return nullptr;
     }
@@ -172,6 +184,7 @@ class Runner {
     for (std::size_t n = 0; n < tick.ms.size(); ++n) report_.stages[n].frame_ms.push_back(tick.ms[n]);
     report_.rss_mb.push_back(static_cast<float>(rss_mb()));
     ++report_.frames;
+    pace_->done(tick.frame);
     if (progress_) progress_(report_.frames, total_);
   }
 
@@ -243,6 +256,7 @@ class Runner {
   std::size_t total_ = 0;
   std::size_t before_ = 0;  ///< frames of the run that this one goes on from
   std::size_t started_ = 0;
+  std::optional<Pace> pace_;
   RunReport report_;
 };
 

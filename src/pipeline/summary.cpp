@@ -164,6 +164,7 @@ void add_report(const RunReport& report, RunSummary& summary) {
   summary.stopped = report.stopped;
   summary.frames.available = report.frames_available;
   summary.map_s = report.map_s;
+  summary.behind_s = report.behind_s;
   summary.export_s = report.export_s;
   summary.stages.clear();
   for (const StageTiming& stage : report.stages) {
@@ -243,6 +244,8 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"depth_fields", depth_fields_of(s)},
       {"timing",
        {{"wall_s", rounded(s.wall_s)},
+        {"pace_hz", rounded(s.pace_hz)},
+        {"behind_s", rounded(s.behind_s)},
         {"map_s", rounded(s.map_s)},
         {"fps", rounded(s.fps())},
         {"export_s", rounded(s.export_s)},
@@ -291,6 +294,9 @@ std::string to_text(const RunSummary& s) {
   text +=
       fmt::format("time       {:.1f} s in all, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n",
                   s.wall_s, s.map_s, s.fps(), s.export_s);
+  if (s.pace_hz > 0.0) {
+    text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", s.pace_hz, s.behind_s);
+  }
   text += fmt::format("memory     {:.0f} MB at most\n", s.peak_rss_mb);
   return text;
 }

@@ -74,6 +74,25 @@ TEST_F(MapCommand, SameBytesForAnyNumberOfThreadsAndFromItsOwnConfiguration) {
   }
 }
 
+TEST_F(MapCommand, PlayedAtAPaceItTakesItsTimeAndGivesTheSameBytes) {
+  const std::string common = "map wall -q --set fuse.voxel=20mm" + std::string(kNoPictures);
+  ASSERT_EQ(run(common + " -o at_once").code, 0);
+  const Outcome paced = run(common + " -o paced --pace 20");
+  ASSERT_EQ(paced.code, 0) << paced;
+  for (const char* file :
+       {"map.ply", "trajectory.txt", "keyframes.txt", "lines.ply", "frames.csv", "config.yaml", "map.db"}) {
+    EXPECT_EQ(slurp(path("at_once") / file), slurp(path("paced") / file)) << file;
+  }
+  const nlohmann::json before = read_json(path("at_once/summary.json"))["timing"];
+  const nlohmann::json timing = read_json(path("paced/summary.json"))["timing"];
+  EXPECT_EQ(timing["pace_hz"], 20.0);
+  EXPECT_GT(timing["behind_s"], 0.0);
+  EXPECT_GE(timing["map_s"], 11.0 / 20.0);
+  EXPECT_EQ(before["pace_hz"], 0.0);
+  EXPECT_EQ(before["behind_s"], 0.0);
+  EXPECT_EQ(run(common + " -o none --pace -1").code, 2);
+}
+
 TEST_F(MapCommand, TakesPartOfTheRecording) {
   const Outcome o =
       run(std::string("map wall -o out -p known_poses --from 0.1 --to 0.3 --every 2") + kNoPictures);

@@ -27,7 +27,8 @@ struct MapRequest {
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   dataset::OpenOptions open;                                 ///< format, camera, from, to, every
   bool replace = false;                                      ///< replace an earlier result
-  bool resume = false;                ///< go on from what an interrupted run left in OUT.partial
+  bool resume = false;   ///< go on from what an interrupted run left in OUT.partial
+  double pace_hz = 0.0;  ///< play each recording at so many frames a second, at most; 0: as fast as that goes
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
 };
 

@@ -28,6 +28,7 @@ struct RunReport {
   double map_s =
       0.0;  ///< first frame read to last change of the map: frames and the end of non-export stages
   double export_s = 0.0;            ///< end of the stages that export
+  double behind_s = 0.0;            ///< how long after it was due the latest frame was done; 0 without a pace
   std::vector<StageTiming> stages;  ///< in graph order
   std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };
@@ -35,6 +36,10 @@ struct RunReport {
 /// Called in frame order, from one thread at a time.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
+/// With a pace (RunContext::pace_hz) frame n of a recording is handed out no earlier than n / pace_hz seconds
+/// after the first frame, as a live camera would; several recordings are played together. Only when things
+/// happen depends on it.
+///
 /// Frames travel the stages in graph order; several are under way at a time, never more than twice the
 /// threads plus two, so that memory stays bounded. Stateless stages work side by side, serial stages see the
 /// frames in order: results do not depend on the number of threads. The run ends early, in order, when the

@@ -119,6 +119,7 @@ struct RunContext {
   std::filesystem::path debug_folder;   ///< where the tracker's pictures go; empty: nowhere
   std::string configuration;            ///< the effective one, YAML; the same for any number of threads
   std::string input;                    ///< what is mapped, as text that another recording does not give
+  double pace_hz = 0.0;                 ///< frames of each recording a second, at most; 0: no matter
   bool keep_changes = false;            ///< some stage wants_map_changes
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
 };

@@ -82,6 +82,8 @@ struct RunSummary {
   double wall_s = 0.0;               ///< the whole run
   double map_s = 0.0;                ///< first frame read to last change of the map
   double export_s = 0.0;             ///< clouds, pictures and tables
+  double pace_hz = 0.0;              ///< that recordings were played at; 0: as fast as that went
+  double behind_s = 0.0;             ///< how long after it was due the latest frame was done
   struct StageTime {
     std::string name;
     double median_ms = 0.0;

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Recordings played as a live camera would deliver them.
+#include <chrono>
+#include <cstddef>
+#include <optional>
+
+#include "plumbline/core/stop.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+
+namespace plumbline::pipeline {
+
+/// When frames may be handed out: frame n of a recording no earlier than n / hz seconds after the first frame
+/// of all. Results know nothing of it. Several recordings are played together: their frames keep the order of
+/// their stamps, so that one with fewer frames a second keeps its own rate beside the densest, which has
+/// `hz`.
+class Pace {
+ public:
+  /// hz 0: at once. `first`: the first frame of the run.
+  Pace(double hz, std::size_t first, const RobotRecordings* recordings)
+      : hz_(hz), recordings_(recordings), first_s_(due_s(first)) {}
+
+  /// Waits until the frame may be handed out, or until `stop` is requested.
+  void wait_for(std::size_t frame, const core::StopToken& stop);
+  /// Whether it may be handed out. The clock starts with the first frame that is asked for.
+  bool is_due(std::size_t frame);
+  /// Frames are told when all is done with them.
+  void done(std::size_t frame);
+  /// How long after it was due the latest frame was done, seconds; 0 without a pace.
+  [[nodiscard]] double behind_s() const { return behind_s_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  [[nodiscard]] double due_s(std::size_t frame) const;
+  [[nodiscard]] Clock::time_point time_of(std::size_t frame);
+
+  double hz_;
+  const RobotRecordings* recordings_;
+  double first_s_;
+  std::optional<Clock::time_point> start_;
+  double behind_s_ = 0.0;
+};
+
+}  // namespace plumbline::pipeline
