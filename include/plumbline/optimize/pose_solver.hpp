@@ -2,7 +2,8 @@
 #pragma once
 
 // Pose of one camera from points, lines and surfaces of the map together: Levenberg-Marquardt with robust
-// losses over 6 unknowns (METHOD section 2). Small and allocation-free; many poses together are bundle_adjustment's work.
+// losses over 6 unknowns (METHOD section 2). Small and allocation-free; many poses together are the work of
+// bundle_adjustment.
 #include <cstddef>
 #include <optional>
 #include <string>
