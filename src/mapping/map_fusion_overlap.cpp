@@ -254,13 +254,24 @@ std::vector<OverlapFinder::Candidate> chosen(std::vector<OverlapFinder::Candidat
 
 }  // namespace
 
-std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
-                                         const core::Executor& executor) {
+std::vector<OverlapFinder::Candidate> find_look_alikes(const std::vector<MapPart>& parts,
+                                                       const MapFusionOptions& options,
+                                                       const core::Executor& executor) {
   OverlapFinder finder(options);
   for (const MapPart& part : parts) {
     for (const KeyframeId id : part.map->keyframe_ids()) finder.add(*part.map, id);
   }
-  const std::vector<OverlapFinder::Candidate> candidates = finder.look_at_all(parts, executor);
+  return finder.look_at_all(parts, executor);
+}
+
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                                         const core::Executor& executor) {
+  return find_overlaps(parts, find_look_alikes(parts, options, executor), options, executor);
+}
+
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
+                                         const std::vector<OverlapFinder::Candidate>& candidates,
+                                         const MapFusionOptions& options, const core::Executor& executor) {
   const std::vector<OverlapFinder::Candidate> tried = chosen(candidates, options.verifications);
   std::vector<VerifiedPair> verified(tried.size());
   executor.parallel_for(tried.size(),

@@ -9,6 +9,12 @@
 namespace plumbline::pipeline {
 namespace {
 
+std::vector<mapping::MapPart> maps_of(const std::vector<RobotPart>& parts) {
+  std::vector<mapping::MapPart> maps;
+  for (const RobotPart& part : parts) maps.push_back(part.map);
+  return maps;
+}
+
 /// The first part of the group that has most keyframes.
 std::size_t largest_group(const std::vector<RobotPart>& parts, const std::vector<std::size_t>& group) {
   std::vector<std::size_t> keyframes(parts.size(), 0);
@@ -50,16 +56,22 @@ std::string left_out(const std::vector<RobotPart>& parts, const std::vector<std:
 
 }  // namespace
 
-MergedRobots merge_robots(const std::vector<RobotPart>& parts, std::size_t anchor,
-                          const mapping::MapFusionOptions& options, const core::Executor& executor,
-                          core::Log& log) {
-  std::vector<mapping::MapPart> maps;
-  for (const RobotPart& part : parts) maps.push_back(part.map);
-  std::vector<mapping::MergeEvidence> evidence = mapping::find_overlaps(maps, options, executor);
+std::vector<mapping::OverlapFinder::Candidate> look_alikes(const std::vector<RobotPart>& parts,
+                                                           const mapping::MapFusionOptions& options,
+                                                           const core::Executor& executor) {
+  return mapping::find_look_alikes(maps_of(parts), options, executor);
+}
+
+MergedRobots merge_robots(const std::vector<RobotPart>& parts,
+                          const std::vector<mapping::OverlapFinder::Candidate>& look_alikes,
+                          std::size_t anchor, const mapping::MapFusionOptions& options,
+                          const core::Executor& executor, core::Log& log) {
+  const std::vector<mapping::MapPart> maps = maps_of(parts);
+  std::vector<mapping::MergeEvidence> evidence = mapping::find_overlaps(maps, look_alikes, options, executor);
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }
-  mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options);
+  mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options, &executor);
   MergedRobots result;
   for (mapping::MergeEvidence& merge : evidence) {
     const std::string& a = parts[merge.a].name;

@@ -30,7 +30,7 @@ class KeepStage : public Stage {
   }
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    if (!enabled_) return {};
+    if (!enabled_ || context.stored_maps != nullptr) return {};  // clouds of stored maps wait there
     auto spool = cloud::CloudSpool::create(context.output_folder);
     if (!spool) return tl::unexpected<core::Error>(spool.error());
     spool_.emplace(std::move(*spool));
@@ -38,15 +38,16 @@ class KeepStage : public Stage {
   }
 
   core::Result<void> process(StageIo& io) override {
-    if (!spool_) return {};
+    if (!enabled_) return {};
     const auto cloud = io.input<KeyframeCloud>("cloud");
-    waiting_.push_back({cloud->id, cloud->robot, cloud->stamp});
+    waiting_.push_back({cloud->id, cloud->robot, cloud->stamp, io.frame()});
+    if (!spool_) return {};
     return cloud->compact != nullptr ? spool_->append(*cloud->compact) : spool_->append(*cloud->cloud);
   }
 
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
-    if (!spool_ || map->map == nullptr) return {};
+    if (!enabled_ || map->map == nullptr) return {};
     maps::StoreHeader header;
     header.camera = map->robots.empty() ? context_->source->camera() : map->robots.front().camera;
     header.configuration = context_->configuration;
@@ -74,6 +75,7 @@ class KeepStage : public Stage {
     core::KeyframeId id;
     std::int32_t robot = 0;
     double stamp = 0.0;
+    std::size_t frame = 0;  ///< that it came with
   };
 
   core::Result<void> add_clouds(const MapResult& map, maps::StoreWriter& writer) const {
@@ -96,7 +98,7 @@ class KeepStage : public Stage {
         if (found == frames.end()) continue;
         cloud.frame = found->second;
       }
-      auto bytes = spool_->read_compact(i);
+      auto bytes = spool_ ? spool_->read_compact(i) : context_->stored_maps->cloud_bytes(waiting_[i].frame);
       if (!bytes) return tl::unexpected<core::Error>(bytes.error());
       cloud.bytes = std::make_shared<std::vector<std::uint8_t>>(std::move(*bytes));
       step.clouds.push_back(std::move(cloud));
@@ -116,7 +118,7 @@ class KeepStage : public Stage {
   const RunContext* context_ = nullptr;
   bool enabled_ = true;
   std::optional<cloud::CloudSpool> spool_;
-  std::vector<Waiting> waiting_;  ///< of the clouds in the spool
+  std::vector<Waiting> waiting_;  ///< for the clouds in the spool or in stored maps
 };
 
 }  // namespace

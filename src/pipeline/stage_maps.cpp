@@ -22,14 +22,18 @@ class MapsStage : public Stage {
     if (maps_ == nullptr) {
       return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
     }
-    std::size_t anchor = maps_->parts().size();
+    anchor_ = maps_->parts().size();
     if (!context.anchor.empty()) {
       const auto found = maps_->find_part(context.anchor);
       if (!found) return tl::unexpected<core::Error>(found.error());
-      anchor = *found;
+      anchor_ = *found;
     }
-    // Overlaps are looked for beside the reading of clouds, which they do not need.
-    merging_ = context.executor->submit([this, anchor] { merge(anchor); });
+    for (const StoredPart& part : maps_->parts()) {
+      parts_.push_back({part.name, {&part.map, part.cameras}, part.robots, &part.frames});
+    }
+    // One thread learns what places look like while others read clouds.
+    looking_ = context.executor->submit(
+        [this] { look_alikes_ = look_alikes(parts_, options_, *context_->executor); });
     return {};
   }
   [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
@@ -53,7 +57,8 @@ class MapsStage : public Stage {
   }
 
   core::Result<void> finish(StageIo& io) override {
-    merging_.wait();
+    looking_.wait();
+    merged_ = merge_robots(parts_, look_alikes_, anchor_, options_, *context_->executor, *context_->log);
     io.output<MapResult>("map", merged_.map);
     return {};
   }
@@ -90,19 +95,14 @@ class MapsStage : public Stage {
     return {};
   }
 
-  void merge(std::size_t anchor) {
-    std::vector<RobotPart> parts;
-    for (const StoredPart& part : maps_->parts()) {
-      parts.push_back({part.name, {&part.map, part.cameras}, part.robots, &part.frames});
-    }
-    merged_ = merge_robots(parts, anchor, options_, *context_->executor, *context_->log);
-  }
-
   const RunContext* context_ = nullptr;
   const StoredMaps* maps_ = nullptr;
   mapping::MapFusionOptions options_;
+  std::vector<RobotPart> parts_;
+  std::size_t anchor_ = 0;
+  std::vector<mapping::OverlapFinder::Candidate> look_alikes_;
   MergedRobots merged_;
-  core::Executor::Job merging_;  ///< goes first: it uses the others
+  core::Executor::Job looking_;  ///< goes first: it uses the others
 };
 
 }  // namespace

@@ -76,7 +76,9 @@ class RobotsStage : public Stage {
       parts.push_back(
           {robot.name, {&slam.map(), {{robot.number, robot.camera.color}}}, {robot}, &slam.frame_poses()});
     }
-    merged_ = merge_robots(parts, parts.size(), fusion_, *context_->executor, *context_->log);
+    const core::Executor& executor = *context_->executor;
+    merged_ = merge_robots(parts, look_alikes(parts, fusion_, executor), parts.size(), fusion_, executor,
+                           *context_->log);
     for (RunSummary::Merge& merge : merged_.merges) {
       const auto when = times_.find({merge.evidence.a, merge.evidence.b});
       if (when != times_.end()) merge.time_s = when->second;

@@ -156,7 +156,16 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
                              const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor);
 
-/// All pairs of parts, by a, then b. The same for any number of threads.
+/// What looks alike among all parts' keyframes: the first step of find_overlaps, most of which is done by one
+/// thread. The same for any number of threads.
+std::vector<OverlapFinder::Candidate> find_look_alikes(const std::vector<MapPart>& parts,
+                                                       const MapFusionOptions& options,
+                                                       const core::Executor& executor);
+
+/// All pairs of parts, by a, then b. The same for any number of threads. `look_alikes`: of find_look_alikes.
+std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
+                                         const std::vector<OverlapFinder::Candidate>& look_alikes,
+                                         const MapFusionOptions& options, const core::Executor& executor);
 std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
                                          const core::Executor& executor);
 
@@ -179,7 +188,7 @@ struct FusedMap {
 /// (stage refine). Merges that the pose graph finds to contradict the rest are no longer accepted, and then
 /// the fusion is done without them.
 FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
-                   const MapFusionOptions& options);
+                   const MapFusionOptions& options, const core::Executor* executor = nullptr);
 
 /// Depends on what the keyframes measured and on their poses, not on names and robots' numbers.
 std::uint64_t content_hash(const maps::Map& map);
