@@ -184,7 +184,7 @@ void judge(RunSummary& summary) {
         "longest loss is {} frames",
         all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
         frames.longest_loss);
-  } else if (all > 0 && summary.cloud_points == 0) {
+  } else if (all > 0 && summary.voxel_m > 0.0 && summary.cloud_points == 0) {
     summary.reason = "the cloud is empty: no keyframe had usable depth";
   } else {
     summary.reason = summary.unconnected;

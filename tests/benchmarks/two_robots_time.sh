@@ -1,20 +1,27 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Until when is a world mapped, by one robot that drives all of a path, and by two that drive half of it each?
-# The recording is played at 30 Hz; what is left to do after the last frame counts, and so does fusion.
-#   two_robots_time.sh PLUMBLINE RECORDING WORK [SHARED_S] [MAP OPTION...]
+#   two_robots_time.sh [--estimate] PLUMBLINE RECORDING WORK [SHARED_S] [MAP OPTION...]
 # RECORDING: a folder in TUM layout; it is cut in the middle, both halves hold the SHARED_S seconds (0) around the
-# cut: halves of a path of laps have enough in common without. WORK: a folder for the halves and the maps. Nothing is
-# paced: recordings are mapped as fast as that goes, and a run counts as long as its frames take at 30 Hz, or as mapping
-# took where that is longer, plus what its stages did after the last frame. Of the two robots that is the longer one's
-# tracker and store, then all that plumbline fuse does from opening the maps on: what they do for pictures and clouds of
-# their own is not needed. Programs are taken as started. Seconds mean something on an idle machine only. Maps that are
-# in WORK already are taken as they are.
+# cut: halves of a path of laps have enough in common without. WORK: a folder for the halves and the maps. All are
+# played at 30 Hz, and what counts is the clock from the start of a program to its end:
+#   1          plumbline map of the whole
+#   2, fuse    the longer one of the halves (plumbline map -p robot, each with the machine to itself), then
+#              plumbline fuse
+#   2, map     plumbline map of both halves at a time: robots and fusion in one process
+# Until the map: without the merged cloud and what is written at the end. With --estimate recordings are mapped as
+# fast as that goes, and a run counts as long as its frames take at 30 Hz, or as mapping took where that is longer,
+# plus what its stages did after the last frame; the third line is left out. Seconds mean something on an idle
+# machine only. Maps that are in WORK already are taken as they are.
 set -euo pipefail
-[ $# -ge 3 ] || { sed -n '3,13s/^# //p' "$0" >&2; exit 2; }
+estimate=
+[ "${1:-}" = --estimate ] && { estimate=1; shift; }
+[ $# -ge 3 ] || { sed -n '3,18s/^# //p' "$0" >&2; exit 2; }
 plumbline=$1 recording=$(realpath "$2") work=$3 shared=${4:-0}
 shift $(($# < 4 ? 3 : 4))
 options=(-q --force --set output.views= --set output.pcd=off "$@")
+pace=(--pace 30)
+[ -z "$estimate" ] || pace=()
 
 cut() { # cut NAME FROM TO: seconds, absolute
   mkdir -p "$work/$1"
@@ -26,24 +33,41 @@ cut() { # cut NAME FROM TO: seconds, absolute
   done
 }
 
+run() { # run NAME COMMAND...: its seconds in WORK/NAME.s; exit code 4 is a result, too
+  local name=$1 start
+  shift
+  [ ! -f "$work/$name/summary.json" ] || return 0
+  start=$(date +%s.%N)
+  "$plumbline" "$@" -o "$work/$name" "${options[@]}" || [ $? -eq 4 ]
+  echo "$(date +%s.%N) - $start" | bc -l >"$work/$name.s"
+}
+
 read -r first last < <(awk '!/^#/ {if (!n++) f = $1; l = $1} END {print f, l}' "$recording/rgb.txt")
 cut a "$first" "$(echo "($first + $last + $shared) / 2" | bc -l)"
 cut b "$(echo "($first + $last - $shared) / 2" | bc -l)" "$last"
-map() { [ -f "$work/$2/summary.json" ] || "$plumbline" map "$1" -o "$work/$2" "${options[@]}"; }
-map "$recording" one
-map "$work/a" map_a
-map "$work/b" map_b
-"$plumbline" fuse "$work/map_a" "$work/map_b" -o "$work/two" "${options[@]}" || [ $? -eq 4 ]
+run one map "$recording" "${pace[@]}"
+# Pictures and tables are no part of the pipeline `robot`.
+views=("${options[@]}")
+options=(-q --force "$@")
+run map_a map "$work/a" -p robot "${pace[@]}"
+run map_b map "$work/b" -p robot "${pace[@]}"
+options=("${views[@]}")
+run two fuse "$work/map_a" "$work/map_b"
+[ -n "$estimate" ] || run both map "$work/a" "$work/b" "${pace[@]}"
 
-python3 - "$work" "$recording" <<'PYTHON'
+python3 - "$work" "$recording" "$estimate" <<'PYTHON'
 import json
 import sys
 
-work, recording = sys.argv[1:]
+work, recording, estimate = sys.argv[1:]
 
 
 def load(name):
     return json.load(open(f"{work}/{name}/summary.json"))
+
+
+def clock(name):
+    return float(open(f"{work}/{name}.s").read())
 
 
 def finish(summary, *stages):
@@ -54,27 +78,41 @@ def finish(summary, *stages):
 EXPORTS = ("store", "keep", "output")  # they run side by side: their time is export_s
 
 
-def before_exports(summary):
-    stages = [stage for stage in summary["timing"]["stages_ms"] if stage not in EXPORTS]
-    return finish(summary, *stages)
+def after_the_map(summary):
+    return finish(summary, "fuse") + summary["timing"]["export_s"]
 
 
 def driving(summary, folder):
     frames = sum(1 for line in open(f"{folder}/rgb.txt") if not line.startswith("#"))
-    return max(frames / 30, summary["timing"]["map_s"] - before_exports(summary))
+    ends = finish(summary, *(s for s in summary["timing"]["stages_ms"] if s not in EXPORTS))
+    return max(frames / 30, summary["timing"]["map_s"] - ends)
 
 
 one, a, b, two = (load(name) for name in ("one", "map_a", "map_b", "two"))
-print("| robots | driven s | until the map s | until the cloud s |")
-print("|---|---|---|---|")
-alone = driving(one, recording)
-alone_map = alone + finish(one, "track", "refine")
-alone_all = alone + before_exports(one) + one["timing"]["export_s"]
-print(f"| 1 | {alone:.1f} | {alone_map:.1f} | {alone_all:.1f} |")
-longer = max(driving(s, f"{work}/{f}") + finish(s, "track", "store") for s, f in ((a, "a"), (b, "b")))
-both_all = longer + two["timing"]["wall_s"]
-both_map = both_all - finish(two, "fuse") - two["timing"]["export_s"]
-print(f"| 2 | {longer:.1f} | {both_map:.1f} | {both_all:.1f} |")
-print(f"ratio: map {both_map / alone_map:.3f}, with the dense cloud {both_all / alone_all:.3f}")
-print("merged" if all(merge["accepted"] for merge in two["merges"]) else "NOT MERGED")
+rows = []
+if estimate:
+    driven = driving(one, recording)
+    whole = driven + finish(one, "track", "refine", "fuse") + one["timing"]["export_s"]
+    rows.append(("1", driven, whole - after_the_map(one), whole))
+    driven = max(driving(s, f"{work}/{f}") + finish(s, "track", "store") for s, f in ((a, "a"), (b, "b")))
+    whole = driven + two["timing"]["wall_s"]
+    rows.append(("2, fuse", driven, whole - after_the_map(two), whole))
+else:
+    rows.append(("1", clock("one") - finish(one) + finish(one, *EXPORTS) - one["timing"]["export_s"],
+                 clock("one") - after_the_map(one), clock("one")))
+    driven = max(clock("map_a"), clock("map_b"))
+    whole = driven + clock("two")
+    rows.append(("2, fuse", driven, whole - after_the_map(two), whole))
+    both = load("both")
+    rows.append(("2, map", clock("both") - finish(both) + finish(both, *EXPORTS) - both["timing"]["export_s"],
+                 clock("both") - after_the_map(both), clock("both")))
+    behind = {name: load(name)["timing"]["behind_s"] for name in ("one", "map_a", "map_b", "both")}
+    print("behind the pace at most, s:", ", ".join(f"{name} {s:.2f}" for name, s in behind.items()))
+print("| robots | driven s | until the map s | ratio | until the cloud s | ratio |")
+print("|---|---|---|---|---|---|")
+for name, driven, until_map, until_cloud in rows:
+    print(f"| {name} | {driven:.1f} | {until_map:.1f} | {until_map / rows[0][2]:.3f} "
+          f"| {until_cloud:.1f} | {until_cloud / rows[0][3]:.3f} |")
+merges = two["merges"] + ([] if estimate else both["merges"])
+print("merged" if all(merge["accepted"] for merge in merges) else "NOT MERGED")
 PYTHON

@@ -76,7 +76,7 @@ struct RunSummary {
   std::vector<Traffic> traffic;
   std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
-  double voxel_m = 0.0;
+  double voxel_m = 0.0;              ///< of the merged cloud; 0: none was to be made
   std::string up = "none";           ///< what the output's frame stands on: floor, camera or none
   geometry::Rigid3 output_from_map;  ///< to that frame from the one that tracking began in
   double wall_s = 0.0;               ///< the whole run
@@ -102,7 +102,8 @@ struct RunSummary {
 /// Takes over counts and times of a run.
 void add_report(const RunReport& report, RunSummary& summary);
 
-/// Sets `reason` when tracking was lost for more than 10 % of the frames or the cloud is empty.
+/// Sets `reason` when tracking was lost for more than 10 % of the frames or the cloud that was to be made is
+/// empty.
 void judge(RunSummary& summary);
 
 /// The one place that writes summary.json. Errors (kOutput) name the file.
