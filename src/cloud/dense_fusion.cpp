@@ -15,7 +15,10 @@
 #include "fusion_tiles.hpp"
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/rooms.hpp"
 #include "plumbline/cloud/sheets.hpp"
+#include "plumbline/cloud/view_points.hpp"
+#include "view_voxels.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -78,7 +81,8 @@ class Fusion {
              cells + tiles_[first + count].occupied <= most_cells) {
         cells += tiles_[first + count++].occupied;
       }
-      std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
+      std::vector<VoxelMap> voxels;
+      for (std::size_t k = 0; k < count; ++k) voxels.emplace_back(options_.voxels);
       if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
       give_back_memory();
       std::vector<FusedCloud> parts(count);
@@ -130,13 +134,25 @@ class Fusion {
     return {};
   }
 
-  [[nodiscard]] core::Result<ViewSummary> summary_of(std::size_t v) const {
+  [[nodiscard]] core::Result<ViewSummary> summary_of(std::size_t v) {
     if (views_.summary) return views_.summary(v);
+    const auto room = workshops_.take();
+    if (auto got = read(v, room->points); !got) return tl::unexpected<core::Error>(got.error());
+    return summarise_view(room->points, views_.cameras[v], options_);
+  }
+  core::Result<void> read(std::size_t v, ViewPoints& points) const {
+    if (views_.points) return views_.points(v, points);
     const auto cloud = views_.read(v);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    return summarise_view(**cloud, views_.cameras[v], options_);
+    take_points(**cloud, points);
+    return {};
   }
 
+  /// What is needed to read a view and to sum it up.
+  struct Workshop {
+    ViewPoints points;
+    ViewVoxels voxels;
+  };
   /// A view on its way into voxels: samples, and the tiles that runs of them belong to.
   struct Run {
     std::size_t begin = 0;
@@ -151,7 +167,7 @@ class Fusion {
 
   /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
   /// for all of these tiles, and every tile takes the views in their order.
-  core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) const {
+  core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) {
     constexpr std::size_t kViewsAtATime = 12;
     std::vector<std::uint32_t> views;
     for (std::size_t k = 0; k < voxels.size(); ++k) {
@@ -159,36 +175,39 @@ class Fusion {
     }
     std::sort(views.begin(), views.end());
     views.erase(std::unique(views.begin(), views.end()), views.end());
-    // The next views are read while the last ones are laid down.
-    std::vector<LaidView> laid, next;
-    for (std::size_t at = 0; at < views.size() || !laid.empty();) {
-      next = std::vector<LaidView>(std::min(kViewsAtATime, views.size() - at));
-      executor_.parallel_for(voxels.size() + next.size(), [&](std::size_t i) {
-        if (i < next.size()) {
-          next[i] = laid_view(views[at + i], first, voxels.size());
+    // The next views are read while the last ones are laid down. Both keep their memory.
+    std::vector<LaidView> laid(kViewsAtATime), next(kViewsAtATime);
+    std::size_t lying = 0;
+    for (std::size_t at = 0; at < views.size() || lying > 0;) {
+      const std::size_t coming = std::min(kViewsAtATime, views.size() - at);
+      executor_.parallel_for(voxels.size() + coming, [&](std::size_t i) {
+        if (i < coming) {
+          lay(views[at + i], first, voxels.size(), next[i]);
         } else {
-          lay_down(i - next.size(), laid, voxels[i - next.size()]);
+          lay_down(i - coming, laid, lying, voxels[i - coming]);
         }
       });
-      for (const LaidView& view : next) {
-        if (view.error) return tl::unexpected<core::Error>(*view.error);
+      for (std::size_t i = 0; i < coming; ++i) {
+        if (next[i].error) return tl::unexpected<core::Error>(*next[i].error);
       }
-      at += next.size();
+      at += coming;
+      lying = coming;
       laid.swap(next);
     }
+    workshops_.clear();
     return {};
   }
 
-  [[nodiscard]] LaidView laid_view(std::uint32_t v, std::size_t first, std::size_t tiles) const {
-    LaidView laid;
-    const auto cloud = views_.read(v);
-    if (!cloud) {
-      laid.error = cloud.error();
-      return laid;
+  void lay(std::uint32_t v, std::size_t first, std::size_t tiles, LaidView& laid) {
+    const auto room = workshops_.take();
+    if (auto got = read(v, room->points); !got) {
+      laid.error = got.error();
+      return;
     }
-    if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
-    laid.view =
-        VoxelMap::sampled(**cloud, poses_[v], options_.voxels, views_.robots.empty() ? 0 : views_.robots[v]);
+    if (!gains_.empty()) apply_gain(room->points, gains_[v]);
+    VoxelMap::sample(room->points, poses_[v], options_.voxels, views_.robots.empty() ? 0 : views_.robots[v],
+                     room->voxels, laid.view);
+    laid.runs.clear();
     std::uint64_t reached = 0;
     for (std::size_t k = 0; k < tiles; ++k) {
       const std::vector<std::uint32_t>& of_tile = tiles_[first + k].views;
@@ -213,7 +232,6 @@ class Fusion {
       if (laid.runs.empty() || laid.runs.back().tiles != bits) laid.runs.push_back({i, i, bits});
       laid.runs.back().end = i + 1;
     }
-    return laid;
   }
 
   static Eigen::Vector3i whole(const Eigen::Vector3d& at) {
@@ -236,8 +254,11 @@ class Fusion {
     return bits;
   }
 
-  static void lay_down(std::size_t tile, const std::vector<LaidView>& laid, VoxelMap& voxels) {
-    for (const LaidView& view : laid) {
+  /// The first `count` of `laid`.
+  static void lay_down(std::size_t tile, const std::vector<LaidView>& laid, std::size_t count,
+                       VoxelMap& voxels) {
+    for (std::size_t v = 0; v < count; ++v) {
+      const LaidView& view = laid[v];
       voxels.begin_view();
       const VoxelSample* samples = view.view.samples.data();
       std::size_t begin = 0;
@@ -301,6 +322,7 @@ class Fusion {
   std::vector<DepthRaster> rasters_;    ///< by view
   std::vector<std::uint8_t> is_look_;   ///< by view: free space only
   std::vector<Eigen::Vector3f> gains_;  ///< by view; empty: colours as they are
+  Rooms<Workshop> workshops_;
 };
 
 }  // namespace
@@ -320,13 +342,20 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
       "Memory that one tile of the map may take, MB; as many as may take six times that are filled together");
 }
 
-ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,
+ViewSummary summarise_view(const ViewPoints& points, const sensor::Pinhole& camera,
                            const DenseFusionOptions& options) {
   ViewSummary summary;
-  summary.look = is_look(camera_cloud, camera);
-  if (!summary.look) summary.spots = color_spots(camera_cloud);
-  if (options.free_space) summary.raster = depth_raster(camera_cloud, camera);
+  summary.look = is_look(points, camera);
+  if (!summary.look) summary.spots = color_spots(points);
+  if (options.free_space) summary.raster = depth_raster(points, camera);
   return summary;
+}
+
+ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,
+                           const DenseFusionOptions& options) {
+  ViewPoints points;
+  take_points(camera_cloud, points);
+  return summarise_view(points, camera, options);
 }
 
 core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,

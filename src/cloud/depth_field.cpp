@@ -224,34 +224,60 @@ DepthField::Terms DepthField::monomials(double x, double y) {
   return terms;
 }
 
+void DepthField::correct(const Eigen::Matrix<float, kTerms, 1>& c, Eigen::Vector3f& p,
+                         Eigen::Vector3f& normal) {
+  const float x = p.x() / p.z();
+  const float y = p.y() / p.z();
+  // The polynomial and its slopes, by powers of x.
+  const float of_1 = y * y * (c[2] + y * (c[6] + y * c[11]));
+  const float of_x = y * (c[1] + y * (c[5] + y * c[10]));
+  const float of_xx = c[0] + y * (c[4] + y * c[9]);
+  const float of_xxx = c[3] + y * c[8];
+  const float exact = of_1 + x * (of_x + x * (of_xx + x * (of_xxx + x * c[7])));
+  const float b = std::clamp(exact, -0.5F / p.z(), 0.5F / p.z());
+  if (std::isfinite(normal.x())) {
+    // A plane is a x + b y + c = 1 / z; its normal lies along (a, b, c).
+    const float along = normal.dot(p);
+    if (std::abs(along) > 1e-3F * p.z()) {
+      const float slope_x = of_x + x * (2.0F * of_xx + x * (3.0F * of_xxx + x * 4.0F * c[7]));
+      const float slope_y =
+          y * (2.0F * c[2] + y * (3.0F * c[6] + y * 4.0F * c[11])) +
+          x * (c[1] + y * (2.0F * c[5] + y * 3.0F * c[10]) + x * (c[4] + y * 2.0F * c[9] + x * c[8]));
+      const Eigen::Vector3f turned =
+          normal / along + Eigen::Vector3f(slope_x, slope_y, b - x * slope_x - y * slope_y);
+      normal = turned * ((along > 0.0F ? 1.0F : -1.0F) / turned.norm());
+    }
+  }
+  p *= 1.0F / (1.0F + b * p.z());
+}
+
 void DepthField::correct(Cloud& camera_cloud) const {
   if (identity()) return;
   const Eigen::Matrix<float, kTerms, 1> c = coefficients_.cast<float>();
   for (Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F)) continue;
-    const float x = p.x / p.z;
-    const float y = p.y / p.z;
-    // The polynomial and its slopes, by powers of x.
-    const float of_1 = y * y * (c[2] + y * (c[6] + y * c[11]));
-    const float of_x = y * (c[1] + y * (c[5] + y * c[10]));
-    const float of_xx = c[0] + y * (c[4] + y * c[9]);
-    const float of_xxx = c[3] + y * c[8];
-    const float exact = of_1 + x * (of_x + x * (of_xx + x * (of_xxx + x * c[7])));
-    const float b = std::clamp(exact, -0.5F / p.z, 0.5F / p.z);
-    if (std::isfinite(p.normal_x)) {
-      // A plane is a x + b y + c = 1 / z; its normal lies along (a, b, c).
-      const float along = p.getNormalVector3fMap().dot(p.getVector3fMap());
-      if (std::abs(along) > 1e-3F * p.z) {
-        const float slope_x = of_x + x * (2.0F * of_xx + x * (3.0F * of_xxx + x * 4.0F * c[7]));
-        const float slope_y =
-            y * (2.0F * c[2] + y * (3.0F * c[6] + y * 4.0F * c[11])) +
-            x * (c[1] + y * (2.0F * c[5] + y * 3.0F * c[10]) + x * (c[4] + y * 2.0F * c[9] + x * c[8]));
-        const Eigen::Vector3f turned = p.getNormalVector3fMap() / along +
-                                       Eigen::Vector3f(slope_x, slope_y, b - x * slope_x - y * slope_y);
-        p.getNormalVector3fMap() = turned * ((along > 0.0F ? 1.0F : -1.0F) / turned.norm());
-      }
-    }
-    p.getVector3fMap() *= 1.0F / (1.0F + b * p.z);
+    Eigen::Vector3f at = p.getVector3fMap();
+    Eigen::Vector3f normal = p.getNormalVector3fMap();
+    correct(c, at, normal);
+    p.getVector3fMap() = at;
+    p.getNormalVector3fMap() = normal;
+  }
+}
+
+void DepthField::correct(ViewPoints& points) const {
+  if (identity()) return;
+  const Eigen::Matrix<float, kTerms, 1> c = coefficients_.cast<float>();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!(points.z[i] > 0.0F)) continue;
+    Eigen::Vector3f at(points.x[i], points.y[i], points.z[i]);
+    Eigen::Vector3f normal(points.normal_x[i], points.normal_y[i], points.normal_z[i]);
+    correct(c, at, normal);
+    points.x[i] = at.x();
+    points.y[i] = at.y();
+    points.z[i] = at.z();
+    points.normal_x[i] = normal.x();
+    points.normal_y[i] = normal.y();
+    points.normal_z[i] = normal.z();
   }
 }
 

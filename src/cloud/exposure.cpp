@@ -5,6 +5,7 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "plumbline/cloud/sum_table.hpp"
@@ -66,21 +67,27 @@ struct SpotSum {
 
 }  // namespace
 
-std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
+std::vector<ColorSpot> color_spots(const ViewPoints& points) {
   constexpr float kSpot_m = 0.05F;
   constexpr float kFar_m = 1e4F;
   constexpr int kDark = 12;
   constexpr int kBright = 245;
   SumTable<SpotSum> table;
-  for (const Point& p : camera_cloud.points) {
-    if (!(p.getVector3fMap().cwiseAbs().maxCoeff() < kFar_m)) continue;
-    const Eigen::Vector3f point = p.getVector3fMap();
-    SpotSum& sum = table.of(pack_cell((point / kSpot_m).array().floor().cast<int>()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f point(points.x[i], points.y[i], points.z[i]);
+    if (!(point.cwiseAbs().maxCoeff() < kFar_m)) continue;
+    Eigen::Vector3i cube;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float at = point[axis] / kSpot_m;
+      cube[axis] = static_cast<int>(at);
+      cube[axis] -= at < static_cast<float>(cube[axis]) ? 1 : 0;
+    }
+    SpotSum& sum = table.of(pack_cell(cube));
     sum.point += point;
     sum.count += 1.0F;
-    const auto [dark, bright] = std::minmax({p.r, p.g, p.b});
-    if (dark < kDark || bright > kBright) continue;
-    sum.color += Eigen::Vector3f(p.r, p.g, p.b);
+    const int r = points.r[i], g = points.g[i], b = points.b[i];
+    if (std::min({r, g, b}) < kDark || std::max({r, g, b}) > kBright) continue;
+    sum.color += Eigen::Vector3f(points.r[i], points.g[i], points.b[i]);
     sum.colored += 1.0F;
   }
   std::vector<ColorSpot> spots;
@@ -89,6 +96,12 @@ std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
     spots.push_back({sum.point / sum.count, sum.color / std::max(1.0F, sum.colored), sum.colored});
   }
   return spots;
+}
+
+std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
+  ViewPoints points;
+  take_points(camera_cloud, points);
+  return color_spots(points);
 }
 
 std::vector<ColorCell> color_cells(const std::vector<ColorSpot>& spots,
@@ -164,11 +177,13 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
   return factors;
 }
 
-void apply_gain(Cloud& cloud, const Eigen::Vector3f& gain) {
-  for (Point& p : cloud.points) {
-    p.r = to_byte(static_cast<double>(gain.x() * static_cast<float>(p.r)));
-    p.g = to_byte(static_cast<double>(gain.y() * static_cast<float>(p.g)));
-    p.b = to_byte(static_cast<double>(gain.z() * static_cast<float>(p.b)));
+void apply_gain(ViewPoints& points, const Eigen::Vector3f& gain) {
+  const std::array<std::vector<std::uint8_t>*, 3> columns{&points.r, &points.g, &points.b};
+  for (int k = 0; k < 3; ++k) {
+    std::array<std::uint8_t, 256> brighter{};
+    for (std::size_t value = 0; value < brighter.size(); ++value)
+      brighter[value] = to_byte(static_cast<double>(gain[k] * static_cast<float>(value)));
+    for (std::uint8_t& value : *columns[static_cast<std::size_t>(k)]) value = brighter[value];
   }
 }
 

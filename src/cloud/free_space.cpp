@@ -301,32 +301,6 @@ bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
                       [](const Point& p) { return std::isfinite(p.normal_x); });
 }
 
-DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
-  DepthRaster raster;
-  raster.camera = camera;
-  raster.width = (camera.width + DepthRaster::kCell_px - 1) / DepthRaster::kCell_px;
-  raster.height = (camera.height + DepthRaster::kCell_px - 1) / DepthRaster::kCell_px;
-  raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
-  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
-  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
-  for (const Point& p : camera_cloud.points) {
-    if (!(p.z > 0.0F) || !(p.z < 65.0F) || !std::isfinite(p.x) || !std::isfinite(p.y)) continue;
-    const float column = fx * p.x / p.z + cx + 0.5F;
-    const float row = fy * p.y / p.z + cy + 0.5F;
-    if (!(column >= 0.0F) || !(row >= 0.0F)) continue;
-    const int u = static_cast<int>(std::min(column, 1e6F));
-    const int v = static_cast<int>(std::min(row, 1e6F));
-    if (u >= camera.width || v >= camera.height) continue;
-    std::uint16_t& cell = raster.nearest[static_cast<std::size_t>(v / DepthRaster::kCell_px) *
-                                             static_cast<std::size_t>(raster.width) +
-                                         static_cast<std::size_t>(u / DepthRaster::kCell_px)];
-    const auto depth = static_cast<std::uint16_t>(std::max(1L, std::lround(1000.0F * p.z)));
-    if (cell == 0 || depth < cell) cell = depth;
-    raster.furthest_m = std::max(raster.furthest_m, p.z);
-  }
-  return raster;
-}
-
 void set_limits(DepthRaster& raster) {
   raster.limits.assign(raster.nearest.size(), {});
   for (int j = 1; j + 1 < raster.height; ++j) {

@@ -18,6 +18,13 @@ constexpr float kExplained = 1.3F;   // residuals over noise, standard deviation
 constexpr float kModel_m = 0.0005F;  // no surface is flatter than that
 constexpr std::uint32_t kFewest = 3;
 
+/// Rounded down: a cast and a step, there is no instruction for floor() on every machine.
+Eigen::Vector3i whole(const Eigen::Vector3d& at) {
+  Eigen::Vector3i cell = at.cast<int>();
+  for (int axis = 0; axis < 3; ++axis) cell[axis] -= at[axis] < static_cast<double>(cell[axis]) ? 1 : 0;
+  return cell;
+}
+
 /// Adds the sums of a sheet whose block lies `offset` metres away.
 void gather(const Sheet& from, const Eigen::Vector3f& offset, Sheet& sums) {
   sums.second += from.second + from.first * offset.transpose() + offset * from.first.transpose() +
@@ -55,10 +62,33 @@ void Sheets::note(std::uint32_t brick) {
   table_[at] = brick;
 }
 
-std::uint32_t Sheets::first_of(const Eigen::Vector3i& block, Cursor& cursor) const {
-  const Eigen::Vector3i place = brick_of(block);
-  if (!cursor.valid || cursor.place != place) cursor = {place, brick_at(place), true};
-  return cursor.brick == kNone ? kNone : bricks_[cursor.brick].first[cell_of(block)];
+Sheets::Halo Sheets::halo_of(std::size_t brick) const {
+  Halo halo;
+  halo.fill(kNone);
+  const Eigen::Vector3i place = bricks_[brick].place;
+  // Of each neighbour along an axis: its cells from ... to, and where these come to lie.
+  struct Part {
+    int from, to, at;
+  };
+  constexpr std::array<Part, 3> kParts{Part{kBrick - 1, kBrick, 0}, Part{0, kBrick, 1},
+                                       Part{0, 1, kBrick + 1}};
+  for (int k = 0; k < 27; ++k) {
+    const Eigen::Vector3i step(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
+    const std::uint32_t other = step.isZero() ? static_cast<std::uint32_t>(brick) : brick_at(place + step);
+    if (other == kNone) continue;
+    const Part& px = kParts[static_cast<std::size_t>(step.x() + 1)];
+    const Part& py = kParts[static_cast<std::size_t>(step.y() + 1)];
+    const Part& pz = kParts[static_cast<std::size_t>(step.z() + 1)];
+    for (int x = px.from; x < px.to; ++x) {
+      for (int y = py.from; y < py.to; ++y) {
+        const std::uint32_t* from = &bricks_[other].first[cell_of({x, y, pz.from})];
+        std::uint32_t* to = &halo[static_cast<std::size_t>(
+            ((px.at + x - px.from) * kHalo + py.at + y - py.from) * kHalo + pz.at)];
+        std::copy(from, from + (pz.to - pz.from), to);
+      }
+    }
+  }
+  return halo;
 }
 
 std::uint32_t& Sheets::slot(const Eigen::Vector3i& block, Cursor& cursor) {
@@ -83,7 +113,7 @@ void Sheets::add(const FusedCloud& points, std::size_t i, Cursor& cursor) {
   const Eigen::Vector3f normal = p.getNormalVector3fMap();
   if (!normal.allFinite()) return;
   const Eigen::Vector3d position = p.getVector3fMap().cast<double>();
-  const Eigen::Vector3i block = (position / block_m_).array().floor().cast<int>();
+  const Eigen::Vector3i block = whole(position / block_m_);
   std::uint32_t& first = slot(block, cursor);
   std::uint32_t at = first;
   std::uint32_t last = kNone;
@@ -96,6 +126,7 @@ void Sheets::add(const FusedCloud& points, std::size_t i, Cursor& cursor) {
     sheets_.emplace_back();
     sheets_.back().block = block;
     next_.push_back(kNone);
+    brick_of_.push_back(cursor.brick);
     (last == kNone ? first : next_[last]) = at;
   }
   Sheet& sheet = sheets_[at];
@@ -116,11 +147,10 @@ Eigen::Vector3d Sheets::position(const Sheet& sheet) const {
 }
 
 template <typename Visit>
-void Sheets::visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal, Cursor& cursor,
-                         const Visit& visit) const {
-  for (std::uint32_t at = first_of(block, cursor); at != kNone; at = next_[at]) {
-    const Eigen::Vector3f& sum = sheets_[at].normal_sum;
-    if (sum.dot(normal) > kAlike * sum.norm()) visit(sheets_[at]);
+void Sheets::visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const {
+  for (std::uint32_t at = first; at != kNone; at = next_[at]) {
+    const Sheet& sheet = sheets_[at];
+    if (sheet.normal_sum.dot(normal) > kAlike * sheet.normal_length) visit(sheet);
   }
 }
 
@@ -155,24 +185,38 @@ void Sheets::measure_noise() {
   noise_share_ = std::min(1.0F, kGenerous * std::sqrt(*middle));
 }
 
+void Sheets::fit_plane(Sheet& sheet, const Eigen::Vector3i& in_brick, const Halo& halo) const {
+  const Eigen::Vector3f own = sheet.normal_sum.normalized();
+  Sheet sums;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const Eigen::Vector3i step(dx, dy, dz);
+        const std::uint32_t first = halo[halo_cell_of(in_brick + step)];
+        if (first == kNone) continue;
+        const Eigen::Vector3f offset = step.cast<float>() * static_cast<float>(block_m_);
+        visit_alike(first, own, [&](const Sheet& other) { gather(other, offset, sums); });
+      }
+    }
+  }
+  sheet.support = sums.points;
+  sheet.noise_m = std::sqrt(sheet.variance / sheet.weight);
+  sheet.flat = set_plane(sums, sheet);
+}
+
 void Sheets::fit_planes() {
-  Cursor cursor;
-  for (Sheet& sheet : sheets_) {
-    const Eigen::Vector3f own = sheet.normal_sum.normalized();
-    Sheet sums;
-    for (int dz = -1; dz <= 1; ++dz) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const Eigen::Vector3i step(dx, dy, dz);
-          const Eigen::Vector3f offset = step.cast<float>() * static_cast<float>(block_m_);
-          visit_alike(sheet.block + step, own, cursor,
-                      [&](const Sheet& other) { gather(other, offset, sums); });
+  for (Sheet& sheet : sheets_) sheet.normal_length = sheet.normal_sum.norm();
+  halos_.resize(bricks_.size());
+  for (std::size_t b = 0; b < bricks_.size(); ++b) {
+    halos_[b] = halo_of(b);
+    for (int x = 0; x < kBrick; ++x) {
+      for (int y = 0; y < kBrick; ++y) {
+        for (int z = 0; z < kBrick; ++z) {
+          for (std::uint32_t s = bricks_[b].first[cell_of({x, y, z})]; s != kNone; s = next_[s])
+            fit_plane(sheets_[s], {x, y, z}, halos_[b]);
         }
       }
     }
-    sheet.support = sums.points;
-    sheet.noise_m = std::sqrt(sheet.variance / sheet.weight);
-    sheet.flat = set_plane(sums, sheet);
   }
   measure_noise();
   for (Sheet& sheet : sheets_) {
@@ -183,7 +227,6 @@ void Sheets::fit_planes() {
 
 void Sheets::settle(FusedCloud& points) const {
   constexpr float kMostSigmas = 3.0F;
-  Cursor cursor;
   for (std::size_t i = 0; i < sheet_of_.size(); ++i) {
     if (sheet_of_[i] == kNone || !sheets_[sheet_of_[i]].flat) continue;
     Point& p = (*points.cloud)[i];
@@ -191,18 +234,27 @@ void Sheets::settle(FusedCloud& points) const {
     const Eigen::Vector3d position = p.getVector3fMap().cast<double>();
     // The eight blocks whose centres surround the point, trilinear.
     const Eigen::Vector3d corner = (position / block_m_).array() - 0.5;
-    const Eigen::Vector3i low = corner.array().floor().cast<int>();
+    const Eigen::Vector3i low = whole(corner);
     const Eigen::Vector3f part = (corner - low.cast<double>()).cast<float>();
+    const Eigen::Vector3f before = (position - centre(low)).cast<float>();
+    const Eigen::Vector3f after = (position - centre(low + Eigen::Vector3i::Ones())).cast<float>();
+    const std::uint32_t brick = brick_of_[sheet_of_[i]];
+    const Halo& halo = halos_[brick];
+    const Eigen::Vector3i in_brick = low - bricks_[brick].place * kBrick;
     float total = 0.0F;
     float shift = 0.0F;
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     for (int k = 0; k < 8; ++k) {
       const Eigen::Vector3i step(k & 1, k >> 1 & 1, k >> 2);
-      const Eigen::Vector3i block = low + step;
+      const std::uint32_t first = halo[halo_cell_of(in_brick + step)];
+      if (first == kNone) continue;
       float share = 1.0F;
-      for (int axis = 0; axis < 3; ++axis) share *= step[axis] == 1 ? part[axis] : 1.0F - part[axis];
-      const Eigen::Vector3f from_centre = (position - centre(block)).cast<float>();
-      visit_alike(block, own, cursor, [&](const Sheet& sheet) {
+      Eigen::Vector3f from_centre;
+      for (int axis = 0; axis < 3; ++axis) {
+        share *= step[axis] == 1 ? part[axis] : 1.0F - part[axis];
+        from_centre[axis] = step[axis] == 1 ? after[axis] : before[axis];
+      }
+      visit_alike(first, own, [&](const Sheet& sheet) {
         if (!sheet.flat) return;
         const float weight = share * sheet.weight;
         const float along = sheet.normal.dot(own);

@@ -19,7 +19,9 @@
 #include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
+#include "plumbline/cloud/rooms.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
@@ -80,7 +82,11 @@ class FuseStage : public Stage {
     }
     const sensor::Pinhole camera = camera_of(keyframe->robot);
     views_.push_back({keyframe->robot, {}, {}, {}});
-    if (keyframe->cloud != nullptr) look_at(*keyframe->cloud, camera, views_.back());
+    if (keyframe->cloud != nullptr) {
+      const auto points = rooms_.take();
+      cloud::take_points(*keyframe->cloud, *points);
+      look_at(*points, camera, views_.back());
+    }
     return spool_->append(*keyframe->compact);
   }
   /// What has not been looked at while it came.
@@ -91,11 +97,11 @@ class FuseStage : public Stage {
     }
     const auto look = [this, open](std::size_t i) {
       View& view = views_[open[i]];
-      const auto cloud = spool_->read(open[i]);
-      if (cloud) {
-        look_at(**cloud, camera_of(view.robot), view);
+      const auto points = rooms_.take();
+      if (const auto got = spool_->read(open[i], *points)) {
+        look_at(*points, camera_of(view.robot), view);
       } else {
-        view.damage = cloud.error();
+        view.damage = got.error();
       }
     };
     looking_ = std::make_unique<IdleWork>(open.size(), look, *context_->executor);
@@ -107,6 +113,7 @@ class FuseStage : public Stage {
     const auto map = io.input<MapResult>("map");
     if (looking_ != nullptr) looking_->finish();
     looking_.reset();
+    rooms_.clear();
     for (const View& view : views_) {
       if (!view.damage) continue;
       return tl::unexpected<core::Error>(context_->stored_maps != nullptr
@@ -182,9 +189,9 @@ class FuseStage : public Stage {
       return context_->recordings->robots()[static_cast<std::size_t>(robot)].camera.color;
     return context_->source->camera().color;
   }
-  void look_at(const cloud::Cloud& cloud, const sensor::Pinhole& camera, View& view) const {
-    view.camera_from_depth = cloud::sensor_pose(cloud);
-    view.summary = cloud::summarise_view(cloud, camera, options_);
+  void look_at(const cloud::ViewPoints& points, const sensor::Pinhole& camera, View& view) const {
+    view.camera_from_depth = points.camera_from_depth;
+    view.summary = cloud::summarise_view(points, camera, options_);
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
@@ -231,7 +238,9 @@ class FuseStage : public Stage {
       for (const std::int32_t robot : robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
+    views.points = [&](std::size_t i, cloud::ViewPoints& points) {
+      return read_corrected(places[i], robots[i], points);
+    };
     views.summary = [&](std::size_t i) { return summary_of(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(
@@ -278,9 +287,17 @@ class FuseStage : public Stage {
     std::optional<cloud::ViewSummary>& summary = views_[place].summary;
     const auto field = fields_.find(robot);
     if (summary && (field == fields_.end() || field->second.identity())) return std::move(*summary);
-    const auto cloud = read_corrected(place, robot);
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    return cloud::summarise_view(**cloud, camera_of(robot), options_);
+    const auto points = rooms_.take();
+    const auto got = read_corrected(place, robot, *points);
+    if (!got) return tl::unexpected<core::Error>(got.error());
+    return cloud::summarise_view(*points, camera_of(robot), options_);
+  }
+
+  core::Result<void> read_corrected(std::size_t place, std::int32_t robot, cloud::ViewPoints& points) const {
+    auto got = spool_->read(place, points);
+    const auto field = fields_.find(robot);
+    if (got && field != fields_.end()) field->second.correct(points);
+    return got;
   }
 
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
@@ -340,6 +357,7 @@ class FuseStage : public Stage {
   std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
   std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
   std::vector<View> views_;                         ///< by place in the spool
+  cloud::Rooms<cloud::ViewPoints> rooms_;
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;

@@ -7,7 +7,7 @@
 
 namespace plumbline::cloud {
 
-template <typename T>
+template <typename T, std::size_t kChunk = 4096>
 class Chunks {
  public:
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -30,7 +30,6 @@ class Chunks {
   }
 
  private:
-  static constexpr std::size_t kChunk = 4096;
   std::vector<std::vector<T>> chunks_;
   std::size_t size_ = 0;
 };

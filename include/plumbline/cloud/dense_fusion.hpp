@@ -13,6 +13,7 @@
 
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/cloud/voxel_map.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
@@ -62,6 +63,8 @@ struct ViewSummary {
 };
 ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,
                            const DenseFusionOptions& options);
+ViewSummary summarise_view(const ViewPoints& points, const sensor::Pinhole& camera,
+                           const DenseFusionOptions& options);
 
 /// The views of a whole run. All vectors: one entry a view.
 struct FusionViews {
@@ -69,6 +72,9 @@ struct FusionViews {
   std::vector<sensor::Pinhole> cameras;
   std::vector<std::uint8_t> robots;  ///< whose view it is, 0-254; empty: of one robot, and no columns.robot
   ReadView read;
+  /// Gives the points of view `i` in memory that is used again, instead of `read`; may be called for several
+  /// views at a time. Null: they are taken from what is read.
+  std::function<core::Result<void>(std::size_t, ViewPoints&)> points;
   /// Gives the summary of view `i`, once; may be called for several views at a time. Null: it is made of what
   /// is read.
   std::function<core::Result<ViewSummary>(std::size_t)> summary;

@@ -41,8 +41,12 @@ class DepthField {
   /// Moves points along their rays and turns their normals with the surface. Camera frame. A depth changes by
   /// half at most.
   void correct(Cloud& camera_cloud) const;
+  void correct(ViewPoints& points) const;
 
  private:
+  /// One point and its normal.
+  static void correct(const Eigen::Matrix<float, kTerms, 1>& c, Eigen::Vector3f& p, Eigen::Vector3f& normal);
+
   Terms coefficients_ = Terms::Zero();
 };
 

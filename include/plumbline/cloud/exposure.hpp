@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plumbline/cloud/types.hpp"
+#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::cloud {
@@ -29,6 +30,7 @@ struct ColorSpot {
 
 /// Spots of 5 cm of a view's cloud, in the order in which its points come to them; dark and saturated points
 /// do not count for colours.
+std::vector<ColorSpot> color_spots(const ViewPoints& points);
 std::vector<ColorSpot> color_spots(const Cloud& camera_cloud);
 
 /// Cubes of `cell_m` that a view's spots lie in, by cell. A point lies within 9 cm of its spot.
@@ -41,6 +43,6 @@ std::vector<ColorCell> color_cells(const std::vector<ColorSpot>& spots,
 std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views);
 
 /// Multiplies the colours in place.
-void apply_gain(Cloud& cloud, const Eigen::Vector3f& gain);
+void apply_gain(ViewPoints& points, const Eigen::Vector3f& gain);
 
 }  // namespace plumbline::cloud

@@ -8,6 +8,7 @@
 
 #include "plumbline/cloud/sheets.hpp"
 #include "plumbline/cloud/types.hpp"
+#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/frame.hpp"
@@ -33,6 +34,7 @@ struct DepthRaster {
 
 /// From a view's cloud, camera frame.
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera);
+DepthRaster depth_raster(const ViewPoints& points, const sensor::Pinhole& camera);
 
 /// Notes the limits, for views that will be asked often.
 void set_limits(DepthRaster& raster);

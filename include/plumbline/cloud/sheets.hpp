@@ -22,6 +22,7 @@ namespace plumbline::cloud {
 struct Sheet {
   Eigen::Vector3i block{0, 0, 0};
   Eigen::Vector3f normal_sum{0, 0, 0};
+  float normal_length = 0.0F;      ///< of normal_sum; set by fit_planes()
   Eigen::Vector3f first{0, 0, 0};  ///< weighted sum of positions
   Eigen::Matrix3f second;          ///< weighted sum of their outer products
   float weight = 0.0F;
@@ -98,6 +99,9 @@ class Sheets {
     Eigen::Vector3i place{0, 0, 0};
     std::array<std::uint32_t, kBrick * kBrick * kBrick> first;  ///< sheet of each block, or kNone
   };
+  /// The sheets of a brick's blocks and of those around it: kHalo x kHalo x kHalo, x first.
+  static constexpr int kHalo = kBrick + 2;
+  using Halo = std::array<std::uint32_t, kHalo * kHalo * kHalo>;
   /// The brick found last: the next question mostly is about the same one.
   struct Cursor {
     Eigen::Vector3i place{0, 0, 0};
@@ -110,14 +114,20 @@ class Sheets {
     return static_cast<std::size_t>(((block.x() & kMask) << kBrickBits | (block.y() & kMask)) << kBrickBits |
                                     (block.z() & kMask));
   }
-  [[nodiscard]] std::uint32_t first_of(const Eigen::Vector3i& block, Cursor& cursor) const;
+  /// Of a block that lies `step` blocks (-1 to 1 each axis) from one of the brick.
+  static std::size_t halo_cell_of(const Eigen::Vector3i& in_brick) {
+    return static_cast<std::size_t>((in_brick.x() + 1) * kHalo * kHalo + (in_brick.y() + 1) * kHalo +
+                                    in_brick.z() + 1);
+  }
+  [[nodiscard]] Halo halo_of(std::size_t brick) const;
   /// Where the first sheet of a block is noted; made if need be.
   std::uint32_t& slot(const Eigen::Vector3i& block, Cursor& cursor);
   void note(std::uint32_t brick);  ///< in the table
   void add(const FusedCloud& points, std::size_t i, Cursor& cursor);
   template <typename Visit>
-  void visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal, Cursor& cursor,
-                   const Visit& visit) const;
+  void visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const;
+  /// Over the sheet and what is around it.
+  void fit_plane(Sheet& sheet, const Eigen::Vector3i& in_brick, const Halo& halo) const;
   /// Plane of a weighted set of points; false when there are too few.
   static bool set_plane(const Sheet& sums, Sheet& sheet);
   [[nodiscard]] bool explained(const Sheet& sheet) const;
@@ -130,7 +140,9 @@ class Sheets {
   std::vector<Sheet> sheets_;
   std::vector<std::uint32_t> next_;      ///< next sheet of the same block
   std::vector<std::uint32_t> sheet_of_;  ///< by point
+  std::vector<std::uint32_t> brick_of_;  ///< by sheet
   std::vector<Brick> bricks_;
+  std::vector<Halo> halos_;           ///< by brick; of fit_planes()
   std::vector<std::uint32_t> table_;  ///< open addressing by place: brick, or kNone
 };
 

@@ -5,8 +5,10 @@
 // size.
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include "plumbline/cloud/chunks.hpp"
@@ -66,6 +68,9 @@ struct ViewSamples {
   std::size_t dropped = 0;  ///< points beyond +-2^20 voxels of the origin
 };
 
+class ViewVoxels;
+struct ViewPoints;
+
 /// A voxel keeps the weighted means of position, normal and colour of its measurements; the weight is
 /// cos(incidence) / sigma_z(z)^2, 1 for a measurement at 1 m face on. A voxel has two sides: measurements
 /// whose normals oppose each other (a thin wall seen from both rooms) are never averaged. Deterministic: the
@@ -85,10 +90,14 @@ class VoxelMap {
   /// points of `robot` (0-254), voxel by voxel, and its taking them up. One call of begin_view() is one view.
   static ViewSamples sampled(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud,
                              const VoxelMapOptions& options, std::uint8_t robot = 0);
+  /// Into `view`, with room that serves for one view after another.
+  static void sample(const ViewPoints& points, const geometry::Rigid3& world_from_cloud,
+                     const VoxelMapOptions& options, std::uint8_t robot, ViewVoxels& voxels,
+                     ViewSamples& view);
   void begin_view() { ++view_; }
   void add(const VoxelSample* samples, std::size_t count);
   /// Of a sample's voxel among voxels, each axis.
-  [[nodiscard]] static Eigen::Vector3i voxel_of(const VoxelSample& sample);
+  [[nodiscard]] static Eigen::Vector3i voxel_of(const VoxelSample& sample) { return voxel_of(sample.key); }
 
   /// Fuses a finished map, weights and observations included: local maps into the global one.
   void merge(const VoxelMap& other, const geometry::Rigid3& this_from_other);
@@ -107,9 +116,8 @@ class VoxelMap {
   void clear();
 
  private:
-  /// Running weighted means of one side of one voxel.
-  struct Side {
-    std::uint64_t key = 0;          ///< voxel and side, ordered as the output
+  /// Running weighted means of one side of one voxel: a cache line.
+  struct alignas(64) Side {
     Eigen::Vector3f mean{0, 0, 0};  ///< metres from the voxel's centre
     Eigen::Vector3f normal{0, 0,
                            0};       ///< weighted sum; while none is known, the direction to the first camera
@@ -123,19 +131,44 @@ class VoxelMap {
     std::uint32_t normal_known : 1;
     std::uint32_t robot_lead : 23;  ///< measurements of `robot`, less those of all others
     std::uint32_t robot : 8;        ///< the majority's, where there is one (Boyer and Moore's vote)
+    std::uint32_t has_back : 1;     ///< of a voxel's front
 
-    Side() : last_observations(0), normal_known(0), robot_lead(0), robot(0) {}
+    Side() : last_observations(0), normal_known(0), robot_lead(0), robot(0), has_back(0) {}
+  };
+  static_assert(sizeof(Side) == 64);
+
+  /// 4 x 4 x 4 voxels: neighbours are asked for together.
+  static constexpr int kBrick = 4;
+  struct Brick {
+    std::array<std::uint32_t, kBrick * kBrick * kBrick> fronts{};  ///< index into sides_ + 1, 0: none
+  };
+  struct Slot {
+    std::uint64_t key = 0;    ///< of the brick's first voxel
+    std::uint32_t brick = 0;  ///< index into bricks_ + 1, 0: free
+  };
+  /// In order of voxels (x, then y, then z), front before back.
+  struct Place {
+    std::uint64_t key = 0;
+    std::uint32_t side = 0;  ///< index into sides_
   };
 
-  void add(const VoxelSample& sample);
-  [[nodiscard]] std::size_t home(std::uint64_t key) const;
-  Side* find_or_add(std::uint64_t key);
+  void add(const VoxelSample& sample, std::uint32_t& front);
+  void add_to(Side& side, const VoxelSample& sample) const;
+  [[nodiscard]] static Eigen::Vector3i voxel_of(std::uint64_t key);
+  [[nodiscard]] std::size_t home(std::uint64_t brick) const;
+  [[nodiscard]] std::uint32_t* find(std::uint64_t key);  ///< null: its brick is not there
+  std::uint32_t& find_or_add(std::uint64_t key);
+  Side& back_of(std::uint32_t front);
   void grow();
-  [[nodiscard]] Eigen::Vector3d position(const Side& side) const;
+  [[nodiscard]] Eigen::Vector3d position(std::uint64_t key, const Side& side) const;
+  [[nodiscard]] std::vector<Place> in_order() const;
 
   VoxelMapOptions options_;
   Chunks<Side> sides_;
-  std::vector<std::uint32_t> table_;  ///< open addressing, linear probing: index into sides_ + 1, 0 = free
+  Chunks<Brick, 256> bricks_;
+  std::vector<Slot> table_;                                 ///< open addressing, linear probing
+  std::unordered_map<std::uint32_t, std::uint32_t> backs_;  ///< of fronts, both by their place in sides_; few
+  Slot last_;  ///< found: neighbours in a picture mostly share their brick
   std::uint32_t view_ = 0;
   std::size_t dropped_ = 0;
 };
