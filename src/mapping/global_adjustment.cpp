@@ -218,9 +218,9 @@ void put_back(const GlobalBundle& bundle, maps::Map& map) {
 }
 
 void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
-                    const GlobalAdjustmentOptions& options, KeyframeId anchor,
+                    const GlobalAdjustmentOptions& options, KeyframeId anchor, const core::Executor* executor,
                     GlobalAdjustmentSummary& summary) {
-  const MapGraphResult graph = solve_map_graph(map, extra, options.graph, anchor);
+  const MapGraphResult graph = solve_map_graph(map, extra, options.graph, anchor, executor);
   summary.message = graph.summary.message;
   if (!graph.summary.usable) return;
   summary.extra = graph.summary.edges;
@@ -301,7 +301,7 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
   if (!anchor.valid()) anchor = ids.front();
   std::vector<Rigid3> before;
   for (const KeyframeId id : ids) before.push_back(map.camera_from_world(id));
-  if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, summary);
+  if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, executor, summary);
   if (options.bundle) run_bundle(map, cameras, extra, options, anchor, executor, summary);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const double shift =

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 
+#include "plane_matches.hpp"
 #include "surface_voxels.hpp"
 
 namespace plumbline::mapping {
@@ -17,14 +18,6 @@ namespace {
 using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
-
-/// Two samples that should lie on one plane, in b's frame.
-struct Match {
-  Eigen::Vector3d moved;   ///< a's sample, where it lies now
-  Eigen::Vector3d normal;  ///< of the plane
-  double distance = 0.0;   ///< along the normal, metres
-  double sigma = 0.01;     ///< of the distance, metres
-};
 
 /// Up to `wanted` samples, as many as possible from each of the ways a surface may face, spread over the
 /// rest.
@@ -145,7 +138,7 @@ class Aligner {
       const maps::SurfaceSample* q = b_.nearest(p.cast<float>(), n.cast<float>(), reach, cosine);
       if (q == nullptr) continue;
       const Eigen::Vector3d normal = q->normal.cast<double>();
-      matches_.push_back({p, normal, normal.dot(p - q->point.cast<double>()), sigma(s, *q)});
+      matches_.add(p, normal, normal.dot(p - q->point.cast<double>()), variance(s, *q));
     }
     for (const maps::SurfaceSample& s : from_b_) {
       const Eigen::Vector3d q = s.point.cast<double>();
@@ -154,74 +147,37 @@ class Aligner {
       const maps::SurfaceSample* p = a_.nearest(in_a.cast<float>(), n.cast<float>(), reach, cosine);
       if (p == nullptr) continue;
       const Eigen::Vector3d normal = b_from_a.rotation * p->normal.cast<double>();
-      matches_.push_back({q, normal, normal.dot(b_from_a * p->point.cast<double>() - q), sigma(s, *p)});
+      matches_.add(q, normal, normal.dot(b_from_a * p->point.cast<double>() - q), variance(s, *p));
     }
   }
-  static double sigma(const maps::SurfaceSample& x, const maps::SurfaceSample& y) {
-    return std::hypot(static_cast<double>(x.sigma), static_cast<double>(y.sigma));
+  static double variance(const maps::SurfaceSample& x, const maps::SurfaceSample& y) {
+    const auto of_x = static_cast<double>(x.sigma);
+    const auto of_y = static_cast<double>(y.sigma);
+    return of_x * of_x + of_y * of_y;
   }
 
   /// One Gauss-Newton step, in the directions that the surfaces hold. Rotations are taken about the middle of
   /// the matches and scaled by their spread, so that all six numbers are metres.
   Vector6d solve() {
-    find_middle();
-    find_scale();
-    Matrix6d h = Matrix6d::Zero();
-    Vector6d g = Vector6d::Zero();
-    double weights = 0.0;
-    inliers_ = 0;
-    double squares = 0.0;
-    for (const Match& m : matches_) {
-      const double e = m.distance / m.sigma;
-      const double w = weight(e) / (m.sigma * m.sigma);
-      if (!(w > 0.0)) continue;
-      Vector6d j;
-      j << m.normal, (m.moved - centre_).cross(m.normal) / lever_;
-      h += w * j * j.transpose();
-      g += w * m.distance * j;
-      weights += w;
-      ++inliers_;
-      squares += e * e;
-    }
-    rms_ = inliers_ > 0 ? std::sqrt(squares / inliers_) : 0.0;
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(h);
+    centre_ = matches_.middle();
+    lever_ = std::max(0.1, matches_.spread(centre_));
+    // What most matches agree on; at least what the depth noise explains.
+    const MatchLoss loss{std::max(1.0, 1.4826 * matches_.median_error()), narrow_};
+    const MatchEquations equations = matches_.equations(centre_, lever_, loss);
+    inliers_ = equations.inliers;
+    rms_ = inliers_ > 0 ? std::sqrt(equations.squares / inliers_) : 0.0;
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(equations.h);
     eigenvalues_ = eigen.eigenvalues();
     directions_ = eigen.eigenvectors();
     Vector6d step = Vector6d::Zero();
     for (int i = 0; i < 6; ++i) {
-      held_[static_cast<std::size_t>(i)] = eigenvalues_(i) > options_.min_hold * weights;
+      held_[static_cast<std::size_t>(i)] = eigenvalues_(i) > options_.min_hold * equations.weights;
       if (!held_[static_cast<std::size_t>(i)]) continue;
-      step -= directions_.col(i) * (directions_.col(i).dot(g) / eigenvalues_(i));
+      step -= directions_.col(i) * (directions_.col(i).dot(equations.g) / eigenvalues_(i));
     }
     step.tail<3>() /= lever_;
     step.head<3>() -= step.tail<3>().cross(centre_);
     return step;
-  }
-
-  /// Huber while the surfaces are still apart, so that the few samples that show it are heard; then Tukey.
-  [[nodiscard]] double weight(double e) const {
-    const double ratio = std::abs(e) / scale_;
-    if (!narrow_) return ratio <= kHuber ? 1.0 : kHuber / ratio;
-    const double u = ratio / kTukey;
-    return u < 1.0 ? (1.0 - u * u) * (1.0 - u * u) : 0.0;
-  }
-
-  void find_middle() {
-    centre_.setZero();
-    for (const Match& m : matches_) centre_ += m.moved;
-    centre_ /= static_cast<double>(matches_.size());
-    double squares = 0.0;
-    for (const Match& m : matches_) squares += (m.moved - centre_).squaredNorm();
-    lever_ = std::max(0.1, std::sqrt(squares / static_cast<double>(matches_.size())));
-  }
-  /// Median of |e|: what most matches agree on; at least what the depth noise explains.
-  void find_scale() {
-    std::vector<double> errors;
-    errors.reserve(matches_.size());
-    for (const Match& m : matches_) errors.push_back(std::abs(m.distance) / m.sigma);
-    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::nth_element(errors.begin(), middle, errors.end());
-    scale_ = std::max(1.0, 1.4826 * *middle);
   }
 
   void judge(const Rigid3& start) {
@@ -263,21 +219,17 @@ class Aligner {
     result_.information = scaled_from_xi.transpose() * scaled * scaled_from_xi;
   }
 
-  static constexpr double kHuber = 1.345;
-  static constexpr double kTukey = 4.685;
-
   const SurfaceIndex& a_;
   const SurfaceIndex& b_;
   const AlignmentOptions& options_;
   CoarseSurface from_a_;
   CoarseSurface from_b_;
   SurfaceAlignment result_;
-  std::vector<Match> matches_;
+  PlaneMatches matches_;  ///< in b's frame
   double reach_;
   double shared_ = 0.0;  ///< of the smaller surface, near the other one at the start
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   double lever_ = 1.0;
-  double scale_ = 1.0;
   int inliers_ = 0;
   double rms_ = 0.0;
   bool narrow_ = false;

@@ -210,7 +210,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
 
   optimize::PoseGraphOptions graph;
   graph.robust = options_.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
-  const MapGraphResult solved = solve_map_graph(map, all, graph, {});
+  const MapGraphResult solved = solve_map_graph(map, all, graph, {}, executor_);
   if (!solved.summary.usable) return false;
   std::vector<PoseEdge> believed;
   std::vector<PoseEdge> fresh;
@@ -235,7 +235,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     adjustment.graph = graph;
     adjustment.noise.orb_scale_factor = options_.verify.orb_scale_factor;
     const KeyframeId anchor{};
-    adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment, anchor);
+    adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment, anchor, executor_);
   }
   return true;
 }

@@ -39,7 +39,7 @@ class VoxelMeans {
   using Floats = float __attribute__((vector_size(4 * kLanes)));
   using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
   using Numbers = Floats[kTogether / kLanes];
-  struct Waiting {
+  struct alignas(32) Waiting {  // as AVX wants it, which compilers that know nothing of it do not see to
     Numbers point[3] = {};
     Numbers normal[3] = {};
     Numbers sigma = {};

@@ -1,100 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/optimize/pose_graph.hpp"
 
-#include <ceres/ceres.h>
-
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <stdexcept>
 
-#include "cost_edge.hpp"
-#include "manifolds.hpp"
+#include "pose_graph_solver.hpp"
 
 namespace plumbline::optimize {
 namespace {
 
-/// Every pose is held to where it started by 30 m and 30 rad: nothing beside a measurement, but enough for
-/// directions that no edge holds.
-constexpr double kHoldInformation = 1e-3;
-
-/// The graph as Ceres wants it, with a weight for each edge that may change between solves. All poses in one
-/// buffer, so that the order of sums does not hang on where the heap puts them.
-class Solver {
- public:
-  Solver(const PoseGraph& graph, const PoseGraphOptions& options)
-      : graph_(graph), options_(options), problem_(problem_options()), numbers_(7 * graph.poses.size()) {
-    from_rigid({}, origin_.data());
-    for (std::size_t i = 0; i < graph.poses.size(); ++i) {
-      from_rigid(graph.poses[i].camera_from_world, block(i));
-      problem_.AddParameterBlock(block(i), 7, &manifold_);
-      if (graph.poses[i].fixed) problem_.SetParameterBlockConstant(block(i));
-    }
-    for (const GraphEdge& edge : graph.edges) {
-      losses_.push_back(std::make_unique<ceres::LossFunctionWrapper>(nullptr, ceres::TAKE_OWNERSHIP));
-      problem_.AddResidualBlock(new EdgeCost({edge.a, edge.b, edge.b_from_a, edge.information}),
-                                losses_.back().get(), block(edge.a), block(edge.b));
-    }
-    hold();
-  }
-
-  void set_weight(std::size_t edge, double weight) {
-    losses_[edge]->Reset(new ceres::ScaledLoss(nullptr, weight, ceres::TAKE_OWNERSHIP),
-                         ceres::TAKE_OWNERSHIP);
-  }
-
-  ceres::Solver::Summary solve(int iterations) {
-    ceres::Solver::Options solver;
-    solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-    solver.num_threads = 1;  // sums in a fixed order
-    solver.max_num_iterations = iterations;
-    solver.function_tolerance = 1e-7;
-    solver.parameter_tolerance = 1e-9;
-    solver.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(solver, &problem_, &summary);
-    return summary;
-  }
-
-  /// Squared error of an edge as the poses are now.
-  [[nodiscard]] double chi2(std::size_t edge) const {
-    const GraphEdge& e = graph_.edges[edge];
-    const geometry::Rigid3 b_from_a =
-        pose(static_cast<std::size_t>(e.b)) * pose(static_cast<std::size_t>(e.a)).inverse();
-    const geometry::Vector6d xi = geometry::log_se3(b_from_a * e.b_from_a.inverse());
-    return std::max(0.0, xi.dot(e.information * xi));
-  }
-  [[nodiscard]] geometry::Rigid3 pose(std::size_t i) const { return to_rigid(numbers_.data() + 7 * i); }
-
- private:
-  static ceres::Problem::Options problem_options() {
-    ceres::Problem::Options options;
-    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    return options;
-  }
-  double* block(std::size_t i) { return numbers_.data() + 7 * i; }
-  double* block(int i) { return block(static_cast<std::size_t>(i)); }
-
-  void hold() {
-    for (std::size_t i = 0; i < graph_.poses.size(); ++i) {
-      if (graph_.poses[i].fixed) continue;
-      const BundleEdge stay{-1, static_cast<int>(i), graph_.poses[i].camera_from_world,
-                            kHoldInformation * geometry::Matrix6d::Identity()};
-      problem_.AddResidualBlock(new EdgeCost(stay), nullptr, origin_.data(), block(i));
-    }
-    if (problem_.HasParameterBlock(origin_.data())) problem_.SetParameterBlockConstant(origin_.data());
-  }
-
-  const PoseGraph& graph_;
-  const PoseGraphOptions& options_;
-  PoseManifold manifold_;
-  std::vector<std::unique_ptr<ceres::LossFunctionWrapper>> losses_;  ///< must outlive problem_
-  ceres::Problem problem_;
-  std::vector<double> numbers_;
-  PoseBlock origin_;
-};
+constexpr double kTolerance = 1e-7;       // of a solve whose weights are decided
+constexpr double kRoughTolerance = 1e-2;  // of one on the way there
+constexpr int kRoughIterations = 3;
 
 /// Weight of a truncated quadratic that is mu away from convex (0) and from truncated (infinity); `ratio` is
 /// the squared error over the gate. Equation 14 of the paper.
@@ -107,7 +27,7 @@ double graduated_weight(double ratio, double mu) {
 /// Least squares again and again, with weights that turn into 0 and 1.
 class Graduated {
  public:
-  Graduated(const PoseGraph& graph, const PoseGraphOptions& options, Solver& solver,
+  Graduated(const PoseGraph& graph, const PoseGraphOptions& options, PoseGraphSolver& solver,
             PoseGraphSummary& summary)
       : graph_(graph), options_(options), solver_(solver), summary_(summary) {
     for (std::size_t i = 0; i < graph.edges.size(); ++i) {
@@ -125,11 +45,12 @@ class Graduated {
     double mu = worst > 1.0 ? 1.0 / (2.0 * worst - 1.0) : 1e6;
     for (int round = 0; round < options_.max_rounds; ++round) {
       const bool decided = set_weights(mu);
-      const ceres::Solver::Summary solved = solver_.solve(decided ? options_.max_iterations : 5);
+      const PoseGraphSolver::Outcome solved = decided ? solver_.solve(options_.max_iterations, kTolerance)
+                                                      : solver_.solve(kRoughIterations, kRoughTolerance);
       ++summary_.rounds;
-      summary_.iterations += static_cast<int>(solved.iterations.size());
+      summary_.iterations += solved.iterations;
       summary_.message = solved.message;
-      if (!solved.IsSolutionUsable()) return false;
+      if (!solved.usable) return false;
       if (decided && !set_weights(mu, true)) break;
       mu *= options_.round_factor;
     }
@@ -158,7 +79,7 @@ class Graduated {
 
   const PoseGraph& graph_;
   const PoseGraphOptions& options_;
-  Solver& solver_;
+  PoseGraphSolver& solver_;
   PoseGraphSummary& summary_;
   std::vector<double> gates_;
 };
@@ -182,6 +103,10 @@ void PoseGraphOptions::declare(core::OptionTable& table) {
 }
 
 int rank_of(const geometry::Matrix6d& information) {
+  if (information.isDiagonal(0.0)) {
+    const double most = information.diagonal().maxCoeff();
+    return most > 0.0 ? static_cast<int>((information.diagonal().array() > 1e-9 * most).count()) : 0;
+  }
   const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(information, Eigen::EigenvaluesOnly);
   const double largest = eigen.eigenvalues()(5);
   return largest > 0.0 ? static_cast<int>((eigen.eigenvalues().array() > 1e-9 * largest).count()) : 0;
@@ -197,14 +122,15 @@ double chi_square_gate(int dimensions, double false_alarm) {
   return false_alarm >= 0.01 ? k01[i] : k001[i];
 }
 
-PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options) {
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options,
+                                  const core::Executor* executor) {
   check(graph);
   PoseGraphSummary summary;
   if (std::none_of(graph.poses.begin(), graph.poses.end(), [](const GraphPose& p) { return p.fixed; })) {
     summary.message = "no pose is fixed: the solution would float";
     return summary;
   }
-  Solver solver(graph, options);
+  PoseGraphSolver solver(graph, executor);
   summary.edges.resize(graph.edges.size());
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     summary.edges[i].dimensions = rank_of(graph.edges[i].information);
@@ -213,11 +139,11 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& opti
   if (options.robust == EdgeRobustness::kGraduated) {
     if (!Graduated(graph, options, solver, summary).run()) return summary;
   } else {
-    const ceres::Solver::Summary solved = solver.solve(options.max_iterations);
+    const PoseGraphSolver::Outcome solved = solver.solve(options.max_iterations, kTolerance);
     summary.rounds = 1;
-    summary.iterations = static_cast<int>(solved.iterations.size());
+    summary.iterations = solved.iterations;
     summary.message = solved.message;
-    if (!solved.IsSolutionUsable()) return summary;
+    if (!solved.usable) return summary;
   }
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     EdgeVerdict& verdict = summary.edges[i];

@@ -4,8 +4,11 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "random_world.hpp"
@@ -157,9 +160,68 @@ TEST(SurfaceIndex, FindsWhatASearchThroughAllFinds) {
       }
     }
     EXPECT_EQ(index.nearest(p, n, 0.08F, 0.3F), expected);
+    EXPECT_EQ(index.any(p, n, 0.08F, 0.3F), expected != nullptr);
     found += expected != nullptr ? 1 : 0;
   }
   EXPECT_GT(found, 50);
+}
+
+TEST(SurfaceIndex, WhatLiesFarAwayOrNowhereDoesNoHarm) {
+  const Eigen::Vector3f up(0.0F, 0.0F, 1.0F);
+  CoarseSurface surface;
+  for (const float x : {0.0F, 0.5F, 1e9F, -3e4F, 3e4F}) surface.push_back({{x, -x, x}, up, 0.01F});
+  const SurfaceIndex index(surface, 0.1);
+  for (const maps::SurfaceSample& s : index.samples()) {
+    EXPECT_EQ(index.nearest(s.point, up, 0.05F, 0.5F), &s);
+    EXPECT_EQ(index.nearest(s.point, -up, 0.05F, 0.5F), nullptr);
+  }
+  EXPECT_FALSE(index.any({1e6F, 0.0F, 0.0F}, up, 0.1F, 0.5F));
+  EXPECT_FALSE(index.any({0.25F, 0.0F, 0.0F}, up, 0.1F, 0.5F));
+  EXPECT_FALSE(index.any(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()), up, 0.1F, 0.5F));
+  EXPECT_FALSE(SurfaceIndex({}, 0.1).any({0.0F, 0.0F, 0.0F}, up, 0.1F, 0.5F));
+}
+
+TEST(CoarseSurface, IsTheWeightedMeanOfEachVoxelAndFacing) {
+  Random random(9);
+  cloud::Cloud cloud;
+  struct Sum {
+    Eigen::Vector3d point{0, 0, 0};
+    Eigen::Vector3d normal{0, 0, 0};
+    double weight = 0.0;
+  };
+  std::map<std::array<int, 4>, Sum> sums;
+  for (int i = 0; i < 1000; ++i) {  // no multiple of what is taken together
+    const Eigen::Vector3f at = random.vector(0.3).cast<float>() + Eigen::Vector3f(0.0F, 0.0F, 1.0F);
+    const Eigen::Vector3f normal = random.direction().cast<float>();
+    cloud::Point p;
+    p.getVector3fMap() = at;
+    p.getNormalVector3fMap() = normal;
+    cloud.points.push_back(p);
+    const double depth_sigma = 0.0012 + 0.0019 * (at.z() - 0.4) * (at.z() - 0.4);
+    const double sigma = 0.5 * depth_sigma * std::max(0.3, -static_cast<double>(normal.z()));
+    Eigen::Index axis = 0;
+    normal.cwiseAbs().maxCoeff(&axis);
+    std::array<int, 4> key{};
+    for (std::size_t k = 0; k < 3; ++k)
+      key[k] = static_cast<int>(std::floor(at[static_cast<Eigen::Index>(k)] / 0.1F));
+    key[3] = static_cast<int>(2 * axis) + (normal[axis] < 0.0F ? 1 : 0);
+    Sum& sum = sums[key];
+    const double weight = 1.0 / (sigma * sigma);
+    sum.point += weight * at.cast<double>();
+    sum.normal += weight * normal.cast<double>();
+    sum.weight += weight;
+  }
+  const CoarseSurface surface = coarse_surface(cloud, 0.1);
+  std::size_t i = 0;
+  for (const auto& [key, sum] : sums) {  // the same order
+    if (sum.normal.norm() < 0.5 * sum.weight) continue;
+    ASSERT_LT(i, surface.size());
+    EXPECT_LT((surface[i].point.cast<double>() - sum.point / sum.weight).norm(), 1e-5);
+    EXPECT_LT((surface[i].normal.cast<double>() - sum.normal.normalized()).norm(), 1e-4);
+    ++i;
+  }
+  EXPECT_EQ(i, surface.size());
+  EXPECT_GT(i, 200U);
 }
 
 TEST(CoarseSurface, MeansOfVoxelsWithoutWhatIsNotKnown) {

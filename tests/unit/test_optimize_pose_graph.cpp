@@ -171,16 +171,50 @@ TEST(PoseGraph, FixedPosesStayAndUnjoinedOnesToo) {
   EXPECT_LT(tests::distance(world.graph.poses.back().camera_from_world, alone), 1e-6);
 }
 
-TEST(PoseGraph, SameInputSameBytes) {
+TEST(PoseGraph, SameInputSameBytesForAnyNumberOfThreads) {
   World a = make_world(30, 13, 7);
   World b = make_world(30, 13, 7);
   const std::vector<double> elsewhere(12345, 1.0);  // another heap
+  const core::Executor two(2);
   solve_pose_graph(a.graph);
-  solve_pose_graph(b.graph);
+  solve_pose_graph(b.graph, {}, &two);
   for (std::size_t i = 0; i < a.graph.poses.size(); ++i) {
     EXPECT_EQ(
         std::memcmp(&a.graph.poses[i].camera_from_world, &b.graph.poses[i].camera_from_world, sizeof(Rigid3)),
         0);
+  }
+}
+
+/// The minimum itself, whatever the steps that led there: nothing pulls at any pose, a little way off costs
+/// more.
+TEST(PoseGraph, NothingPullsAtTheSolution) {
+  World world = make_world(30, 0, 3);
+  PoseGraphOptions options;
+  options.robust = EdgeRobustness::kNone;
+  const auto cost = [&](const PoseGraph& graph) {
+    double sum = 0.0;
+    for (const GraphEdge& e : graph.edges) {
+      const Rigid3 b_from_a = graph.poses[static_cast<std::size_t>(e.b)].camera_from_world *
+                              graph.poses[static_cast<std::size_t>(e.a)].camera_from_world.inverse();
+      const Vector6d xi = geometry::log_se3(b_from_a * e.b_from_a.inverse());
+      sum += 0.5 * xi.dot(e.information * xi);
+    }
+    return sum;
+  };
+  const PoseGraphSummary summary = solve_pose_graph(world.graph, options);
+  ASSERT_TRUE(summary.usable);
+  const double least = cost(world.graph);
+  EXPECT_NEAR(summary.final_cost, least, 1e-6 * least);
+  for (std::size_t i = 1; i < world.graph.poses.size(); i += 7) {
+    for (int k = 0; k < 6; ++k) {
+      PoseGraph off = world.graph;
+      Vector6d xi = Vector6d::Zero();
+      for (const double step : {-1e-3, 1e-3}) {
+        xi(k) = step;
+        off.poses[i].camera_from_world = geometry::exp_se3(xi) * world.graph.poses[i].camera_from_world;
+        EXPECT_GT(cost(off), least) << i << " " << k;
+      }
+    }
   }
 }
 
