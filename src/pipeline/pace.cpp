@@ -18,7 +18,11 @@ Pace::Clock::time_point Pace::time_of(std::size_t frame) {
   return *start_ + std::chrono::duration_cast<Clock::duration>(since_first);
 }
 
-bool Pace::is_due(std::size_t frame) { return !(hz_ > 0.0) || time_of(frame) <= Clock::now(); }
+bool Pace::is_due(std::size_t frame) {
+  if (!(hz_ > 0.0)) return true;
+  const Clock::time_point due = time_of(frame);  // first: it may start the clock
+  return due <= Clock::now();
+}
 
 void Pace::wait_for(std::size_t frame, const core::StopToken& stop) {
   if (!(hz_ > 0.0)) return;

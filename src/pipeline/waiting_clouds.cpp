@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "waiting_clouds.hpp"
+
+#include <utility>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/view_points.hpp"
+#include "plumbline/pipeline/stored_maps.hpp"
+
+namespace plumbline::pipeline {
+
+core::Result<WaitingClouds> WaitingClouds::create(const RunContext& context) {
+  WaitingClouds clouds(context.stored_maps);
+  if (clouds.maps_ != nullptr) return clouds;
+  auto spool = cloud::CloudSpool::create(context.output_folder);
+  if (!spool) return tl::unexpected<core::Error>(spool.error());
+  clouds.spool_.emplace(std::move(*spool));
+  return clouds;
+}
+
+core::Result<void> WaitingClouds::append(const std::vector<std::uint8_t>& compact, std::size_t frame) {
+  bytes_ += compact.size();
+  if (spool_) return spool_->append(compact);
+  frames_.push_back(frame);
+  return {};
+}
+
+core::Result<cloud::CloudPtr> WaitingClouds::read(std::size_t place) const {
+  if (spool_) return spool_->read(place);
+  const auto bytes = maps_->cloud_bytes(frames_.at(place));
+  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  return cloud::decode_cloud(bytes->data(), bytes->size());
+}
+
+core::Result<void> WaitingClouds::read(std::size_t place, cloud::ViewPoints& points) const {
+  if (spool_) return spool_->read(place, points);
+  auto bytes = maps_->cloud_bytes(frames_.at(place));
+  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  points.compact = std::move(*bytes);
+  return cloud::decode_points(points.compact.data(), points.compact.size(), points);
+}
+
+}  // namespace plumbline::pipeline
