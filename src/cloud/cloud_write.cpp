@@ -4,8 +4,11 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
+#include <vector>
 
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -30,6 +33,46 @@ std::size_t count_finite(const Cloud& cloud) {
   return count;
 }
 
+/// Records of points on their way into a file, many at a time.
+class Records {
+ public:
+  Records(core::OutputFile& out, const CloudColumns& columns)
+      : out_(out),
+        columns_(columns),
+        most_(kPoint + 9 + sizeof(float) * columns.others.size()),
+        buffer_(kBuffer + most_) {}
+  /// Of the next point.
+  void begin() {
+    if (at_ >= kBuffer) finish();
+  }
+  template <typename T>
+  void put(const T& value) {
+    std::memcpy(buffer_.data() + at_, &value, sizeof(value));
+    at_ += sizeof(value);
+  }
+  /// What is known of point `i` besides.
+  void put_columns(std::size_t i) {
+    if (!columns_.confidence.empty()) put(columns_.confidence[i]);
+    if (!columns_.observations.empty()) put(columns_.observations[i]);
+    if (!columns_.robot.empty()) put(columns_.robot[i]);
+    for (const auto& other : columns_.others) put(other.values[i]);
+  }
+  void finish() {
+    out_.write(buffer_.data(), at_);
+    at_ = 0;
+  }
+
+ private:
+  static constexpr std::size_t kPoint = 32;  // bytes of a point alone, at most
+  static constexpr std::size_t kBuffer = std::size_t{1} << 16U;
+
+  core::OutputFile& out_;
+  const CloudColumns& columns_;
+  std::size_t most_;  ///< bytes of a record
+  std::vector<char> buffer_;
+  std::size_t at_ = 0;
+};
+
 }  // namespace
 
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
@@ -48,19 +91,18 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
   if (!columns.robot.empty()) out.write("property uchar robot\n");
   for (const auto& other : columns.others) out.write("property float " + other.name + "\n");
   out.write("end_header\n");
+  Records records(out, columns);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!finite(p)) continue;
     const bool normal = std::isfinite(p.normal_x + p.normal_y + p.normal_z);
-    const float zero = 0.0F;
-    for (float value : {p.x, p.y, p.z}) out.put(value);
-    for (float value : {p.normal_x, p.normal_y, p.normal_z}) out.put(normal ? value : zero);
-    for (std::uint8_t value : {p.r, p.g, p.b}) out.put(value);
-    if (!columns.confidence.empty()) out.put(columns.confidence[i]);
-    if (!columns.observations.empty()) out.put(columns.observations[i]);
-    if (!columns.robot.empty()) out.put(columns.robot[i]);
-    for (const auto& other : columns.others) out.put(other.values[i]);
+    records.begin();
+    records.put(std::array<float, 3>{p.x, p.y, p.z});
+    records.put(normal ? std::array<float, 3>{p.normal_x, p.normal_y, p.normal_z} : std::array<float, 3>{});
+    records.put(std::array<std::uint8_t, 3>{p.r, p.g, p.b});
+    records.put_columns(i);
   }
+  records.finish();
   return out.commit();
 }
 
@@ -93,18 +135,18 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
                   "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
                   fields, sizes, types, counts, organised ? cloud.width : points,
                   organised ? cloud.height : 1, t[0], t[1], t[2], q.w(), q.x(), q.y(), q.z(), points));
+  Records records(out, columns);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!organised && !finite(p)) continue;
-    for (float value : {p.x, p.y, p.z}) out.put(value);
-    out.put(static_cast<std::uint32_t>(p.r) << 16 | static_cast<std::uint32_t>(p.g) << 8 |
-            static_cast<std::uint32_t>(p.b));
-    for (float value : {p.normal_x, p.normal_y, p.normal_z, p.curvature}) out.put(value);
-    if (!columns.confidence.empty()) out.put(columns.confidence[i]);
-    if (!columns.observations.empty()) out.put(columns.observations[i]);
-    if (!columns.robot.empty()) out.put(columns.robot[i]);
-    for (const auto& other : columns.others) out.put(other.values[i]);
+    records.begin();
+    records.put(std::array<float, 3>{p.x, p.y, p.z});
+    records.put(static_cast<std::uint32_t>(p.r) << 16 | static_cast<std::uint32_t>(p.g) << 8 |
+                static_cast<std::uint32_t>(p.b));
+    records.put(std::array<float, 4>{p.normal_x, p.normal_y, p.normal_z, p.curvature});
+    records.put_columns(i);
   }
+  records.finish();
   return out.commit();
 }
 

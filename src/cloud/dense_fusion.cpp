@@ -99,7 +99,7 @@ class Fusion {
     }
     rasters_ = {};
     give_back_memory();
-    return joined(std::move(all));
+    return joined(std::move(all), executor_);
   }
 
  private:
@@ -280,28 +280,29 @@ class Fusion {
     const Eigen::AlignedBox3d box = tile.box(kCell_m);
     FusedCloud points = voxels.extract();
     voxels.clear();
-    points = cleaned(points, report);
+    clean(points, report);
     if (options_.settle) {
       voxels.merge(points);
       points = voxels.extract();
     }
     const auto least = static_cast<std::uint32_t>(options_.min_observations);
-    return chosen(points, [&](std::size_t i) {
+    leave(points, [&](std::size_t i) {
       const Eigen::Vector3d p = (*points.cloud)[i].getVector3fMap().cast<double>();
       return points.columns.observations[i] >= least && (p.array() >= box.min().array()).all() &&
              (p.array() < box.max().array()).all();
     });
+    return points;
   }
 
   /// Without what is seen through and without dust; settled.
-  [[nodiscard]] FusedCloud cleaned(FusedCloud& points, FusionReport& report) const {
+  void clean(FusedCloud& points, FusionReport& report) const {
     Sheets sheets(points, block_m(options_.voxels.voxel_m));
     std::vector<std::uint8_t> goes(sheets.all().size(), 0);
     if (options_.free_space) goes = seen_through(sheets, rasters_, is_look_, poses_);
     sheets.fit_planes();
     if (options_.settle) sheets.settle(points);
     const auto least = static_cast<std::uint32_t>(options_.min_support);
-    return chosen(points, [&](std::size_t i) {
+    leave(points, [&](std::size_t i) {
       const std::uint32_t s = sheets.of(i);
       if (s == Sheets::kNone) return true;
       if (goes[s] != 0) {

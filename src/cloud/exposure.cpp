@@ -21,10 +21,13 @@ constexpr float kPrior = 3.0F;    // a view's gain is held at 1 by as much as th
 constexpr float kFewestPoints = 5.0F;
 constexpr float kMostLog = 0.693F;
 
+/// Red, green, blue, and nothing: four numbers are worked on at once.
+using Tint = Eigen::Array4f;
+
 /// A cell as a view saw it: index of the cell among all shared ones, and logarithms of its colour.
 struct Sighting {
+  Tint log_color;
   std::uint32_t cell;
-  Eigen::Array3f log_color;
 };
 
 /// Keeps cells that two views or more saw in colour, numbered from 0.
@@ -48,13 +51,15 @@ std::vector<std::vector<Sighting>> shared_cells(const std::vector<std::vector<Co
       if (cell.points < kFewestPoints) continue;
       const auto found = std::lower_bound(shared.begin(), shared.end(), cell.cell);
       if (found == shared.end() || *found != cell.cell) continue;
-      sightings[v].push_back({static_cast<std::uint32_t>(found - shared.begin()), cell.color.array().log()});
+      Tint log_color = Tint::Zero();
+      log_color.head<3>() = cell.color.array().log();
+      sightings[v].push_back({log_color, static_cast<std::uint32_t>(found - shared.begin())});
     }
   }
   return sightings;
 }
 
-Eigen::Array3f robust_weight(const Eigen::Array3f& residual) { return kRobust / residual.abs().max(kRobust); }
+Tint robust_weight(const Tint& residual) { return kRobust / residual.abs().max(kRobust); }
 
 /// Of a small cube.
 struct SpotSum {
@@ -135,30 +140,29 @@ std::vector<ColorCell> color_cells(const std::vector<ColorSpot>& spots,
 std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views) {
   std::size_t count = 0;
   const auto sightings = shared_cells(views, count);
-  std::vector<Eigen::Array3f> gains(views.size(), Eigen::Array3f::Zero());  // logarithms
-  std::vector<Eigen::Array3f> mean(count), weight(count);
+  std::vector<Tint> gains(views.size(), Tint::Zero());  // logarithms
+  std::vector<Tint> mean(count), weight(count);
   for (int round = 0; round < kRounds; ++round) {
     // The first round's means are not robust: there is nothing yet to measure residuals from.
-    const std::vector<Eigen::Array3f> before = mean;
-    std::fill(mean.begin(), mean.end(), Eigen::Array3f::Zero());
-    std::fill(weight.begin(), weight.end(), Eigen::Array3f::Zero());
+    const std::vector<Tint> before = mean;
+    std::fill(mean.begin(), mean.end(), Tint::Zero());
+    std::fill(weight.begin(), weight.end(), Tint::Zero());
     for (std::size_t v = 0; v < views.size(); ++v) {
       for (const Sighting& s : sightings[v]) {
-        const Eigen::Array3f value = s.log_color + gains[v];
-        const Eigen::Array3f w =
-            round == 0 ? Eigen::Array3f::Ones().eval() : robust_weight(value - before[s.cell]);
+        const Tint value = s.log_color + gains[v];
+        const Tint w = round == 0 ? Tint::Ones().eval() : robust_weight(value - before[s.cell]);
         mean[s.cell] += w * value;
         weight[s.cell] += w;
       }
     }
     for (std::size_t c = 0; c < count; ++c) mean[c] /= weight[c];
-    Eigen::Array3f drift = Eigen::Array3f::Zero();
+    Tint drift = Tint::Zero();
     for (std::size_t v = 0; v < views.size(); ++v) {
-      Eigen::Array3f sum = Eigen::Array3f::Zero();
-      Eigen::Array3f total = Eigen::Array3f::Constant(kPrior);
+      Tint sum = Tint::Zero();
+      Tint total = Tint::Constant(kPrior);
       for (const Sighting& s : sightings[v]) {
-        const Eigen::Array3f wanted = mean[s.cell] - s.log_color;
-        const Eigen::Array3f w = robust_weight(wanted - gains[v]);
+        const Tint wanted = mean[s.cell] - s.log_color;
+        const Tint w = robust_weight(wanted - gains[v]);
         sum += w * wanted;
         total += w;
       }
@@ -166,13 +170,14 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
       drift += gains[v];
     }
     if (!views.empty()) drift /= static_cast<float>(views.size());
-    for (Eigen::Array3f& gain : gains) gain -= drift;
+    for (Tint& gain : gains) gain -= drift;
   }
   std::vector<Eigen::Vector3f> factors;
   factors.reserve(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
-    factors.emplace_back(sightings[v].empty() ? Eigen::Vector3f::Ones().eval()
-                                              : gains[v].max(-kMostLog).min(kMostLog).exp().matrix().eval());
+    factors.emplace_back(sightings[v].empty()
+                             ? Eigen::Vector3f::Ones().eval()
+                             : gains[v].head<3>().max(-kMostLog).min(kMostLog).exp().matrix().eval());
   }
   return factors;
 }

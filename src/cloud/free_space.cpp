@@ -9,42 +9,14 @@
 #include <cmath>
 #include <limits>
 
-#include "plumbline/sensor/depth_noise.hpp"
+#include "evidence.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
-constexpr float kSigmas = 3.0F;
-constexpr float kPose_m = 0.03F;   // poses are not exact
-constexpr int kFewestCells = 7;    // of 3 x 3
 constexpr int kSolid = 4;          // clouds that see a surface where none looks through leave no doubt
 constexpr double kAround_m = 0.1;  // no more than the margin of a tile
 constexpr int kPasses = 3;         // the side of a person is 0.3 m deep
-
-/// Of the 3 x 3 cells around (i, j), which all lie within the raster.
-DepthRaster::Limits limits_around(const DepthRaster& raster, int i, int j) {
-  int cells = 0;
-  std::uint16_t nearest = 65535;
-  std::uint16_t furthest = 0;
-  for (int y = j - 1; y <= j + 1; ++y) {
-    const std::uint16_t* row = raster.nearest.data() + static_cast<std::ptrdiff_t>(y) * raster.width;
-    for (int x = i - 1; x <= i + 1; ++x) {
-      const std::uint16_t depth = row[x];
-      cells += depth != 0 ? 1 : 0;
-      nearest = std::min(nearest, depth != 0 ? depth : nearest);
-      furthest = std::max(furthest, depth);
-    }
-  }
-  if (cells < kFewestCells) return {};
-  const auto margin_mm = [](std::uint16_t mm) {
-    const double sigma = sensor::depth_sigma(0.001 * static_cast<double>(mm));
-    return 1000.0F * (kSigmas * static_cast<float>(sigma) + kPose_m);
-  };
-  const float free_to = static_cast<float>(nearest) - margin_mm(nearest);
-  const float hidden_from = static_cast<float>(furthest) + margin_mm(furthest);
-  return {static_cast<std::uint16_t>(std::clamp(free_to, 1.0F, 65535.0F)),
-          static_cast<std::uint16_t>(std::clamp(hidden_from, 1.0F, 65535.0F))};
-}
 
 /// What of a view matters for a box: null transforms are never used.
 struct NearView {
@@ -72,6 +44,18 @@ struct Cluster {
   Eigen::Vector3f centre{0, 0, 0};
   float radius = 0.0F;
   std::vector<std::uint32_t> sheets;
+  std::vector<float> x, y, z;  ///< of the sheets, metres
+
+  void set_positions(const std::vector<Eigen::Vector3f>& positions) {
+    x.clear();
+    y.clear();
+    z.clear();
+    for (const std::uint32_t s : sheets) {
+      x.push_back(positions[s].x());
+      y.push_back(positions[s].y());
+      z.push_back(positions[s].z());
+    }
+  }
 };
 
 std::vector<Cluster> clusters_of(const Sheets& sheets, const std::vector<Eigen::Vector3f>& positions) {
@@ -89,6 +73,7 @@ std::vector<Cluster> clusters_of(const Sheets& sheets, const std::vector<Eigen::
     for (const std::uint32_t s : cluster.sheets) {
       cluster.radius = std::max(cluster.radius, (positions[s] - cluster.centre).norm());
     }
+    cluster.set_positions(positions);
   }
   return clusters;
 }
@@ -122,18 +107,21 @@ class Frustum {
 };
 
 /// What the views say about each sheet of the clusters.
-void count(const std::vector<Cluster>& clusters, const std::vector<Eigen::Vector3f>& positions,
-           const std::vector<NearView>& views, std::vector<Votes>& votes) {
+void count(const std::vector<Cluster>& clusters, const std::vector<NearView>& views,
+           std::vector<Votes>& votes) {
+  std::vector<Evidence> found;
   for (const NearView& view : views) {
     const Frustum frustum(*view.raster);
+    const Asking asking(*view.raster, view.rotation, view.translation);
     for (const Cluster& cluster : clusters) {
       if (!frustum.reaches(view.rotation * cluster.centre + view.translation, cluster.radius)) continue;
-      for (const std::uint32_t s : cluster.sheets) {
-        const Evidence found = evidence(*view.raster, view.raster->camera,
-                                        Eigen::Vector3f(view.rotation * positions[s] + view.translation));
-        votes[s].free += found == Evidence::kFree ? 1 : 0;
-        votes[s].surface += found == Evidence::kSurface ? 1 : 0;
-        votes[s].hidden += found == Evidence::kHidden ? 1 : 0;
+      found.resize(cluster.sheets.size());
+      asking.ask(cluster.x.data(), cluster.y.data(), cluster.z.data(), found.size(), found.data());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        Votes& of_sheet = votes[cluster.sheets[i]];
+        of_sheet.free += found[i] == Evidence::kFree ? 1 : 0;
+        of_sheet.surface += found[i] == Evidence::kSurface ? 1 : 0;
+        of_sheet.hidden += found[i] == Evidence::kHidden ? 1 : 0;
       }
     }
   }
@@ -154,7 +142,7 @@ std::vector<Verdict> judge(const Sheets& sheets, const NearViews& views) {
   for (const Sheet& sheet : sheets.all()) positions.push_back(sheets.position(sheet).cast<float>());
   std::vector<Cluster> clusters = clusters_of(sheets, positions);
   std::vector<Votes> votes(positions.size());
-  count(clusters, positions, views.clouds, votes);
+  count(clusters, views.clouds, votes);
   const auto clear = [&](std::uint32_t s) {
     return judge(votes[s]) == Verdict::kGoes || (votes[s].free == 0 && votes[s].surface >= kSolid);
   };
@@ -165,7 +153,8 @@ std::vector<Verdict> judge(const Sheets& sheets, const NearViews& views) {
   clusters.erase(
       std::remove_if(clusters.begin(), clusters.end(), [](const Cluster& c) { return c.sheets.empty(); }),
       clusters.end());
-  count(clusters, positions, views.looks, votes);
+  for (Cluster& cluster : clusters) cluster.set_positions(positions);
+  count(clusters, views.looks, votes);
   std::vector<Verdict> verdicts;
   verdicts.reserve(votes.size());
   for (const Votes& v : votes) verdicts.push_back(judge(v));
@@ -299,40 +288,6 @@ bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
   }
   return std::none_of(camera_cloud.points.begin(), camera_cloud.points.end(),
                       [](const Point& p) { return std::isfinite(p.normal_x); });
-}
-
-void set_limits(DepthRaster& raster) {
-  raster.limits.assign(raster.nearest.size(), {});
-  for (int j = 1; j + 1 < raster.height; ++j) {
-    for (int i = 1; i + 1 < raster.width; ++i) {
-      raster.limits[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.width) +
-                    static_cast<std::size_t>(i)] = limits_around(raster, i, j);
-    }
-  }
-}
-
-Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point) {
-  constexpr float kCells_per_px = 1.0F / static_cast<float>(DepthRaster::kCell_px);
-  if (!(point.z() > 0.05F) || point.z() > raster.furthest_m + 0.5F) return Evidence::kNone;
-  const float per_m = 1.0F / point.z();
-  const float u = static_cast<float>(camera.fx) * point.x() * per_m + static_cast<float>(camera.cx);
-  const float v = static_cast<float>(camera.fy) * point.y() * per_m + static_cast<float>(camera.cy);
-  const float column = u * kCells_per_px;
-  const float row = v * kCells_per_px;
-  if (!(column >= 1.0F) || !(row >= 1.0F)) return Evidence::kNone;
-  if (column >= static_cast<float>(raster.width - 1) || row >= static_cast<float>(raster.height - 1))
-    return Evidence::kNone;
-  const int i = static_cast<int>(column);
-  const int j = static_cast<int>(row);
-  const DepthRaster::Limits limits =
-      raster.limits.empty()
-          ? limits_around(raster, i, j)
-          : raster.limits[static_cast<std::size_t>(j) * static_cast<std::size_t>(raster.width) +
-                          static_cast<std::size_t>(i)];
-  if (limits.free_to == 0) return Evidence::kNone;
-  const float z_mm = 1000.0F * point.z();
-  if (z_mm < static_cast<float>(limits.free_to)) return Evidence::kFree;
-  return z_mm > static_cast<float>(limits.hidden_from) ? Evidence::kHidden : Evidence::kSurface;
 }
 
 std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,

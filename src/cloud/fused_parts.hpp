@@ -11,32 +11,45 @@
 #include <vector>
 
 #include "plumbline/cloud/voxel_map.hpp"
+#include "plumbline/core/executor.hpp"
 
 namespace plumbline::cloud {
 
-/// The points that `keep` says, columns and all.
+/// Leaves the points that `keep` says, columns and all.
 template <typename Keep>
-FusedCloud chosen(const FusedCloud& points, const Keep& keep) {
-  FusedCloud result;
-  result.cloud = std::make_shared<Cloud>();
+void leave(FusedCloud& points, const Keep& keep) {
+  std::size_t count = 0;
+  const bool robots = !points.robot_lead.empty();
   for (std::size_t i = 0; i < points.cloud->size(); ++i) {
     if (!keep(i)) continue;
-    result.cloud->points.push_back((*points.cloud)[i]);
-    result.columns.observations.push_back(points.columns.observations[i]);
-    result.columns.confidence.push_back(points.columns.confidence[i]);
-    result.spread_m.push_back(points.spread_m[i]);
-    result.weight.push_back(points.weight[i]);
-    result.noise_m.push_back(points.noise_m[i]);
-    if (points.robot_lead.empty()) continue;
-    result.columns.robot.push_back(points.columns.robot[i]);
-    result.robot_lead.push_back(points.robot_lead[i]);
+    if (i != count) {
+      points.cloud->points[count] = points.cloud->points[i];
+      points.columns.observations[count] = points.columns.observations[i];
+      points.columns.confidence[count] = points.columns.confidence[i];
+      points.spread_m[count] = points.spread_m[i];
+      points.weight[count] = points.weight[i];
+      points.noise_m[count] = points.noise_m[i];
+      if (robots) {
+        points.columns.robot[count] = points.columns.robot[i];
+        points.robot_lead[count] = points.robot_lead[i];
+      }
+    }
+    ++count;
   }
-  return result;
+  points.cloud->points.resize(count);
+  points.columns.observations.resize(count);
+  points.columns.confidence.resize(count);
+  points.spread_m.resize(count);
+  points.weight.resize(count);
+  points.noise_m.resize(count);
+  if (!robots) return;
+  points.columns.robot.resize(count);
+  points.robot_lead.resize(count);
 }
 
-/// All parts one after the other. Room is taken once and each part given back when it is copied: what has
-/// been joined and what has not is never in memory twice.
-inline FusedCloud joined(std::vector<FusedCloud>&& parts) {
+/// All parts one after the other: cloud, observations, confidence and robots. Columns are put together side
+/// by side, each part given back when it is copied.
+inline FusedCloud joined(std::vector<FusedCloud>&& parts, const core::Executor& executor) {
   FusedCloud all;
   all.cloud = std::make_shared<Cloud>();
   std::size_t count = 0;
@@ -50,14 +63,17 @@ inline FusedCloud joined(std::vector<FusedCloud>&& parts) {
       column = {};
     }
   };
-  join([](FusedCloud & f) -> auto& { return f.columns.observations; });
-  join([](FusedCloud & f) -> auto& { return f.columns.confidence; });
-  join([](FusedCloud & f) -> auto& { return f.columns.robot; });
-  join([](FusedCloud & f) -> auto& { return f.robot_lead; });
-  join([](FusedCloud & f) -> auto& { return f.spread_m; });
-  join([](FusedCloud & f) -> auto& { return f.weight; });
-  join([](FusedCloud & f) -> auto& { return f.noise_m; });
-  join([](FusedCloud & f) -> auto& { return f.cloud->points; });
+  // Points are most of it: half of them each; what else is known of them goes with one half.
+  for (FusedCloud& part : parts) {
+    part.spread_m = part.weight = part.noise_m = {};
+    part.robot_lead = {};
+  }
+  executor.parallel_for(2, [&](std::size_t k) {
+    if (k == 0) return join([](FusedCloud & f) -> auto& { return f.cloud->points; });
+    join([](FusedCloud & f) -> auto& { return f.columns.observations; });
+    join([](FusedCloud & f) -> auto& { return f.columns.confidence; });
+    join([](FusedCloud & f) -> auto& { return f.columns.robot; });
+  });
   all.cloud->width = static_cast<std::uint32_t>(count);
   all.cloud->height = 1;
   all.cloud->is_dense = true;

@@ -16,7 +16,6 @@
 #include "chain_option.hpp"
 #include "idle_work.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/rooms.hpp"
@@ -29,15 +28,21 @@
 #include "resumed_run.hpp"
 #include "stages.hpp"
 #include "up_frame.hpp"
+#include "waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
 
-void move_cloud(cloud::Cloud& cloud, const geometry::Rigid3& to_from) {
-  for (cloud::Point& p : cloud.points) {
-    p.getVector3fMap() = (to_from * p.getVector3fMap().cast<double>()).cast<float>();
-    p.getNormalVector3fMap() = (to_from.rotation * p.getNormalVector3fMap().cast<double>()).cast<float>();
-  }
+void move_cloud(cloud::Cloud& cloud, const geometry::Rigid3& to_from, const core::Executor& executor) {
+  constexpr std::size_t kAtATime = 1U << 16U;
+  executor.parallel_for((cloud.size() + kAtATime - 1) / kAtATime, [&](std::size_t part) {
+    const std::size_t end = std::min(cloud.size(), (part + 1) * kAtATime);
+    for (std::size_t i = part * kAtATime; i < end; ++i) {
+      cloud::Point& p = cloud[i];
+      p.getVector3fMap() = (to_from * p.getVector3fMap().cast<double>()).cast<float>();
+      p.getNormalVector3fMap() = (to_from.rotation * p.getNormalVector3fMap().cast<double>()).cast<float>();
+    }
+  });
 }
 
 class FuseStage : public Stage {
@@ -68,17 +73,17 @@ class FuseStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    auto spool = cloud::CloudSpool::create(context.output_folder);
-    if (!spool) return tl::unexpected<core::Error>(spool.error());
-    spool_.emplace(std::move(*spool));
+    auto clouds = WaitingClouds::create(context);
+    if (!clouds) return tl::unexpected<core::Error>(clouds.error());
+    clouds_.emplace(std::move(*clouds));
     return context.resumed != nullptr ? read_clouds(*context.resumed) : core::Result<void>();
   }
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("cloud");
     if (keyframe->id.valid()) {
-      places_[keyframe->id] = spool_->size();
+      places_[keyframe->id] = clouds_->size();
     } else {
-      between_.push_back({keyframe->robot, keyframe->stamp, spool_->size()});
+      between_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
     }
     const sensor::Pinhole camera = camera_of(keyframe->robot);
     views_.push_back({keyframe->robot, {}, {}, {}});
@@ -87,7 +92,7 @@ class FuseStage : public Stage {
       cloud::take_points(*keyframe->cloud, *points);
       look_at(*points, camera, views_.back());
     }
-    return spool_->append(*keyframe->compact);
+    return clouds_->append(*keyframe->compact, io.frame());
   }
   /// What has not been looked at while it came.
   void frames_have_ended() override {
@@ -98,7 +103,7 @@ class FuseStage : public Stage {
     const auto look = [this, open](std::size_t i) {
       View& view = views_[open[i]];
       const auto points = rooms_.take();
-      if (const auto got = spool_->read(open[i], *points)) {
+      if (const auto got = clouds_->read(open[i], *points)) {
         look_at(*points, camera_of(view.robot), view);
       } else {
         view.damage = got.error();
@@ -127,11 +132,11 @@ class FuseStage : public Stage {
     frame_ = find_up(up_, fused->cloud, map->trajectory);
     dense->output_from_map = frame_.output_from_map;
     dense->upright = frame_.up != "none";
-    if (dense->upright) move_cloud(*fused->cloud, frame_.output_from_map);
+    if (dense->upright) move_cloud(*fused->cloud, frame_.output_from_map, *context_->executor);
     if (keyframe_clouds_) {
       if (auto written = write_keyframes(*map); !written) return written;
     }
-    spool_.reset();
+    clouds_.reset();
     if (auto done = filter(std::move(*fused), *dense); !done) return done;
     points_ = dense->cloud->size();
     io.output<DenseCloud>("cloud", dense);
@@ -157,9 +162,9 @@ class FuseStage : public Stage {
     for (const core::KeyframeId id : *keyframes) {
       const auto bytes = store->cloud_bytes(id);
       if (!bytes) return fail(bytes.error());
-      places_[id] = spool_->size();
+      places_[id] = clouds_->size();
       views_.push_back({id.robot, {}, {}, {}});
-      if (auto kept = spool_->append(*bytes); !kept) return kept;
+      if (auto kept = clouds_->append(*bytes, 0); !kept) return kept;
     }
     const auto frames = store->frame_cloud_ids();
     if (!frames) return fail(frames.error());
@@ -168,14 +173,14 @@ class FuseStage : public Stage {
       if (!bytes) return fail(bytes.error());
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
-      between_.push_back({pose.reference.robot, pose.stamp, spool_->size()});
+      between_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
       views_.push_back({pose.reference.robot, {}, {}, {}});
-      if (auto kept = spool_->append(*bytes); !kept) return kept;
+      if (auto kept = clouds_->append(*bytes, 0); !kept) return kept;
     }
     return {};
   }
 
-  /// A cloud in the spool.
+  /// One of the clouds.
   struct View {
     std::int32_t robot = 0;
     geometry::Rigid3 camera_from_depth;
@@ -226,7 +231,7 @@ class FuseStage : public Stage {
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
     cloud::FusionReport report;
-    const cloud::ReadView read_raw = [&](std::size_t i) { return spool_->read(places[i]); };
+    const cloud::ReadView read_raw = [&](std::size_t i) { return clouds_->read(places[i]); };
     if (auto found = find_fields(map, poses, stamps, robots, cameras, read_raw); !found) {
       return tl::unexpected<core::Error>(found.error());
     }
@@ -244,10 +249,10 @@ class FuseStage : public Stage {
     views.summary = [&](std::size_t i) { return summary_of(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(
-        fmt::format("{} clouds, {:.1f} MB on disk, fused in {} tiles; {} points seen through, {} of "
+        fmt::format("{} clouds, {:.1f} MB, fused in {} tiles; {} points seen through, {} of "
                     "dust; colour "
                     "gains {:.2f} to {:.2f}",
-                    poses.size(), static_cast<double>(spool_->bytes()) / 1e6, report.tiles,
+                    poses.size(), static_cast<double>(clouds_->bytes()) / 1e6, report.tiles,
                     report.seen_through, report.dust, report.least_gain, report.most_gain));
     return fused;
   }
@@ -294,14 +299,14 @@ class FuseStage : public Stage {
   }
 
   core::Result<void> read_corrected(std::size_t place, std::int32_t robot, cloud::ViewPoints& points) const {
-    auto got = spool_->read(place, points);
+    auto got = clouds_->read(place, points);
     const auto field = fields_.find(robot);
     if (got && field != fields_.end()) field->second.correct(points);
     return got;
   }
 
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
-    auto cloud = spool_->read(place);
+    auto cloud = clouds_->read(place);
     const auto field = fields_.find(robot);
     if (cloud && field != fields_.end()) field->second.correct(**cloud);
     return cloud;
@@ -337,8 +342,10 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera *
-                              views_[found->second].camera_from_depth);
+      move_cloud(
+          **cloud,
+          frame_.output_from_map * keyframe.world_from_camera * views_[found->second].camera_from_depth,
+          *context_->executor);
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
@@ -354,15 +361,15 @@ class FuseStage : public Stage {
   cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<cloud::CloudSpool> spool_;          ///< the keyframes' clouds, camera frame
-  std::map<core::KeyframeId, std::size_t> places_;  ///< in the spool
-  std::vector<View> views_;                         ///< by place in the spool
+  std::optional<WaitingClouds> clouds_;             ///< camera frame
+  std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
+  std::vector<View> views_;                         ///< by place among the clouds
   cloud::Rooms<cloud::ViewPoints> rooms_;
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;
     double stamp = 0.0;
-    std::size_t place = 0;  ///< in the spool
+    std::size_t place = 0;  ///< among the clouds
   };
   std::vector<Between> between_;
   std::map<std::int32_t, cloud::DepthField> fields_;  ///< by robot

@@ -85,12 +85,13 @@ class OutputStage : public Stage {
         [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
         [&] { return write_trajectories(folder, map, dense->output_from_map); },
         [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
-        [&] { return write_snapshots(folder / "snapshots", map, *dense); },
     };
-    for (const auto& step : steps) {
-      if (auto written = step(); !written) return written;
+    std::vector<core::Result<void>> written(steps.size());
+    context_->executor->parallel_for(steps.size(), [&](std::size_t i) { written[i] = steps[i](); });
+    for (const auto& one : written) {
+      if (!one) return one;
     }
-    return {};
+    return write_snapshots(folder / "snapshots", map, *dense);
   }
 
  private:

@@ -16,16 +16,18 @@ class Chunks {
   const T& operator[](std::size_t i) const { return chunks_[i / kChunk][i % kChunk]; }
   /// A new element at the end.
   T& add() {
-    if (size_ % kChunk == 0) {
+    const std::size_t chunk = size_ / kChunk;
+    if (chunk == chunks_.size()) {
       chunks_.emplace_back();
       chunks_.back().reserve(kChunk);
     }
     ++size_;
-    chunks_.back().emplace_back();
-    return chunks_.back().back();
+    chunks_[chunk].emplace_back();
+    return chunks_[chunk].back();
   }
+  /// Memory is kept for what comes next.
   void clear() {
-    chunks_.clear();
+    for (std::vector<T>& chunk : chunks_) chunk.clear();
     size_ = 0;
   }
 

@@ -80,7 +80,8 @@ struct FusionViews {
   std::function<core::Result<ViewSummary>(std::size_t)> summary;
 };
 
-/// The same for views of several cameras and robots; columns.robot tells who measured each point most.
+/// The same for views of several cameras and robots; columns.robot tells who measured each point most. What
+/// else a FusedCloud has (spread, weight, noise, lead of robots) is given up.
 core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
                                     const core::Executor& executor, FusionReport* report = nullptr);
 

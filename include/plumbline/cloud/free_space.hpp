@@ -51,10 +51,10 @@ bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 /// What one view says about a place.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
 
-/// `point`: metres, frame of `camera`, which took the view. Free: all cells around (3 x 3, at least 7
+/// `point`: metres, frame of the camera, which took the view. Free: all cells around (3 x 3, at least 7
 /// measured) lie further away than the sensor's noise and 3 cm explain. kNone outside of the picture or where
 /// too little was measured.
-Evidence evidence(const DepthRaster& raster, const sensor::Pinhole& camera, const Eigen::Vector3f& point);
+Evidence evidence(const DepthRaster& raster, const Eigen::Vector3f& point);
 
 /// `is_look`: by view; looks are asked only where clouds alone do not let a sheet go: some cloud looks
 /// through, or fewer than four see a surface. For every sheet whether it is to go: at least half as many
