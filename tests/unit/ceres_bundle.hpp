@@ -6,7 +6,9 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include <algorithm>
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "plumbline/optimize/bundle_adjustment.hpp"
@@ -95,6 +97,7 @@ struct CeresEdge {
 struct CeresCosts {
   double initial = 0.0;
   double final = 0.0;
+  int iterations = 0;
 };
 
 /// One round with Huber losses, as the options say; poses and points are written back. Information of edges
@@ -148,9 +151,9 @@ inline CeresCosts solve_with_ceres(optimize::BundleProblem& problem, const optim
       ceres_problem.SetParameterBlockConstant(poses[i].data());
   }
   ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  solver.linear_solver_type = problem.poses.size() <= 60 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   solver.max_num_iterations = options.max_iterations;
-  solver.function_tolerance = 1e-14;
+  solver.function_tolerance = std::max(options.tolerance, 1e-14);
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &ceres_problem, &summary);
@@ -158,7 +161,7 @@ inline CeresCosts solve_with_ceres(optimize::BundleProblem& problem, const optim
     const CeresPose<double> pose(problem.poses[i].camera_from_world, poses[i].data());
     problem.poses[i].camera_from_world = geometry::Rigid3(pose.rotation, pose.translation);
   }
-  return {summary.initial_cost, summary.final_cost};
+  return {summary.initial_cost, summary.final_cost, static_cast<int>(summary.iterations.size())};
 }
 
 }  // namespace plumbline::tests
