@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/cloud/exposure.hpp"
 
-#include <pcl/point_cloud.h>
-#include <pcl/point_types.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "plumbline/cloud/sum_table.hpp"
 #include "scalar.hpp"
 #include "voxel_key.hpp"
 
@@ -61,53 +57,7 @@ std::vector<std::vector<Sighting>> shared_cells(const std::vector<std::vector<Co
 
 Tint robust_weight(const Tint& residual) { return kRobust / residual.abs().max(kRobust); }
 
-/// Of a small cube.
-struct SpotSum {
-  std::uint64_t key = 0;
-  Eigen::Vector3f point{0, 0, 0};
-  Eigen::Vector3f color{0, 0, 0};
-  float count = 0.0F;
-  float colored = 0.0F;
-};
-
 }  // namespace
-
-std::vector<ColorSpot> color_spots(const ViewPoints& points) {
-  constexpr float kSpot_m = 0.05F;
-  constexpr float kFar_m = 1e4F;
-  constexpr int kDark = 12;
-  constexpr int kBright = 245;
-  SumTable<SpotSum> table;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f point(points.x[i], points.y[i], points.z[i]);
-    if (!(point.cwiseAbs().maxCoeff() < kFar_m)) continue;
-    Eigen::Vector3i cube;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float at = point[axis] / kSpot_m;
-      cube[axis] = static_cast<int>(at);
-      cube[axis] -= at < static_cast<float>(cube[axis]) ? 1 : 0;
-    }
-    SpotSum& sum = table.of(pack_cell(cube));
-    sum.point += point;
-    sum.count += 1.0F;
-    const int r = points.r[i], g = points.g[i], b = points.b[i];
-    if (std::min({r, g, b}) < kDark || std::max({r, g, b}) > kBright) continue;
-    sum.color += Eigen::Vector3f(points.r[i], points.g[i], points.b[i]);
-    sum.colored += 1.0F;
-  }
-  std::vector<ColorSpot> spots;
-  spots.reserve(table.sums().size());
-  for (const SpotSum& sum : table.sums()) {
-    spots.push_back({sum.point / sum.count, sum.color / std::max(1.0F, sum.colored), sum.colored});
-  }
-  return spots;
-}
-
-std::vector<ColorSpot> color_spots(const Cloud& camera_cloud) {
-  ViewPoints points;
-  take_points(camera_cloud, points);
-  return color_spots(points);
-}
 
 std::vector<ColorCell> color_cells(const std::vector<ColorSpot>& spots,
                                    const geometry::Rigid3& world_from_camera, double cell_m) {

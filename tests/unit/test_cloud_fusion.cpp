@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "plumbline/cloud/compact_cloud.hpp"
@@ -325,6 +326,50 @@ TEST(FreeSpace, EvidenceOfAView) {
   EXPECT_EQ(at(162, 240, 1.5), Evidence::kSurface);  // at the box's border: not sure
   EXPECT_EQ(at(-50, 240, 1.0), Evidence::kNone);
   EXPECT_EQ(at(400, 240, -1.0), Evidence::kNone);
+}
+
+TEST(FreeSpace, LimitsSayWhatTheirCellsSay) {
+  Views views;
+  cv::Mat depth = with_box(plane_depth({0.2, 0, 0.9}, 2.0, 1.0), cv::Rect(100, 100, 200, 150), 1.0F);
+  depth(cv::Rect(300, 300, 90, 70)) = 0.0F;
+  views.add_whole(depth, 0.0);
+  const DepthRaster plain = depth_raster(*views.clouds[0], camera());
+  DepthRaster noted = plain;
+  set_limits(noted);
+  std::array<int, 4> seen{};
+  for (int v = -8; v < 490; v += 7) {
+    for (int u = -8; u < 650; u += 7) {
+      for (const double z : {0.5, 1.0, 1.9, 2.1, 3.0}) {
+        const Eigen::Vector3f place = camera().unproject(u, v, z).cast<float>();
+        EXPECT_EQ(evidence(plain, place), evidence(noted, place)) << u << ", " << v << ", " << z;
+        ++seen[static_cast<std::size_t>(evidence(noted, place))];
+      }
+    }
+  }
+  for (const int count : seen) EXPECT_GT(count, 50);
+}
+
+TEST(DenseFusion, PointsInMemoryThatIsUsedAgainAreAsGoodAsClouds) {
+  const Views views = wall_views(1.5, 14);  // more than are read at a time
+  const auto wanted = views.fuse(fine());
+  FusionViews all;
+  all.world_from_camera = views.poses;
+  all.cameras.assign(views.poses.size(), camera());
+  all.points = [&](std::size_t i, ViewPoints& points) -> core::Result<void> {
+    take_points(*views.clouds[i], points);
+    return {};
+  };
+  const core::Executor executor(2);
+  const auto fused = fuse_views(all, fine(), executor);
+  ASSERT_TRUE(wanted.has_value() && fused.has_value());
+  ASSERT_EQ(fused->cloud->size(), wanted->cloud->size());
+  ASSERT_GT(fused->cloud->size(), 1000U);
+  for (std::size_t i = 0; i < fused->cloud->size(); ++i) {
+    ASSERT_EQ((*fused->cloud)[i].getVector3fMap(), (*wanted->cloud)[i].getVector3fMap());
+    ASSERT_EQ((*fused->cloud)[i].rgba, (*wanted->cloud)[i].rgba);
+  }
+  EXPECT_EQ(fused->columns.observations, wanted->columns.observations);
+  EXPECT_EQ(fused->columns.confidence, wanted->columns.confidence);
 }
 
 }  // namespace
