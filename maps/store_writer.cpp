@@ -22,6 +22,12 @@ void use_log(Database& database) {
       "PRAGMA wal_autocheckpoint = 4000");  // pages: the log is taken in every 32 MB, and synced only then
 }
 
+/// Neither a log beside the file nor a sync before the last transaction: all is written once.
+void use_memory(Database& database) {
+  database.run("PRAGMA journal_mode = MEMORY");
+  database.run("PRAGMA synchronous = OFF");
+}
+
 /// One file again, that opens in a folder that may not be written. Where that cannot be, for somebody reads
 /// the store, file and log together are whole as well.
 void leave_one_file(Database& database) {
@@ -246,7 +252,8 @@ StoreWriter::~StoreWriter() {
   if (impl_ != nullptr) leave_one_file(*impl_->database);
 }
 
-core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file, const StoreHeader& header) {
+core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file, const StoreHeader& header,
+                                              StoreUse use) {
   std::error_code ignored;
   if (std::filesystem::exists(file, ignored)) {
     return core::output_error(file.string() + ": is there already; remove it or write to another folder");
@@ -254,7 +261,7 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
   core::Result<StoreWriter> made = guarded(file, ErrorKind::kOutput, [&] {
     auto database = std::make_unique<Database>(file, Database::Access::kCreate);
     database->run("PRAGMA page_size = 8192");
-    use_log(*database);
+    use == StoreUse::kGrowing ? use_log(*database) : use_memory(*database);
     {
       Transaction transaction(*database, true);
       create_tables(*database, header);
@@ -317,6 +324,10 @@ core::Result<void> StoreWriter::attach(const std::string& name, const std::vecto
 
 core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<FramePose>& frames,
                                            const ResultFrame& result, const StoreStep& rest) {
+  // Of a store that is written in one go, this is the first moment that it is whole.
+  auto synced =
+      guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA synchronous = NORMAL"); });
+  if (!synced) return synced;
   core::Result<void> done = impl_->transact([&] {
     impl_->put_log_and_clouds(rest);
     impl_->write(map, frames, true);

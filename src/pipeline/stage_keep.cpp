@@ -18,7 +18,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-constexpr std::size_t kCloudsAtATime = 32;  // in one transaction
+constexpr std::size_t kCloudsAtATime = 128;  // in one transaction
 
 class KeepStage : public Stage {
  public:
@@ -54,7 +54,8 @@ class KeepStage : public Stage {
     header.input = context_->input;
     header.robot = map->robots.empty() ? context_->source->name() : map->robots.front().name;
     header.program_version = core::version();
-    auto writer = maps::StoreWriter::create(context_->output_folder / "map.db", header);
+    auto writer =
+        maps::StoreWriter::create(context_->output_folder / "map.db", header, maps::StoreUse::kInOneGo);
     if (!writer) return tl::unexpected<core::Error>(writer.error());
     maps::StoreStep whole;
     whole.map = std::make_shared<maps::MapChanges>(map->map->changes_since({}));

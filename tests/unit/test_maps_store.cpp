@@ -62,10 +62,13 @@ TEST(MapStore, EveryCommitIsTheMapInEveryBit) {
   ASSERT_FALSE(world.map.loops().empty());
 }
 
-TEST(MapStore, SavesTheFinalMap) {
+class FinalMap : public testing::TestWithParam<StoreUse> {};
+INSTANTIATE_TEST_SUITE_P(MapStore, FinalMap, testing::Values(StoreUse::kGrowing, StoreUse::kInOneGo));
+
+TEST_P(FinalMap, IsSaved) {
   const StoreFolder folder;
   StoreWorld world(2);
-  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera), GetParam());
   ASSERT_TRUE(writer);
   std::vector<KeyframeId> ids;
   for (int i = 0; i < 6; ++i) {

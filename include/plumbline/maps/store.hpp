@@ -86,12 +86,19 @@ struct StoreStep {
   std::vector<StoreCloud> clouds;
 };
 
+/// How a new store comes about.
+enum class StoreUse {
+  kGrowing,  ///< while a run goes: whatever ends the program, the file holds what was added
+  kInOneGo,  ///< at the end of a run, quicker: nothing can be relied on before save_final()
+};
+
 /// One writer per file at a time; not thread-safe. A call that fails leaves the file as it was before the
 /// call, and may be tried again.
 class StoreWriter {
  public:
   /// Makes a new file. Errors (kOutput): it is there already, its folder is not there, disk full.
-  static core::Result<StoreWriter> create(const std::filesystem::path& file, const StoreHeader& header);
+  static core::Result<StoreWriter> create(const std::filesystem::path& file, const StoreHeader& header,
+                                          StoreUse use = StoreUse::kGrowing);
   /// Goes on in a file that a run left, which gets today's format. Errors (kInput) as StoreReader::open;
   /// (kOutput): it is in use.
   static core::Result<StoreWriter> resume(const std::filesystem::path& file);
