@@ -71,10 +71,6 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
   terms.resize(kept);
 }
 
-constexpr double kBlind = 100.0;  // information of a standard deviation of 10 cm
-constexpr double kAllTheSurface = 0.9;
-constexpr double kLongestCoast_s = 2.5;
-
 }  // namespace
 
 const char* to_string(TrackState state) {
@@ -159,7 +155,9 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
                           {kSecondRadius, 0.05, 1200, true, true},
                           {kSecondRadius, 0.03, 2400, false, true},
                           {kSecondRadius, 0.03, 2400, false, false}};
-  for (const Round& round : rounds) {
+  bool stiff = !motion_refuted_;
+  bool surface_alone = false;
+  const auto run = [&](const Round& round) {
     if (round.rematch) {
       result.visible_points.clear();
       result.visible_lines.clear();
@@ -183,69 +181,23 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
     pose = result.estimate.camera_from_world;
-    const bool surface_alone =
-        uses_features() &&
-        result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
-    problem.prior = motion_prior(result.estimate.information, predicted, surface_alone);
+    surface_alone = uses_features() &&
+                    result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
+    problem.prior = motion_prior(result.estimate.information, predicted, surface_alone && stiff);
     if (round.gate) {
       drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
       drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);
     }
+  };
+  for (const Round& round : rounds) run(round);
+  if (stiff && surface_alone && problem.prior && refutes_motion(problem, result.estimate, predicted, pose)) {
+    stiff = false;
+    for (std::size_t i = 2; i < std::size(rounds); ++i) run(rounds[i]);
   }
+  result.motion_refuted = surface_alone && !stiff;
   result.camera_from_world = pose;
   judge(std::move(problem), result);
   return result;
-}
-
-/// Every direction must be held by families that can be trusted: a handful of chance matches would otherwise
-/// hold what a wall leaves free.
-void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
-  const optimize::PoseSummary& estimate = result.estimate;
-  result.surface_share = result.surface_in_view > 0
-                             ? static_cast<double>(estimate.planes.inliers) / result.surface_in_view
-                             : 0.0;
-  const bool by_features = estimate.points.inliers + 2 * estimate.lines.inliers >= options_.min_inliers;
-  const bool by_surface = estimate.planes.inliers >= options_.min_surface && result.surface_share > 0.5;
-  geometry::Matrix6d information = estimate.information;
-  if (by_features != by_surface) {
-    if (by_features) problem.planes.clear();
-    if (by_surface) problem.points.clear();
-    if (by_surface) problem.lines.clear();
-    optimize::PoseSolverOptions look = options_.solver;
-    look.max_iterations = 0;
-    information = optimize::solve_pose(problem, result.camera_from_world, look).information;
-  }
-  const Directions directions = weigh_directions(information);
-  result.min_eigenvalue = directions.eigenvalues(0);
-  result.weak_directions = static_cast<int>(
-      (directions.eigenvalues.array() < weak_below(information, uses_features() && !by_features)).count());
-  // Far corners or one wall leave a direction to the motion model. It may hold that for a while, when what is
-  // seen is no chance find.
-  const bool many = estimate.points.inliers + 2 * estimate.lines.inliers >= 3 * options_.min_inliers &&
-                    result.min_eigenvalue >= kBlind;
-  const bool all_surface = by_surface && result.surface_share > kAllTheSurface;
-  result.held_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
-  const bool coasts = last_.valid && lost_frames_ == 0 && coasting_s_ < kLongestCoast_s &&
-                      ((by_features && many) || all_surface);
-  const bool held = result.held_by_motion ? coasts : by_features || by_surface;
-  result.state =
-      held && result.camera_from_world.translation.allFinite() ? TrackState::kTracked : TrackState::kLost;
-}
-
-/// Places can look alike: what only the small picture suggested must be confirmed by every family that is in
-/// use and has something to say there.
-bool Tracker::beyond_doubt(const TrackResult& result) const {
-  constexpr double kMostOfTheSurface = 0.75;
-  constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
-  if (result.weak_directions > 0) return false;
-  if (options_.depth &&
-      (result.estimate.planes.inliers < options_.min_surface || result.surface_share < kMostOfTheSurface)) {
-    return false;
-  }
-  if (!options_.points && !options_.lines) return true;
-  const auto found = static_cast<double>(result.points.size() + 2 * result.lines.size());
-  const auto expected = static_cast<double>(result.visible_points.size() + 2 * result.visible_lines.size());
-  return found >= options_.min_inliers && found >= kMostOfTheFeatures * expected;
 }
 
 std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
@@ -361,6 +313,7 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
     velocity_.setZero();
   }
   coasting_s_ = result.held_by_motion && last_.valid ? coasting_s_ + dt : 0.0;
+  motion_refuted_ = result.motion_refuted;
   lost_frames_ = 0;
   last_.stamp = frame.stamp;
   last_.camera_from_world = result.camera_from_world;

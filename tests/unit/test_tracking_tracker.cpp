@@ -198,5 +198,36 @@ TEST_F(TwoPlaces, ALookAlikeIsAlignedFromAShortWayOff) {
   EXPECT_LT(tests::angle(pose, moved * away_), 0.015);
 }
 
+/// A camera that stands before a bare wall but is thought to fall by 0.15 m/s: where it is thought to be
+/// after 20 frames, metres. `others`: what else is in view.
+double fallen(const std::vector<tests::WorldPlane>& others) {
+  std::vector<tests::WorldPlane> planes{{{0.2, 0.0, 0.8}, {0.0, 0.0, -1.0}, 0.55}};
+  planes.insert(planes.end(), others.begin(), others.end());
+  Look seen;
+  seen.frame.depth = tests::render_depth(planes, {});
+  seen.frame.gray = cv::Mat(480, 640, CV_8UC1, cv::Scalar(150));
+  maps::Map map;
+  const core::KeyframeId id = add_keyframe(map, seen, {});
+  Tracker tracker({}, kTestCamera);
+  geometry::Vector6d velocity = geometry::Vector6d::Zero();
+  velocity(1) = -0.15;
+  tracker.restore(map, id, {}, velocity);
+  double y = 0.0;
+  for (int i = 1; i <= 20; ++i) {
+    seen.frame.stamp = seen.frame.depth_stamp = i / 30.0;
+    const TrackResult result =
+        tracker.track(map, seen.frame, std::make_shared<features::FrameFeatures>(seen.features));
+    EXPECT_EQ(result.state, TrackState::kTracked) << i;
+    y = result.camera_from_world.inverse().translation.y();
+  }
+  return y;
+}
+
+TEST(BareWall, TheMotionModelIsBelievedUntilSomethingSpeaksAgainstIt) {
+  EXPECT_NEAR(fallen({}), 0.1, 0.02);  // nothing can tell
+  // A sloping roof, far and small: its normals weigh nothing beside those of the wall, but it is right.
+  EXPECT_NEAR(fallen({{{-2.2, 0.3, 4.2}, {0.0, -0.8, -0.6}, 0.7}}), 0.0, 0.01);
+}
+
 }  // namespace
 }  // namespace plumbline::tracking

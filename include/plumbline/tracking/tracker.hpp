@@ -59,6 +59,7 @@ struct TrackResult {
   double min_eigenvalue = 0.0;
   int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
   bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
+  bool motion_refuted = false;  ///< surfaces are all but alone, and have spoken against the motion model
   bool relocalised = false;
   /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
   /// what was matched, and what a keyframe should keep.
@@ -144,6 +145,8 @@ class Tracker {
                                        const Eigen::Vector3d& turn_rate) const;
   void settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
                       TrackResult& found) const;
+  [[nodiscard]] bool refutes_motion(optimize::PoseProblem problem, const optimize::PoseSummary& held,
+                                    const geometry::Rigid3& predicted, geometry::Rigid3& pose) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;
   void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                 const TrackResult& result);
@@ -156,7 +159,8 @@ class Tracker {
   Last last_;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
   int lost_frames_ = 0;
-  double coasting_s_ = 0.0;  ///< how long the motion model has held what nothing else does
+  double coasting_s_ = 0.0;      ///< how long the motion model has held what nothing else does
+  bool motion_refuted_ = false;  ///< by what is seen, since surfaces have been all but alone
 };
 
 }  // namespace plumbline::tracking
