@@ -194,7 +194,8 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     stiff = false;
     for (std::size_t i = 2; i < std::size(rounds); ++i) run(rounds[i]);
   }
-  result.motion_refuted = surface_alone && !stiff;
+  result.motion_refuted =
+      surface_alone && !stiff && !motion_prior(result.estimate.information, predicted, false);
   result.camera_from_world = pose;
   judge(std::move(problem), result);
   return result;

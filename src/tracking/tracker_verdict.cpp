@@ -15,12 +15,15 @@ constexpr double kLongestCoast_s = 2.5;
 }  // namespace
 
 /// Whether what is seen speaks against the motion model where that holds what surfaces seem not to: after a
-/// second along a bare wall it may be wrong by centimetres when the edge of a door comes into view. `pose`
-/// becomes the one that is seen.
+/// second along a bare wall it may be wrong by centimetres when the edge of a door comes into view. Only what
+/// holds every direction by itself can: before the wall alone, chance speaks for anything. `pose` becomes the
+/// one that is seen.
 bool Tracker::refutes_motion(optimize::PoseProblem problem, const optimize::PoseSummary& held,
                              const Rigid3& predicted, Rigid3& pose) const {
-  constexpr double kGain = 4.0;  // of the cost: 0.1 along bare walls, and above 8 where the model was wrong
+  constexpr double kGain =
+      4.0;  // of the cost: 1 at most where the model was right, soon above 8 where it was not
   problem.prior = motion_prior(held.information, predicted, false);
+  if (problem.prior) return false;
   optimize::PoseSolverOptions solver = options_.solver;
   solver.max_iterations = 8;
   const optimize::PoseSummary freed = optimize::solve_pose(problem, pose, solver);

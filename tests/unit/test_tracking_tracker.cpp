@@ -225,8 +225,11 @@ double fallen(const std::vector<tests::WorldPlane>& others) {
 
 TEST(BareWall, TheMotionModelIsBelievedUntilSomethingSpeaksAgainstIt) {
   EXPECT_NEAR(fallen({}), 0.1, 0.02);  // nothing can tell
-  // A sloping roof, far and small: its normals weigh nothing beside those of the wall, but it is right.
-  EXPECT_NEAR(fallen({{{-2.2, 0.3, 4.2}, {0.0, -0.8, -0.6}, 0.7}}), 0.0, 0.01);
+  // Two sloping surfaces, far and small: their normals weigh nothing beside those of the wall, but they are
+  // right.
+  EXPECT_NEAR(
+      fallen({{{-2.2, -0.9, 4.2}, {0.0, -0.8, -0.6}, 0.8}, {{-2.2, 0.9, 4.2}, {0.8, 0.0, -0.6}, 0.8}}), 0.0,
+      0.01);
 }
 
 }  // namespace
