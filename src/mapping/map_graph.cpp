@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "plumbline/geometry/adjoint.hpp"
 #include "plumbline/mapping/global_adjustment.hpp"
 
 namespace plumbline::mapping {
@@ -58,14 +59,6 @@ class EdgeCollector {
   std::map<std::pair<KeyframeId, KeyframeId>, PoseEdge> edges_;
 };
 
-Matrix6d adjoint(const Rigid3& t) {
-  Matrix6d result = Matrix6d::Zero();
-  result.topLeftCorner<3, 3>() = t.rotation;
-  result.bottomRightCorner<3, 3>() = t.rotation;
-  result.topRightCorner<3, 3>() = geometry::skew(t.translation) * t.rotation;
-  return result;
-}
-
 /// Errors of one keyframe after another along the way from `a` to `b`, were they independent: covariance of
 /// b_from_a. `steps` counts them.
 Matrix6d covariance_of_way(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
@@ -76,7 +69,7 @@ Matrix6d covariance_of_way(const maps::Map& map, const std::vector<KeyframeId>& 
   const Rigid3& b_from_world = map.camera_from_world(b);
   for (auto id = std::upper_bound(ids.begin(), ids.end(), a); id != ids.end() && !(b < *id); ++id) {
     if (id->robot != a.robot) continue;
-    const Matrix6d carry = adjoint(b_from_world * map.camera_from_world(*id).inverse());
+    const Matrix6d carry = geometry::adjoint(b_from_world * map.camera_from_world(*id).inverse());
     sum += carry * step * carry.transpose();
     ++steps;
   }
@@ -104,7 +97,7 @@ Discrepancy discrepancy(const maps::Map& map, const std::vector<KeyframeId>& ids
   d.own = (e.information + 1e-6 * Matrix6d::Identity()).inverse();
   if (e.b < e.a) {
     error = b_from_a.inverse() * e.b_from_a;
-    const Matrix6d carry = adjoint(b_from_a.inverse());
+    const Matrix6d carry = geometry::adjoint(b_from_a.inverse());
     d.own = carry * d.own * carry.transpose();
   }
   d.error = geometry::log_se3(error);

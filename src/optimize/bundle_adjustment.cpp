@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "bundle_solver.hpp"
+#include "bundle_terms.hpp"
 #include "plumbline/optimize/pose_terms.hpp"
 
 namespace plumbline::optimize {
@@ -41,11 +42,7 @@ class Gate {
   }
 
   void mark(BundlePointObservation& o) const {
-    PointTerm term;
-    term.pixel = o.pixel;
-    term.pixel_sigma = o.pixel_sigma;
-    term.depth = o.depth;
-    term.depth_sigma = o.depth_sigma;
+    PointTerm term = to_term(o);
     term.world = state_.points[static_cast<std::size_t>(o.point)];
     Eigen::Vector3d r;
     const int rows =

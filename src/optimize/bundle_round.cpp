@@ -4,15 +4,6 @@
 namespace plumbline::optimize {
 namespace {
 
-PointTerm to_term(const BundlePointObservation& o) {
-  PointTerm term;
-  term.pixel = o.pixel;
-  term.pixel_sigma = o.pixel_sigma;
-  term.depth = o.depth;
-  term.depth_sigma = o.depth_sigma;
-  return term;
-}
-
 /// How many inliers see each landmark. What one pose alone sees without depth would leave its block singular.
 template <typename Seen>
 std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmark, std::size_t landmarks) {

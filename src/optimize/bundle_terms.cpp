@@ -4,6 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "plumbline/geometry/adjoint.hpp"
+
 namespace plumbline::optimize {
 namespace {
 
@@ -45,15 +47,16 @@ Eigen::Matrix<double, 6, 4> unit_direction_jacobian(const geometry::OrthonormalL
   return j;
 }
 
-Matrix6d adjoint(const Rigid3& t) {
-  Matrix6d a = Matrix6d::Zero();
-  a.topLeftCorner<3, 3>() = t.rotation;
-  a.bottomRightCorner<3, 3>() = t.rotation;
-  a.topRightCorner<3, 3>() = geometry::skew(t.translation) * t.rotation;
-  return a;
-}
-
 }  // namespace
+
+PointTerm to_term(const BundlePointObservation& o) {
+  PointTerm term;
+  term.pixel = o.pixel;
+  term.pixel_sigma = o.pixel_sigma;
+  term.depth = o.depth;
+  term.depth_sigma = o.depth_sigma;
+  return term;
+}
 
 LineView::LineView(const BundleLineObservation& seen, const sensor::Pinhole& camera)
     : start(seen.start),
@@ -122,7 +125,7 @@ Vector6d edge_rows(const EdgeView& edge, const Rigid3& a_from_world, const Rigid
     inverse_left.topRightCorner<3, 3>() -= 0.5 * rho;
     inverse_left.bottomRightCorner<3, 3>() -= 0.5 * phi;
     derivatives->by_b.noalias() = edge.root * inverse_left;
-    derivatives->by_a.noalias() = -derivatives->by_b * adjoint(b_from_a);
+    derivatives->by_a.noalias() = -derivatives->by_b * geometry::adjoint(b_from_a);
   }
   return edge.root * e;
 }

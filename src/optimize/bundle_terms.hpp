@@ -9,8 +9,12 @@
 #include "plumbline/geometry/plucker.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
+#include "plumbline/optimize/pose_terms.hpp"
 
 namespace plumbline::optimize {
+
+/// What was seen of a point; where it lies in the world is not filled in.
+PointTerm to_term(const BundlePointObservation& o);
 
 /// What a line's observation needs of its camera.
 struct LineView {
