@@ -2,6 +2,8 @@
 # One place for flags. No global -march (Debian's PCL is built for plain x86-64) and never -ffast-math.
 set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off>)
+# Only the libraries that are used: a program that loads fewer starts sooner.
+add_link_options(LINKER:--as-needed)
 
 # -Wmaybe-uninitialized: g++ 12 with -O3 reports it inside Eigen where nothing is uninitialised.
 add_library(plumbline_warnings INTERFACE)

@@ -25,6 +25,25 @@ function(plumbline_module name)
   install(TARGETS plumbline_${name} EXPORT plumbline ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endfunction()
 
+# plumbline_part(NAME MODULE module SOURCES source... [LINK library...] [PCH header...])
+# A shared object that is loaded by the first who needs it (core/part.hpp). It has all its code in itself: what
+# sources a part shares with its module are compiled into both.
+function(plumbline_part name)
+  cmake_parse_arguments(ARG "" "MODULE" "SOURCES;LINK;PCH" ${ARGN})
+  set(target plumbline_part_${name})
+  add_library(${target} MODULE ${ARG_SOURCES})
+  set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME plumbline_${name} CXX_VISIBILITY_PRESET hidden
+                        VISIBILITY_INLINES_HIDDEN ON SKIP_BUILD_RPATH ON
+                        LIBRARY_OUTPUT_DIRECTORY ${PLUMBLINE_PARTS})
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include ${CMAKE_CURRENT_SOURCE_DIR})
+  target_link_libraries(${target} PRIVATE ${ARG_LINK} plumbline_warnings)
+  if(ARG_PCH)
+    target_precompile_headers(${target} PRIVATE ${ARG_PCH})
+  endif()
+  add_dependencies(plumbline_${ARG_MODULE} ${target}) # so that whatever links the module has the part at hand
+  install(TARGETS ${target} LIBRARY DESTINATION ${PLUMBLINE_INSTALLED_PARTS})
+endfunction()
+
 # plumbline_test(NAME SOURCES... LINK library... [LABEL label]): a GoogleTest program, each of its tests seen by
 # ctest under the label (default: unit). A test that GTEST_SKIPs, for want of recordings say, is told as skipped.
 function(plumbline_test name)

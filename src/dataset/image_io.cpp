@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 
 #include "image_decoders.hpp"
+#include "image_formats.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -30,12 +30,11 @@ core::Result<Bytes> read_bytes(const std::filesystem::path& file) {
 }  // namespace
 
 Decoded decode_other(const Bytes& file) {
-  try {
-    cv::Mat image = cv::imdecode(file, cv::IMREAD_UNCHANGED);
-    if (!image.empty()) return image;
-  } catch (const cv::Exception&) {  // the same as an empty image
-  }
-  return tl::unexpected<std::string>("no known image format");
+  const auto& formats = core::part<ImageFormats>();
+  if (!formats) return tl::unexpected<std::string>(formats.error().message);
+  cv::Mat image = (*formats)->decode(file);
+  if (image.empty()) return tl::unexpected<std::string>("no known image format");
+  return image;
 }
 
 core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
@@ -48,6 +47,14 @@ core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
                                     : decode_other(*bytes);
   if (image) return std::move(*image);
   return core::input_error(fmt::format("{}: truncated or damaged: {}", file.string(), image.error()));
+}
+
+core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int level) {
+  const auto& formats = core::part<ImageFormats>();
+  if (!formats) return tl::unexpected<core::Error>(formats.error());
+  Bytes bytes = (*formats)->encode_png(image, level);
+  if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the picture cannot be encoded as PNG");
+  return bytes;
 }
 
 }  // namespace plumbline::dataset

@@ -5,12 +5,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core/mat.hpp>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/dataset/image_io.hpp"
 #include "plumbline/tracking/overlay.hpp"
 
 namespace plumbline::pipeline {
@@ -84,10 +85,11 @@ core::Result<void> write_debug_picture(const fs::path& folder, std::size_t numbe
   // A keyframe has moved with the landmarks when the map was adjusted to it.
   if (report.keyframe.valid()) track.camera_from_world = slam.map().camera_from_world(report.keyframe);
   const cv::Mat picture = tracking::draw_overlay(shown, features, track, slam.map(), camera);
-  std::vector<unsigned char> png;
-  cv::imencode(".png", picture, png, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  constexpr int kQuick = 1;
+  const auto png = dataset::encode_png(picture, kQuick);
+  if (!png) return tl::unexpected<core::Error>(png.error());
   core::OutputFile file(folder / picture_name(number));
-  file.write(png.data(), png.size());
+  file.write(png->data(), png->size());
   return file.commit();
 }
 

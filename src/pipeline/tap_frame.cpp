@@ -4,10 +4,11 @@
 
 #include <cmath>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core/mat.hpp>
 
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/image_io.hpp"
 #include "stages.hpp"
 #include "tap_file.hpp"
 
@@ -15,13 +16,11 @@ namespace plumbline::pipeline {
 namespace {
 
 core::Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) {
-  std::vector<unsigned char> bytes;
   constexpr int kQuick = 1;
-  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, kQuick})) {
-    return core::failure(core::ErrorKind::kInternal, file.string() + ": the picture cannot be encoded");
-  }
+  const auto bytes = dataset::encode_png(image, kQuick);
+  if (!bytes) return core::failure(bytes.error().kind, file.string() + ": " + bytes.error().message);
   core::OutputFile out(file);
-  out.write(bytes.data(), bytes.size());
+  out.write(bytes->data(), bytes->size());
   return out.commit();
 }
 

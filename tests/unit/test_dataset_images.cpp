@@ -5,6 +5,7 @@
 #include <iterator>
 #include <vector>
 
+#include "plumbline/core/part.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "test_dataset_world.hpp"
 
@@ -85,6 +86,27 @@ TEST_F(Images, JpegAgreesWithOpenCv) {
 TEST_F(Images, OtherFormatsGoToOpenCv) {
   write_image("color.bmp", picture(CV_8UC3, {64, 48}));
   expect_same_as_opencv("color.bmp");
+}
+
+TEST(EncodePng, GivesOpenCvsBytes) {
+  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1}) {
+    for (const int level : {1, 9}) {
+      const cv::Mat image = picture(type, {64, 48});
+      std::vector<std::uint8_t> expected;
+      ASSERT_TRUE(cv::imencode(".png", image, expected, {cv::IMWRITE_PNG_COMPRESSION, level}));
+      const auto bytes = encode_png(image, level);
+      ASSERT_TRUE(bytes) << bytes.error().message;
+      EXPECT_EQ(*bytes, expected) << type << " at " << level;
+    }
+  }
+  EXPECT_FALSE(encode_png(cv::Mat(), 1));
+}
+
+TEST(ImageFormats, PartOfAnotherProgramIsRefused) {
+  const auto loaded = core::load_part("images", 1);
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("plumbline_images.so"), std::string::npos) << loaded.error().message;
+  EXPECT_NE(loaded.error().message.find("not built together"), std::string::npos) << loaded.error().message;
 }
 
 TEST_F(Images, TruncationAnywhereIsAnError) {

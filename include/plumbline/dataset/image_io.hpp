@@ -2,8 +2,10 @@
 #pragma once
 
 // Images of recordings: quick, strict and quiet decoding.
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <vector>
 
 #include "plumbline/core/error.hpp"
 
@@ -13,5 +15,9 @@ namespace plumbline::dataset {
 /// by strict decoders, other formats by OpenCV. A file that ends early or whose checksums are wrong is an
 /// error ("truncated or damaged") and never a half-filled image. Thread-safe.
 core::Result<cv::Mat> read_image(const std::filesystem::path& file);
+
+/// CV_8U with 1, 3 (BGR) or 4 channels, or CV_16U with one, as the bytes of a PNG file. `level`: 0 (large and
+/// quick) to 9 (small). Thread-safe.
+core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int level);
 
 }  // namespace plumbline::dataset

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/core/part.hpp"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <link.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace plumbline::core {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Where the dynamic linker looks for the libraries of the program: its RUNPATH, then the system's folders.
+/// dlopen would look there itself, but not when a sanitizer stands between. Never the current folder.
+std::vector<fs::path> library_folders() {
+  void* program = dlopen(nullptr, RTLD_LAZY);
+  Dl_serinfo head{};
+  if (program == nullptr || dlinfo(program, RTLD_DI_SERINFOSIZE, &head) != 0) return {};
+  std::vector<std::max_align_t> room(head.dls_size / sizeof(std::max_align_t) + 1);
+  auto* info = reinterpret_cast<Dl_serinfo*>(room.data());
+  *info = head;
+  if (dlinfo(program, RTLD_DI_SERINFO, info) != 0) return {};
+  std::vector<fs::path> folders;
+  const Dl_serpath* paths = info->dls_serpath;
+  for (unsigned i = 0; i < info->dls_cnt; ++i) {
+    if (fs::path folder(paths[i].dls_name); folder.is_absolute()) folders.push_back(std::move(folder));
+  }
+  return folders;
+}
+
+}  // namespace
+
+Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
+  const std::string file = fmt::format("plumbline_{}.so", name);
+  const std::vector<fs::path> folders = library_folders();
+  std::error_code ec;
+  const auto folder = std::find_if(folders.begin(), folders.end(),
+                                   [&](const fs::path& f) { return fs::exists(f / file, ec); });
+  if (folder == folders.end()) {
+    return failure(
+        ErrorKind::kInternal,
+        fmt::format("{}: this part of Plumbline is missing; install it anew, it belongs into {}", file,
+                    folders.empty() ? "lib/plumbline" : folders.front().lexically_normal().string()));
+  }
+  const std::string path = (*folder / file).lexically_normal().string();
+  const auto unfit = [&path](const std::string& why) {
+    return failure(ErrorKind::kInternal,
+                   fmt::format("{}: this part of Plumbline {}; install Plumbline anew", path, why));
+  };
+  void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
+  if (handle == nullptr) {
+    const char* why = dlerror();
+    return unfit(fmt::format("cannot be loaded ({})", why == nullptr ? "unknown reason" : why));
+  }
+  using Entry = PartEntry (*)();
+  const auto entry = reinterpret_cast<Entry>(dlsym(handle, "plumbline_part"));
+  if (entry == nullptr) return unfit("has no functions");
+  const PartEntry found = entry();
+  if (found.layout != layout) return unfit("was not built together with this program");
+  return found.functions;
+}
+
+}  // namespace plumbline::core

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// OpenCV's image formats, a part of its own (core/part.hpp): read_image decodes what recordings are made of
+// without it.
+#include "image_decoders.hpp"
+#include "plumbline/core/part.hpp"
+
+namespace plumbline::dataset {
+
+struct ImageFormats {
+  static constexpr const char* kPart = "images";
+  static constexpr std::uint64_t layout() { return core::layout_of<ImageFormats, Bytes, cv::Mat>(); }
+
+  /// As stored; empty when it cannot be.
+  cv::Mat (*decode)(const Bytes& file);
+  /// Empty when it cannot be.
+  Bytes (*encode_png)(const cv::Mat& image, int level);
+};
+
+}  // namespace plumbline::dataset
