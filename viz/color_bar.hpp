@@ -1,24 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Ticks at round numbers, and the colour bar that snapshots and charts share.
+// The colour bar that snapshots and charts share.
 #include <Eigen/Core>
 #include <string>
-#include <vector>
 
 #include "painter.hpp"
+#include "ticks.hpp"
 
 namespace plumbline::viz {
-
-/// The greatest of 1, 2, 5 x 10^n that is at most `limit` (> 0).
-double nice_number_below(double limit);
-
-struct Ticks {
-  std::vector<double> values;
-  std::vector<std::string> labels;  ///< with as many decimals as the step needs
-};
-/// Ticks in [low, high] at multiples of 1, 2 or 5 x 10^n, about `wish` apart.
-Ticks nice_ticks(double low, double high, double wish);
 
 /// What a colour bar explains.
 struct ColorScale {

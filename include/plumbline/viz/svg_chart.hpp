@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Charts as part of an HTML page: SVG text that the page's style sheet colours, for light and dark ground and
+// for paper; words stay words that can be read aloud, searched and copied. Charts as files of their own:
+// figure.hpp.
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plumbline/viz/figure.hpp"
+
+namespace plumbline::viz {
+
+/// Points joined in order; a non-finite x or y breaks the line. `kind` names how it is drawn, one of those of
+/// svg_chart_style(): "k0" ... "k7" (category_color), "truth", "lost", "loop", "plain".
+struct SvgLine {
+  std::string label;  ///< in the legend; empty = not listed
+  std::string kind = "k0";
+  std::vector<double> x, y;
+};
+
+struct SvgDots {
+  std::string label;
+  std::string kind = "k0";
+  std::vector<double> x, y;
+  double radius_px = 2.5;
+  bool ring = false;  ///< open in the middle
+};
+
+/// Marks a stretch of x over the whole height: "lost", "unreadable", "tracked".
+struct SvgBand {
+  std::string kind;
+  double from = 0.0;
+  double to = 0.0;
+};
+
+/// A picture under everything, laid over these ranges of x and y.
+struct SvgBackground {
+  std::string data_uri;
+  AxisRange x, y;
+};
+
+struct SvgChart {
+  std::string title;             ///< told to those who cannot see the chart
+  std::string x_label, y_label;  ///< with units: "time (s)"
+  int width_px = 1000;           ///< of the drawing, which the page may scale
+  int height_px = 170;           ///< equal_aspect: found from the data
+  bool equal_aspect = false;     ///< one unit of x is as long as one unit of y
+  bool y_ticks = true;
+  std::optional<AxisRange> x_range, y_range;  ///< none = from the data
+  std::optional<SvgBackground> background;
+  std::vector<SvgBand> bands;
+  std::vector<SvgLine> lines;
+  std::vector<SvgDots> dots;
+};
+
+/// <figure> with legend and SVG, of ASCII and escaped labels. Long curves are thinned to what can be seen,
+/// peaks are kept. Needs no identifiers, so any number of charts fit on a page.
+std::string svg_chart(const SvgChart& chart);
+
+/// CSS rules of all charts of a page.
+std::string svg_chart_style();
+
+/// Text as it may stand in HTML and XML, in attributes too: markup escaped, what is not UTF-8 or a control
+/// character replaced by U+FFFD.
+std::string markup_text(std::string_view text);
+
+}  // namespace plumbline::viz
