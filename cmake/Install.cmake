@@ -11,8 +11,6 @@ set_target_properties(plumbline_offscreen PROPERTIES EXPORT_NAME offscreen)
 install(TARGETS plumbline_pcl plumbline_offscreen EXPORT plumbline)
 install(EXPORT plumbline NAMESPACE plumbline:: DESTINATION ${package_folder} FILE plumblineTargets.cmake)
 
-get_directory_property(PLUMBLINE_VTK_COMPONENTS DIRECTORY viz DEFINITION PLUMBLINE_VTK_COMPONENTS)
-string(REPLACE ";" " " PLUMBLINE_VTK_COMPONENTS "${PLUMBLINE_VTK_COMPONENTS}")
 configure_package_config_file(cmake/plumblineConfig.cmake.in ${PROJECT_BINARY_DIR}/plumblineConfig.cmake
                               INSTALL_DESTINATION ${package_folder} NO_SET_AND_CHECK_MACRO)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/plumblineConfigVersion.cmake COMPATIBILITY SameMinorVersion)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# plumbline_module(NAME [DEPENDS module...] [LINK library...] [PCH header...])
-# One folder = one static library = one layer. Sources are all *.cpp of the folder.
+# plumbline_module(NAME [DEPENDS module...] [LINK library...] [PRIVATE_LINK library...] [EXCEPT source...] [PCH header...])
+# One folder = one static library = one layer. Sources are all *.cpp of the folder, except those of a part.
 function(plumbline_module name)
-  cmake_parse_arguments(ARG "" "" "DEPENDS;LINK;PRIVATE_LINK;PCH" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "DEPENDS;LINK;PRIVATE_LINK;EXCEPT;PCH" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  list(TRANSFORM ARG_EXCEPT PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  list(REMOVE_ITEM sources ${ARG_EXCEPT})
   list(TRANSFORM ARG_DEPENDS PREPEND plumbline::)
   if(sources)
     add_library(plumbline_${name} STATIC ${sources})

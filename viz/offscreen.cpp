@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // VTK off-screen with Debian's packages: Debian builds VTK for X11 and its GLEW for GLX, so VTK's generic
-// window gets an OSMesa (software) context, and GLEW's four calls to GLX end here instead of in libGL.
-// For that, programs must export the four functions below (the target plumbline::viz asks the linker to)
-// and OSMesa must come before VTK in the link order, so that the gl* functions are OSMesa's.
+// window gets an OSMesa (software) context, and GLEW's four calls to GLX end in drawing.cpp instead of in
+// libGL. OSMesa must come before VTK in the link order, so that the gl* functions are OSMesa's.
 #include "offscreen.hpp"
 
 #include <GL/osmesa.h>
@@ -12,41 +11,10 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
-#include <cstring>
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2)
 VTK_MODULE_INIT(vtkRenderingContextOpenGL2)
 VTK_MODULE_INIT(vtkRenderingFreeType)
-
-extern "C" {
-
-using GlFunction = void (*)();
-
-__attribute__((visibility("default"))) void* glXGetCurrentDisplay() {
-  static char any;  // GLEW only asks whether there is one
-  return &any;
-}
-
-__attribute__((visibility("default"))) int glXQueryVersion(void* /*display*/, int* major, int* minor) {
-  if (major != nullptr) *major = 1;
-  if (minor != nullptr) *minor = 4;
-  return 1;
-}
-
-__attribute__((visibility("default"))) const char* glXGetClientString(void* /*display*/, int /*name*/) {
-  return "";
-}
-
-__attribute__((visibility("default"))) GlFunction glXGetProcAddressARB(const unsigned char* name) {
-  const char* text = reinterpret_cast<const char*>(name);
-  if (std::strcmp(text, "glXGetCurrentDisplay") == 0) {
-    return reinterpret_cast<GlFunction>(&glXGetCurrentDisplay);
-  }
-  if (std::strncmp(text, "glX", 3) == 0) return nullptr;
-  return reinterpret_cast<GlFunction>(OSMesaGetProcAddress(text));
-}
-
-}  // extern "C"
 
 namespace plumbline::viz {
 

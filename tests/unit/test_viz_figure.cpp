@@ -8,7 +8,8 @@
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
-#include "../../viz/series.hpp"
+#include "../../viz/clip_segment.hpp"
+#include "../../viz/figure_layout.hpp"
 #include "plumbline/viz/figure.hpp"
 #include "plumbline/viz/trajectory_plots.hpp"
 
