@@ -111,6 +111,7 @@ int run(int argc, char** argv) {
   add_info(app, session);
   add_render(app, session);
   add_export(app, session);
+  add_report(app, session);
   add_evaluate(app, session);
   add_synth(app, session);
   add_filter(app, session);

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline report OUT
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app.hpp"
+#include "plumbline/pipeline/report.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+int report(Session& session, const pipeline::ReportRequest& request) {
+  const auto done = pipeline::write_report(request);
+  if (!done) return session.fail(done.error());
+  for (const std::string& line : done->missing) session.console().warning(line);
+  if (!session.quiet) {
+    fmt::print("written    {} ({:.1f} MB)\n", done->file.string(), static_cast<double>(done->bytes) / 1e6);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<pipeline::ReportRequest>();
+  CLI::App* command = add_command(app, session, "report", "Tell a result as one HTML page: OUT/report.html",
+                                  [&session, request] { return report(session, *request); });
+  command->add_option("OUT", request->result, "Result folder of plumbline map or fuse")->required();
+  command->add_option("-o,--output", request->output, "File to write (default: OUT/report.html)")
+      ->type_name("FILE.html");
+  command
+      ->add_option(
+          "--truth", request->truth,
+          "Compare the paths with the truth: a recording with groundtruth.txt, a folder with one for each "
+          "robot, or a file in TUM format")
+      ->type_name("FOLDER|FILE");
+  command->add_flag("--force", request->replace, "Replace an earlier report");
+}
+
+}  // namespace plumbline::cli
