@@ -189,7 +189,7 @@ std::string files_html(const ReportData& data, const fs::path& left_out) {
   for (fs::recursive_directory_iterator it(data.folder, ec), end; !ec && it != end; it.increment(ec)) {
     std::error_code problem;
     const std::string name = it->path().lexically_relative(data.folder).generic_string();
-    const bool hidden = it->path().filename().string().front() == '.';
+    const bool hidden = it->path().filename().string().front() == '.' || name == "report.html";
     if (hidden || !it->is_regular_file(problem) || fs::equivalent(it->path(), left_out, problem)) continue;
     files.emplace_back(name, static_cast<double>(it->file_size(problem)));
     all += files.back().second;

@@ -26,7 +26,7 @@ class Tools : public ProgramTest {
 
 TEST_F(Tools, HelpAndVersionEverywhere) {
   for (const char* command :
-       {"", "map", "info", "render", "export", "evaluate", "evaluate trajectory", "evaluate cloud", "synth",
+       {"", "map", "info", "render", "report", "export", "evaluate", "evaluate trajectory", "evaluate cloud", "synth",
         "filter", "filters", "filters list", "filters describe", "filters check", "pipelines",
         "pipelines list", "pipelines check"}) {
     const Outcome help = run(std::string(command) + " --help");
