@@ -1,22 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
-#include <pcl/filters/conditional_removal.h>
 #include <pcl/point_types_conversion.h>
 
 #include "filter_tools.hpp"
+#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
-
-/// Points that meet all comparisons (or not all, when `inside` is off), by PCL's ConditionalRemoval.
-CloudPtr select_where(const CloudConstPtr& input,
-                      const std::vector<pcl::ComparisonBase<Point>::ConstPtr>& comparisons, bool inside) {
-  auto all = std::make_shared<pcl::ConditionAnd<Point>>();
-  for (const auto& comparison : comparisons) all->addComparison(comparison);
-  // Not ConditionalRemoval's own run: it has no negative, and it moves an organised cloud's rejected points
-  // only.
-  return select(*input, [&](std::size_t, const Point& p) { return all->evaluate(p) == inside; });
-}
 
 class ColorFilter : public Filter {
  public:
@@ -36,12 +26,10 @@ class ColorFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     if (is_byte()) {
-      using Compare = pcl::PackedRGBComparison<Point>;
-      const std::string letter = channel_.substr(0, 1);
-      return select_where(input,
-                          {std::make_shared<Compare>(letter, pcl::ComparisonOps::GE, min_),
-                           std::make_shared<Compare>(letter, pcl::ComparisonOps::LE, max_)},
-                          inside_);
+      const auto& pcl = pcl_functions();
+      if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+      const std::vector<bool> within = (*pcl)->packed_rgb_within(*input, channel_.substr(0, 1), min_, max_);
+      return select(*input, [&](std::size_t i, const Point&) { return within[i] == inside_; });
     }
     // PCL's PackedHSIComparison keeps the last colour in static variables; its conversion to HSV does not.
     const auto min = static_cast<float>(min_);
@@ -75,14 +63,13 @@ class CurvatureFilter : public Filter {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    using Compare = pcl::FieldComparison<Point>;
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
     // PCL takes NaN for equal to anything.
     const CloudConstPtr known =
         select(*input, [](std::size_t, const Point& p) { return std::isfinite(p.curvature); });
-    return select_where(known,
-                        {std::make_shared<Compare>("curvature", pcl::ComparisonOps::GE, min_),
-                         std::make_shared<Compare>("curvature", pcl::ComparisonOps::LE, max_)},
-                        true);
+    const std::vector<bool> within = (*pcl)->field_within(*known, "curvature", min_, max_);
+    return select(*known, [&](std::size_t i, const Point&) { return within[i]; });
   }
 
  private:

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <pcl/filters/crop_box.h>
-#include <pcl/filters/passthrough.h>
 
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "filter_tools.hpp"
+#include "pcl_functions.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 
 namespace plumbline::cloud {
@@ -28,14 +27,9 @@ class CropBoxFilter : public Filter {
     return "";
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    pcl::CropBox<Point> crop(true);  // true: PCL prints a line otherwise
-    crop.setMin(corner(min_m_));
-    crop.setMax(corner(max_m_));
-    crop.setNegative(!inside_);
-    crop.setKeepOrganized(organised(*input));
-    crop.setInputCloud(input);
-    auto output = std::make_shared<Cloud>();
-    crop.filter(*output);
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+    const CloudPtr output = (*pcl)->crop_box(input, corner(min_m_), corner(max_m_), !inside_);
     return select(*output, [](std::size_t, const Point&) { return true; });
   }
 
@@ -67,14 +61,10 @@ class PassThroughFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (!column_.empty()) return by_column(*input, context);
-    pcl::PassThrough<Point> pass(true);
-    pass.setFilterFieldName(field_);
-    pass.setFilterLimits(static_cast<float>(min_), static_cast<float>(max_));
-    pass.setNegative(!inside_);
-    pass.setKeepOrganized(organised(*input));
-    pass.setInputCloud(input);
-    auto output = std::make_shared<Cloud>();
-    pass.filter(*output);
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+    const CloudPtr output =
+        (*pcl)->pass_through(input, field_, static_cast<float>(min_), static_cast<float>(max_), !inside_);
     return select(*output, [](std::size_t, const Point&) { return true; });
   }
 

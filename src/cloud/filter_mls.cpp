@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <pcl/search/kdtree.h>
-#include <pcl/surface/mls.h>
-
 #include "filter_tools.hpp"
+#include "pcl_functions.hpp"
 #include "plumbline/cloud/columns.hpp"
 
 namespace plumbline::cloud {
@@ -18,20 +16,14 @@ class MlsFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);
     if (points->size() < 3) return like(*input);
-    pcl::MovingLeastSquares<Point, Point> mls;
-    mls.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());
-    mls.setSearchRadius(radius_m_);
-    mls.setPolynomialOrder(order_);
-    mls.setComputeNormals(true);
-    mls.setCacheMLSResults(false);  // hundreds of bytes a point, only needed to add points
-    mls.setInputCloud(points);
-    auto output = std::make_shared<Cloud>();
-    mls.process(*output);
-    const auto indices = mls.getCorrespondingIndices();
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+    pcl::Indices indices;
+    const CloudPtr output = (*pcl)->moving_least_squares(points, radius_m_, order_, indices);
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
     std::vector<std::size_t> sources;  // of the points that stay
     for (std::size_t i = 0; i < output->size(); ++i) {
-      const auto source = static_cast<std::size_t>(indices->indices[i]);
+      const auto source = static_cast<std::size_t>(indices[i]);
       turn((*output)[i], (*points)[source], viewpoint);
       if (finite((*output)[i])) sources.push_back(source);
     }

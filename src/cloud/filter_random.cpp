@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <pcl/filters/random_sample.h>
-
 #include "filter_tools.hpp"
+#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -15,12 +14,10 @@ class RandomSamplingFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);
     if (points->size() <= static_cast<std::size_t>(count_)) return finite_list(*points);
-    pcl::RandomSample<Point> sample;
-    sample.setSample(static_cast<unsigned>(count_));
-    sample.setSeed(context.seed + static_cast<unsigned>(seed_));
-    sample.setInputCloud(points);
-    auto output = std::make_shared<Cloud>();
-    sample.filter(*output);
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+    CloudPtr output = (*pcl)->random_sample(points, static_cast<unsigned>(count_),
+                                            context.seed + static_cast<unsigned>(seed_));
     make_list(*output);
     return output;
   }

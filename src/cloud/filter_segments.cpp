@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pcl/common/centroid.h>
 #include <pcl/common/colors.h>
-#include <pcl/sample_consensus/ransac.h>
-#include <pcl/sample_consensus/sac_model_plane.h>
-#include <pcl/search/kdtree.h>
-#include <pcl/segmentation/extract_clusters.h>
-#include <pcl/segmentation/sac_segmentation.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "filter_tools.hpp"
+#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -50,8 +46,6 @@ bool spans_a_plane(const Cloud& points, const pcl::Indices& indices) {
   return size[1] > 1e-10 * size[2] && size[1] > 1e-14;
 }
 
-enum class Refine { kNever, kOnce, kSpread };
-
 class PlaneFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
@@ -59,8 +53,9 @@ class PlaneFilter : public Filter {
     table.integer("planes", planes_, {1, 100}, "", "How many planes are looked for, the largest first");
     table.integer("min_points", min_points_, {3, 100000000}, "", "Planes with fewer points are none");
     table.integer("iterations", iterations_, {1, 1000000}, "", "Tries of RANSAC, at most");
-    table.choice<Refine>(
-        "refine", refine_, {{"on", Refine::kOnce}, {"off", Refine::kNever}, {"spread", Refine::kSpread}},
+    table.choice<PlaneFit>(
+        "refine", refine_,
+        {{"on", PlaneFit::kOnce}, {"off", PlaneFit::kNever}, {"spread", PlaneFit::kSpread}},
         "Fit each plane to all of its points, then choose its points again; spread: again and again, "
         "in the end those within twice the standard deviation of its own points");
     table.choice<Mode>("mode", mode_,
@@ -68,12 +63,14 @@ class PlaneFilter : public Filter {
                        "Keep the planes, remove them, or colour each (and grey the rest)");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
     auto rest = std::make_shared<pcl::Indices>(points->size());
     for (std::size_t i = 0; i < rest->size(); ++i) (*rest)[i] = static_cast<pcl::index_t>(i);
     for (int plane = 0; plane < planes_ && spans_a_plane(*points, *rest); ++plane) {
-      const pcl::Indices found = largest_plane(points, rest);
+      const pcl::Indices found = (*pcl)->plane(points, rest, distance_m_, iterations_, refine_);
       if (found.size() < static_cast<std::size_t>(min_points_)) break;
       for (const auto i : found) segments[static_cast<std::size_t>(i)] = plane;
       rest->erase(std::remove_if(rest->begin(), rest->end(),
@@ -84,36 +81,11 @@ class PlaneFilter : public Filter {
   }
 
  private:
-  pcl::Indices largest_plane(const CloudConstPtr& points, const pcl::IndicesPtr& among) const {
-    if (refine_ == Refine::kSpread) {
-      const auto model = std::make_shared<pcl::SampleConsensusModelPlane<Point>>(points, *among);
-      pcl::RandomSampleConsensus<Point> ransac(model, distance_m_);
-      ransac.setMaxIterations(iterations_);
-      pcl::Indices inliers;
-      if (!ransac.computeModel()) return inliers;
-      ransac.refineModel(2.0, 50);
-      ransac.getInliers(inliers);
-      return inliers;
-    }
-    pcl::SACSegmentation<Point> segmentation;  // always the same random numbers
-    segmentation.setModelType(pcl::SACMODEL_PLANE);
-    segmentation.setMethodType(pcl::SAC_RANSAC);
-    segmentation.setDistanceThreshold(distance_m_);
-    segmentation.setMaxIterations(iterations_);
-    segmentation.setOptimizeCoefficients(refine_ == Refine::kOnce);
-    segmentation.setInputCloud(points);
-    segmentation.setIndices(among);
-    pcl::PointIndices inliers;
-    pcl::ModelCoefficients coefficients;
-    segmentation.segment(inliers, coefficients);
-    return inliers.indices;
-  }
-
   double distance_m_ = 0.02;
   int planes_ = 1;
   int min_points_ = 100;
   int iterations_ = 1000;
-  Refine refine_ = Refine::kOnce;
+  PlaneFit refine_ = PlaneFit::kOnce;
   Mode mode_ = Mode::kKeep;
 };
 
@@ -128,9 +100,12 @@ class ClustersFilter : public Filter {
                        "Keep the clusters, remove them, or colour each (and grey the rest)");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    const auto& pcl = pcl_functions();
+    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
-    std::vector<pcl::PointIndices> clusters = find(points);
+    std::vector<pcl::PointIndices> clusters;
+    if (!points->empty()) clusters = (*pcl)->euclidean_clusters(points, distance_m_, min_points_);
     // Largest first; of equals the one that comes first in the cloud.
     std::sort(clusters.begin(), clusters.end(), [](const pcl::PointIndices& a, const pcl::PointIndices& b) {
       if (a.indices.size() != b.indices.size()) return a.indices.size() > b.indices.size();
@@ -144,20 +119,6 @@ class ClustersFilter : public Filter {
   }
 
  private:
-  std::vector<pcl::PointIndices> find(const CloudConstPtr& points) const {
-    std::vector<pcl::PointIndices> clusters;
-    if (points->empty()) return clusters;
-    pcl::EuclideanClusterExtraction<Point> extraction;
-    extraction.setClusterTolerance(distance_m_);
-    extraction.setMinClusterSize(min_points_);
-    auto tree = std::make_shared<pcl::search::KdTree<Point>>(false);
-    tree->setInputCloud(points);
-    extraction.setSearchMethod(tree);
-    extraction.setInputCloud(points);
-    extraction.extract(clusters);
-    return clusters;
-  }
-
   double distance_m_ = 0.05;
   int min_points_ = 100;
   int count_ = 1;

@@ -2,10 +2,10 @@
 #include "plumbline/cloud/mesh.hpp"
 
 #include <fmt/format.h>
+#include <pcl/conversions.h>
 #include <pcl/kdtree/kdtree_flann.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
-#include <pcl/surface/poisson.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "pcl_functions.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
@@ -46,7 +47,8 @@ core::Result<int> depth_for(const Cloud& cloud, double resolution_m) {
                                        resolution_m, side, side / (1 << kDeepest)));
 }
 
-pcl::PolygonMesh poisson(const Cloud& cloud, int depth) {
+/// Positions and normals only.
+std::shared_ptr<pcl::PointCloud<pcl::PointNormal>> without_color(const Cloud& cloud) {
   auto input = std::make_shared<pcl::PointCloud<pcl::PointNormal>>();
   input->reserve(cloud.size());
   for (const Point& p : cloud.points) {
@@ -55,13 +57,7 @@ pcl::PolygonMesh poisson(const Cloud& cloud, int depth) {
     q.getNormalVector3fMap() = p.getNormalVector3fMap();
     input->push_back(q);
   }
-  pcl::Poisson<pcl::PointNormal> reconstruction;
-  reconstruction.setDepth(depth);
-  reconstruction.setThreads(1);  // the same mesh every time
-  reconstruction.setInputCloud(input);
-  pcl::PolygonMesh mesh;
-  reconstruction.reconstruct(mesh);
-  return mesh;
+  return input;
 }
 
 /// x, y and z of a PCL mesh.
@@ -159,7 +155,9 @@ core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options) 
   }
   const auto depth = depth_for(*points, options.resolution_m);
   if (!depth) return tl::unexpected<core::Error>(depth.error());
-  const pcl::PolygonMesh mesh = poisson(*points, *depth);
+  const auto& pcl = pcl_functions();
+  if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+  const pcl::PolygonMesh mesh = (*pcl)->poisson(without_color(*points), *depth);
   return dressed(vertices_of(mesh), mesh, points, options.reach_m);
 }
 

@@ -2,7 +2,6 @@
 // PCD v0.6 and v0.7 (pointclouds.org, "The PCD file format"). The header is checked against the file before
 // memory is taken, which PCL's reader does not do; the decompression is PCL's.
 #include <fmt/format.h>
-#include <pcl/io/lzf.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -10,6 +9,7 @@
 
 #include "byte_reader.hpp"
 #include "cloud_table.hpp"
+#include "pcl_functions.hpp"
 #include "scalar.hpp"
 
 namespace plumbline::cloud {
@@ -213,7 +213,9 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
   if (packed == nullptr)
     return fmt::format("header promises {} compressed bytes; the file is truncated", packed_size);
   std::vector<std::uint8_t> bytes(size);
-  if (size > 0 && pcl::lzfDecompress(packed, packed_size, bytes.data(), size) != size) {
+  const auto& pcl = pcl_functions();
+  if (!pcl) return pcl.error().message;
+  if (size > 0 && (*pcl)->lzf_decompress(packed, packed_size, bytes.data(), size) != size) {
     return "compressed data are damaged";
   }
   for (std::size_t f = 0; f < header.fields.size(); ++f) {

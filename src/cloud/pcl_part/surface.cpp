@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// PCL's smoothing and reconstruction of surfaces.
+#include <pcl/search/kdtree.h>
+#include <pcl/surface/mls.h>
+#include <pcl/surface/poisson.h>
+
+#include "functions.hpp"
+
+namespace plumbline::cloud {
+
+CloudPtr moving_least_squares(const CloudConstPtr& points, double radius, int order, pcl::Indices& indices) {
+  pcl::MovingLeastSquares<Point, Point> mls;
+  mls.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());
+  mls.setSearchRadius(radius);
+  mls.setPolynomialOrder(order);
+  mls.setComputeNormals(true);
+  mls.setCacheMLSResults(false);  // hundreds of bytes a point, only needed to add points
+  mls.setInputCloud(points);
+  auto output = std::make_shared<Cloud>();
+  mls.process(*output);
+  indices = mls.getCorrespondingIndices()->indices;
+  return output;
+}
+
+pcl::PolygonMesh poisson(const pcl::PointCloud<pcl::PointNormal>::ConstPtr& points, int depth) {
+  pcl::Poisson<pcl::PointNormal> reconstruction;
+  reconstruction.setDepth(depth);
+  reconstruction.setThreads(1);  // the same mesh every time
+  reconstruction.setInputCloud(points);
+  pcl::PolygonMesh mesh;
+  reconstruction.reconstruct(mesh);
+  return mesh;
+}
+
+}  // namespace plumbline::cloud
