@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # cmake -D BUILD=... -D WORK=... [-D FLAGS=...] -P run.cmake: installs BUILD below WORK, builds the project beside
-# this file against it and runs it; a pipeline of the installed program is checked, too.
+# this file against it and runs it; the installed program is tried, too.
 function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
@@ -22,4 +22,14 @@ execute_process(COMMAND ${WORK}/prefix/bin/plumbline filters list --plugin ${WOR
 if(NOT list MATCHES "grey +Takes the colour")
   message(FATAL_ERROR "the plugin's filter is not in the list:\n${list}")
 endif()
-file(REMOVE_RECURSE ${WORK}/prefix)
+# The installed program draws wherever the whole is put, and tells when one of its parts is missing.
+file(RENAME ${WORK}/prefix ${WORK}/moved)
+set(draw ${WORK}/moved/bin/plumbline render ${WORK}/out/thin.ply -o ${WORK}/out/moved.png --size 320x240)
+run(${draw})
+file(GLOB_RECURSE part ${WORK}/moved/plumbline_viz.so)
+file(REMOVE ${part})
+execute_process(COMMAND ${draw} RESULT_VARIABLE code ERROR_VARIABLE told)
+if(code EQUAL 0 OR NOT told MATCHES "plumbline_viz.so: this part .* is missing; .*${WORK}/moved/lib")
+  message(FATAL_ERROR "exit code ${code} without the part ${part}:\n${told}")
+endif()
+file(REMOVE_RECURSE ${WORK}/moved)
