@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -144,6 +147,9 @@ struct StoreReader::Impl {
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> blob(const char* sql, std::int64_t robot,
                                                              std::int64_t number,
                                                              const std::string& what) const;
+  /// What stores of `format` and above may keep of a cloud; empty: this one does not.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> extra(int format, const char* sql, std::int64_t robot,
+                                                              std::int64_t number) const;
   [[nodiscard]] core::Result<cloud::CloudPtr> decode(const core::Result<std::vector<std::uint8_t>>& bytes,
                                                      const std::string& what) const;
 };
@@ -165,6 +171,18 @@ core::Result<StoreReader> StoreReader::open(const std::filesystem::path& file) {
 }
 
 const StoreHeader& StoreReader::header() const { return impl_->header; }
+
+/// In parts: of more at a time only the beginning is read.
+void StoreReader::read_ahead() const {
+#ifdef POSIX_FADV_WILLNEED
+  constexpr off_t kPart = 4 << 20;
+  const int file = ::open(impl_->file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return;  // who reads will tell
+  const off_t size = ::lseek(file, 0, SEEK_END);
+  for (off_t at = 0; at < size; at += kPart) ::posix_fadvise(file, at, kPart, POSIX_FADV_WILLNEED);
+  ::close(file);
+#endif
+}
 
 core::Result<StoredMap> StoreReader::load() const {
   return guarded(impl_->file, ErrorKind::kInput, [&] { return read_map(*impl_->database, impl_->header); });
@@ -219,13 +237,30 @@ core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
   return impl_->decode(cloud_bytes(keyframe), "keyframe " + name_of(keyframe));
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId keyframe) const {
-  return guarded(impl_->file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
-    if (impl_->header.format < 2) return {};
-    Statement row(*impl_->database, "SELECT data FROM surface WHERE robot = ? AND number = ?");
-    if (!row.bind(1, keyframe.robot).bind(2, keyframe.index).step()) return {};
+core::Result<std::vector<std::uint8_t>> StoreReader::Impl::extra(int format, const char* sql,
+                                                                 std::int64_t robot,
+                                                                 std::int64_t number) const {
+  return guarded(file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
+    if (header.format < format) return {};
+    Statement row(*database, sql);
+    if (!row.bind(1, robot).bind(2, number).step()) return {};
     return row.blob(0);
   });
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId keyframe) const {
+  return impl_->extra(2, "SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe.robot,
+                      keyframe.index);
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::summary_bytes(KeyframeId keyframe) const {
+  return impl_->extra(3, "SELECT data FROM summary WHERE robot = ? AND number = ?", keyframe.robot,
+                      keyframe.index);
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::frame_summary_bytes(std::size_t frame) const {
+  return impl_->extra(3, "SELECT data FROM frame_summary WHERE robot = ? AND number = ?", 0,
+                      static_cast<std::int64_t>(frame));
 }
 
 core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes) {

@@ -182,21 +182,23 @@ void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
 
 void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
   const bool of_keyframe = cloud.keyframe.valid();
-  Statement(*database,
-            of_keyframe ? "REPLACE INTO cloud VALUES (?, ?, ?)" : "REPLACE INTO frame_cloud VALUES (?, ?, ?)")
-      .bind(1, of_keyframe ? cloud.keyframe.robot : 0)
-      .bind(2, of_keyframe ? cloud.keyframe.index : static_cast<std::int64_t>(cloud.frame))
-      .bind(3, *cloud.bytes)
-      .run();
+  const auto put = [&](const char* of_keyframes, const char* of_frames, const Bytes& bytes) {
+    Statement(*database, of_keyframe ? of_keyframes : of_frames)
+        .bind(1, of_keyframe ? cloud.keyframe.robot : 0)
+        .bind(2, of_keyframe ? cloud.keyframe.index : static_cast<std::int64_t>(cloud.frame))
+        .bind(3, bytes)
+        .run();
+  };
+  put("REPLACE INTO cloud VALUES (?, ?, ?)", "REPLACE INTO frame_cloud VALUES (?, ?, ?)", *cloud.bytes);
+  if (cloud.summary != nullptr) {
+    put("REPLACE INTO summary VALUES (?, ?, ?)", "REPLACE INTO frame_summary VALUES (?, ?, ?)",
+        *cloud.summary);
+  }
   if (!of_keyframe || cloud.surface == nullptr) return;
   ByteWriter bytes;
   encode(*cloud.surface, bytes);
   const Bytes packed = pack(bytes.bytes());
-  Statement(*database, "REPLACE INTO surface VALUES (?, ?, ?)")
-      .bind(1, cloud.keyframe.robot)
-      .bind(2, cloud.keyframe.index)
-      .bind(3, packed)
-      .run();
+  put("REPLACE INTO surface VALUES (?, ?, ?)", nullptr, packed);
 }
 
 void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {

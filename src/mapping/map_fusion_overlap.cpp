@@ -254,19 +254,17 @@ std::vector<OverlapFinder::Candidate> chosen(std::vector<OverlapFinder::Candidat
 
 }  // namespace
 
-std::vector<OverlapFinder::Candidate> find_look_alikes(const std::vector<MapPart>& parts,
-                                                       const MapFusionOptions& options,
-                                                       const core::Executor& executor) {
+OverlapFinder learn_places(const std::vector<MapPart>& parts, const MapFusionOptions& options) {
   OverlapFinder finder(options);
   for (const MapPart& part : parts) {
     for (const KeyframeId id : part.map->keyframe_ids()) finder.add(*part.map, id);
   }
-  return finder.look_at_all(parts, executor);
+  return finder;
 }
 
 std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
                                          const core::Executor& executor) {
-  return find_overlaps(parts, find_look_alikes(parts, options, executor), options, executor);
+  return find_overlaps(parts, learn_places(parts, options).look_at_all(parts, executor), options, executor);
 }
 
 std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,

@@ -1,7 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/pipeline/data.hpp"
 
+#include <utility>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+
 namespace plumbline::pipeline {
+
+core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe) {
+  if (keyframe.cloud != nullptr) return keyframe.cloud;
+  if (keyframe.compact != nullptr)
+    return cloud::decode_cloud(keyframe.compact->data(), keyframe.compact->size());
+  const auto bytes = keyframe.stored();
+  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  return cloud::decode_cloud(bytes->data(), bytes->size());
+}
 
 geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot) {
   if (map.robots.empty()) return map.trajectory;

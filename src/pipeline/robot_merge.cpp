@@ -56,18 +56,17 @@ std::string left_out(const std::vector<RobotPart>& parts, const std::vector<std:
 
 }  // namespace
 
-std::vector<mapping::OverlapFinder::Candidate> look_alikes(const std::vector<RobotPart>& parts,
-                                                           const mapping::MapFusionOptions& options,
-                                                           const core::Executor& executor) {
-  return mapping::find_look_alikes(maps_of(parts), options, executor);
+mapping::OverlapFinder learn_places(const std::vector<RobotPart>& parts,
+                                    const mapping::MapFusionOptions& options) {
+  return mapping::learn_places(maps_of(parts), options);
 }
 
-MergedRobots merge_robots(const std::vector<RobotPart>& parts,
-                          const std::vector<mapping::OverlapFinder::Candidate>& look_alikes,
+MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder places,
                           std::size_t anchor, const mapping::MapFusionOptions& options,
                           const core::Executor& executor, core::Log& log) {
   const std::vector<mapping::MapPart> maps = maps_of(parts);
-  std::vector<mapping::MergeEvidence> evidence = mapping::find_overlaps(maps, look_alikes, options, executor);
+  std::vector<mapping::MergeEvidence> evidence =
+      mapping::find_overlaps(maps, places.look_at_all(maps, executor), options, executor);
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }

@@ -27,14 +27,13 @@ struct MergedRobots {
   std::string unconnected;  ///< which maps are left out and what was tried; empty: none
 };
 
-/// mapping::find_look_alikes of the parts: can be done beside other work.
-std::vector<mapping::OverlapFinder::Candidate> look_alikes(const std::vector<RobotPart>& parts,
-                                                           const mapping::MapFusionOptions& options,
-                                                           const core::Executor& executor);
+/// mapping::learn_places of the parts: can be done beside other work.
+mapping::OverlapFinder learn_places(const std::vector<RobotPart>& parts,
+                                    const mapping::MapFusionOptions& options);
 
 /// Fuses the parts that hang together with `anchor`; parts.size(): with the group that has most keyframes.
-MergedRobots merge_robots(const std::vector<RobotPart>& parts,
-                          const std::vector<mapping::OverlapFinder::Candidate>& look_alikes,
+/// `places`: of learn_places, used up.
+MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder places,
                           std::size_t anchor, const mapping::MapFusionOptions& options,
                           const core::Executor& executor, core::Log& log);
 

@@ -92,7 +92,7 @@ class FuseStage : public Stage {
       cloud::take_points(*keyframe->cloud, *points);
       look_at(*points, camera, views_.back());
     }
-    return clouds_->append(*keyframe->compact, io.frame());
+    return clouds_->append(keyframe->compact.get(), io.frame());
   }
   /// What has not been looked at while it came.
   void frames_have_ended() override {
@@ -102,6 +102,12 @@ class FuseStage : public Stage {
     }
     const auto look = [this, open](std::size_t i) {
       View& view = views_[open[i]];
+      if (auto kept = clouds_->summary(open[i], camera_of(view.robot))) {
+        view.camera_from_depth = kept->camera_from_depth;
+        view.summary = std::move(kept->summary);
+        if (!options_.free_space) view.summary->raster = {};
+        return;
+      }
       const auto points = rooms_.take();
       if (const auto got = clouds_->read(open[i], *points)) {
         look_at(*points, camera_of(view.robot), view);
@@ -120,10 +126,7 @@ class FuseStage : public Stage {
     looking_.reset();
     rooms_.clear();
     for (const View& view : views_) {
-      if (!view.damage) continue;
-      return tl::unexpected<core::Error>(context_->stored_maps != nullptr
-                                             ? context_->stored_maps->damaged(view.robot, *view.damage)
-                                             : *view.damage);
+      if (view.damage) return tl::unexpected<core::Error>(*view.damage);
     }
     auto fused = fuse(*map);
     if (!fused) return tl::unexpected<core::Error>(fused.error());
@@ -164,7 +167,7 @@ class FuseStage : public Stage {
       if (!bytes) return fail(bytes.error());
       places_[id] = clouds_->size();
       views_.push_back({id.robot, {}, {}, {}});
-      if (auto kept = clouds_->append(*bytes, 0); !kept) return kept;
+      if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     const auto frames = store->frame_cloud_ids();
     if (!frames) return fail(frames.error());
@@ -175,7 +178,7 @@ class FuseStage : public Stage {
       const maps::FramePose& pose = run.map.frames[frame];
       between_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
       views_.push_back({pose.reference.robot, {}, {}, {}});
-      if (auto kept = clouds_->append(*bytes, 0); !kept) return kept;
+      if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     return {};
   }
@@ -248,12 +251,13 @@ class FuseStage : public Stage {
     };
     views.summary = [&](std::size_t i) { return summary_of(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
-    context_->log->debug(
-        fmt::format("{} clouds, {:.1f} MB, fused in {} tiles; {} points seen through, {} of "
-                    "dust; colour "
-                    "gains {:.2f} to {:.2f}",
-                    poses.size(), static_cast<double>(clouds_->bytes()) / 1e6, report.tiles,
-                    report.seen_through, report.dust, report.least_gain, report.most_gain));
+    context_->log->debug(fmt::format(
+        "{} clouds{}, fused in {} tiles; {} points seen through, {} of dust; colour gains {:.2f} "
+        "to {:.2f}",
+        poses.size(),
+        clouds_->bytes() > 0 ? fmt::format(", {:.1f} MB", static_cast<double>(clouds_->bytes()) / 1e6)
+                             : std::string(),
+        report.tiles, report.seen_through, report.dust, report.least_gain, report.most_gain));
     return fused;
   }
 

@@ -2,9 +2,9 @@
 // maps: finished maps of several robots, laid into one frame; their clouds come one after another.
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <utility>
 
-#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "robot_merge.hpp"
@@ -31,34 +31,33 @@ class MapsStage : public Stage {
     for (const StoredPart& part : maps_->parts()) {
       parts_.push_back({part.name, {&part.map, part.cameras}, part.robots, &part.frames});
     }
-    // One thread learns what places look like while others read clouds.
-    looking_ = context.executor->submit(
-        [this] { look_alikes_ = look_alikes(parts_, options_, *context_->executor); });
+    // One thread learns what places look like while others read surfaces.
+    learning_ = context.executor->submit([this] { places_.emplace(learn_places(parts_, options_)); });
     return {};
   }
   [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
 
+  /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
   core::Result<void> process(StageIo& io) override {
     const StoredCloud& stored = maps_->clouds()[io.frame()];
-    auto bytes = maps_->cloud_bytes(io.frame());
-    if (!bytes) return tl::unexpected<core::Error>(bytes.error());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = stored.id;
     result->stamp = stored.stamp;
     result->robot = stored.robot;
-    if (stored.id.valid()) {  // surfaces are wanted at once; what is only laid down at the end can wait
-      if (auto read = read_surface(io.frame(), *bytes, *result); !read) {
+    result->stored = [maps = maps_, index = io.frame()] { return maps->cloud_bytes(index); };
+    if (stored.id.valid()) {
+      if (auto read = read_surface(io.frame(), *result); !read) {
         return tl::unexpected<core::Error>(maps_->damaged(stored.robot, read.error()));
       }
     }
-    result->compact = std::make_shared<std::vector<std::uint8_t>>(std::move(*bytes));
     io.output<KeyframeCloud>("cloud", result);
     return {};
   }
 
   core::Result<void> finish(StageIo& io) override {
-    looking_.wait();
-    merged_ = merge_robots(parts_, look_alikes_, anchor_, options_, *context_->executor, *context_->log);
+    learning_.wait();
+    merged_ =
+        merge_robots(parts_, std::move(*places_), anchor_, options_, *context_->executor, *context_->log);
     io.output<MapResult>("map", merged_.map);
     return {};
   }
@@ -78,20 +77,14 @@ class MapsStage : public Stage {
   }
 
  private:
-  /// Its surface as it was kept with the map, or else the cloud, which has it.
-  core::Result<void> read_surface(std::size_t index, const std::vector<std::uint8_t>& cloud_bytes,
-                                  KeyframeCloud& result) const {
+  /// As it was kept with the map, if it was.
+  core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
     const auto kept = maps_->surface_bytes(index);
     if (!kept) return tl::unexpected<core::Error>(kept.error());
-    if (!kept->empty()) {
-      auto surface = maps::unpack_surface(*kept);
-      if (!surface) return tl::unexpected<core::Error>(surface.error());
-      result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
-      return {};
-    }
-    auto cloud = cloud::decode_cloud(cloud_bytes.data(), cloud_bytes.size());
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    result.cloud = std::move(*cloud);
+    if (kept->empty()) return {};
+    auto surface = maps::unpack_surface(*kept);
+    if (!surface) return tl::unexpected<core::Error>(surface.error());
+    result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
     return {};
   }
 
@@ -100,9 +93,9 @@ class MapsStage : public Stage {
   mapping::MapFusionOptions options_;
   std::vector<RobotPart> parts_;
   std::size_t anchor_ = 0;
-  std::vector<mapping::OverlapFinder::Candidate> look_alikes_;
+  std::optional<mapping::OverlapFinder> places_;
   MergedRobots merged_;
-  core::Executor::Job looking_;  ///< goes first: it uses the others
+  core::Executor::Job learning_;  ///< goes first: it uses the others
 };
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -69,8 +68,7 @@ class RefineStage : public Stage {
     if (keyframe.surface != nullptr && keyframe.surface->voxel_m == local_maps_.voxel_m) {
       return keyframe.surface->samples;
     }
-    if (keyframe.cloud != nullptr) return mapping::coarse_surface(*keyframe.cloud, local_maps_.voxel_m);
-    const auto cloud = cloud::decode_cloud(keyframe.compact->data(), keyframe.compact->size());
+    const auto cloud = cloud_of(keyframe);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
     return mapping::coarse_surface(**cloud, local_maps_.voxel_m);
   }

@@ -109,6 +109,7 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
   }
   auto reader = maps::StoreReader::open(file);
   if (!reader) return tl::unexpected<core::Error>(reader.error());
+  reader->read_ahead();
   auto stored = reader->load();
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   if (stored->map.keyframe_count() == 0) {
@@ -227,6 +228,14 @@ core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t in
   if (!cloud.stored_id.valid()) return std::vector<std::uint8_t>();
   const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
   return parts_[cloud.part].reader->surface_bytes(cloud.stored_id);
+}
+
+core::Result<std::vector<std::uint8_t>> StoredMaps::summary_bytes(std::size_t index) const {
+  const StoredCloud& cloud = clouds_.at(index);
+  const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
+  const maps::StoreReader& reader = *parts_[cloud.part].reader;
+  return cloud.stored_id.valid() ? reader.summary_bytes(cloud.stored_id)
+                                 : reader.frame_summary_bytes(cloud.frame);
 }
 
 sensor::Pinhole StoredMaps::camera_of(std::int32_t robot) const {

@@ -5,7 +5,6 @@
 #include <memory>
 
 #include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/result_folder.hpp"
@@ -58,13 +57,9 @@ class KeyframeCloudTap : public Tap {
   core::Result<void> process(StageIo& io) override {
     const auto keyframe = io.input<KeyframeCloud>("in");
     if (!keyframe->id.valid()) return {};
-    cloud::CloudPtr cloud = keyframe->cloud;
-    if (cloud == nullptr) {
-      auto decoded = cloud::decode_cloud(keyframe->compact->data(), keyframe->compact->size());
-      if (!decoded) return tl::unexpected<core::Error>(decoded.error());
-      cloud = std::move(*decoded);
-    }
-    return cloud::write_cloud(file_.path(static_cast<std::size_t>(keyframe->id.index)), *cloud);
+    const auto cloud = cloud_of(*keyframe);
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    return cloud::write_cloud(file_.path(static_cast<std::size_t>(keyframe->id.index)), **cloud);
   }
 };
 

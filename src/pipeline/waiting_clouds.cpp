@@ -18,26 +18,44 @@ core::Result<WaitingClouds> WaitingClouds::create(const RunContext& context) {
   return clouds;
 }
 
-core::Result<void> WaitingClouds::append(const std::vector<std::uint8_t>& compact, std::size_t frame) {
-  bytes_ += compact.size();
-  if (spool_) return spool_->append(compact);
+core::Result<void> WaitingClouds::append(const std::vector<std::uint8_t>* compact, std::size_t frame) {
+  if (spool_) {
+    bytes_ += compact->size();
+    return spool_->append(*compact);
+  }
   frames_.push_back(frame);
   return {};
 }
 
 core::Result<cloud::CloudPtr> WaitingClouds::read(std::size_t place) const {
   if (spool_) return spool_->read(place);
-  const auto bytes = maps_->cloud_bytes(frames_.at(place));
+  const std::size_t frame = frames_.at(place);
+  const auto bytes = maps_->cloud_bytes(frame);
   if (!bytes) return tl::unexpected<core::Error>(bytes.error());
-  return cloud::decode_cloud(bytes->data(), bytes->size());
+  auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
+  if (!cloud) return tl::unexpected<core::Error>(maps_->damaged(maps_->clouds()[frame].robot, cloud.error()));
+  return cloud;
 }
 
 core::Result<void> WaitingClouds::read(std::size_t place, cloud::ViewPoints& points) const {
   if (spool_) return spool_->read(place, points);
-  auto bytes = maps_->cloud_bytes(frames_.at(place));
+  const std::size_t frame = frames_.at(place);
+  auto bytes = maps_->cloud_bytes(frame);
   if (!bytes) return tl::unexpected<core::Error>(bytes.error());
   points.compact = std::move(*bytes);
-  return cloud::decode_points(points.compact.data(), points.compact.size(), points);
+  auto read = cloud::decode_points(points.compact.data(), points.compact.size(), points);
+  if (!read) return tl::unexpected<core::Error>(maps_->damaged(maps_->clouds()[frame].robot, read.error()));
+  return read;
+}
+
+std::optional<cloud::KeptSummary> WaitingClouds::summary(std::size_t place,
+                                                         const sensor::Pinhole& camera) const {
+  if (spool_) return std::nullopt;
+  const auto bytes = maps_->summary_bytes(frames_.at(place));
+  if (!bytes || bytes->empty()) return std::nullopt;
+  auto kept = cloud::decode_summary(bytes->data(), bytes->size(), camera);
+  if (!kept) return std::nullopt;  // the cloud says the same
+  return std::move(*kept);
 }
 
 }  // namespace plumbline::pipeline

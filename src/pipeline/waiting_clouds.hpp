@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plumbline/cloud/cloud_spool.hpp"
+#include "plumbline/cloud/summary_bytes.hpp"
 #include "plumbline/pipeline/stage.hpp"
 
 namespace plumbline::pipeline {
@@ -19,16 +20,20 @@ class WaitingClouds {
   /// Errors (kOutput): no file can be made in the result's folder.
   static core::Result<WaitingClouds> create(const RunContext& context);
 
-  /// The cloud that came with frame `frame`, bytes of cloud::encode_cloud; its place is size() before the
-  /// call. Errors (kOutput): disk full.
-  core::Result<void> append(const std::vector<std::uint8_t>& compact, std::size_t frame);
+  /// The cloud that came with frame `frame`, bytes of cloud::encode_cloud; those of finished maps are where
+  /// they are, and it may be null. Its place is size() before the call. Errors (kOutput): disk full.
+  core::Result<void> append(const std::vector<std::uint8_t>* compact, std::size_t frame);
   /// As encode_cloud() left it. Errors (kOutput, kInput): it cannot be read back.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(std::size_t place) const;
   /// Its points, in memory that is used again.
   [[nodiscard]] core::Result<void> read(std::size_t place, cloud::ViewPoints& points) const;
 
+  /// What was kept with the cloud; none: nothing, or nothing that can be used.
+  [[nodiscard]] std::optional<cloud::KeptSummary> summary(std::size_t place,
+                                                          const sensor::Pinhole& camera) const;
+
   [[nodiscard]] std::size_t size() const { return spool_ ? spool_->size() : frames_.size(); }
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }  ///< of all
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }  ///< of those in the temporary file
 
  private:
   explicit WaitingClouds(const StoredMaps* maps) : maps_(maps) {}

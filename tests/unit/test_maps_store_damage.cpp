@@ -155,8 +155,8 @@ TEST(MapStoreDamage, TruncatedFilesAreRefused) {
 
 TEST(MapStoreDamage, WrongBytesAreRefusedOrHarmless) {
   const StoreFolder folder;
-  write_store(folder.file(), 10);
-  const StoreWorld world = world_after(10);
+  write_store(folder.file(), 14);
+  const StoreWorld world = world_after(14);
   const std::string whole = read_file(folder.file());
   tests::Random random(6);
   int refused = 0;
@@ -209,8 +209,8 @@ TEST(MapStoreDamage, ForeignAndNewerFilesAreRefused) {
   expect_no_store(file, "SQLite file, but no map store");
   std::filesystem::remove(file);
   write_store(file, 1);
-  run_sql(file, "PRAGMA user_version = 3");
-  expect_no_store(file, "format 3, this program reads up to 2; use a newer Plumbline");
+  run_sql(file, "PRAGMA user_version = 4");
+  expect_no_store(file, "format 4, this program reads up to 3; use a newer Plumbline");
 }
 
 TEST(MapStoreDamage, WritersRefuseWhatTheyMayNotWrite) {

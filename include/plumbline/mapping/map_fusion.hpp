@@ -156,13 +156,11 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
                              const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor);
 
-/// What looks alike among all parts' keyframes: the first step of find_overlaps, most of which is done by one
-/// thread. The same for any number of threads.
-std::vector<OverlapFinder::Candidate> find_look_alikes(const std::vector<MapPart>& parts,
-                                                       const MapFusionOptions& options,
-                                                       const core::Executor& executor);
+/// A finder that knows all parts' keyframes, for look_at_all(): the first step of find_overlaps, and work of
+/// one thread.
+OverlapFinder learn_places(const std::vector<MapPart>& parts, const MapFusionOptions& options);
 
-/// All pairs of parts, by a, then b. The same for any number of threads. `look_alikes`: of find_look_alikes.
+/// All pairs of parts, by a, then b. The same for any number of threads. `look_alikes`: of look_at_all().
 std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
                                          const std::vector<OverlapFinder::Candidate>& look_alikes,
                                          const MapFusionOptions& options, const core::Executor& executor);

@@ -18,8 +18,8 @@
 
 namespace plumbline::maps {
 
-/// Stores of this and of lower formats are read. 1: without surfaces.
-constexpr int kStoreFormat = 2;
+/// Stores of this and of lower formats are read. 1: without surfaces. 2: without summaries of views.
+constexpr int kStoreFormat = 3;
 
 /// What is written once, when a store is made.
 struct StoreHeader {
@@ -76,6 +76,8 @@ struct StoreCloud {
   std::size_t frame = 0;  ///< of a frame between keyframes: its place among the store's frames
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
+  /// Bytes of cloud::encode_summary; null: none are kept.
+  std::shared_ptr<const std::vector<std::uint8_t>> summary = nullptr;
 };
 
 /// What a run adds in one go.
@@ -142,6 +144,8 @@ class StoreReader {
   ~StoreReader();
 
   [[nodiscard]] const StoreHeader& header() const;
+  /// Tells the system that all of the file will be wanted soon: it is read from disk ahead.
+  void read_ahead() const;
   /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
   /// pictures of the camera's size. Errors (kInput): damaged.
   [[nodiscard]] core::Result<StoredMap> load() const;
@@ -159,6 +163,10 @@ class StoreReader {
   [[nodiscard]] core::Result<std::vector<std::size_t>> frame_cloud_ids() const;
   [[nodiscard]] core::Result<cloud::CloudPtr> frame_cloud(std::size_t frame) const;
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> frame_cloud_bytes(std::size_t frame) const;
+  /// What was kept of a cloud for who lays it down, bytes of cloud::encode_summary; empty: nothing. Errors
+  /// (kInput): damaged.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> summary_bytes(KeyframeId keyframe) const;
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> frame_summary_bytes(std::size_t frame) const;
   /// None: nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
       const std::string& name) const;

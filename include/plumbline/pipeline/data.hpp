@@ -3,6 +3,7 @@
 
 // What flows between the stages of this library.
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -77,10 +78,15 @@ struct KeyframeCloud {
   double stamp = 0.0;   ///< seconds
   std::int32_t robot = 0;
   cloud::CloudPtr cloud;                                     ///< null: what `compact` holds, not decoded
-  std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it
+  std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it;
+                                                             ///< null: it waits in a store
+  std::function<core::Result<std::vector<std::uint8_t>>()> stored;  ///< reads it there
   /// Of a keyframe, mapping::coarse_surface of the cloud; null: none was kept.
   std::shared_ptr<const maps::StoredSurface> surface;
 };
+
+/// The cloud, wherever it is. Errors (kInput): it cannot be read.
+core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe);
 
 /// Voxels of the surfaces of keyframes that are kept with their clouds: as the stage refine wants them.
 constexpr double kSurfaceVoxel_m = 0.03;
