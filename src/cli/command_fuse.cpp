@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "app.hpp"
+#include "leftovers.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
 #include "signals.hpp"
 
@@ -21,7 +22,7 @@ int fuse(Session& session, pipeline::FuseRequest request) {
   Console& console = session.console();
   const auto summary = pipeline::fuse_stored_maps(
       request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); }, &leftovers());
   console.end_progress();
   return session.finish(summary, request.output);
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app.hpp"
+#include "leftovers.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
 #include "signals.hpp"
 
@@ -33,7 +34,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
   Console& console = session.console();
   const auto summary = pipeline::map_recording(
       request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); }, &leftovers());
   console.end_progress();
   return session.finish(summary, request.output);
 }

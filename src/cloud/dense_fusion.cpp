@@ -123,10 +123,14 @@ class Fusion {
       rasters_[v].nearest = {};  // limits are all that is asked
     });
     if (const auto error = first_error(done)) return tl::unexpected<core::Error>(*error);
-    tiles_ = plan_tiles(cells, cells_per_tile(options_));
+    executor_.parallel_for(2, [&](std::size_t k) {
+      if (k == 0) {
+        tiles_ = plan_tiles(cells, cells_per_tile(options_));
+      } else if (options_.exposure) {
+        gains_ = color_gains(cells, executor_);
+      }
+    });
     report.tiles = tiles_.size();
-    if (!options_.exposure) return {};
-    gains_ = color_gains(cells);
     for (const Eigen::Vector3f& gain : gains_) {
       report.least_gain = std::min(report.least_gain, static_cast<double>(gain.minCoeff()));
       report.most_gain = std::max(report.most_gain, static_cast<double>(gain.maxCoeff()));

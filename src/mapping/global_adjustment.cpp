@@ -55,7 +55,9 @@ class GlobalBuilder {
       : map_(map), cameras_(cameras), options_(options) {
     bundle_.problem.camera = cameras.at(anchor.robot);
     for (const KeyframeId id : map.keyframe_ids()) {
-      index_[id] = static_cast<int>(bundle_.keyframes.size());
+      index_.insert(id, static_cast<int>(bundle_.keyframes.size()));
+      const double ratio = map.keyframe(id).turn_rate / options.turn_rate;
+      unrest_.push_back(std::hypot(1.0, ratio * ratio));
       bundle_.keyframes.push_back(id);
       bundle_.problem.poses.push_back({map.camera_from_world(id), id == anchor});
     }
@@ -107,23 +109,32 @@ class GlobalBuilder {
     }
   }
   void add_edge(KeyframeId a, KeyframeId b, const Rigid3& b_from_a, const Matrix6d& information) {
-    bundle_.problem.edges.push_back({index_.at(a), index_.at(b), b_from_a, information});
+    bundle_.problem.edges.push_back({index_of(a), index_of(b), b_from_a, information});
   }
   GlobalBundle take() { return std::move(bundle_); }
 
  private:
+  /// Among the problem's poses.
+  [[nodiscard]] int index_of(KeyframeId id) const {
+    const int* found = index_.find(id);
+    if (found == nullptr) throw std::out_of_range("adjust_map: no such keyframe");
+    return *found;
+  }
   /// What standard deviations of a keyframe's measurements are multiplied by.
-  [[nodiscard]] double unrest(KeyframeId id) const {
-    const double ratio = map_.keyframe(id).turn_rate / options_.turn_rate;
-    return std::hypot(1.0, ratio * ratio);
+  [[nodiscard]] double unrest(KeyframeId id) const { return unrest_[static_cast<std::size_t>(index_of(id))]; }
+  [[nodiscard]] double octave_px(int octave) {
+    if (octave < 0 || octave > 64) return options_.noise.octave_px(octave);
+    while (static_cast<int>(octave_px_.size()) <= octave)
+      octave_px_.push_back(options_.noise.octave_px(static_cast<int>(octave_px_.size())));
+    return octave_px_[static_cast<std::size_t>(octave)];
   }
   bool wanted(const std::vector<maps::Observation>& seen, int enough) {
     bool any = false;
     for (const maps::Observation& o : seen) {
-      any = any || tied_[static_cast<std::size_t>(index_.at(o.keyframe))] < enough;
+      any = any || tied_[static_cast<std::size_t>(index_of(o.keyframe))] < enough;
     }
     if (!any) return false;
-    for (const maps::Observation& o : seen) ++tied_[static_cast<std::size_t>(index_.at(o.keyframe))];
+    for (const maps::Observation& o : seen) ++tied_[static_cast<std::size_t>(index_of(o.keyframe))];
     return true;
   }
   /// A pixel as the problem's camera would have it.
@@ -147,8 +158,8 @@ class GlobalBuilder {
     for (const maps::Observation& o : point.observations) {
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen = options_.noise.of(f, unrest(o.keyframe));
-      seen.pose = index_.at(o.keyframe);
+      optimize::BundlePointObservation seen = options_.noise.of(f, unrest(o.keyframe), octave_px(f.octave));
+      seen.pose = index_of(o.keyframe);
       seen.point = index;
       seen.pixel = pixel(o.keyframe, seen.pixel);
       seen.pixel_sigma *= pixel_size(o.keyframe);
@@ -164,7 +175,7 @@ class GlobalBuilder {
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
       optimize::BundleLineObservation seen = options_.noise.of(f, unrest(o.keyframe));
-      seen.pose = index_.at(o.keyframe);
+      seen.pose = index_of(o.keyframe);
       seen.line = index;
       seen.start = pixel(o.keyframe, seen.start);
       seen.end = pixel(o.keyframe, seen.end);
@@ -178,8 +189,10 @@ class GlobalBuilder {
   const Cameras& cameras_;
   const GlobalAdjustmentOptions& options_;
   GlobalBundle bundle_;
-  std::map<KeyframeId, int> index_;
-  std::vector<int> tied_;  ///< landmarks taken that a keyframe sees
+  maps::IdMap<KeyframeId, int> index_;
+  std::vector<double> unrest_;     ///< of the problem's poses
+  std::vector<double> octave_px_;  ///< as far as it was asked for
+  std::vector<int> tied_;          ///< landmarks taken that a keyframe sees
 };
 
 /// Landmarks that no keyframe sees any more are gone.

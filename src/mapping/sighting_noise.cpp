@@ -17,11 +17,13 @@ void SightingNoise::declare(core::OptionTable& table, const std::string& prefix)
       "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
 }
 
-optimize::BundlePointObservation SightingNoise::of(const features::PointFeature& corner,
-                                                   double unrest) const {
+double SightingNoise::octave_px(int octave) const { return std::pow(orb_scale_factor, octave); }
+
+optimize::BundlePointObservation SightingNoise::of(const features::PointFeature& corner, double unrest,
+                                                   double corner_px) const {
   optimize::BundlePointObservation seen;
   seen.pixel = corner.pixel.cast<double>();
-  seen.pixel_sigma = unrest * std::pow(orb_scale_factor, corner.octave);
+  seen.pixel_sigma = unrest * corner_px;
   seen.depth = static_cast<double>(corner.depth);
   seen.depth_sigma = corner.depth > 0.0F ? depth_factor * unrest * sensor::depth_sigma(seen.depth) : 1.0;
   return seen;

@@ -88,9 +88,8 @@ std::vector<int> elimination_places(int unknowns, const std::vector<std::pair<in
   return places;
 }
 
-BlockCholesky::BlockCholesky(int unknowns, const std::vector<std::pair<int, int>>& pairs,
-                             const core::Executor* executor)
-    : executor_(executor) {
+BlockCholesky::BlockCholesky(int unknowns, const std::vector<std::pair<int, int>>& pairs, core::Crew* crew)
+    : crew_(crew) {
   begin_.assign(at(unknowns) + 1, 0);
   analyse(pairs);
   list_rows();
@@ -148,14 +147,14 @@ void BlockCholesky::eliminate(int column, std::size_t first) {
 }
 
 bool BlockCholesky::factor() {
-  constexpr std::size_t kWorthSharing = 48;  // blocks in a column
+  constexpr std::size_t kWorthSharing = 16;  // blocks in a column
   for (int j = 0; j < size(); ++j) {
     const std::size_t begin = begin_[at(j)];
     const std::size_t count = begin_[at(j) + 1] - begin;
     if (!factor_block(diagonal(j))) return false;
     divide(diagonal(j), block(begin), count);
-    if (executor_ != nullptr && count >= kWorthSharing) {
-      executor_->parallel_for(count, [&](std::size_t i) { eliminate(j, i); });
+    if (crew_ != nullptr && count >= kWorthSharing) {
+      crew_->each(count, 1, [&](std::size_t i) { eliminate(j, i); });
     } else {
       for (std::size_t i = 0; i < count; ++i) eliminate(j, i);
     }

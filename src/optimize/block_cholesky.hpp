@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/core/executor.hpp"
+#include "plumbline/core/crew.hpp"
 
 namespace plumbline::optimize {
 
@@ -21,8 +21,8 @@ class BlockCholesky {
   static constexpr int kSize = 6;
   static constexpr std::size_t kBlock = 36;
 
-  /// `pairs` as places. `executor` may be null: then the caller's thread does it all.
-  BlockCholesky(int unknowns, const std::vector<std::pair<int, int>>& pairs, const core::Executor* executor);
+  /// `pairs` as places. `crew` may be null: then the caller's thread does it all.
+  BlockCholesky(int unknowns, const std::vector<std::pair<int, int>>& pairs, core::Crew* crew);
 
   [[nodiscard]] int size() const { return static_cast<int>(begin_.size()) - 1; }
   void set_zero();
@@ -56,7 +56,7 @@ class BlockCholesky {
   void list_rows();
   void eliminate(int column, std::size_t first);
 
-  const core::Executor* executor_;
+  core::Crew* crew_;
   std::vector<std::size_t> begin_;  ///< of each column, into rows_ and blocks_
   std::vector<int> rows_;           ///< of each column, below the diagonal, ascending
   std::vector<double> diagonal_;

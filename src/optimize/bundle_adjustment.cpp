@@ -103,12 +103,13 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
     return summary;
   }
   BundleState state = state_of(problem);
+  core::Crew crew(executor);
   if (options.first_gate > 0.0) {
     const double gate = options.first_gate * options.first_gate;
     mark_outliers(problem, state, gate, gate);
   }
   for (int round = 0; round < options.rounds; ++round) {
-    const RoundSummary done = solve_bundle_round(problem, options, executor, state);
+    const RoundSummary done = solve_bundle_round(problem, options, crew, state);
     if (round == 0) summary.initial_cost = done.initial_cost;
     summary.message = done.message;
     if (!done.usable) return summary;

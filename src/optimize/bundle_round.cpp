@@ -16,11 +16,11 @@ std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmar
 
 }  // namespace
 
-BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& options,
-                         const core::Executor* executor, const BundleState& state)
+BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
+                         const BundleState& state)
     : problem_(problem),
       options_(options),
-      executor_(executor),
+      crew_(crew),
       projection_(geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx,
                                             problem.camera.cy)),
       point_loss_{options.point_loss},
@@ -35,7 +35,7 @@ BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& opti
   damping_.resize(at(free_));
   pose_steps_.assign(6 * at(free_), 0.0);
   costs_.assign(slot_pose_.size(), 0.0);
-  matrix_.emplace(free_, pairs_, executor_);
+  matrix_.emplace(free_, pairs_, &crew_);
 }
 
 void BundleRound::choose_sightings() {

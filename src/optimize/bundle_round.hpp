@@ -40,7 +40,7 @@ struct Target {
 /// Normal equations of one round, and what it steps through.
 class BundleRound {
  public:
-  BundleRound(const BundleProblem& problem, const BundleOptions& options, const core::Executor* executor,
+  BundleRound(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
               const BundleState& state);
 
   RoundSummary run(BundleState& state);
@@ -48,14 +48,7 @@ class BundleRound {
  private:
   template <typename Body>
   void each(std::size_t count, std::size_t grain, const Body& body) const {
-    if (executor_ == nullptr || count <= grain) {
-      for (std::size_t i = 0; i < count; ++i) body(i);
-      return;
-    }
-    executor_->parallel_for((count + grain - 1) / grain, [&](std::size_t chunk) {
-      const std::size_t end = std::min(count, (chunk + 1) * grain);
-      for (std::size_t i = chunk * grain; i < end; ++i) body(i);
-    });
+    crew_.each(count, grain, body);
   }
 
   void choose_sightings();
@@ -99,7 +92,7 @@ class BundleRound {
 
   const BundleProblem& problem_;
   const BundleOptions& options_;
-  const core::Executor* executor_;
+  core::Crew& crew_;
   Eigen::Matrix3d projection_;
   Huber point_loss_;
   Huber line_loss_;

@@ -220,9 +220,9 @@ RoundSummary BundleRound::run(BundleState& state) {
   return summary;
 }
 
-RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options,
-                                const core::Executor* executor, BundleState& state) {
-  return BundleRound(problem, options, executor, state).run(state);
+RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
+                                BundleState& state) {
+  return BundleRound(problem, options, crew, state).run(state);
 }
 
 }  // namespace plumbline::optimize

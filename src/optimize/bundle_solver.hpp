@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/core/executor.hpp"
+#include "plumbline/core/crew.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 
 namespace plumbline::optimize {
@@ -31,8 +31,8 @@ struct RoundSummary {
 };
 
 /// Improves `state`; leaves out what the problem calls outliers, and landmarks that a single pose sees
-/// without depth. `executor` may be null: then the caller's thread does it all.
-RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options,
-                                const core::Executor* executor, BundleState& state);
+/// without depth.
+RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
+                                BundleState& state);
 
 }  // namespace plumbline::optimize

@@ -33,7 +33,7 @@ PoseGraphSolver::Term::Term(int of_a, int of_b, const Rigid3& b_from_a, const Ma
 }
 
 PoseGraphSolver::PoseGraphSolver(const PoseGraph& graph, const core::Executor* executor)
-    : executor_(executor), radius_(kFirstRadius) {
+    : crew_(executor), radius_(kFirstRadius) {
   terms_.reserve(graph.edges.size() + graph.poses.size());
   for (const GraphEdge& edge : graph.edges)
     terms_.emplace_back(edge.a, edge.b, edge.b_from_a, edge.information);
@@ -68,7 +68,7 @@ void PoseGraphSolver::make_matrix() {
     a = order[at(a)];
     b = order[at(b)];
   }
-  matrix_ = std::make_unique<BlockCholesky>(free, pairs, executor_);
+  matrix_ = std::make_unique<BlockCholesky>(free, pairs, &crew_);
   for (Term& term : terms_) {
     const int a = place(term.a);
     const int b = place(term.b);
@@ -84,16 +84,7 @@ void PoseGraphSolver::make_matrix() {
 template <typename Body>
 void PoseGraphSolver::each_term(const Body& body) {
   constexpr std::size_t kTogether = 64;
-  const auto some = [&](std::size_t chunk) {
-    const std::size_t end = std::min(terms_.size(), (chunk + 1) * kTogether);
-    for (std::size_t i = chunk * kTogether; i < end; ++i) body(i);
-  };
-  const std::size_t chunks = (terms_.size() + kTogether - 1) / kTogether;
-  if (executor_ != nullptr) {
-    executor_->parallel_for(chunks, some);
-  } else {
-    for (std::size_t chunk = 0; chunk < chunks; ++chunk) some(chunk);
-  }
+  crew_.each(terms_.size(), kTogether, body);
 }
 
 double PoseGraphSolver::chi2(const Term& term, const Poses& poses) const {

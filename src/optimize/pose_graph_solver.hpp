@@ -60,7 +60,7 @@ class PoseGraphSolver {
   template <typename Body>
   void each_term(const Body& body);
 
-  const core::Executor* executor_;
+  core::Crew crew_;
   Poses poses_;
   std::vector<Term> terms_;  ///< the edges, then what holds the poses
   std::vector<int> places_;  ///< in the matrix, of each pose; -1: fixed

@@ -43,7 +43,7 @@ std::string names_of(const StoredMaps& maps) {
 
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
-                                          const Progress& progress) {
+                                          const Progress& progress, Leftovers* leftovers) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
   std::unique_ptr<StoredMaps> maps;  // goes last: stages may still be at work on it
@@ -98,6 +98,10 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   if (auto written = write_summary(output->path() / "summary.json", summary); !written)
     return fail(written.error());
   if (auto committed = output->commit(); !committed) return fail(committed.error());
+  if (leftovers != nullptr) {
+    leftovers->push_back(std::make_shared<Graph>(std::move(*graph)));
+    leftovers->push_back(std::shared_ptr<StoredMaps>(std::move(maps)));
+  }
   return summary;
 }
 

@@ -138,7 +138,7 @@ bool is_finished(const std::filesystem::path& out) {
 
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop,
-                                       const Progress& progress) {
+                                       const Progress& progress, Leftovers* leftovers) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
 
@@ -236,6 +236,7 @@ core::Result<RunSummary> map_recording(const MapRequest& request, const core::Ex
   if (debug) {
     if (auto committed = debug->commit(); !committed) return fail(committed.error());
   }
+  if (leftovers != nullptr) leftovers->push_back(std::make_shared<Graph>(std::move(*graph)));
   return summary;
 }
 

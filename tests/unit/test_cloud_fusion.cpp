@@ -291,8 +291,9 @@ TEST(Exposure, ViewsAgreeOnColours) {
   std::vector<std::vector<ColorCell>> cells;
   for (std::size_t v = 0; v < 3; ++v)
     cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
-  const auto gains = color_gains(cells);
+  const auto gains = color_gains(cells, core::Executor(2));
   ASSERT_EQ(gains.size(), 3U);
+  EXPECT_EQ(gains, color_gains(cells, core::Executor(1)));
   EXPECT_NEAR(gains[0].z() / gains[2].z(), 1.4F, 0.03F);  // blue
   EXPECT_NEAR(gains[0].y() / gains[2].y(), 1.2F, 0.02F);
   EXPECT_NEAR(gains[0].x() / gains[2].x(), 1.0F, 0.01F);
@@ -306,8 +307,9 @@ TEST(Exposure, WithoutAnythingSharedNothingChanges) {
   std::vector<std::vector<ColorCell>> cells;
   for (std::size_t v = 0; v < 2; ++v)
     cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
-  for (const Eigen::Vector3f& gain : color_gains(cells)) EXPECT_EQ(gain, Eigen::Vector3f(1, 1, 1));
-  EXPECT_TRUE(color_gains({}).empty());
+  for (const Eigen::Vector3f& gain : color_gains(cells, core::Executor(1)))
+    EXPECT_EQ(gain, Eigen::Vector3f(1, 1, 1));
+  EXPECT_TRUE(color_gains({}, core::Executor(1)).empty());
 }
 
 TEST(FreeSpace, EvidenceOfAView) {

@@ -132,7 +132,8 @@ TEST(BlockCholesky, SameBytesForAnyNumberOfThreads) {
   Eigen::VectorXd reference;
   for (const int threads : {0, 1, 2, 3}) {
     const core::Executor executor(std::max(1, threads));
-    BlockCholesky cholesky(120, system.places, threads > 0 ? &executor : nullptr);
+    core::Crew crew(&executor);
+    BlockCholesky cholesky(120, system.places, threads > 0 ? &crew : nullptr);
     fill(system, cholesky);
     ASSERT_TRUE(cholesky.factor());
     Eigen::VectorXd x = system.right;

@@ -9,6 +9,7 @@
 
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/cloud/view_points.hpp"
+#include "plumbline/core/executor.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::cloud {
@@ -39,8 +40,9 @@ std::vector<ColorCell> color_cells(const std::vector<ColorSpot>& spots,
 
 /// Factors of red, green and blue for every view that make the views agree on shared cubes, their geometric
 /// mean 1: robust least squares over logarithms, drawn towards 1 where little is shared, within 0.5 to 2.
-/// Views without anything shared get 1.
-std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views);
+/// Views without anything shared get 1. The same for any number of threads.
+std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views,
+                                         const core::Executor& executor);
 
 /// Multiplies the colours in place.
 void apply_gain(ViewPoints& points, const Eigen::Vector3f& gain);

@@ -22,7 +22,14 @@ struct SightingNoise {
   /// As a bundle's camera of the same intrinsics saw it; which pose and which landmark is left to the caller.
   /// `unrest`: all standard deviations are so many times as large.
   [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner,
-                                                    double unrest = 1.0) const;
+                                                    double unrest = 1.0) const {
+    return of(corner, unrest, octave_px(corner.octave));
+  }
+  /// The same for many: `corner_px` is octave_px() of its octave.
+  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, double unrest,
+                                                    double corner_px) const;
+  /// Standard deviation of a corner of this octave.
+  [[nodiscard]] double octave_px(int octave) const;
   [[nodiscard]] optimize::BundleLineObservation of(const features::LineFeature& line,
                                                    double unrest = 1.0) const;
 };

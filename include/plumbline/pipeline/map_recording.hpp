@@ -39,8 +39,9 @@ bool is_finished(const std::filesystem::path& out);
 /// Checks everything first (pipeline: kUsage, recording: kInput, output folder: kOutput), then maps. When the
 /// result is written but should not be trusted, the summary's `reason` says why. Errors leave an earlier
 /// result untouched; what a run that failed on the way had stored stays in OUT.partial. `resume` with another
-/// input or configuration than that run's is kUsage. `progress` may be empty.
+/// input or configuration than that run's is kUsage. `progress` may be empty, `leftovers` null.
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
-                                       core::Log& log, const core::StopToken& stop, const Progress& progress);
+                                       core::Log& log, const core::StopToken& stop, const Progress& progress,
+                                       Leftovers* leftovers = nullptr);
 
 }  // namespace plumbline::pipeline

@@ -4,6 +4,7 @@
 // Runs a checked graph on oneTBB.
 #include <functional>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,10 @@ struct RunReport {
   std::vector<StageTiming> stages;  ///< in graph order
   std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };
+
+/// What is left of a run when all is written: taking maps apart landmark by landmark takes a while, which
+/// whoever ends next can do without. In the order in which it is to be taken apart.
+using Leftovers = std::vector<std::shared_ptr<void>>;
 
 /// Called in frame order, from one thread at a time.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
