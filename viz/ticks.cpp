@@ -22,6 +22,8 @@ Ticks nice_ticks(double low, double high, double wish) {
   if (!(span > 0.0) || !std::isfinite(span) || !(wish > 0.0)) return ticks;
   // The step nearest to the wish rather than the one below it, which may give twice as many.
   const double step = nice_number_below(1.5 * wish);
+  constexpr double kMostSteps = 1e12;  // from zero: beyond, neighbouring ticks are soon the same number
+  if (std::max(std::abs(low), std::abs(high)) > kMostSteps * step) return ticks;
   const int decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 12);
   const bool scientific = step >= 1e6 || step < 1e-6;
   for (double k = std::ceil(low / step - 1e-6); k * step <= high + 1e-6 * span; k += 1.0) {

@@ -2,6 +2,7 @@
 #include "plumbline/pipeline/report.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <system_error>
@@ -54,7 +55,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
       return tl::unexpected<core::Error>(added.error());
   }
   fs::path scratch = file;
-  scratch.replace_filename("." + file.filename().string() + ".picture.png");
+  scratch.replace_filename(fmt::format(".{}.{}.png", file.filename().string(), getpid()));
   auto pictures = pictures_html(*data, scratch);  // first: damaged ones are told in the head
   if (!pictures) return tl::unexpected<core::Error>(pictures.error());
   const std::string page = page_html(

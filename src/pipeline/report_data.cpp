@@ -68,44 +68,53 @@ void add_paths(ReportData& data) {
   if (robots.empty()) add_path("", data.folder, data);
 }
 
-/// Which robot has which number: of its points and of its colour.
-void name_robots(ReportData& data) {
-  const auto reader = maps::StoreReader::open(data.folder / "map.db");
-  const auto bytes =
-      reader ? reader->attachment(kRobotsAttachment) : tl::unexpected<core::Error>(reader.error());
-  if (!bytes || !*bytes) return;
-  const auto robots = robots_from_bytes(**bytes);
-  if (!robots) return;
-  for (const RobotInfo& robot : *robots) {
+/// The robots of a map of several, from its store.
+std::vector<RobotInfo> robots_of(const fs::path& store) {
+  const auto reader = maps::StoreReader::open(store);
+  if (!reader) return {};
+  const auto bytes = reader->attachment(kRobotsAttachment);
+  if (!bytes || !*bytes) return {};
+  auto robots = robots_from_bytes(**bytes);
+  return robots ? std::move(*robots) : std::vector<RobotInfo>();
+}
+
+/// Pairs of keyframes that loops, and merges of several robots' maps, tie together.
+void add_loops(const StoredResult& stored, ReportData& data) {
+  std::map<core::KeyframeId, Eigen::Vector3d> places;
+  for (const KeyframePose& k : stored.keyframes()) places[k.id] = k.world_from_camera.translation;
+  for (const maps::LoopEdge& loop : stored.stored().map.loops()) {
+    const auto a = places.find(loop.a);
+    const auto b = places.find(loop.b);
+    if (a != places.end() && b != places.end()) data.loops.emplace_back(a->second, b->second);
+  }
+}
+
+/// What only map.db knows: which robot has which number (of its points and of its colour), loops, how well
+/// all fits.
+void add_store(ReportData& data) {
+  const fs::path file = data.folder / "map.db";
+  std::error_code ec;
+  if (!fs::exists(file, ec)) {
+    const bool loops =
+        number_at(data.summary, "/loops/accepted") > 0.0 || !list_at(data.summary, "/merges").empty();
+    if (loops) data.missing.emplace_back("map.db is not there: loops are not drawn");
+    return;
+  }
+  const auto stored = StoredResult::open(file);
+  if (!stored) {
+    data.missing.emplace_back("map.db is damaged: loops are not drawn");
+    return;
+  }
+  std::map<std::int32_t, sensor::Pinhole> cameras;
+  for (const RobotInfo& robot : robots_of(file)) {
+    cameras[robot.number] = robot.camera.color;
     data.robot_names[robot.number] = robot.name;
     for (ReportPath& path : data.paths) {
       if (path.robot == robot.name && robot.number >= 0) path.number = static_cast<std::size_t>(robot.number);
     }
   }
-}
-
-/// Loops, and merges of several robots' maps: pairs of keyframes.
-void add_loops(ReportData& data) {
-  std::error_code ec;
-  if (!fs::exists(data.folder / "map.db", ec)) {
-    const bool any =
-        number_at(data.summary, "/loops/accepted") > 0.0 || !list_at(data.summary, "/merges").empty();
-    if (any) data.missing.emplace_back("map.db is not there: loops are not drawn");
-    return;
-  }
-  const auto stored = StoredResult::open(data.folder / "map.db");
-  if (!stored) {
-    data.missing.emplace_back("map.db is damaged: loops are not drawn");
-    return;
-  }
-  name_robots(data);
-  std::map<core::KeyframeId, Eigen::Vector3d> places;
-  for (const KeyframePose& k : stored->keyframes()) places[k.id] = k.world_from_camera.translation;
-  for (const maps::LoopEdge& loop : stored->stored().map.loops()) {
-    const auto a = places.find(loop.a);
-    const auto b = places.find(loop.b);
-    if (a != places.end() && b != places.end()) data.loops.emplace_back(a->second, b->second);
-  }
+  add_loops(*stored, data);
+  data.fit = fit_of(stored->stored().map, stored->stored().header.camera.color, cameras);
 }
 
 /// Whether the folder is of plumbline fuse, whose results have no frames.
@@ -184,7 +193,7 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
   add_paths(data);
   data.fused_afterwards = fused_afterwards(folder);
   add_frames(data);
-  add_loops(data);
+  add_store(data);
   add_cloud(data);
   return data;
 }

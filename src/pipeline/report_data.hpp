@@ -14,6 +14,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/geometry/trajectory.hpp"
+#include "report_fit.hpp"
 #include "report_table.hpp"
 
 namespace plumbline::pipeline {
@@ -68,6 +69,7 @@ struct ReportData {
   std::vector<LostStretch> lost;
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> loops;  ///< keyframes that a loop or merge ties
   std::map<std::int32_t, std::string> robot_names;                 ///< by number, as far as map.db tells
+  std::optional<MapFit> fit;                                       ///< none without map.db
   std::optional<cloud::CloudFile> cloud;
   std::optional<CloudExtent> extent;            ///< none without finite points
   std::string cloud_file;                       ///< its name

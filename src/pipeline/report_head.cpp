@@ -98,15 +98,24 @@ std::string frame_of_results(const ReportData& data) {
   return up.empty() ? up : "that of the first camera: x right, y down, z forward; metres";
 }
 
+/// Those in the result, and those that were mapped but left out.
+std::string robots_text(const ReportData& data) {
+  std::string in, out;
+  const auto is_in = [&](const std::string& name) {
+    return std::any_of(data.paths.begin(), data.paths.end(), [&](const auto& p) { return p.robot == name; });
+  };
+  for (const ReportPath& path : data.paths) in += (in.empty() ? "" : ", ") + path.robot;
+  for (const ReportFrames& frames : data.frames) {
+    if (!is_in(frames.robot)) out += (out.empty() ? "" : ", ") + frames.robot;
+  }
+  return out.empty() ? in : in + "; mapped, but not in the result: " + out;
+}
+
 std::string facts(const ReportData& data) {
   const auto& s = data.summary;
-  std::string robots;
-  for (const ReportPath& path : data.paths) {
-    if (!path.robot.empty()) robots += (robots.empty() ? "" : ", ") + path.robot;
-  }
   return facts_html(
       {{"Input", text_at(s, "/input")},
-       {"Robots", robots},
+       {"Robots", robots_text(data)},
        {"Frames", frames_text(data)},
        {"Duration of the recording", duration_text(data.end_s - data.start_s)},
        {"Pipeline", text_at(s, "/pipeline")},

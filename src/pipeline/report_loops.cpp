@@ -107,6 +107,24 @@ std::string refused_pairs(const Json& merge) {
   return table.html();
 }
 
+/// Distances of what the keyframes saw from where the finished map has it.
+std::string fit_html(const ReportData& data) {
+  if (!data.fit) return {};
+  HtmlTable table({{"what the keyframes saw"},
+                   {"sightings", true},
+                   {"off by, median", true},
+                   {"nine of ten within", true}});
+  const auto add = [&](const char* name, const FamilyFit& fit, int decimals, const char* unit) {
+    if (fit.sightings == 0) return;
+    table.row({name, count_text(static_cast<double>(fit.sightings)), number_text(fit.median, decimals, unit),
+               number_text(fit.p90, decimals, unit)});
+  };
+  add("Points, in the picture", data.fit->points_px, 2, "px");
+  add("Points, depth", data.fit->depths_mm, 1, "mm");
+  add("Ends of lines, across the line", data.fit->lines_px, 2, "px");
+  return table.rows() == 0 ? "" : "<h3>How well the finished map fits</h3>\n" + table.html();
+}
+
 }  // namespace
 
 std::string loops_html(const ReportData& data) {
@@ -173,7 +191,9 @@ std::string refinement_html(const ReportData& data) {
   const Json& s = data.summary;
   const double maps = number_at(s, "/refine/local_maps");
   if (!(maps > 0.0) && !(number_at(s, "/refine/max_shift_m") > 0.0)) {
-    return paragraph("The map was not refined as a whole: there was nothing to align, or the stage was off.");
+    return paragraph(
+               "The map was not refined as a whole: there was nothing to align, or the stage was off.") +
+           fit_html(data);
   }
   const auto count = [&](const char* place) { return count_text(number_at(s, place)); };
   std::string out = facts_html(
@@ -198,7 +218,8 @@ std::string refinement_html(const ReportData& data) {
                count_text(number_at(d, "/samples")), number_text(number_at(d, "/before"), 3),
                number_text(number_at(d, "/after"), 3), number_text(1e3 * number_at(d, "/most_at_2m"), 1)});
   }
-  return out + (depth.rows() > 0 ? "<h3>Systematic error of the depth cameras</h3>\n" + depth.html() : "");
+  if (depth.rows() > 0) out += "<h3>Systematic error of the depth cameras</h3>\n" + depth.html();
+  return out + fit_html(data);
 }
 
 }  // namespace plumbline::pipeline

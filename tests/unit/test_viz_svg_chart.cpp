@@ -62,9 +62,11 @@ TEST(SvgChart, IsWellFormedWhateverItsLabels) {
 }
 
 TEST(SvgChart, DrawsWhatIsNotThereAsNothing) {
-  for (const SvgLine& line : {SvgLine{}, SvgLine{"", "k0", {kNaN, kNaN}, {1.0, kNaN}},
-                              SvgLine{"", "k0", {3.0}, {7.0}}, SvgLine{"", "k0", {1.0, 1.0}, {2.0, 2.0}},
-                              SvgLine{"", "k0", {0.0, INFINITY, 1.0}, {1.0, 2.0, -INFINITY}}}) {
+  for (const SvgLine& line :
+       {SvgLine{}, SvgLine{"", "k0", {kNaN, kNaN}, {1.0, kNaN}}, SvgLine{"", "k0", {3.0}, {7.0}},
+        SvgLine{"", "k0", {1e18, 1e18 + 256}, {-1e18, -1e18 - 256}},
+        SvgLine{"", "k0", {1.0, 1.0}, {2.0, 2.0}},
+        SvgLine{"", "k0", {0.0, INFINITY, 1.0}, {1.0, 2.0, -INFINITY}}}) {
     for (const bool equal : {false, true}) {
       SvgChart chart = chart_of(line);
       chart.equal_aspect = equal;
