@@ -39,6 +39,7 @@ function(plumbline_part name)
                         LIBRARY_OUTPUT_DIRECTORY ${PLUMBLINE_PARTS})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include ${CMAKE_CURRENT_SOURCE_DIR})
   target_link_libraries(${target} PRIVATE ${ARG_LINK} plumbline_warnings)
+  target_link_options(${target} PRIVATE LINKER:--exclude-libs,ALL) # its copies cannot meet the program's
   if(ARG_PCH)
     target_precompile_headers(${target} PRIVATE ${ARG_PCH})
   endif()
