@@ -81,9 +81,39 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
   return chosen;
 }
 
-/// FAST over the region; cells where the high threshold finds nothing get the low one.
-std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int high, int low) {
+/// Whether the gradients around a pixel nearly all point the same way or its opposite (structure tensor;
+/// Harris and Stephens 1988 ask the same of one number).
+bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
+  constexpr int kReach = 3;
+  int xx = 0;
+  int xy = 0;
+  int yy = 0;
+  for (int v = y - kReach; v <= y + kReach; ++v) {
+    const unsigned char* above = level.ptr<unsigned char>(v - 1);
+    const unsigned char* row = level.ptr<unsigned char>(v);
+    const unsigned char* below = level.ptr<unsigned char>(v + 1);
+    for (int u = x - kReach; u <= x + kReach; ++u) {
+      const int dx = row[u + 1] - row[u - 1];
+      const int dy = below[u] - above[u];
+      xx += dx * dx;
+      xy += dx * dy;
+      yy += dy * dy;
+    }
+  }
+  const double sum = static_cast<double>(xx) + yy;
+  const double difference = std::hypot(static_cast<double>(xx) - yy, 2.0 * xy);
+  return sum - difference < min_corner * (sum + difference);
+}
+
+/// FAST over the region, without what lies on edges; cells where the high threshold finds nothing get the low
+/// one.
+std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int high, int low,
+                           double min_corner) {
   std::vector<Corner> corners = fast_corners(level(region), low);
+  const auto edge = [&](const Corner& c) {
+    return on_edge(level, c.x + region.x, c.y + region.y, min_corner);
+  };
+  if (min_corner > 0.0) corners.erase(std::remove_if(corners.begin(), corners.end(), edge), corners.end());
   const Cells cells(region.width, region.height);
   std::vector<char> has_strong(cells.count(), 0);
   for (const Corner& c : corners) {
@@ -108,6 +138,10 @@ void OrbOptions::declare(core::OptionTable& table) {
   table.integer("orb.fast_threshold", fast_threshold, {1, 200}, "", "FAST threshold, grey values");
   table.integer("orb.fast_threshold_min", fast_threshold_min, {1, 200}, "",
                 "FAST threshold where a cell of the picture has no corner otherwise");
+  table.number(
+      "orb.min_corner", min_corner, {0.0, 1.0}, "",
+      "Corners whose gradients across the main direction are weaker, squared, than this share of those "
+      "along it lie on an edge and are left out; 0: none are");
 }
 
 OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {
@@ -159,7 +193,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
     const int wanted = static_cast<int>(std::lround(options_.count / (scale * share_sum)));
     const std::vector<Corner> corners =
         spread(detect(image, inner, options_.fast_threshold,
-                      std::min(options_.fast_threshold, options_.fast_threshold_min)),
+                      std::min(options_.fast_threshold, options_.fast_threshold_min), options_.min_corner),
                image.size(), wanted);
     if (corners.empty()) continue;
     const cv::Mat smooth = orb_smooth(exact);

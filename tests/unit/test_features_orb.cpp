@@ -49,6 +49,42 @@ TEST(Orb, WeakTextureGetsItsPointsBesideStrong) {
   EXPECT_GT(weak, 250);
 }
 
+/// A board: a dark frame a little out of level on a noisy wall, as a camera sees it.
+cv::Mat board() {
+  cv::Mat image(4 * 480, 4 * 640, CV_8UC1, cv::Scalar(200));
+  const std::vector<cv::Point> frame{{600, 420}, {1960, 300}, {2000, 1500}, {560, 1560}};
+  cv::polylines(image, frame, true, cv::Scalar(90), 24, cv::LINE_AA);
+  cv::resize(image, image, {640, 480}, 0.0, 0.0, cv::INTER_AREA);
+  cv::Mat noise(image.size(), CV_16SC1);
+  cv::RNG random(3);
+  random.fill(noise, cv::RNG::NORMAL, 0.0, 2.0);
+  cv::add(image, noise, image, cv::noArray(), CV_8U);
+  return image;
+}
+
+TEST(Orb, PointsLieAtCornersAndNotAlongEdges) {
+  const std::array<Eigen::Vector2f, 4> corners{
+      Eigen::Vector2f(150.0F, 105.0F), Eigen::Vector2f(490.0F, 75.0F), Eigen::Vector2f(500.0F, 375.0F),
+      Eigen::Vector2f(140.0F, 390.0F)};
+  const auto count = [&](const OrbFeatures& found) {
+    std::array<int, 2> at_corners_along_edges{};
+    for (const PointFeature& p : found.points) {
+      const bool corner = std::any_of(corners.begin(), corners.end(),
+                                      [&](const Eigen::Vector2f& c) { return (c - p.pixel).norm() < 25.0F; });
+      ++at_corners_along_edges[corner ? 0 : 1];
+    }
+    return at_corners_along_edges;
+  };
+  OrbOptions all;
+  all.min_corner = 0.0;
+  const auto [corners_of_all, edges_of_all] = count(extract(board(), all));
+  const auto [at_corners, along_edges] = count(extract(board()));
+  EXPECT_GT(edges_of_all, 30);
+  EXPECT_LT(along_edges, edges_of_all / 4);
+  EXPECT_GT(at_corners, 8);
+  EXPECT_GT(at_corners, 2 * corners_of_all / 3);
+}
+
 TEST(Orb, AllOctavesAreUsedAndInRange) {
   const OrbFeatures found = extract(texture(640, 480));
   std::array<int, 8> count{};
