@@ -2,13 +2,9 @@
 #include "laid_over.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <numeric>
-#include <set>
 
-#include "plumbline/features/descriptor.hpp"
+#include "landmark_cells.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
@@ -16,41 +12,17 @@ namespace {
 
 using core::KeyframeId;
 using geometry::Rigid3;
-using Cell = std::array<int, 3>;
 
 constexpr double kReach_m = 0.12;  // landmarks that are one may lie so far apart
 constexpr double kCell_m = 2.0 * kReach_m;
-constexpr int kAlike = 50;                 // Hamming distance of landmarks that may be one
-constexpr double kBin_m = 0.2;             // of the votes; a peak covers two in each direction
-constexpr std::size_t kPeaks = 6;          // that are looked at
-constexpr std::size_t kMostVoters = 3000;  // of each side
 constexpr std::size_t kMostAsked = 6000;
 constexpr double kNear_m = 0.4;  // what depth is believed
 constexpr double kFar_m = 5.0;
-
-Cell cell_of(const Eigen::Vector3d& p, double size) {
-  const Eigen::Vector3d scaled = p / size;
-  return {static_cast<int>(std::floor(scaled.x())), static_cast<int>(std::floor(scaled.y())),
-          static_cast<int>(std::floor(scaled.z()))};
-}
-
-Cell corner_of(const Cell& low, int corner, int sign = 1) {
-  return {low[0] + sign * (corner & 1), low[1] + sign * (corner >> 1 & 1), low[2] + sign * (corner >> 2)};
-}
 
 std::uint64_t key_of(const Cell& c) {
   std::uint64_t key = 0;
   for (const int v : c) key = key << 21U | (static_cast<std::uint64_t>(v + (1 << 20)) & 0x1fffffU);
   return key;
-}
-
-/// Every how manieth, so that no more than `most` are taken.
-std::size_t stride(std::size_t count, std::size_t most) {
-  return std::max<std::size_t>(1, (count + most - 1) / most);
-}
-
-bool alike(const features::Descriptor256& a, const features::Descriptor256& b) {
-  return features::hamming_distance(a, b) <= kAlike;
 }
 
 enum class Seen { kNot, kThere, kThrough };
@@ -92,72 +64,6 @@ std::vector<View> views_of(const MapPart& part) {
   return views;
 }
 
-/// Votes for steps, in bins.
-class Peaks {
- public:
-  Peaks(const std::vector<Eigen::Vector3d>& steps, double least_m) : steps_(steps), least_m_(least_m) {
-    for (std::size_t i = 0; i < steps.size(); ++i) {
-      if (steps[i].norm() >= least_m) bins_[cell_of(steps[i], kBin_m)].push_back(i);
-    }
-  }
-  /// Means of the fullest blocks of eight bins, no two of one peak.
-  [[nodiscard]] std::vector<Eigen::Vector3d> highest(std::size_t most) const {
-    std::map<Cell, std::size_t> counts;
-    for (const auto& bin : bins_) {
-      for (int corner = 0; corner < 8; ++corner) {
-        counts[corner_of(bin.first, corner, -1)] += bin.second.size();
-      }
-    }
-    std::vector<std::pair<std::size_t, Cell>> blocks;
-    for (const auto& [low, count] : counts) blocks.emplace_back(count, low);
-    std::sort(blocks.begin(), blocks.end(), [](const auto& x, const auto& y) {
-      return x.first != y.first ? x.first > y.first : x.second < y.second;
-    });
-    std::vector<Eigen::Vector3d> result;
-    for (const auto& block : blocks) {
-      if (result.size() >= most) break;
-      const Eigen::Vector3d mean = settled(mean_of(block.second));
-      const auto same = [&](const Eigen::Vector3d& other) { return (other - mean).norm() < 2.0 * kBin_m; };
-      if (mean.norm() >= least_m_ && std::none_of(result.begin(), result.end(), same)) result.push_back(mean);
-    }
-    return result;
-  }
-
- private:
-  [[nodiscard]] Eigen::Vector3d mean_of(const Cell& low) const {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double count = 0.0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const auto bin = bins_.find(corner_of(low, corner));
-      if (bin == bins_.end()) continue;
-      for (const std::size_t i : bin->second) sum += steps_[i];
-      count += static_cast<double>(bin->second.size());
-    }
-    return sum / count;
-  }
-
-  /// The block need not have the peak in its middle.
-  [[nodiscard]] Eigen::Vector3d settled(Eigen::Vector3d peak) const {
-    constexpr int kRounds = 5;
-    constexpr double kWide_m = 0.75 * kBin_m;
-    for (int round = 0; round < kRounds; ++round) {
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      double count = 0.0;
-      for (const Eigen::Vector3d& step : steps_) {
-        if ((step - peak).squaredNorm() > kWide_m * kWide_m) continue;
-        sum += step;
-        count += 1.0;
-      }
-      if (count > 0.0) peak = sum / count;
-    }
-    return peak;
-  }
-
-  const std::vector<Eigen::Vector3d>& steps_;
-  double least_m_;
-  std::map<Cell, std::vector<std::size_t>> bins_;
-};
-
 }  // namespace
 
 LaidMaps::Landmark LaidMaps::landmark(const maps::Map& map, core::PointId id) {
@@ -194,7 +100,7 @@ LaidMaps::LaidMaps(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)
 }
 
 /// Whether the side has a landmark there that looks alike, and how probable that was.
-void LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
+bool LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
                      LaidOver& sum) const {
   // Cells are twice the reach wide: eight of them hold all that is near.
   const Cell low = cell_of(at - Eigen::Vector3d::Constant(kReach_m), kCell_m);
@@ -212,10 +118,11 @@ void LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Ve
   }
   sum.matched += found ? 1 : 0;
   sum.chance += 1.0 - std::pow(1.0 - alike_, near);
+  return found;
 }
 
-void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
-                   LaidOver& sum) const {
+void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved, LaidOver& sum,
+                   std::vector<Eigen::Vector3d>* matched) const {
   constexpr double kLikeSide = 0.8;  // cosine between the directions from which a landmark was seen
   constexpr double kTimes = 1.8;     // nearer or farther: a corner does not look the same from everywhere
   const std::vector<View> views = views_of(fixed.part);
@@ -240,7 +147,7 @@ void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_fro
     }
     if (there) {
       ++sum.expected;
-      match(fixed, landmark, at, sum);
+      if (match(fixed, landmark, at, sum) && matched != nullptr) matched->push_back(at);
     } else if (through) {
       ++sum.contradicted;
     }
@@ -249,14 +156,9 @@ void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_fro
 
 namespace {
 
-struct SurfaceCounts {
-  int there = 0;
-  int through = 0;
-};
-
 /// Surface samples of one map in the views of another.
 void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
-                  SurfaceCounts& sum) {
+                  LaidMaps::Surfaces& sum) {
   constexpr double kFacing = 0.25;  // cosine
   const std::vector<View> views = views_of(fixed);
   const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
@@ -289,13 +191,11 @@ void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixe
 
 }  // namespace
 
-double LaidMaps::surfaces_seen_through(const Rigid3& a_from_b) const {
-  constexpr int kFew = 500;  // samples; tell nothing
-  SurfaceCounts sum;
+LaidMaps::Surfaces LaidMaps::surfaces(const Rigid3& a_from_b) const {
+  Surfaces sum;
   lay_surfaces(b_.part, a_.part, a_from_b, sum);
   lay_surfaces(a_.part, b_.part, a_from_b.inverse(), sum);
-  const int told = sum.there + sum.through;
-  return told >= kFew ? static_cast<double>(sum.through) / told : 0.0;
+  return sum;
 }
 
 LaidOver LaidMaps::fit(const Rigid3& a_from_b) const {
@@ -303,47 +203,6 @@ LaidOver LaidMaps::fit(const Rigid3& a_from_b) const {
   lay(b_, a_, a_from_b, sum);
   lay(a_, b_, a_from_b.inverse(), sum);
   return sum;
-}
-
-/// Steps, in the fixed map's world, between landmarks that look very much alike.
-void LaidMaps::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
-                    const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps) {
-  const maps::Map& map = *moved.part.map;
-  std::set<core::PointId> ids;
-  for (const VerifiedPair& pair : pairs) {
-    for (const core::PointId id : map.points_of(map.has_keyframe(pair.query) ? pair.query : pair.match)) {
-      if (id.valid() && map.point(id).observations.size() >= 2) ids.insert(id);
-    }
-  }
-  const std::vector<core::PointId> voters(ids.begin(), ids.end());
-  std::vector<features::Descriptor256> descriptors;
-  for (const Landmark& l : fixed.landmarks) descriptors.push_back(l.descriptor);
-  std::vector<int> all(descriptors.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<int> distances(descriptors.size());
-  for (std::size_t v = 0; v < voters.size(); v += stride(voters.size(), kMostVoters)) {
-    const Landmark voter = landmark(map, voters[v]);
-    const Eigen::Vector3d at = fixed_from_moved * voter.position;
-    features::hamming_distances(voter.descriptor, descriptors.data(), all.data(), all.size(),
-                                distances.data());
-    for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] <= kAlike) steps.push_back(fixed.landmarks[i].position - at);
-    }
-  }
-}
-
-std::vector<Rigid3> LaidMaps::steps(const Rigid3& a_from_b, const std::vector<VerifiedPair>& pairs,
-                                    double least_m) const {
-  std::vector<Eigen::Vector3d> votes;
-  vote(a_, b_, a_from_b.inverse(), pairs, votes);
-  // A step of a in b's world is the opposite one of b in a's.
-  for (Eigen::Vector3d& step : votes) step = -(a_from_b.rotation * step);
-  vote(b_, a_, a_from_b, pairs, votes);
-  std::vector<Rigid3> result;
-  for (const Eigen::Vector3d& step : Peaks(votes, least_m).highest(kPeaks)) {
-    result.emplace_back(a_from_b.rotation, a_from_b.translation + step);
-  }
-  return result;
 }
 
 }  // namespace plumbline::mapping

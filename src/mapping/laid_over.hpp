@@ -20,9 +20,21 @@ class LaidMaps {
   /// The fit of b laid over a.
   [[nodiscard]] LaidOver fit(const geometry::Rigid3& a_from_b) const;
 
-  /// Share of the surfaces of each map, at their place in the other, that lie where its cameras saw through;
-  /// of those of which they saw anything, that face them. 0 when that are too few.
-  [[nodiscard]] double surfaces_seen_through(const geometry::Rigid3& a_from_b) const;
+  /// Surface samples of each map, at their place in the other, of which its cameras saw anything and that
+  /// face them: where they saw a surface too, and where they saw through.
+  struct Surfaces {
+    int there = 0;
+    int through = 0;
+    /// More than this share of no fewer than so many was seen through.
+    [[nodiscard]] bool contradict(double share, int least) const {
+      return there + through >= least && through > share * (there + through);
+    }
+  };
+  [[nodiscard]] Surfaces surfaces(const geometry::Rigid3& a_from_b) const;
+
+  /// At how many spots landmarks match when b is laid over a, spots side by side as seen along `step` (in a's
+  /// world): what lies behind one another in that direction counts once.
+  [[nodiscard]] int matching_spots(const geometry::Rigid3& a_from_b, const Eigen::Vector3d& step) const;
 
   /// Other ways to lay b over a, a step of `least_m` or more away from `a_from_b`, that most landmarks seen
   /// by the keyframes of `pairs` speak for.
@@ -44,9 +56,10 @@ class LaidMaps {
   };
   static Side side(const MapPart& part);
   static Landmark landmark(const maps::Map& map, core::PointId id);
-  void match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, LaidOver& sum) const;
-  void lay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
-           LaidOver& sum) const;
+  bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, LaidOver& sum) const;
+  /// `matched`: where (in the fixed map's world) landmarks match, added to it; may be null.
+  void lay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved, LaidOver& sum,
+           std::vector<Eigen::Vector3d>* matched = nullptr) const;
   static void vote(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
                    const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps);
 

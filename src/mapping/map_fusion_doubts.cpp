@@ -17,7 +17,13 @@ constexpr double kApart_m = 1.0;     // another place: more than maps drift with
 constexpr double kTurned_rad = 0.3;  // ... or so far turned
 constexpr int kFewLandmarks = 30;    // tell nothing
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
-constexpr double kNoRival = 0.2;     // share of surfaces seen through where no landmark speaks against it
+// What rules an answer out that no landmark speaks against: so many surfaces seen through ...
+constexpr double kNoRival = 0.2;
+constexpr int kSurfaces = 500;
+// ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.
+constexpr int kSpots = 3;
+constexpr double kNoRivalOfFewSpots = 0.1;
+constexpr int kFewSurfaces = 100;
 
 /// How far apart two answers put the camera of b's keyframes that agree, and how far they turn it.
 struct Difference {
@@ -56,14 +62,22 @@ struct Rival {
   bool refuted = false;
 };
 
-/// Held against the maps, side by side. Surfaces are asked where landmarks leave it open.
-void hold_against(const LaidMaps& maps, const LaidOver& answer, const MapFusionOptions& options,
-                  const core::Executor& executor, std::vector<Rival>& rivals) {
+/// Held against the maps, side by side. Surfaces are asked where landmarks leave it open; what landmarks
+/// alone stand for must show at several spots.
+void hold_against(const LaidMaps& maps, const Rigid3& a_from_b, const LaidOver& answer,
+                  const MapFusionOptions& options, const core::Executor& executor,
+                  std::vector<Rival>& rivals) {
   executor.parallel_for(rivals.size(), [&](std::size_t i) {
     Rival& rival = rivals[i];
     rival.fit = maps.fit(rival.a_from_b);
     rival.refuted = rival.witnesses > 0 ? refuted(rival.fit, options) : !fits_too(rival.fit, answer, options);
-    if (!rival.refuted) rival.refuted = maps.surfaces_seen_through(rival.a_from_b) > kNoRival;
+    if (rival.refuted) return;
+    const LaidMaps::Surfaces surfaces = maps.surfaces(rival.a_from_b);
+    rival.refuted = surfaces.contradict(kNoRival, kSurfaces);
+    if (rival.refuted || rival.witnesses > 0 || !surfaces.contradict(kNoRivalOfFewSpots, kFewSurfaces))
+      return;
+    const Eigen::Vector3d step = rival.a_from_b.translation - a_from_b.translation;
+    rival.refuted = maps.matching_spots(rival.a_from_b, step) < kSpots;
   });
 }
 
@@ -94,7 +108,7 @@ std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
   for (const Rigid3& other : maps.steps(merge.a_from_b, merge.pairs, kApart_m)) {
     rivals.push_back({other, between(b, at, merge.a_from_b, other), 0, {}, false});
   }
-  hold_against(maps, merge.laid, options, executor, rivals);
+  hold_against(maps, merge.a_from_b, merge.laid, options, executor, rivals);
   for (const Rival& rival : rivals) {
     if (rival.refuted) continue;
     merge.rival = std::max(merge.rival, rival.witnesses);
