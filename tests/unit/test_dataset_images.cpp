@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <thread>
 #include <vector>
 
 #include "plumbline/core/part.hpp"
@@ -107,6 +108,20 @@ TEST(ImageFormats, PartOfAnotherProgramIsRefused) {
   ASSERT_FALSE(loaded);
   EXPECT_NE(loaded.error().message.find("plumbline_images.so"), std::string::npos) << loaded.error().message;
   EXPECT_NE(loaded.error().message.find("not built together"), std::string::npos) << loaded.error().message;
+}
+
+TEST_F(Images, OtherFormatsAreReadByManyThreadsAtOnceFromTheFirst) {
+  write_image("color.bmp", picture(CV_8UC3, {64, 48}));
+  std::vector<std::thread> threads;
+  std::vector<int> rows(8, 0);
+  for (int& r : rows) {
+    threads.emplace_back([this, &r] {
+      const auto image = read_image(folder_ / "color.bmp");
+      r = image ? image->rows : -1;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(rows, std::vector<int>(8, 48));
 }
 
 TEST_F(Images, TruncationAnywhereIsAnError) {
