@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bundle_solver.hpp"
 #include "bundle_terms.hpp"
@@ -29,7 +30,28 @@ void write_back(const BundleState& state, BundleProblem& problem) {
     problem.lines[i] = geometry::to_plucker(state.lines[i]);
 }
 
-/// Beyond these squared standard deviations an observation is an outlier.
+/// Sums of squares by and by.
+class FitSum {
+ public:
+  void add(double squared, bool fits) {
+    ++fit_.all;
+    if (!fits) return;
+    ++fit_.fitting;
+    sum_ += squared;
+  }
+  /// Each square was that of so many coordinates.
+  [[nodiscard]] BundleFit fit(int coordinates) const {
+    BundleFit fit = fit_;
+    if (fit.fitting > 0) fit.rms = std::sqrt(sum_ / (coordinates * static_cast<double>(fit.fitting)));
+    return fit;
+  }
+
+ private:
+  BundleFit fit_;
+  double sum_ = 0.0;
+};
+
+/// What is off by more squared standard deviations than a gate is an outlier.
 class Gate {
  public:
   Gate(const BundleState& state, const sensor::Pinhole& camera, double point_gate, double line_gate)
@@ -41,16 +63,19 @@ class Gate {
     for (const geometry::OrthonormalLine& line : state.lines) lines_.push_back(geometry::to_plucker(line));
   }
 
-  void mark(BundlePointObservation& o) const {
+  /// Squared standard deviations; infinite where it cannot have been seen.
+  double mark(BundlePointObservation& o) const {
     PointTerm term = to_term(o);
     term.world = state_.points[static_cast<std::size_t>(o.point)];
     Eigen::Vector3d r;
     const int rows =
         point_residual(term, state_.poses[static_cast<std::size_t>(o.pose)], camera_, r, nullptr);
-    o.outlier = rows == 0 || !(r.head<2>().squaredNorm() <= point_gate_);
+    const double squared = rows == 0 ? kInfinity : r.head<2>().squaredNorm();
+    o.outlier = !(squared <= point_gate_);
+    return squared;
   }
   /// A line through the camera's centre has no image: it cannot be what was seen there.
-  void mark(BundleLineObservation& o) const {
+  double mark(BundleLineObservation& o) const {
     LineTerm term;
     term.world = lines_[static_cast<std::size_t>(o.line)];
     term.start = o.start;
@@ -59,11 +84,14 @@ class Gate {
     Eigen::Vector2d r;
     const Rigid3& pose = state_.poses[static_cast<std::size_t>(o.pose)];
     const bool has_image = line_residual(term, pose, projection_, r, nullptr);
-    o.outlier = !has_image || !(r.squaredNorm() <= line_gate_);
+    const double squared = has_image ? r.squaredNorm() : kInfinity;
+    o.outlier = !(squared <= line_gate_);
+    return squared;
   }
 
  private:
   using Rigid3 = geometry::Rigid3;
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const BundleState& state_;
   const sensor::Pinhole& camera_;
   Eigen::Matrix3d projection_;
@@ -72,10 +100,31 @@ class Gate {
   std::vector<geometry::PluckerLine> lines_;
 };
 
-void mark_outliers(BundleProblem& problem, const BundleState& state, double point_gate, double line_gate) {
+BundleFit fit_of_edges(const BundleProblem& problem, const BundleState& state) {
+  FitSum sum;
+  for (const BundleEdge& edge : problem.edges) {
+    const geometry::Rigid3& a = state.poses[static_cast<std::size_t>(edge.a)];
+    const geometry::Rigid3& b = state.poses[static_cast<std::size_t>(edge.b)];
+    const geometry::Vector6d xi = geometry::log_se3(b * a.inverse() * edge.b_from_a.inverse());
+    sum.add(xi.dot(edge.information * xi), true);
+  }
+  return sum.fit(6);
+}
+
+/// Puts what is beyond the gates aside. Tells how well all fits, by the gates of the options.
+BundleFits mark_outliers(BundleProblem& problem, const BundleState& state, const BundleOptions& options,
+                         double point_gate, double line_gate) {
   const Gate gate(state, problem.camera, point_gate, line_gate);
-  for (BundlePointObservation& o : problem.point_observations) gate.mark(o);
-  for (BundleLineObservation& o : problem.line_observations) gate.mark(o);
+  FitSum points, lines;
+  for (BundlePointObservation& o : problem.point_observations) {
+    const double squared = gate.mark(o);
+    points.add(squared, squared <= options.point_gate);
+  }
+  for (BundleLineObservation& o : problem.line_observations) {
+    const double squared = gate.mark(o);
+    lines.add(squared, squared <= options.line_gate);
+  }
+  return {points.fit(2), lines.fit(2), fit_of_edges(problem, state)};
 }
 
 }  // namespace
@@ -106,7 +155,7 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
   core::Crew crew(executor);
   if (options.first_gate > 0.0) {
     const double gate = options.first_gate * options.first_gate;
-    mark_outliers(problem, state, gate, gate);
+    summary.before = mark_outliers(problem, state, options, gate, gate);
   }
   for (int round = 0; round < options.rounds; ++round) {
     const RoundSummary done = solve_bundle_round(problem, options, crew, state);
@@ -115,7 +164,7 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
     if (!done.usable) return summary;
     summary.final_cost = done.final_cost;
     summary.iterations += done.iterations;
-    mark_outliers(problem, state, options.point_gate, options.line_gate);
+    summary.after = mark_outliers(problem, state, options, options.point_gate, options.line_gate);
   }
   write_back(state, problem);
   summary.usable = true;

@@ -107,6 +107,27 @@ std::string refused_pairs(const Json& merge) {
   return table.html();
 }
 
+/// Before and after all keyframes and landmarks were adjusted together.
+std::string adjustment_html(const Json& s) {
+  HtmlTable table({{"adjusted together"},
+                   {"in all", true},
+                   {"fitting before", true},
+                   {"after", true},
+                   {"rms of these before (σ)", true},
+                   {"after (σ)", true}});
+  for (const auto& [name, what] : {std::pair{"points", "points"}, std::pair{"lines", "lines"},
+                                   std::pair{"edges", "surfaces of two keyframes or local maps; loops"}}) {
+    const Json& before = list_at(s, std::string("/refine/before/") + name);
+    const Json& after = list_at(s, std::string("/refine/after/") + name);
+    if (after.empty()) continue;
+    const double all = number_at(after, "/all");
+    table.row({what, count_text(all), percent(number_at(before, "/fitting") / all),
+               percent(number_at(after, "/fitting") / all), number_text(number_at(before, "/rms"), 2),
+               number_text(number_at(after, "/rms"), 2)});
+  }
+  return table.html();
+}
+
 /// Distances of what the keyframes saw from where the finished map has it.
 std::string fit_html(const ReportData& data) {
   if (!data.fit) return {};
@@ -206,6 +227,7 @@ std::string refinement_html(const ReportData& data) {
        {"Keyframes moved", fmt::format("{} on average, {} at most",
                                        number_text(1e3 * number_at(s, "/refine/mean_shift_m"), 1, "mm"),
                                        number_text(1e3 * number_at(s, "/refine/max_shift_m"), 1, "mm"))}});
+  out += adjustment_html(s);
   HtmlTable depth({{"depth camera"},
                    {"correction"},
                    {"samples", true},

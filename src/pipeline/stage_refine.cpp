@@ -102,6 +102,8 @@ class RefineStage : public Stage {
     }
     counts_.mean_shift_m = summary.mean_shift_m;
     counts_.max_shift_m = summary.max_shift_m;
+    counts_.before = summary.bundle.before;
+    counts_.after = summary.bundle.after;
     if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
     log_->debug(fmt::format(
         "refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "

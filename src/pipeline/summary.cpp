@@ -80,6 +80,15 @@ nlohmann::ordered_json laid(const mapping::LaidOver& fit) {
           {"seen_through", fit.contradicted}};
 }
 
+nlohmann::ordered_json fits_of(const optimize::BundleFits& fits) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::object();
+  for (const auto& [name, fit] :
+       {std::pair{"points", fits.points}, std::pair{"lines", fits.lines}, std::pair{"edges", fits.edges}}) {
+    if (fit.all > 0) all[name] = {{"all", fit.all}, {"fitting", fit.fitting}, {"rms", rounded(fit.rms)}};
+  }
+  return all;
+}
+
 nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::DepthField& found : summary.depth_fields) {
@@ -236,7 +245,9 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"rejected", s.refine.rejected},
         {"mean_rms", rounded(s.refine.mean_rms)},
         {"mean_shift_m", rounded(s.refine.mean_shift_m)},
-        {"max_shift_m", rounded(s.refine.max_shift_m)}}},
+        {"max_shift_m", rounded(s.refine.max_shift_m)},
+        {"before", fits_of(s.refine.before)},
+        {"after", fits_of(s.refine.after)}}},
       {"merges", merges_of(s)},
       {"robots", traffic_of(s)},
       {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},

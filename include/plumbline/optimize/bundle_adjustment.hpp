@@ -5,6 +5,7 @@
 // sections 2 and 3). Plain structs in, plain structs out. Every sum runs in a fixed order: the same bytes for
 // any number of threads.
 #include <Eigen/Core>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -82,12 +83,26 @@ struct BundleOptions {
   void declare(core::OptionTable& table);
 };
 
+/// How well what was seen of one kind fits.
+struct BundleFit {
+  std::size_t all = 0;      ///< observations
+  std::size_t fitting = 0;  ///< within BundleOptions::point_gate or line_gate
+  double rms = 0.0;         ///< of these: of a coordinate, in the image or of an edge; standard deviations
+};
+struct BundleFits {
+  BundleFit points;
+  BundleFit lines;
+  BundleFit edges;
+};
+
 struct BundleSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
   int iterations = 0;
   int point_outliers = 0;
   int line_outliers = 0;
+  BundleFits before;    ///< the first round; all zero unless first_gate made it necessary to look
+  BundleFits after;     ///< the last round
   bool usable = false;  ///< poses, points and lines were updated
   std::string message;
 };

@@ -13,6 +13,7 @@
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/pipeline/run.hpp"
 
 namespace plumbline::pipeline {
@@ -50,6 +51,8 @@ struct RunSummary {
     double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
     double mean_shift_m = 0.0;  ///< how far keyframes moved
     double max_shift_m = 0.0;
+    optimize::BundleFits before;  ///< how well all fits where the pose graph had put it; zeros: not known
+    optimize::BundleFits after;   ///< when all was adjusted
   } refine;
   /// What was found of a depth camera's systematic error.
   struct DepthField {
