@@ -327,10 +327,13 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
   if (told.samples < kLeastSamples) return DepthField();
 
   // Each part of the run is asked what it makes of a field in which it had no say.
-  std::vector<double> before;
-  std::vector<double> after;
+  struct Answer {
+    bool enough = false;
+    std::vector<double> before, after;
+  };
+  std::vector<Answer> answers(kParts);
   const auto part = [&](std::size_t view) { return view * kBlocks / count % kParts; };
-  for (std::size_t k = 0; k < kParts; ++k) {
+  executor.parallel_for(kParts, [&](std::size_t k) {
     std::vector<const Rows*> own;
     std::vector<const Rows*> others;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -338,9 +341,18 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
       if (part(a) == k) own.push_back(&rows[i]);
       if (part(a) != k && part(b) != k) others.push_back(&rows[i]);
     }
-    if (count_of(others) < kLeastSamples) return DepthField();
-    add_disagreement(own, DepthField(), before);
-    add_disagreement(own, fitted(others, camera, executor), after);
+    Answer& answer = answers[k];
+    answer.enough = count_of(others) >= kLeastSamples;
+    if (!answer.enough) return;
+    add_disagreement(own, DepthField(), answer.before);
+    add_disagreement(own, fitted(others, camera, executor), answer.after);
+  });
+  std::vector<double> before;
+  std::vector<double> after;
+  for (const Answer& answer : answers) {
+    if (!answer.enough) return DepthField();
+    before.insert(before.end(), answer.before.begin(), answer.before.end());
+    after.insert(after.end(), answer.after.begin(), answer.after.end());
   }
   told.before = median(before);
   told.after = median(after);

@@ -27,15 +27,10 @@ std::size_t chunks_of(std::uint64_t ticket) {
 }
 std::size_t next_of(std::uint64_t ticket) { return static_cast<std::size_t>(ticket) & kMostChunks; }
 
-void relax(int& spins) {
-  constexpr int kBeforeYielding = 64;
-  if (++spins < kBeforeYielding) {
+void relax() {
 #if defined(__x86_64__)
-    __builtin_ia32_pause();
+  __builtin_ia32_pause();
 #endif
-  } else {
-    std::this_thread::yield();
-  }
 }
 
 }  // namespace
@@ -64,14 +59,13 @@ struct Crew::Shared {
     constexpr std::chrono::microseconds kPatience(500);
     using Clock = std::chrono::steady_clock;
     Clock::time_point last = Clock::now();
-    for (int spins = 0; !ended.load(std::memory_order_acquire);) {
+    while (!ended.load(std::memory_order_acquire)) {
       if (one()) {
-        spins = 0;
         last = Clock::now();
       } else if (Clock::now() - last > kPatience) {
-        break;
+        break;  // without giving way before: who comes next would keep the processor for milliseconds
       } else {
-        relax(spins);
+        relax();
       }
     }
     awake.store(false, std::memory_order_release);
@@ -112,7 +106,10 @@ void Crew::run(std::size_t chunks, const std::function<void(std::size_t)>& work)
   }
   while (s.one()) {
   }
-  for (int spins = 0; s.done.load(std::memory_order_acquire) < chunks;) relax(spins);
+  constexpr int kBeforeGivingWay = 10000;
+  for (int spins = 0; s.done.load(std::memory_order_acquire) < chunks; ++spins) {
+    spins < kBeforeGivingWay ? relax() : std::this_thread::yield();
+  }
   if (s.failure) std::rethrow_exception(std::exchange(s.failure, nullptr));
 }
 

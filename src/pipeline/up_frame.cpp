@@ -24,13 +24,35 @@ constexpr double kBin_m = 0.02;
 constexpr double kUpright = 0.9;     // cosine of what counts as horizontal
 constexpr double kLargeShare = 0.2;  // of the largest horizontal surface
 
+constexpr std::size_t kAtATime = 1U << 16U;
+
+/// What faces up, with its height along `up`: in the order of the cloud.
+struct Upright {
+  Eigen::Vector3d at;
+  double height_m;
+};
+std::vector<Upright> facing_up(const cloud::Cloud& cloud, const Eigen::Vector3d& up,
+                               const core::Executor& executor) {
+  std::vector<std::vector<Upright>> parts((cloud.size() + kAtATime - 1) / kAtATime);
+  executor.parallel_for(parts.size(), [&](std::size_t part) {
+    const std::size_t end = std::min(cloud.size(), (part + 1) * kAtATime);
+    for (std::size_t i = part * kAtATime; i < end; ++i) {
+      const cloud::Point& p = cloud[i];
+      if (!(p.getNormalVector3fMap().cast<double>().dot(up) > kUpright)) continue;  // false for NaN, too
+      const Eigen::Vector3d at = p.getVector3fMap().cast<double>();
+      parts[part].push_back({at, at.dot(up)});
+    }
+  });
+  std::vector<Upright> all;
+  for (const std::vector<Upright>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 /// Height of the lowest large surface that faces up.
-std::optional<double> floor_height(const cloud::Cloud& cloud, const Eigen::Vector3d& up) {
+std::optional<double> floor_height(const std::vector<Upright>& points) {
   std::vector<double> heights;
-  for (const cloud::Point& p : cloud.points) {
-    if (!(p.getNormalVector3fMap().cast<double>().dot(up) > kUpright)) continue;  // false for NaN, too
-    const double height = p.getVector3fMap().cast<double>().dot(up);
-    if (std::isfinite(height)) heights.push_back(height);
+  for (const Upright& p : points) {
+    if (std::isfinite(p.height_m)) heights.push_back(p.height_m);
   }
   constexpr std::size_t kFewest = 200;
   if (heights.size() < kFewest) return std::nullopt;
@@ -52,18 +74,16 @@ std::optional<double> floor_height(const cloud::Cloud& cloud, const Eigen::Vecto
   return std::nullopt;
 }
 
-/// The plane of the points near `height` that face up; `up` within a few degrees of its normal.
-std::optional<Floor> fit_floor(const cloud::Cloud& cloud, const Eigen::Vector3d& up, double height) {
+/// The plane of the points near `height`; `up` within a few degrees of its normal.
+std::optional<Floor> fit_floor(const std::vector<Upright>& points, const Eigen::Vector3d& up, double height) {
   constexpr double kWithin_m = 0.06;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
   double count = 0.0;
-  for (const cloud::Point& p : cloud.points) {
-    if (!(p.getNormalVector3fMap().cast<double>().dot(up) > kUpright)) continue;
-    const Eigen::Vector3d at = p.getVector3fMap().cast<double>();
-    if (!(std::abs(at.dot(up) - height) < kWithin_m)) continue;
-    sum += at;
-    products += at * at.transpose();
+  for (const Upright& p : points) {
+    if (!(std::abs(p.height_m - height) < kWithin_m)) continue;
+    sum += p.at;
+    products += p.at * p.at.transpose();
     count += 1.0;
   }
   if (count < 100.0) return std::nullopt;
@@ -78,7 +98,8 @@ std::optional<Floor> fit_floor(const cloud::Cloud& cloud, const Eigen::Vector3d&
   return floor;
 }
 
-std::optional<Floor> find_floor(const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory) {
+std::optional<Floor> find_floor(const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory,
+                                const core::Executor& executor) {
   if (cloud == nullptr || cloud->empty()) return std::nullopt;
   viz::Scene scene;
   scene.cloud = cloud;
@@ -86,13 +107,15 @@ std::optional<Floor> find_floor(const cloud::CloudConstPtr& cloud, const geometr
   path.trajectory = trajectory;
   scene.paths.push_back(std::move(path));
   const Eigen::Vector3d up = viz::estimate_up(scene);
-  const auto height = floor_height(*cloud, up);
-  return height ? fit_floor(*cloud, up, *height) : std::nullopt;
+  const std::vector<Upright> points = facing_up(*cloud, up, executor);
+  const auto height = floor_height(points);
+  return height ? fit_floor(points, up, *height) : std::nullopt;
 }
 
 }  // namespace
 
-UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory) {
+UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory,
+                const core::Executor& executor) {
   UpFrame frame;
   if (wanted == Up::kNone || trajectory.empty()) return frame;
   const geometry::Rigid3& first = trajectory.front().world_from_camera;
@@ -100,7 +123,7 @@ UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Tr
   double ground = up.dot(first.translation);
   frame.up = "camera";
   if (wanted == Up::kFloor) {
-    if (const auto floor = find_floor(cloud, trajectory)) {
+    if (const auto floor = find_floor(cloud, trajectory, executor)) {
       up = floor->normal;
       ground = floor->height_m;
       frame.up = "floor";

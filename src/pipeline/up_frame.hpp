@@ -5,6 +5,7 @@
 #include <string>
 
 #include "plumbline/cloud/types.hpp"
+#include "plumbline/core/executor.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 
@@ -25,6 +26,7 @@ struct UpFrame {
 /// (camera) the first camera. kFloor takes the direction that most horizontal surface shares and the lowest
 /// large surface that faces it as the floor, and falls back to kCamera when no such surface is seen. Without
 /// poses: none.
-UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory);
+UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory,
+                const core::Executor& executor);
 
 }  // namespace plumbline::pipeline
