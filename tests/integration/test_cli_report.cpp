@@ -177,7 +177,7 @@ TEST_F(Report, TellsOfSeveralRobots) {
   const std::string html = page("out --truth world/robot0");
   for (const char* text : {"id=\"merges\"", "Evidence: ", "all, one alignment", "Robots</th><td>a, b",
                            "Points by who saw them most", "How well the finished map fits",
-                           "why pairs of keyframes were refused"}) {
+                           "adjusted together", "why pairs of keyframes were refused"}) {
     EXPECT_TRUE(has(html, text)) << text;
   }
   EXPECT_EQ(count_of("class=\"line loop\"", html), 2U);  // curve and legend

@@ -160,6 +160,32 @@ Scenario noisy() {
   return s;
 }
 
+TEST(AdjustBundle, TellsHowWellAllFitsBeforeAndAfter) {
+  Scenario s = noisy();
+  s.pose_error_m = 0.005;
+  s.pose_error_rad = 0.002;
+  s.landmark_error_m = 0.004;
+  World world = make_world(s);
+  World plain = world;
+  BundleOptions options;
+  options.first_gate = 3.0;
+  const BundleSummary summary = adjust_bundle(world.problem, options);
+  ASSERT_TRUE(summary.usable) << summary.message;
+  const BundleFit& points = summary.after.points;
+  EXPECT_EQ(points.all, world.problem.point_observations.size());
+  EXPECT_EQ(points.all, points.fitting + static_cast<std::size_t>(summary.point_outliers));
+  EXPECT_EQ(summary.after.lines.all, world.problem.line_observations.size());
+  EXPECT_EQ(summary.after.edges.all, world.problem.edges.size());
+  // Noise of one standard deviation without what lies beyond the gate is 0.957; of its three rows each, three
+  // for every point went into where the points lie.
+  const auto unknowns = static_cast<double>(world.problem.points.size());
+  EXPECT_NEAR(points.rms, 0.957 * std::sqrt(1.0 - unknowns / static_cast<double>(points.fitting)), 0.015);
+  EXPECT_EQ(summary.before.points.all, points.all);
+  EXPECT_LT(summary.before.points.fitting, points.fitting);
+  EXPECT_GT(summary.before.points.rms, points.rms);
+  EXPECT_EQ(adjust_bundle(plain.problem, {}).before.points.all, 0U);  // nobody had to look
+}
+
 TEST(AdjustBundle, BringsADisturbedMapBackToTheTruth) {
   World world = make_world(noisy());
   ASSERT_GT(world.problem.point_observations.size(), 15000U);
