@@ -115,8 +115,9 @@ std::string adjustment_html(const Json& s) {
                    {"after", true},
                    {"rms of these before (σ)", true},
                    {"after (σ)", true}});
-  for (const auto& [name, what] : {std::pair{"points", "points"}, std::pair{"lines", "lines"},
-                                   std::pair{"edges", "surfaces of two keyframes or local maps; loops"}}) {
+  for (const auto& [name, what] :
+       {std::pair{"points", "points"}, std::pair{"lines", "lines"},
+        std::pair{"edges", "keyframes to each other: surfaces, alignments, loops"}}) {
     const Json& before = list_at(s, std::string("/refine/before/") + name);
     const Json& after = list_at(s, std::string("/refine/after/") + name);
     if (after.empty()) continue;
