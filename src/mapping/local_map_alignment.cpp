@@ -279,6 +279,7 @@ std::vector<SurfaceAlignment> align_pairs(const maps::Map& map, const std::vecto
                             map.camera_from_world(local_maps[pair.a].anchor).inverse();
     alignments[i] = align_surfaces(*indices[pair.a], *indices[pair.b], b_from_a, options);
   });
+  executor.parallel_for(indices.size(), [&](std::size_t i) { indices[i].reset(); });
   return alignments;
 }
 

@@ -61,7 +61,7 @@ mapping::OverlapFinder learn_places(const std::vector<RobotPart>& parts,
   return mapping::learn_places(maps_of(parts), options);
 }
 
-MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder places,
+MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder& places,
                           std::size_t anchor, const mapping::MapFusionOptions& options,
                           const core::Executor& executor, core::Log& log) {
   const std::vector<mapping::MapPart> maps = maps_of(parts);

@@ -32,8 +32,8 @@ mapping::OverlapFinder learn_places(const std::vector<RobotPart>& parts,
                                     const mapping::MapFusionOptions& options);
 
 /// Fuses the parts that hang together with `anchor`; parts.size(): with the group that has most keyframes.
-/// `places`: of learn_places, used up.
-MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder places,
+/// `places`: of learn_places, for once.
+MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder& places,
                           std::size_t anchor, const mapping::MapFusionOptions& options,
                           const core::Executor& executor, core::Log& log);
 

@@ -56,8 +56,9 @@ class MapsStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     learning_.wait();
-    merged_ =
-        merge_robots(parts_, std::move(*places_), anchor_, options_, *context_->executor, *context_->log);
+    merged_ = merge_robots(parts_, *places_, anchor_, options_, *context_->executor, *context_->log);
+    // Beside what comes next: it lies in many small pieces.
+    forgetting_ = context_->executor->submit([this] { places_.reset(); });
     io.output<MapResult>("map", merged_.map);
     return {};
   }
@@ -95,6 +96,7 @@ class MapsStage : public Stage {
   std::size_t anchor_ = 0;
   std::optional<mapping::OverlapFinder> places_;
   MergedRobots merged_;
+  core::Executor::Job forgetting_;
   core::Executor::Job learning_;  ///< goes first: it uses the others
 };
 

@@ -55,7 +55,7 @@ class RefineStage : public Stage {
       result->map = map;
       take_poses_from_map(*result);
     }
-    surfaces_.clear();
+    clearing_ = executor_->submit([this] { surfaces_.clear(); });  // beside what comes next
     io.output<MapResult>("map", result);
     return {};
   }
@@ -144,6 +144,7 @@ class RefineStage : public Stage {
   std::mutex one_at_a_time_;
   std::map<core::KeyframeId, mapping::CoarseSurface> surfaces_;  ///< under the mutex while frames come
   RunSummary::Refine counts_;
+  core::Executor::Job clearing_;  ///< goes first: it uses the others
 };
 
 }  // namespace

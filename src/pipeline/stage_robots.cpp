@@ -77,8 +77,8 @@ class RobotsStage : public Stage {
           {robot.name, {&slam.map(), {{robot.number, robot.camera.color}}}, {robot}, &slam.frame_poses()});
     }
     const core::Executor& executor = *context_->executor;
-    merged_ = merge_robots(parts, learn_places(parts, fusion_), parts.size(), fusion_, executor,
-                           *context_->log);
+    mapping::OverlapFinder places = learn_places(parts, fusion_);
+    merged_ = merge_robots(parts, places, parts.size(), fusion_, executor, *context_->log);
     for (RunSummary::Merge& merge : merged_.merges) {
       const auto when = times_.find({merge.evidence.a, merge.evidence.b});
       if (when != times_.end()) merge.time_s = when->second;
