@@ -12,7 +12,8 @@ using geometry::Vector6d;
 namespace {
 
 constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
-constexpr double kAlone = 1e7;    // and of 0.3 mm
+constexpr double kBeside = 2e4;   // of 7 mm
+constexpr double kAlone = 1e7;    // of 0.3 mm
 // Squared, in a direction that they hold; they are good to 3 degrees.
 constexpr double kShareOfNormals = 0.004;
 const Vector6d kDirectionScale = (Vector6d() << 1.0, 1.0, 1.0, 0.5, 0.5, 0.5).finished();
@@ -29,6 +30,14 @@ double weak_below(const geometry::Matrix6d& information, bool surface_alone) {
   return surface_alone ? std::max(kWeak, kShareOfNormals * information.topLeftCorner<3, 3>().trace()) : kWeak;
 }
 
+geometry::Matrix6d weak_part(const Directions& directions, double below) {
+  geometry::Matrix6d part = geometry::Matrix6d::Zero();
+  for (int i = 0; i < 6 && directions.eigenvalues(i) < below; ++i) {
+    part += directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();
+  }
+  return kDirectionScale.asDiagonal() * part * kDirectionScale.cwiseInverse().asDiagonal();
+}
+
 std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
                                                 const Rigid3& predicted, bool surface_alone) {
   const Directions directions = weigh_directions(information);
@@ -36,7 +45,7 @@ std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& inform
   if (directions.eigenvalues(0) >= limit) return std::nullopt;
   geometry::Matrix6d weak = geometry::Matrix6d::Zero();
   for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
-    weak += (surface_alone ? kAlone : kWeak) * directions.eigenvectors.col(i) *
+    weak += (surface_alone ? kAlone : kBeside) * directions.eigenvectors.col(i) *
             directions.eigenvectors.col(i).transpose();
   }
   const Vector6d inverse = kDirectionScale.cwiseInverse();

@@ -23,7 +23,11 @@ Directions weigh_directions(const geometry::Matrix6d& information);
 /// nothing better to go by.)
 double weak_below(const geometry::Matrix6d& information, bool surface_alone);
 
-/// What no measurement holds is held by the motion model: information of 2 cm in the weak directions only.
+/// The part of a motion (left perturbation of camera_from_world) that lies in the directions weaker than
+/// `below`, as a matrix to multiply it with.
+geometry::Matrix6d weak_part(const Directions& directions, double below);
+
+/// What no measurement holds is held by the motion model: information of 7 mm in the weak directions only.
 /// Beside surfaces alone it is more, so that what uneven normals say does not brake the camera frame by
 /// frame. None when nothing is weak.
 std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,

@@ -18,6 +18,7 @@ namespace {
 constexpr double kSecondRadius = 6.0;  // px, once the pose is roughly known
 constexpr double kPointGate = 7.8;     // chi-square, 2 degrees of freedom, 98 %
 constexpr double kLineGate = 9.2;      // 99 %: line ends are less exact than corners
+constexpr double kDoubt = 0.75;        // of a change of motion in directions that nothing else holds
 
 std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
                                              const features::FrameFeatures& features, double scale_factor) {
@@ -309,7 +310,10 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
                        const TrackResult& result) {
   const double dt = frame.stamp - last_.stamp;
   if (last_.valid && lost_frames_ == 0 && dt > 1e-4 && dt < 0.5) {
+    const Vector6d before = velocity_;
     velocity_ = geometry::log_se3(result.camera_from_world * last_.camera_from_world.inverse()) / dt;
+    // Where only the motion model holds the camera, steps are noise above all, and would run away with it.
+    if (!result.motion_refuted) velocity_ -= kDoubt * (result.unheld * (velocity_ - before));
   } else {
     velocity_.setZero();
   }

@@ -52,14 +52,15 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
   }
   const Directions directions = weigh_directions(information);
   result.min_eigenvalue = directions.eigenvalues(0);
-  result.weak_directions = static_cast<int>(
-      (directions.eigenvalues.array() < weak_below(information, uses_features() && !by_features)).count());
+  const double weak = weak_below(information, uses_features() && !by_features);
+  result.weak_directions = static_cast<int>((directions.eigenvalues.array() < weak).count());
   // Far corners or one wall leave a direction to the motion model. It may hold that for a while, when what is
   // seen is no chance find.
   const bool many = estimate.points.inliers + 2 * estimate.lines.inliers >= 3 * options_.min_inliers &&
                     result.min_eigenvalue >= kBlind;
   const bool all_surface = by_surface && result.surface_share > kAllTheSurface;
   result.held_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
+  if (result.held_by_motion) result.unheld = weak_part(directions, weak);
   const bool coasts = last_.valid && lost_frames_ == 0 && coasting_s_ < kLongestCoast_s &&
                       ((by_features && many) || all_surface);
   const bool held = result.held_by_motion ? coasts : by_features || by_surface;

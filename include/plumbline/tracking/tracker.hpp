@@ -59,6 +59,9 @@ struct TrackResult {
   double min_eigenvalue = 0.0;
   int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
   bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
+  /// What these directions have of a motion (left perturbation of camera_from_world), to multiply it with;
+  /// zero unless held_by_motion.
+  geometry::Matrix6d unheld = geometry::Matrix6d::Zero();
   bool motion_refuted = false;  ///< surfaces are all but alone, and have spoken against the motion model
   bool relocalised = false;
   /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
