@@ -12,7 +12,7 @@ using geometry::Vector6d;
 namespace {
 
 constexpr double kWeak = 2500.0;  // information of a standard deviation of 2 cm
-constexpr double kBeside = 2e4;   // of 7 mm
+constexpr double kLikely = 4e4;   // of 5 mm
 constexpr double kAlone = 1e7;    // of 0.3 mm
 // Squared, in a direction that they hold; they are good to 3 degrees.
 constexpr double kShareOfNormals = 0.004;
@@ -39,14 +39,15 @@ geometry::Matrix6d weak_part(const Directions& directions, double below) {
 }
 
 std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
-                                                const Rigid3& predicted, bool surface_alone) {
+                                                const Rigid3& predicted, Motion motion) {
   const Directions directions = weigh_directions(information);
-  const double limit = weak_below(information, surface_alone);
+  const double limit =
+      motion == Motion::kLikely ? kLikely : weak_below(information, motion == Motion::kAlone);
   if (directions.eigenvalues(0) >= limit) return std::nullopt;
+  const double worth = motion == Motion::kAlone ? kAlone : motion == Motion::kLikely ? kLikely : kWeak;
   geometry::Matrix6d weak = geometry::Matrix6d::Zero();
   for (int i = 0; i < 6 && directions.eigenvalues(i) < limit; ++i) {
-    weak += (surface_alone ? kAlone : kBeside) * directions.eigenvectors.col(i) *
-            directions.eigenvectors.col(i).transpose();
+    weak += worth * directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();
   }
   const Vector6d inverse = kDirectionScale.cwiseInverse();
   return optimize::PosePrior{predicted, inverse.asDiagonal() * weak * inverse.asDiagonal()};

@@ -27,10 +27,17 @@ double weak_below(const geometry::Matrix6d& information, bool surface_alone);
 /// `below`, as a matrix to multiply it with.
 geometry::Matrix6d weak_part(const Directions& directions, double below);
 
-/// What no measurement holds is held by the motion model: information of 7 mm in the weak directions only.
-/// Beside surfaces alone it is more, so that what uneven normals say does not brake the camera frame by
-/// frame. None when nothing is weak.
+/// What the motion model is worth.
+enum class Motion {
+  kUnknown,  ///< it was refuted, or nothing is known of the past: 2 cm, where nothing holds better than that
+  kLikely,   ///< beside features: 5 mm, where they hold no better than that
+  kAlone,    ///< beside surfaces alone: 0.3 mm where these hold nothing, so that what uneven normals say does
+             ///< not brake the camera frame by frame
+};
+
+/// What measurements leave open is held by the motion model, in these directions only. None when there are
+/// none.
 std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
-                                                const geometry::Rigid3& predicted, bool surface_alone);
+                                                const geometry::Rigid3& predicted, Motion motion);
 
 }  // namespace plumbline::tracking

@@ -18,7 +18,7 @@ namespace {
 constexpr double kSecondRadius = 6.0;  // px, once the pose is roughly known
 constexpr double kPointGate = 7.8;     // chi-square, 2 degrees of freedom, 98 %
 constexpr double kLineGate = 9.2;      // 99 %: line ends are less exact than corners
-constexpr double kDoubt = 0.75;        // of a change of motion in directions that nothing else holds
+constexpr double kDoubt = 0.75;        // of a change of motion in directions that hardly anything else holds
 
 std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
                                              const features::FrameFeatures& features, double scale_factor) {
@@ -184,7 +184,11 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     pose = result.estimate.camera_from_world;
     surface_alone = uses_features() &&
                     result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
-    problem.prior = motion_prior(result.estimate.information, predicted, surface_alone && stiff);
+    const Motion motion = !stiff           ? Motion::kUnknown
+                          : surface_alone  ? Motion::kAlone
+                          : knows_motion() ? Motion::kLikely
+                                           : Motion::kUnknown;
+    problem.prior = motion_prior(result.estimate.information, predicted, motion);
     if (round.gate) {
       drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
       drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);
@@ -196,7 +200,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     for (std::size_t i = 2; i < std::size(rounds); ++i) run(rounds[i]);
   }
   result.motion_refuted =
-      surface_alone && !stiff && !motion_prior(result.estimate.information, predicted, false);
+      surface_alone && !stiff && !motion_prior(result.estimate.information, predicted, Motion::kUnknown);
   result.camera_from_world = pose;
   judge(std::move(problem), result);
   return result;
@@ -249,7 +253,7 @@ std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const senso
     if (guess.rough && !beyond_doubt(attempt)) continue;
     if (is_place_ && !is_place_(frame, features, guess.keyframe, attempt.camera_from_world)) continue;
     attempt.relocalised = true;
-    velocity_.setZero();
+    stand();
     last_.valid = false;
     return attempt;
   }
@@ -310,12 +314,15 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
                        const TrackResult& result) {
   const double dt = frame.stamp - last_.stamp;
   if (last_.valid && lost_frames_ == 0 && dt > 1e-4 && dt < 0.5) {
+    const bool known = knows_motion();
     const Vector6d before = velocity_;
     velocity_ = geometry::log_se3(result.camera_from_world * last_.camera_from_world.inverse()) / dt;
-    // Where only the motion model holds the camera, steps are noise above all, and would run away with it.
-    if (!result.motion_refuted) velocity_ -= kDoubt * (result.unheld * (velocity_ - before));
+    // Where little but the motion model holds the camera, steps are noise above all, and would run away with
+    // it.
+    if (known && !result.motion_refuted) velocity_ -= kDoubt * (result.unheld * (velocity_ - before));
+    ++steps_;
   } else {
-    velocity_.setZero();
+    stand();
   }
   coasting_s_ = result.held_by_motion && last_.valid ? coasting_s_ + dt : 0.0;
   motion_refuted_ = result.motion_refuted;
@@ -338,6 +345,7 @@ void Tracker::restore(const maps::Map& map, core::KeyframeId reference, const Ri
   }
   last_.valid = keyframe.features != nullptr;
   velocity_ = velocity;
+  steps_ = 2;
   lost_frames_ = 0;
 }
 

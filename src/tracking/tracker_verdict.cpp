@@ -9,6 +9,7 @@ namespace {
 using geometry::Rigid3;
 
 constexpr double kBlind = 100.0;  // information of a standard deviation of 10 cm
+constexpr double kNoisy = 1e4;    // of 1 cm: a step of that accuracy is noise more than motion
 constexpr double kAllTheSurface = 0.9;
 constexpr double kLongestCoast_s = 2.5;
 
@@ -22,7 +23,7 @@ bool Tracker::refutes_motion(optimize::PoseProblem problem, const optimize::Pose
                              const Rigid3& predicted, Rigid3& pose) const {
   constexpr double kGain =
       4.0;  // of the cost: 1 at most where the model was right, soon above 8 where it was not
-  problem.prior = motion_prior(held.information, predicted, false);
+  problem.prior = motion_prior(held.information, predicted, Motion::kUnknown);
   if (problem.prior) return false;
   optimize::PoseSolverOptions solver = options_.solver;
   solver.max_iterations = 8;
@@ -60,7 +61,8 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
                     result.min_eigenvalue >= kBlind;
   const bool all_surface = by_surface && result.surface_share > kAllTheSurface;
   result.held_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
-  if (result.held_by_motion) result.unheld = weak_part(directions, weak);
+  result.unheld = result.held_by_motion ? weak_part(directions, weak)
+                                        : weak_part(weigh_directions(estimate.information), kNoisy);
   const bool coasts = last_.valid && lost_frames_ == 0 && coasting_s_ < kLongestCoast_s &&
                       ((by_features && many) || all_surface);
   const bool held = result.held_by_motion ? coasts : by_features || by_surface;

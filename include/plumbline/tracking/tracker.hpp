@@ -128,6 +128,11 @@ class Tracker {
   };
 
   [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
+  [[nodiscard]] bool knows_motion() const { return last_.valid && lost_frames_ == 0 && steps_ >= 2; }
+  void stand() {
+    velocity_.setZero();
+    steps_ = 0;
+  }
   [[nodiscard]] std::vector<geometry::Rigid3> guesses(const features::FrameFeatures& features,
                                                       double stamp) const;
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
@@ -161,6 +166,7 @@ class Tracker {
   PlaceJudge is_place_;
   Last last_;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
+  int steps_ = 0;  ///< between frames, one after the other, that it was found from
   int lost_frames_ = 0;
   double coasting_s_ = 0.0;      ///< how long the motion model has held what nothing else does
   bool motion_refuted_ = false;  ///< by what is seen, since surfaces have been all but alone
