@@ -4,6 +4,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "../../src/mapping/laid_over.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "poster_view.hpp"
 
@@ -94,6 +95,25 @@ TEST(FusionDoubts, WhatStandsBeforeItOnlyOnceTellsThatAStepIsWrong) {
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_TRUE(merge.accepted) << merge.refused;
   EXPECT_EQ(merge.rival_m, 0.0);
+}
+
+/// How many spots match when the wall is laid over itself, a repetition further.
+int spots_a_step_further(const cv::Mat& wall) {
+  const maps::Map a = walk(wall);
+  const maps::Map b = as_second(a);
+  const LaidMaps maps({&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}});
+  const Eigen::Vector3d step(1.2, 0.0, 0.0);
+  return maps.matching_spots(Rigid3(Eigen::Matrix3d::Identity(), step), step);
+}
+
+TEST(FusionDoubts, AStripMatchesAtOneSpotAndAWallAtMany) {
+  cv::Mat wall = repeating_wall();
+  EXPECT_GE(spots_a_step_further(wall), 3);
+  const int middle = wall.rows / 2;
+  wall.rowRange(0, middle - 25).setTo(128);
+  wall.rowRange(middle + 25, wall.rows).setTo(128);
+  EXPECT_EQ(spots_a_step_further(wall), 1);
+  EXPECT_EQ(spots_a_step_further(cv::Mat(wall.size(), wall.type(), cv::Scalar(128))), 0);
 }
 
 TEST(FusionDoubts, MapsThatContradictAreNotMerged) {

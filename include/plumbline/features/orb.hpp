@@ -30,7 +30,7 @@ struct OrbOptions {
   /// Gradients around a corner (7 x 7 pixels of its level): least share of the weaker principal direction in
   /// the stronger one, squared. On an edge a point matches as well a few pixels further along it, so that it
   /// holds a direction that it does not know. 0: all are kept.
-  double min_corner = 0.02;
+  double min_corner = 0.03;
   void declare(core::OptionTable& table);
 };
 
