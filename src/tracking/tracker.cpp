@@ -184,10 +184,10 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     pose = result.estimate.camera_from_world;
     surface_alone = uses_features() &&
                     result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
-    const Motion motion = !stiff           ? Motion::kUnknown
-                          : surface_alone  ? Motion::kAlone
-                          : knows_motion() ? Motion::kLikely
-                                           : Motion::kUnknown;
+    const Motion motion = !stiff                      ? Motion::kUnknown
+                          : surface_alone             ? Motion::kAlone
+                          : knows_motion(frame.stamp) ? Motion::kLikely
+                                                      : Motion::kUnknown;
     problem.prior = motion_prior(result.estimate.information, predicted, motion);
     if (round.gate) {
       drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
@@ -314,13 +314,14 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
                        const TrackResult& result) {
   const double dt = frame.stamp - last_.stamp;
   if (last_.valid && lost_frames_ == 0 && dt > 1e-4 && dt < 0.5) {
-    const bool known = knows_motion();
+    const bool known = knows_motion(frame.stamp);
     const Vector6d before = velocity_;
     velocity_ = geometry::log_se3(result.camera_from_world * last_.camera_from_world.inverse()) / dt;
     // Where little but the motion model holds the camera, steps are noise above all, and would run away with
     // it.
     if (known && !result.motion_refuted) velocity_ -= kDoubt * (result.unheld * (velocity_ - before));
     ++steps_;
+    step_s_ = dt;
   } else {
     stand();
   }
@@ -346,6 +347,7 @@ void Tracker::restore(const maps::Map& map, core::KeyframeId reference, const Ri
   last_.valid = keyframe.features != nullptr;
   velocity_ = velocity;
   steps_ = 2;
+  step_s_ = 0.2;  // not known: any that predict() looks ahead
   lost_frames_ = 0;
 }
 

@@ -128,7 +128,11 @@ class Tracker {
   };
 
   [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
-  [[nodiscard]] bool knows_motion() const { return last_.valid && lost_frames_ == 0 && steps_ >= 2; }
+  /// Whether the motion model can tell where the camera is: not after frames that are missing.
+  [[nodiscard]] bool knows_motion(double stamp) const {
+    constexpr double kLonger = 1.5;
+    return last_.valid && lost_frames_ == 0 && steps_ >= 2 && stamp - last_.stamp < kLonger * step_s_;
+  }
   void stand() {
     velocity_.setZero();
     steps_ = 0;
@@ -166,7 +170,8 @@ class Tracker {
   PlaceJudge is_place_;
   Last last_;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
-  int steps_ = 0;  ///< between frames, one after the other, that it was found from
+  int steps_ = 0;        ///< between frames, one after the other, that it was found from
+  double step_s_ = 0.0;  ///< how long the last one was
   int lost_frames_ = 0;
   double coasting_s_ = 0.0;      ///< how long the motion model has held what nothing else does
   bool motion_refuted_ = false;  ///< by what is seen, since surfaces have been all but alone
