@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "axis_extent.hpp"
 
 namespace plumbline::viz {
 namespace {
@@ -11,26 +12,6 @@ namespace {
 constexpr double kTitleHeight = 38.0, kLegendHeight = 30.0, kBelow = 76.0, kLeft = 104.0, kRight = 30.0;
 constexpr double kColorBarWidth = 120.0;
 constexpr double kFigureTitleHeight = 52.0;
-
-struct Extent {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-  void include(double v) {
-    if (!std::isfinite(v)) return;
-    low = std::min(low, v);
-    high = std::max(high, v);
-  }
-  void include(const std::vector<double>& values) {
-    for (const double v : values) include(v);
-  }
-  [[nodiscard]] bool empty() const { return !(low <= high); }
-  [[nodiscard]] AxisRange padded(double part) const {
-    if (empty()) return {0.0, 1.0};
-    const double span = high - low;
-    const double pad = span > 0.0 ? part * span : std::max(0.5, 0.1 * std::abs(low));
-    return {low - pad, high + pad};
-  }
-};
 
 void include_series(const Axes& axes, Extent& x, Extent& y) {
   for (const auto& line : axes.lines) {
@@ -69,12 +50,6 @@ void data_ranges(const Axes& axes, PanelLayout& layout) {
   }
   layout.x = axes.x_range.value_or(layout.x);
   layout.y = axes.y_range.value_or(layout.y);
-}
-
-void widen(AxisRange& range, double factor) {
-  const double middle = 0.5 * (range.first + range.second);
-  const double half = 0.5 * (range.second - range.first) * factor;
-  range = {middle - half, middle + half};
 }
 
 void equalise(PanelLayout& layout) {

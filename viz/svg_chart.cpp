@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "axis_extent.hpp"
 #include "ticks.hpp"
 
 namespace plumbline::viz {
@@ -22,24 +22,6 @@ struct Plot {
   AxisRange x{0.0, 1.0}, y{0.0, 1.0};
   [[nodiscard]] double px(double v) const { return width * (v - x.first) / (x.second - x.first); }
   [[nodiscard]] double py(double v) const { return height * (y.second - v) / (y.second - y.first); }
-};
-
-struct Extent {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-  void include(const std::vector<double>& values) {
-    for (const double v : values) {
-      if (!std::isfinite(v)) continue;
-      low = std::min(low, v);
-      high = std::max(high, v);
-    }
-  }
-  [[nodiscard]] AxisRange padded(double part) const {
-    if (!(low <= high)) return {0.0, 1.0};
-    const double span = high - low;
-    const double pad = span > 0.0 ? part * span : std::max(0.5, 0.1 * std::abs(low));
-    return {low - pad, high + pad};
-  }
 };
 
 void find_ranges(const SvgChart& chart, Plot& plot) {
@@ -62,12 +44,6 @@ void find_ranges(const SvgChart& chart, Plot& plot) {
   if (!chart.equal_aspect && y.low >= 0.0 && y.low < 0.5 * y.high) plot.y.first = 0.0;
   plot.x = chart.x_range.value_or(plot.x);
   plot.y = chart.y_range.value_or(plot.y);
-}
-
-void widen(AxisRange& range, double factor) {
-  const double middle = 0.5 * (range.first + range.second);
-  const double half = 0.5 * (range.second - range.first) * factor;
-  range = {middle - half, middle + half};
 }
 
 /// The height that the data want at this width, and one scale for both axes.
