@@ -167,6 +167,15 @@ cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale
   return {x0, y0, x1 - x0, y1 - y0};
 }
 
+/// Where the middle of a level's pixel lies in the full picture: both show the same from edge to edge, and a
+/// level is a whole number of pixels wide, not quite its scale.
+Eigen::Vector2f in_full_picture(const Corner& corner, const cv::Size& level, const cv::Size& full) {
+  const auto there = [](int at, int size, int full_size) {
+    return (static_cast<float>(at) + 0.5F) * static_cast<float>(full_size) / static_cast<float>(size) - 0.5F;
+  };
+  return {there(corner.x, level.width, full.width), there(corner.y, level.height, full.height)};
+}
+
 }  // namespace
 
 OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) const {
@@ -199,7 +208,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
     const cv::Mat smooth = orb_smooth(exact);
     for (const Corner& c : corners) {
       const float angle = orb_orientation(image, c.x, c.y);
-      const Eigen::Vector2f pixel(static_cast<float>(c.x) * scale, static_cast<float>(c.y) * scale);
+      const Eigen::Vector2f pixel = in_full_picture(c, image.size(), gray.size());
       result.points.push_back({pixel, 0.0F, angle, static_cast<float>(c.score), level});
       result.descriptors.push_back(orb_descriptor(smooth, c.x, c.y, angle));
     }

@@ -49,6 +49,45 @@ TEST(Orb, WeakTextureGetsItsPointsBesideStrong) {
   EXPECT_GT(weak, 250);
 }
 
+/// Squares are the same on all sides: what is found around them has its mean in their middle, in every
+/// octave.
+TEST(Orb, CornersLieWhereTheyAreInEveryOctave) {
+  constexpr int kFiner = 8;
+  cv::Mat image(kFiner * 960, kFiner * 1280, CV_8UC1, cv::Scalar(220));
+  std::vector<Eigen::Vector2f> middles;
+  std::mt19937 random(1);
+  for (int y = 60; y < 920; y += 52) {
+    for (int x = 60; x < 1240; x += 52) {
+      constexpr int kHalf = kFiner * 12;
+      const int u = kFiner * x + static_cast<int>(random() % 17);  // any part of a pixel
+      const int v = kFiner * y + static_cast<int>(random() % 17);
+      const cv::Rect square(u - kHalf, v - kHalf, 2 * kHalf, 2 * kHalf);
+      cv::rectangle(image, square, cv::Scalar(60), cv::FILLED);
+      const auto middle = [](int at) { return static_cast<float>(at) / kFiner - 0.5F; };
+      middles.emplace_back(middle(u), middle(v));
+    }
+  }
+  cv::resize(image, image, {1280, 960}, 0.0, 0.0, cv::INTER_AREA);
+  cv::GaussianBlur(image, image, {5, 5}, 1.0);
+  OrbOptions options;
+  options.count = 20000;
+  std::array<Eigen::Vector2f, 8> sum{};
+  std::array<int, 8> count{};
+  sum.fill(Eigen::Vector2f::Zero());
+  for (const PointFeature& p : extract(image, options).points) {
+    const auto nearest = std::min_element(middles.begin(), middles.end(), [&](const auto& a, const auto& b) {
+      return (a - p.pixel).squaredNorm() < (b - p.pixel).squaredNorm();
+    });
+    sum[static_cast<std::size_t>(p.octave)] += p.pixel - *nearest;
+    ++count[static_cast<std::size_t>(p.octave)];
+  }
+  for (std::size_t octave = 0; octave < count.size(); ++octave) {
+    ASSERT_GT(count[octave], 150) << octave;
+    const Eigen::Vector2f mean = sum[octave] / static_cast<float>(count[octave]);
+    EXPECT_LT(mean.cwiseAbs().maxCoeff(), 0.2F) << octave << ": " << mean.transpose();
+  }
+}
+
 /// A board: a dark frame a little out of level on a noisy wall, as a camera sees it.
 cv::Mat board() {
   cv::Mat image(4 * 480, 4 * 640, CV_8UC1, cv::Scalar(200));
