@@ -79,23 +79,22 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
   for (const PointTerm& term : problem.points) {
     Eigen::Vector3d r;
     const int rows = point_residual(term, pose, problem.camera, r, kDerivatives ? &j3 : nullptr);
-    const double weight = options.point_weight * term.weight;
     if (rows == 0) {
-      n.cost += weight * huber(kUnseen * kUnseen, options.point_loss).cost;
+      n.cost += options.point_weight * huber(kUnseen * kUnseen, options.point_loss).cost;
       continue;
     }
     const Robust pixel = huber(r.head<2>().squaredNorm(), options.point_loss);
-    n.cost += weight * pixel.cost;
+    n.cost += options.point_weight * pixel.cost;
     double depth_weight = 0.0;
     if (rows == 3) {
       const Robust depth = huber(r(2) * r(2), options.plane_loss);
       // A corner whose picture does not fit has no say about depth either.
-      depth_weight = weight * depth.weight * pixel.weight;
-      n.cost += weight * depth.cost;
+      depth_weight = options.point_weight * depth.weight * pixel.weight;
+      n.cost += options.point_weight * depth.cost;
     }
     if constexpr (kDerivatives) {
-      sums.add(j3.row(0), r(0), weight * pixel.weight);
-      sums.add(j3.row(1), r(1), weight * pixel.weight);
+      sums.add(j3.row(0), r(0), options.point_weight * pixel.weight);
+      sums.add(j3.row(1), r(1), options.point_weight * pixel.weight);
       if (rows == 3) sums.add(j3.row(2), r(2), depth_weight);
     }
   }

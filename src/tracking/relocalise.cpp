@@ -7,6 +7,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "plumbline/optimize/pose_solver.hpp"
+
 namespace plumbline::tracking {
 namespace {
 
@@ -49,6 +51,25 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
   return pairs;
 }
 
+/// OpenCV's answer is that of EPnP for all inliers, which before a plane may be decimetres off what each of
+/// them says.
+geometry::Rigid3 settled(const geometry::Rigid3& start, const std::vector<cv::Point3d>& world,
+                         const std::vector<cv::Point2d>& pixels, const std::vector<int>& inliers,
+                         const sensor::Pinhole& camera) {
+  optimize::PoseProblem problem;
+  problem.camera = camera;
+  for (const int i : inliers) {
+    const auto k = static_cast<std::size_t>(i);
+    optimize::PointTerm term;
+    term.world = {world[k].x, world[k].y, world[k].z};
+    term.pixel = {pixels[k].x, pixels[k].y};
+    problem.points.push_back(term);
+  }
+  optimize::PoseSolverOptions solver;
+  solver.max_iterations = 30;
+  return optimize::solve_pose(problem, start, solver).camera_from_world;
+}
+
 }  // namespace
 
 std::optional<Relocalisation> relocalise(const maps::Map& map,
@@ -78,8 +99,9 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
     const int count = static_cast<int>(inliers.size());
     if (!solved || count < min_inliers || (best && best->inliers >= count)) continue;
     const Eigen::Vector3d r(rotation[0], rotation[1], rotation[2]);
-    best = Relocalisation{
-        id, {geometry::exp_so3(r), Eigen::Vector3d(translation[0], translation[1], translation[2])}, count};
+    const geometry::Rigid3 start(geometry::exp_so3(r),
+                                 Eigen::Vector3d(translation[0], translation[1], translation[2]));
+    best = Relocalisation{id, settled(start, world, pixels, inliers, camera), count};
   }
   return best;
 }

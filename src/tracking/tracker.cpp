@@ -18,56 +18,18 @@ namespace {
 constexpr double kSecondRadius = 6.0;  // px, once the pose is roughly known
 constexpr double kPointGate = 7.8;     // chi-square, 2 degrees of freedom, 98 %
 constexpr double kLineGate = 9.2;      // 99 %: line ends are less exact than corners
-constexpr double kOneCorner = 4.0;     // px of the octave: corners this near are one
 constexpr double kDoubt = 0.75;        // of a change of motion in directions that hardly anything else holds
 
-/// How many of the matched corners say the same as each: one corner of the world is found in several octaves,
-/// or several times around its edges, and whatever pulls at one of them pulls at all.
-std::vector<int> crowds(const std::vector<PointMatch>& matches, const features::FrameFeatures& features,
-                        double scale_factor) {
-  struct Spot {
-    Eigen::Vector2f pixel;
-    float reach;
-    std::size_t match;
-  };
-  std::vector<Spot> spots;
-  spots.reserve(matches.size());
-  float widest = 0.0F;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const features::PointFeature& f = features.points[static_cast<std::size_t>(matches[i].feature)];
-    const auto reach = static_cast<float>(kOneCorner * std::pow(scale_factor, f.octave));
-    widest = std::max(widest, reach);
-    spots.push_back({f.pixel, reach, i});
-  }
-  std::sort(spots.begin(), spots.end(), [](const Spot& a, const Spot& b) {
-    return a.pixel.x() != b.pixel.x() ? a.pixel.x() < b.pixel.x() : a.match < b.match;
-  });
-  std::vector<int> crowd(matches.size(), 1);
-  for (std::size_t i = 0; i < spots.size(); ++i) {
-    for (std::size_t j = i + 1; j < spots.size() && spots[j].pixel.x() - spots[i].pixel.x() < widest; ++j) {
-      const float reach = std::max(spots[i].reach, spots[j].reach);
-      if ((spots[j].pixel - spots[i].pixel).squaredNorm() >= reach * reach) continue;
-      ++crowd[spots[i].match];
-      ++crowd[spots[j].match];
-    }
-  }
-  return crowd;
-}
-
-/// All that is one corner counts once.
 std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
                                              const features::FrameFeatures& features, double scale_factor) {
   std::vector<optimize::PointTerm> terms;
   terms.reserve(matches.size());
-  const std::vector<int> crowd = crowds(matches, features, scale_factor);
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const PointMatch& match = matches[i];
+  for (const PointMatch& match : matches) {
     const features::PointFeature& f = features.points[static_cast<std::size_t>(match.feature)];
     optimize::PointTerm term;
     term.world = map.point(match.point).position;
     term.pixel = f.pixel.cast<double>();
     term.pixel_sigma = std::pow(scale_factor, f.octave);
-    term.weight = 1.0 / crowd[i];
     if (f.depth > 0.0F) {
       term.depth = static_cast<double>(f.depth);
       // The landmark's own depth is no better than the measurement.

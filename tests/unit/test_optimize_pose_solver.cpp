@@ -111,24 +111,6 @@ TEST(SolvePose, ThirtyPercentOutliersMoveItLittle) {
             3.0 * tests::distance(summary.camera_from_world, world.truth));
 }
 
-TEST(SolvePose, PointsThatSayTheSameCountAsTheirWeightTells) {
-  const World world = make_world(30, 0, 0, 5, 7);
-  const Rigid3 start =
-      geometry::exp_se3((Vector6d() << 0.02, -0.01, 0.03, 0.01, 0.02, -0.01).finished()) * world.truth;
-  const PoseSummary once = solve_pose(world.problem, start, {});
-  PoseProblem crowded = world.problem;
-  crowded.points.clear();
-  for (PointTerm term : world.problem.points) {
-    term.weight = 0.25;
-    crowded.points.insert(crowded.points.end(), 4, term);
-  }
-  const PoseSummary crowd = solve_pose(crowded, start, {});
-  EXPECT_LT(geometry::log_se3(crowd.camera_from_world * once.camera_from_world.inverse()).norm(), 1e-9);
-  EXPECT_LT((crowd.information - once.information).norm(), 1e-9 * once.information.norm());
-  EXPECT_NEAR(crowd.final_cost, once.final_cost, 1e-9 * once.final_cost);
-  EXPECT_EQ(crowd.points.terms, 4 * once.points.terms) << "a weight is no part of what is counted";
-}
-
 TEST(SolvePose, NeverIncreasesTheCost) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
     World world = make_world(30, 10, 30, 100 + seed, seed % 2 == 0 ? 2 : 0);

@@ -19,7 +19,6 @@ struct PointTerm {
   double pixel_sigma = 1.0;
   double depth = 0.0;        ///< measured, metres; 0: none
   double depth_sigma = 1.0;  ///< metres
-  double weight = 1.0;       ///< of its cost: less than 1 where others say the same; no part of the residual
 };
 
 /// A map line seen as a segment.
