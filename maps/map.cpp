@@ -37,7 +37,19 @@ KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe,
   entry.data = std::move(keyframe);
   entry.pose = camera_from_world;
   keyframes_.insert(id, std::move(entry));
+  forget_patches({id.robot, id.index - kPatchedKeyframes});
   return id;
+}
+
+void Map::forget_patches(KeyframeId id) {
+  if (!id.valid() || !keyframes_.contains(id)) return;
+  std::shared_ptr<const Keyframe>& data = keyframes_.at(id).data;
+  if (data->features == nullptr || data->features->patches.empty()) return;
+  auto features = std::make_shared<features::FrameFeatures>(*data->features);
+  features->patches = {};
+  auto keyframe = std::make_shared<Keyframe>(*data);
+  keyframe->features = std::move(features);
+  data = std::move(keyframe);
 }
 
 void Map::set_pose(KeyframeId id, const geometry::Rigid3& camera_from_world) {
@@ -110,12 +122,12 @@ void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int
   }
 }
 
-bool Map::observe(PointId id, KeyframeId keyframe, int feature) {
+bool Map::observe(PointId id, KeyframeId keyframe, int feature, bool aligned) {
   MapPoint& p = points_.at(id);
   PointId& slot = keyframes_.at(keyframe).points.at(static_cast<std::size_t>(feature));
   if (slot.valid() || seen_by(p.observations, keyframe)) return false;
   share(p.observations, keyframe, +1);
-  p.observations.push_back({keyframe, feature});
+  p.observations.push_back({keyframe, feature, aligned});
   slot = id;
   return true;
 }

@@ -31,7 +31,7 @@ KeyframeMemory memory_of(const Map& map, KeyframeId id) {
   memory.surface = bytes(keyframe.surface);
   if (keyframe.features != nullptr) {
     const features::FrameFeatures& f = *keyframe.features;
-    memory.features = sizeof(f) + bytes(f.points) + bytes(f.descriptors) + bytes(f.lines) +
+    memory.features = sizeof(f) + bytes(f.points) + bytes(f.descriptors) + bytes(f.patches) + bytes(f.lines) +
                       f.points.size() * sizeof(int) + kGridCells + bytes(f.thumbnail) +
                       bytes(f.thumbnail_depth);
   }

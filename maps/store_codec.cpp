@@ -5,20 +5,24 @@ namespace plumbline::maps {
 namespace {
 
 constexpr std::size_t kObservationBytes = 12;
+constexpr std::int32_t kAligned = 1 << 30;  // beside the number of a feature
 constexpr std::size_t kIdBytes = 8;
 
 void write(const std::vector<Observation>& observations, ByteWriter& to) {
   to.count(observations.size());
   for (const Observation& o : observations) {
     to.put(o.keyframe);
-    to.put(static_cast<std::int32_t>(o.feature));
+    to.put(static_cast<std::int32_t>(o.aligned ? o.feature | kAligned : o.feature));
   }
 }
 void read(ByteReader& from, std::vector<Observation>& observations) {
   observations.resize(from.count(kObservationBytes));
   for (Observation& o : observations) {
-    from.get(o.keyframe);
-    o.feature = from.get<std::int32_t>();
+    KeyframeId keyframe;
+    from.get(keyframe);
+    const auto number = from.get<std::int32_t>();
+    const bool aligned = number >= 0 && (number & kAligned) != 0;
+    o = {keyframe, aligned ? number - kAligned : number, aligned};
   }
 }
 

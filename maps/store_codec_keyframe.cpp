@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Keyframes as bytes: column by column, each column in byte planes.
+#include <algorithm>
 #include <utility>
 
 #include "store_codec.hpp"
@@ -7,6 +8,7 @@
 namespace plumbline::maps {
 namespace {
 
+using features::CornerPatch;
 using features::FrameFeatures;
 using features::LineFeature;
 using features::PointFeature;
@@ -154,6 +156,32 @@ FrameFeatures read_features(ByteReader& from, const sensor::Pinhole& picture) {
   return f;
 }
 
+void write_patches(const FrameFeatures& f, ByteWriter& to) {
+  to.count(f.patches.size());
+  const auto column = column_writer<float>(f.patches, to);
+  column([](const CornerPatch& p) { return p.offset.x(); });
+  column([](const CornerPatch& p) { return p.offset.y(); });
+  std::vector<std::uint8_t> gray;
+  gray.reserve(f.patches.size() * CornerPatch::kPixels);
+  for (const CornerPatch& p : f.patches) gray.insert(gray.end(), p.gray.begin(), p.gray.end());
+  to.planes(gray);
+}
+
+void read_patches(ByteReader& from, FrameFeatures& f) {
+  f.patches.resize(from.count(2 * sizeof(float) + CornerPatch::kPixels));
+  if (!f.patches.empty() && f.patches.size() != f.points.size()) throw BadBytes("patches and points differ");
+  const auto column = column_reader<float>(f.patches, from);
+  column([](CornerPatch & p) -> auto& { return p.offset.x(); });
+  column([](CornerPatch & p) -> auto& { return p.offset.y(); });
+  const auto gray = from.planes<std::uint8_t>(f.patches.size() * CornerPatch::kPixels);
+  auto next = gray.begin();
+  for (std::size_t i = 0; i < f.patches.size(); ++i) {
+    std::copy_n(next, CornerPatch::kPixels, f.patches[i].gray.begin());
+    next += CornerPatch::kPixels;
+    f.patches[i].middle = f.points[i].pixel - f.patches[i].offset;
+  }
+}
+
 }  // namespace
 
 void encode(const Keyframe& keyframe, ByteWriter& to) {
@@ -165,6 +193,7 @@ void encode(const Keyframe& keyframe, ByteWriter& to) {
   if (keyframe.features != nullptr) write_features(*keyframe.features, to);
   to.count(keyframe.surface.size());
   surface_columns(column_writer<float>(keyframe.surface, to));
+  if (keyframe.features != nullptr) write_patches(*keyframe.features, to);
 }
 
 std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& picture) {
@@ -174,9 +203,12 @@ std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor
   from.get(keyframe->frame_index);
   from.get(keyframe->stamp);
   from.get(keyframe->turn_rate);
-  if (from.flag()) keyframe->features = std::make_shared<FrameFeatures>(read_features(from, picture));
+  std::shared_ptr<FrameFeatures> features;
+  if (from.flag()) features = std::make_shared<FrameFeatures>(read_features(from, picture));
   keyframe->surface.resize(from.count(7 * sizeof(float)));
   surface_columns(column_reader<float>(keyframe->surface, from));
+  if (features != nullptr && !from.at_end()) read_patches(from, *features);  // none up to format 3
+  keyframe->features = features;
   from.expect_end();
   return keyframe;
 }

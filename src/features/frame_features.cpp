@@ -131,6 +131,8 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
     for (PointFeature& p : orb.points) p.depth = corner_depth(frame.depth, p.pixel.x(), p.pixel.y());
     result.points = std::move(orb.points);
     result.descriptors = std::move(orb.descriptors);
+    result.patches = std::move(orb.patches);
+    result.levels = std::move(orb.levels);
   }
   result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
   if (options_.lines) result.lines = lines_.extract(frame.gray, frame.depth, camera_);

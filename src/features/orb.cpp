@@ -197,6 +197,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
       cv::resize(exact, smaller_exact, size, 0, 0, cv::INTER_LINEAR_EXACT);
       exact = smaller_exact;
     }
+    result.levels.push_back(image);
     const cv::Rect inner = inner_region(region, image.size(), scale);
     if (inner.width < 8 || inner.height < 8) continue;
     const int wanted = static_cast<int>(std::lround(options_.count / (scale * share_sum)));
@@ -211,6 +212,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
       const Eigen::Vector2f pixel = in_full_picture(c, image.size(), gray.size());
       result.points.push_back({pixel, 0.0F, angle, static_cast<float>(c.score), level});
       result.descriptors.push_back(orb_descriptor(smooth, c.x, c.y, angle));
+      result.patches.push_back(cut_patch(image, c.x, c.y, pixel));
     }
   }
   return result;

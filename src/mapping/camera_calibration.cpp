@@ -74,7 +74,7 @@ void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Ca
       if (pose == index.end()) continue;
       const features::PointFeature& f =
           run.map->keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      const optimize::BundlePointObservation in_bundle = noise.of(f);
+      const optimize::BundlePointObservation in_bundle = noise.of(f, o.aligned);
       CalibrationObservation seen;
       seen.pose = pose->second;
       seen.pixel = optimize::distorted_pixel(camera, in_bundle.pixel);

@@ -158,7 +158,8 @@ class GlobalBuilder {
     for (const maps::Observation& o : point.observations) {
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen = options_.noise.of(f, unrest(o.keyframe), octave_px(f.octave));
+      optimize::BundlePointObservation seen =
+          options_.noise.of(f, o.aligned, unrest(o.keyframe), octave_px(f.octave));
       seen.pose = index_of(o.keyframe);
       seen.point = index;
       seen.pixel = pixel(o.keyframe, seen.pixel);

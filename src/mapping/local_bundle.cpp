@@ -170,7 +170,7 @@ class Builder {
       if (!has(o.keyframe) || !calm(o.keyframe)) continue;
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen = options_.noise.of(f);
+      optimize::BundlePointObservation seen = options_.noise.of(f, o.aligned);
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
       bundle_.problem.point_observations.push_back(seen);

@@ -87,7 +87,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
   move(keyframe->surface, track.depth_from_camera.inverse());
   const core::KeyframeId id = map.add_keyframe(keyframe, track.camera_from_world);
   for (const tracking::PointMatch& m : track.points) {
-    if (map.observe(m.point, id, m.feature)) map.refresh_point(m.point);
+    if (map.observe(m.point, id, m.feature, m.aligned)) map.refresh_point(m.point);
   }
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
   add_points(map, id);
@@ -118,7 +118,8 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     point.visible = 1;
     point.found = 1;
     const core::PointId point_id = map.add_point(id.robot, point);
-    map.observe(point_id, id, static_cast<int>(i));
+    map.observe(point_id, id, static_cast<int>(i),
+                i < features.patches.size() && !features.patches[i].empty());
     culler_.watch(point_id, id);
   }
 }

@@ -10,6 +10,9 @@
 namespace plumbline::mapping {
 
 void SightingNoise::declare(core::OptionTable& table, const std::string& prefix) {
+  table.number(
+      prefix + "aligned", aligned, {0.01, 1.0}, "",
+      "Standard deviation of corners that were aligned with their landmark's patch, over that of others");
   table.number(prefix + "line_sigma", line_sigma_px, {0.01, 10.0}, "px",
                "Standard deviation of a line's ends across it");
   table.number(
@@ -19,11 +22,11 @@ void SightingNoise::declare(core::OptionTable& table, const std::string& prefix)
 
 double SightingNoise::octave_px(int octave) const { return std::pow(orb_scale_factor, octave); }
 
-optimize::BundlePointObservation SightingNoise::of(const features::PointFeature& corner, double unrest,
-                                                   double corner_px) const {
+optimize::BundlePointObservation SightingNoise::of(const features::PointFeature& corner, bool is_aligned,
+                                                   double unrest, double corner_px) const {
   optimize::BundlePointObservation seen;
   seen.pixel = corner.pixel.cast<double>();
-  seen.pixel_sigma = unrest * corner_px;
+  seen.pixel_sigma = unrest * corner_px * (is_aligned ? aligned : 1.0);
   seen.depth = static_cast<double>(corner.depth);
   seen.depth_sigma = corner.depth > 0.0F ? depth_factor * unrest * sensor::depth_sigma(seen.depth) : 1.0;
   return seen;

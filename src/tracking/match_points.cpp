@@ -67,6 +67,10 @@ void AssociationOptions::declare(core::OptionTable& table) {
   table.number("match.ratio", ratio, {0.1, 1.0}, "", "Best distance over second best, at most");
   table.number("match.max_point_angle", max_point_angle_rad, {0.05, 3.2}, "rad",
                "Angle between a predicted and a measured corner's orientation, at most");
+  table.boolean("match.align", align,
+                "Matched corners are aligned with what their landmark looked like, to a tenth of a pixel");
+  table.number("match.aligned_sigma", aligned_sigma, {0.01, 1.0}, "",
+               "Standard deviation of corners that were aligned, over that of others");
   table.integer("match.max_line_hamming", max_line_hamming, {1, 256}, "bit",
                 "Line descriptors may differ by so many bits");
   table.number("match.max_line_angle", max_line_angle_rad, {0.01, 1.6}, "rad",

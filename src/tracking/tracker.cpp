@@ -6,6 +6,7 @@
 
 #include "held_directions.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
+#include "plumbline/tracking/align_points.hpp"
 #include "plumbline/tracking/thumbnail_alignment.hpp"
 
 namespace plumbline::tracking {
@@ -21,15 +22,17 @@ constexpr double kLineGate = 9.2;      // 99 %: line ends are less exact than co
 constexpr double kDoubt = 0.75;        // of a change of motion in directions that hardly anything else holds
 
 std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
-                                             const features::FrameFeatures& features, double scale_factor) {
+                                             const features::FrameFeatures& features,
+                                             const AssociationOptions& options) {
   std::vector<optimize::PointTerm> terms;
   terms.reserve(matches.size());
   for (const PointMatch& match : matches) {
     const features::PointFeature& f = features.points[static_cast<std::size_t>(match.feature)];
     optimize::PointTerm term;
     term.world = map.point(match.point).position;
-    term.pixel = f.pixel.cast<double>();
-    term.pixel_sigma = std::pow(scale_factor, f.octave);
+    term.pixel = (f.pixel + match.shift).cast<double>();
+    term.pixel_sigma =
+        std::pow(options.scale_factor, f.octave) * (match.aligned ? options.aligned_sigma : 1.0);
     if (f.depth > 0.0F) {
       term.depth = static_cast<double>(f.depth);
       // The landmark's own depth is no better than the measurement.
@@ -70,6 +73,20 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
   }
   matches.resize(kept);
   terms.resize(kept);
+}
+
+/// What is left of a frame's features once it is tracked: corners lie where they were aligned.
+Tracker::Features without_picture(const features::FrameFeatures& features,
+                                  const std::vector<PointMatch>& matches) {
+  auto kept = std::make_shared<features::FrameFeatures>(features);
+  kept->levels.clear();
+  for (const PointMatch& m : matches) {
+    if (!m.aligned) continue;
+    const auto i = static_cast<std::size_t>(m.feature);
+    kept->points[i].pixel += m.shift;
+    kept->patches[i].offset = m.shift;
+  }
+  return kept;
 }
 
 }  // namespace
@@ -165,7 +182,9 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
       if (options_.points) {
         result.points = match_points(map, local_map_.points, features, camera_, pose, round.radius,
                                      options_.association, &result.visible_points);
-        problem.points = point_terms(map, result.points, features, options_.association.scale_factor);
+        if (options_.association.align && round.gate)
+          align_points(map, features, camera_, pose, options_.association.scale_factor, result.points);
+        problem.points = point_terms(map, result.points, features, options_.association);
       }
       if (options_.lines) {
         result.lines = match_lines(map, local_map_.lines, features, camera_, pose, round.radius,
@@ -265,7 +284,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   TrackResult result;
   if (map.keyframe_count() == 0) {
     result.state = TrackState::kInitialising;
-    result.features = features;
+    result.features = without_picture(*features, {});
     remember(frame, *features, result);
     return result;
   }
@@ -285,6 +304,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   }
   found->features = still;
   settle_shutter(map, frame, features, *found);
+  found->features = without_picture(*found->features, found->points);
   remember(frame, *found->features, *found);
   return *std::move(found);
 }

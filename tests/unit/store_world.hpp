@@ -35,7 +35,8 @@ struct StoreWorld {
     const core::KeyframeId id = map.next_keyframe_id(robot);
     map.add_keyframe(make_keyframe(id), random_.pose(3.0, 5.0));
     for (const core::PointId p : map.point_ids()) {
-      if (random_.integer(0, 3) == 0) map.observe(p, id, random_.integer(0, features - 1));
+      if (random_.integer(0, 3) == 0)
+        map.observe(p, id, random_.integer(0, features - 1), random_.integer(0, 1) == 0);
     }
     for (const core::LineId l : map.line_ids()) {
       if (random_.integer(0, 3) == 0) map.observe(l, id, random_.integer(0, lines - 1));
@@ -63,6 +64,7 @@ struct StoreWorld {
       p.octave = random_.integer(0, 7);
       f->points.push_back(p);
       f->descriptors.push_back(bits());
+      f->patches.push_back(patch(p));
     }
     f->grid = features::PointGrid(f->points, camera.color.width, camera.color.height);
     for (int i = 0; i < lines; ++i) f->lines.push_back(make_line(i % 3 != 0));
@@ -79,6 +81,15 @@ struct StoreWorld {
           {random_.vector(3).cast<float>(), random_.direction().cast<float>(), number(0, 1)});
     }
     return keyframe;
+  }
+
+  features::CornerPatch patch(features::PointFeature& p) {
+    features::CornerPatch made;
+    for (std::uint8_t& gray : made.gray) gray = static_cast<std::uint8_t>(random_.integer(0, 255));
+    made.middle = p.pixel;
+    if (random_.integer(0, 1) == 0) made.offset = {number(-1, 1), number(-1, 1)};
+    p.pixel += made.offset;
+    return made;
   }
 
   features::LineFeature make_line(bool in_space) {
@@ -107,7 +118,7 @@ struct StoreWorld {
     p.reference_octave = random_.integer(0, 7);
     p.visible = random_.integer(1, 9);
     p.found = 1;
-    map.observe(map.add_point(id.robot, p), id, feature);
+    map.observe(map.add_point(id.robot, p), id, feature, true);
   }
   void add_line(core::KeyframeId id, int feature) {
     maps::MapLine l;
@@ -173,7 +184,7 @@ inline bool same(const geometry::Rigid3& a, const geometry::Rigid3& b) {
 }
 inline bool same(const std::vector<maps::Observation>& a, const std::vector<maps::Observation>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
-    return x.keyframe == y.keyframe && x.feature == y.feature;
+    return x.keyframe == y.keyframe && x.feature == y.feature && x.aligned == y.aligned;
   });
 }
 inline bool same(const maps::MapPoint& a, const maps::MapPoint& b) {
@@ -197,6 +208,9 @@ inline bool same(const maps::LoopEdge& a, const maps::LoopEdge& b) {
 inline bool same(const features::PointFeature& a, const features::PointFeature& b) {
   return a.pixel == b.pixel && a.depth == b.depth && a.angle == b.angle && a.response == b.response &&
          a.octave == b.octave;
+}
+inline bool same(const features::CornerPatch& a, const features::CornerPatch& b) {
+  return a.gray == b.gray && a.offset == b.offset;
 }
 inline bool same(const features::LineFeature& a, const features::LineFeature& b) {
   if (a.segment.start != b.segment.start || a.segment.end != b.segment.end ||
@@ -248,8 +262,9 @@ inline bool same(const maps::Keyframe& a, const maps::Keyframe& b) {
   if (a.features == nullptr) return true;
   const features::FrameFeatures& x = *a.features;
   const features::FrameFeatures& y = *b.features;
-  return same_all(x.points, y.points) && x.descriptors == y.descriptors && same_all(x.lines, y.lines) &&
-         same(x.thumbnail, y.thumbnail) && same(x.thumbnail_depth, y.thumbnail_depth) && same_lookup(x, y);
+  return same_all(x.points, y.points) && x.descriptors == y.descriptors && same_all(x.patches, y.patches) &&
+         same_all(x.lines, y.lines) && same(x.thumbnail, y.thumbnail) &&
+         same(x.thumbnail_depth, y.thumbnail_depth) && same_lookup(x, y);
 }
 
 /// Says what differs first.

@@ -103,6 +103,26 @@ TEST(FeatureExtractor, PointsCarryDepthExceptOverBorders) {
   EXPECT_NE(std::find(near.begin(), near.end(), 5), near.end());
 }
 
+TEST(FeatureExtractor, EveryPointHasThePatchAroundIt) {
+  const sensor::RgbdFrame frame = textured_frame();
+  const FrameFeatures found = FeatureExtractor({}, kCamera).extract(frame);
+  ASSERT_EQ(found.patches.size(), found.points.size());
+  ASSERT_EQ(found.levels.size(), 8U);
+  for (std::size_t i = 0; i < found.points.size(); ++i) {
+    const CornerPatch& patch = found.patches[i];
+    EXPECT_EQ(patch.middle, found.points[i].pixel);
+    EXPECT_TRUE(patch.offset.isZero());
+    EXPECT_FALSE(patch.empty());
+    const cv::Mat& level = found.levels[static_cast<std::size_t>(found.points[i].octave)];
+    const float shrink = static_cast<float>(level.cols) / static_cast<float>(frame.gray.cols);
+    const auto x = cvRound((patch.middle.x() + 0.5F) * shrink - 0.5F);
+    const auto y = cvRound((patch.middle.y() + 0.5F) * static_cast<float>(level.rows) /
+                               static_cast<float>(frame.gray.rows) -
+                           0.5F);
+    EXPECT_EQ(patch.gray[CornerPatch::kPixels / 2], level.at<std::uint8_t>(y, x));
+  }
+}
+
 TEST(FeatureExtractor, ThumbnailsAreSmallAndNeverMixDepth) {
   const sensor::RgbdFrame frame = textured_frame();
   const FrameFeatures found = FeatureExtractor({}, kCamera).extract(frame);

@@ -106,10 +106,11 @@ TEST(SightingNoise, UnrestMultipliesEveryStandardDeviation) {
   line.line3->start = {0.0, 0.0, 2.0};
   line.line3->end = {0.5, 0.0, 2.5};
   const SightingNoise noise;
-  const auto calm = noise.of(corner);
-  const auto turning = noise.of(corner, 3.0);
+  const auto calm = noise.of(corner, false);
+  const auto turning = noise.of(corner, false, 3.0);
   EXPECT_DOUBLE_EQ(calm.pixel_sigma, 1.2 * 1.2 * 1.2);
   EXPECT_DOUBLE_EQ(turning.pixel_sigma, 3.0 * calm.pixel_sigma);
+  EXPECT_DOUBLE_EQ(noise.of(corner, true, 3.0).pixel_sigma, noise.aligned * turning.pixel_sigma);
   EXPECT_DOUBLE_EQ(turning.depth_sigma, 3.0 * calm.depth_sigma);
   const auto calm_line = noise.of(line);
   const auto turning_line = noise.of(line, 3.0);

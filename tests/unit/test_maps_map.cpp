@@ -96,6 +96,50 @@ TEST(Map, OneFeatureOneLandmarkAndTheOtherWayRound) {
   expect_consistent(map);
 }
 
+TEST(Map, WhatWasAlignedWithAnotherLandmarkIsNotAlignedAfterAMerger) {
+  Map map;
+  const KeyframeId a = add_keyframe(map, 0, 2, 0);
+  const KeyframeId b = add_keyframe(map, 0, 2, 0);
+  const KeyframeId c = add_keyframe(map, 0, 2, 0);
+  const PointId kept = map.add_point(0, {});
+  const PointId gone = map.add_point(0, {});
+  map.observe(kept, a, 0, true);
+  map.observe(kept, b, 0);
+  map.observe(gone, c, 1, true);
+  map.merge_points(kept, gone);
+  const std::vector<Observation>& seen = map.point(kept).observations;
+  ASSERT_EQ(seen.size(), 3U);
+  EXPECT_TRUE(seen[0].aligned);
+  EXPECT_FALSE(seen[1].aligned);
+  EXPECT_FALSE(seen[2].aligned) << "its own patch shows another place";
+}
+
+TEST(Map, OnlyTheNewestKeyframesOfEachRobotKeepPatches) {
+  Map map;
+  const auto add = [&](std::int32_t robot) {
+    auto features = std::make_shared<features::FrameFeatures>();
+    features->points.resize(2);
+    features->descriptors.resize(2);
+    features->patches.resize(2);
+    auto keyframe = std::make_shared<Keyframe>();
+    keyframe->id = map.next_keyframe_id(robot);
+    keyframe->stamp = 0.5;
+    keyframe->features = features;
+    map.add_keyframe(keyframe, {});
+    return std::shared_ptr<const Keyframe>(keyframe);
+  };
+  const auto first = add(0);
+  add(1);
+  for (int i = 1; i <= kPatchedKeyframes + 2; ++i) add(0);
+  for (int i = 0; i <= kPatchedKeyframes + 2; ++i) {
+    EXPECT_EQ(map.keyframe({0, i}).features->patches.size(), i < 3 ? 0U : 2U) << i;
+    EXPECT_EQ(map.keyframe({0, i}).features->points.size(), 2U) << i;
+  }
+  EXPECT_EQ(map.keyframe({1, 0}).features->patches.size(), 2U);
+  EXPECT_EQ(map.keyframe({0, 0}).stamp, 0.5);
+  EXPECT_EQ(first->features->patches.size(), 2U) << "who holds a keyframe keeps what it was";
+}
+
 TEST(Map, UnobserveFreesBothSides) {
   Map map;
   const KeyframeId a = add_keyframe(map, 0, 1, 0);

@@ -225,9 +225,10 @@ TEST(MapStore, KeyframesTakeFewBytes) {
   }
   const auto bytes = static_cast<double>(std::filesystem::file_size(folder.file())) / kCount;
   RecordProperty("bytes_per_keyframe", static_cast<int>(bytes));
-  // Random numbers cannot be packed: 1000 points are 56 kB, 100 lines 17 kB, 333 new landmarks 45 kB.
-  EXPECT_LT(bytes, 160e3);
-  EXPECT_GT(bytes, 50e3);
+  // Random numbers cannot be packed: 1000 points are 56 kB and their patches 125 kB, 100 lines 17 kB, 333 new
+  // landmarks 45 kB.
+  EXPECT_LT(bytes, 285e3);
+  EXPECT_GT(bytes, 150e3);
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Everything the tracker and the map need to know of one picture; the picture itself is not kept.
+// Everything the tracker and the map need to know of one picture; the picture itself is kept only until the
+// frame is tracked.
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -33,6 +34,8 @@ class PointGrid {
 struct FrameFeatures {
   std::vector<PointFeature> points;
   std::vector<Descriptor256> descriptors;  ///< of points
+  std::vector<CornerPatch> patches;        ///< of points; empty: not known
+  std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave; empty once the frame is tracked
   PointGrid grid;
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values

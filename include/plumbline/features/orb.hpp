@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plumbline/core/options.hpp"
+#include "plumbline/features/corner_patch.hpp"
 #include "plumbline/features/descriptor.hpp"
 
 namespace plumbline::features {
@@ -38,6 +39,8 @@ struct OrbOptions {
 struct OrbFeatures {
   std::vector<PointFeature> points;
   std::vector<Descriptor256> descriptors;
+  std::vector<CornerPatch> patches;
+  std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave
 };
 
 /// FAST corners on a pyramid; in every cell of a grid the strongest are kept, with a lower threshold where a

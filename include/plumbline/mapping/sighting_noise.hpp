@@ -13,6 +13,7 @@ namespace plumbline::mapping {
 
 struct SightingNoise {
   double orb_scale_factor = 1.2;  ///< from octave to octave; corners are good to a pixel of theirs
+  double aligned = 0.3;           ///< to so much of it where they were aligned (maps::Observation)
   double line_sigma_px = 0.25;    ///< of a line's ends, across it
   double depth_factor = 2.0;      ///< of the depth noise, for the depth of corners and lines
 
@@ -21,13 +22,13 @@ struct SightingNoise {
 
   /// As a bundle's camera of the same intrinsics saw it; which pose and which landmark is left to the caller.
   /// `unrest`: all standard deviations are so many times as large.
-  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner,
+  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
                                                     double unrest = 1.0) const {
-    return of(corner, unrest, octave_px(corner.octave));
+    return of(corner, is_aligned, unrest, octave_px(corner.octave));
   }
   /// The same for many: `corner_px` is octave_px() of its octave.
-  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, double unrest,
-                                                    double corner_px) const;
+  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
+                                                    double unrest, double corner_px) const;
   /// Standard deviation of a corner of this octave.
   [[nodiscard]] double octave_px(int octave) const;
   [[nodiscard]] optimize::BundleLineObservation of(const features::LineFeature& line,

@@ -28,7 +28,8 @@ struct SurfaceSample {
   float sigma = 0.01F;                                ///< metres, along the normal
 };
 
-/// What was measured at a keyframe; never changes after creation.
+/// What was measured at a keyframe; never changes after creation, but that patches are given up
+/// (kPatchedKeyframes).
 struct Keyframe {
   KeyframeId id;
   std::int64_t frame_index = -1;
@@ -41,8 +42,20 @@ struct Keyframe {
 /// Feature `feature` of keyframe `keyframe`.
 struct Observation {
   KeyframeId keyframe;
-  int feature = -1;
+  int feature : 31;
+  /// The feature's pixel is that of what the landmark was made of, to a tenth of a pixel or so (its first
+  /// feature, and those that were aligned with its patch); else of some corner there.
+  bool aligned : 1;
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+  Observation(KeyframeId by = {}, int number = -1, bool is_aligned = false)
+      : keyframe(by), feature(number), aligned(is_aligned) {}
+#pragma GCC diagnostic pop
 };
+static_assert(sizeof(Observation) == 12, "a map has thousands of them for each keyframe");
+
+/// So many keyframes of each robot, those made last, keep the patches of their corners.
+constexpr int kPatchedKeyframes = 200;
 
 struct MapPoint {
   PointId id;
@@ -222,7 +235,7 @@ class Map {
 
   // Observations. A feature sees at most one landmark; a keyframe sees a landmark with at most one feature:
   // observe returns false and changes nothing otherwise.
-  bool observe(PointId point, KeyframeId keyframe, int feature);
+  bool observe(PointId point, KeyframeId keyframe, int feature, bool aligned = false);
   bool observe(LineId line, KeyframeId keyframe, int feature);
   void unobserve(PointId point, KeyframeId keyframe);
   void unobserve(LineId line, KeyframeId keyframe);
@@ -267,6 +280,7 @@ class Map {
     std::vector<KeyframeId> retired;   ///< whose heir this is
   };
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
+  void forget_patches(KeyframeId id);
   void forget_observations(KeyframeId id);
   void forget_edges(KeyframeId id);
   void detach(KeyframeId child);

@@ -17,6 +17,8 @@ struct PointMatch {
   core::PointId point;
   int feature = -1;
   int distance = 256;
+  bool aligned = false;                             ///< with the landmark's patch (align_points)
+  Eigen::Vector2f shift = Eigen::Vector2f::Zero();  ///< from the corner to the landmark, px
 };
 struct LineMatch {
   core::LineId line;
@@ -29,6 +31,8 @@ struct AssociationOptions {
   double ratio = 0.9;
   double scale_factor = 1.2;  ///< of the ORB pyramid
   double max_point_angle_rad = 0.6;
+  bool align = true;           ///< matched corners with their landmark's patch (align_points)
+  double aligned_sigma = 0.3;  ///< standard deviation of those, over that of others
   int max_line_hamming = 90;
   double max_line_angle_rad = 0.2;
   void declare(core::OptionTable& table);
