@@ -11,6 +11,8 @@ using geometry::Rigid3;
 constexpr double kBlind = 100.0;  // information of a standard deviation of 10 cm
 constexpr double kNoisy = 1e4;    // of 1 cm: a step of that accuracy is noise more than motion
 constexpr double kAllTheSurface = 0.9;
+constexpr double kMostOfTheSurface = 0.75;
+constexpr double kNearlyHeld = 0.5;  // of the information that a direction needs
 constexpr double kLongestCoast_s = 2.5;
 
 }  // namespace
@@ -59,7 +61,9 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
   // seen is no chance find.
   const bool many = estimate.points.inliers + 2 * estimate.lines.inliers >= 3 * options_.min_inliers &&
                     result.min_eigenvalue >= kBlind;
-  const bool all_surface = by_surface && result.surface_share > kAllTheSurface;
+  // A direction that falls short by a little is no chance find yet, though some of the surface does not fit.
+  const bool nearly = result.min_eigenvalue >= kNearlyHeld * weak;
+  const bool all_surface = by_surface && result.surface_share > (nearly ? kMostOfTheSurface : kAllTheSurface);
   result.held_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
   result.unheld = result.held_by_motion ? weak_part(directions, weak)
                                         : weak_part(weigh_directions(estimate.information), kNoisy);
@@ -73,7 +77,6 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
 /// Places can look alike: what only the small picture suggested must be confirmed by every family that is in
 /// use and has something to say there.
 bool Tracker::beyond_doubt(const TrackResult& result) const {
-  constexpr double kMostOfTheSurface = 0.75;
   constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
   if (result.weak_directions > 0) return false;
   if (options_.depth &&
