@@ -2,6 +2,7 @@
 #include "plumbline/features/frame_features.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -45,6 +46,45 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
     }
   }
   return result;
+}
+
+/// Whether depth jumps within `reach` pixels of a corner, or is missing (as in the shadow behind a border):
+/// on a plane, inverse depth on opposite sides has its mean in the middle.
+bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) {
+  const auto at = [&](const Eigen::Vector2f& p) {
+    const int u = cvRound(p.x());
+    const int v = cvRound(p.y());
+    return u < 0 || v < 0 || u >= depth.cols || v >= depth.rows ? 0.0F : depth.at<float>(v, u);
+  };
+  constexpr std::array<float, 4> kRings{0.4F, 0.7F, 1.0F, 1.3F};
+  constexpr float kDiagonal = 0.70710678F;
+  const std::array<Eigen::Vector2f, 4> ways{
+      Eigen::Vector2f(1.0F, 0.0F), Eigen::Vector2f(kDiagonal, kDiagonal), Eigen::Vector2f(0.0F, 1.0F),
+      Eigen::Vector2f(-kDiagonal, kDiagonal)};
+  constexpr std::size_t kPairs = 16;
+  const float here = at(pixel);
+  if (!(here > 0.0F)) return true;
+  const float tolerance = 0.01F + 4.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
+  std::size_t seen = 0;
+  for (const float ring : kRings) {
+    for (const Eigen::Vector2f& way : ways) {
+      const float a = at(pixel + ring * reach * way);
+      const float b = at(pixel - ring * reach * way);
+      if (!(a > 0.0F) || !(b > 0.0F)) continue;
+      ++seen;
+      if (std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance) return true;
+    }
+  }
+  return 4 * seen < 3 * kPairs;
+}
+
+/// What lies behind a border moves apart from what lies before: patches there are left empty.
+void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extractor, OrbFeatures& orb) {
+  if (depth.empty()) return;
+  for (std::size_t i = 0; i < orb.points.size(); ++i) {
+    const auto reach = static_cast<float>(CornerPatch::kReach) * extractor.sigma(orb.points[i].octave);
+    if (at_border(depth, orb.points[i].pixel, reach)) orb.patches[i].gray.fill(0);
+  }
 }
 
 }  // namespace
@@ -129,6 +169,7 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
     for (PointFeature& p : orb.points) p.depth = corner_depth(frame.depth, p.pixel.x(), p.pixel.y());
+    empty_patches_at_borders(frame.depth, orb_, orb);
     result.points = std::move(orb.points);
     result.descriptors = std::move(orb.descriptors);
     result.patches = std::move(orb.patches);

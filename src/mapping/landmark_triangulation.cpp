@@ -154,8 +154,7 @@ core::PointId add_landmark(maps::Map& map, KeyframeId keyframe, int feature,
   point.visible = 1;
   point.found = 1;
   const core::PointId id = map.add_point(keyframe.robot, point);
-  const auto number = static_cast<std::size_t>(feature);
-  map.observe(id, keyframe, feature, number < features.patches.size() && !features.patches[number].empty());
+  map.observe(id, keyframe, feature, true);
   return id;
 }
 

@@ -118,8 +118,7 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     point.visible = 1;
     point.found = 1;
     const core::PointId point_id = map.add_point(id.robot, point);
-    map.observe(point_id, id, static_cast<int>(i),
-                i < features.patches.size() && !features.patches[i].empty());
+    map.observe(point_id, id, static_cast<int>(i), true);
     culler_.watch(point_id, id);
   }
 }

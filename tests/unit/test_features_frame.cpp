@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -104,7 +105,8 @@ TEST(FeatureExtractor, PointsCarryDepthExceptOverBorders) {
 }
 
 TEST(FeatureExtractor, EveryPointHasThePatchAroundIt) {
-  const sensor::RgbdFrame frame = textured_frame();
+  sensor::RgbdFrame frame = textured_frame();
+  frame.depth = cv::Mat();  // no border is known
   const FrameFeatures found = FeatureExtractor({}, kCamera).extract(frame);
   ASSERT_EQ(found.patches.size(), found.points.size());
   ASSERT_EQ(found.levels.size(), 8U);
@@ -114,12 +116,34 @@ TEST(FeatureExtractor, EveryPointHasThePatchAroundIt) {
     EXPECT_TRUE(patch.offset.isZero());
     EXPECT_FALSE(patch.empty());
     const cv::Mat& level = found.levels[static_cast<std::size_t>(found.points[i].octave)];
-    const float shrink = static_cast<float>(level.cols) / static_cast<float>(frame.gray.cols);
-    const auto x = cvRound((patch.middle.x() + 0.5F) * shrink - 0.5F);
-    const auto y = cvRound((patch.middle.y() + 0.5F) * static_cast<float>(level.rows) /
-                               static_cast<float>(frame.gray.rows) -
-                           0.5F);
+    const float shrink_x = static_cast<float>(level.cols) / static_cast<float>(frame.gray.cols);
+    const float shrink_y = static_cast<float>(level.rows) / static_cast<float>(frame.gray.rows);
+    const int x = cvRound((patch.middle.x() + 0.5F) * shrink_x - 0.5F);
+    const int y = cvRound((patch.middle.y() + 0.5F) * shrink_y - 0.5F);
     EXPECT_EQ(patch.gray[CornerPatch::kPixels / 2], level.at<std::uint8_t>(y, x));
+  }
+}
+
+TEST(FeatureExtractor, PatchesAreLeftEmptyWhereDepthJumpsOrIsMissing) {
+  sensor::RgbdFrame frame = textured_frame();
+  for (const float beyond : {3.0F, 0.0F}) {
+    frame.depth(cv::Rect(320, 0, 320, 480)).setTo(beyond);
+    const FrameFeatures found = FeatureExtractor({}, kCamera).extract(frame);
+    int near = 0;
+    int far = 0;
+    for (std::size_t i = 0; i < found.points.size(); ++i) {
+      const PointFeature& p = found.points[i];
+      const float pixels = std::abs(p.pixel.x() - 319.5F) / std::pow(1.2F, static_cast<float>(p.octave));
+      if (pixels > 0.5F && pixels < 3.0F) {
+        ++near;
+        EXPECT_TRUE(found.patches[i].empty()) << p.pixel.transpose() << " " << p.octave;
+      } else if (pixels > 6.5F && (beyond > 0.0F || p.pixel.x() < 320.0F)) {
+        ++far;
+        EXPECT_FALSE(found.patches[i].empty()) << p.pixel.transpose() << " " << p.octave;
+      }
+    }
+    EXPECT_GT(near, 5);
+    EXPECT_GT(far, 250);
   }
 }
 
