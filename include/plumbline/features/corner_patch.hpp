@@ -21,7 +21,7 @@ struct CornerPatch {
   /// From there to what the feature stands for, pixels of the full picture: zero for the corner itself; where
   /// a known landmark was aligned, to where that is.
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();
-  /// All zero: nothing is known, as of a patch that was never cut out.
+  /// All zero: none, as at borders of depth (FeatureExtractor): nothing is aligned with it.
   std::array<std::uint8_t, kPixels> gray{};
 
   [[nodiscard]] bool empty() const {

@@ -34,7 +34,7 @@ class PointGrid {
 struct FrameFeatures {
   std::vector<PointFeature> points;
   std::vector<Descriptor256> descriptors;  ///< of points
-  std::vector<CornerPatch> patches;        ///< of points; empty: not known
+  std::vector<CornerPatch> patches;        ///< of points; no elements: not known
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave; empty once the frame is tracked
   PointGrid grid;
   std::vector<LineFeature> lines;
