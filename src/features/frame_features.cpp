@@ -156,6 +156,7 @@ float corner_depth(const cv::Mat& depth, float x, float y) {
 void FeatureOptions::declare(core::OptionTable& table) {
   table.boolean("points", points, "Extract ORB points");
   table.boolean("lines", lines, "Extract lines");
+  table.boolean("photometric", photometric, "Keep pictures for direct alignment");
   orb.declare(table);
   line.declare(table);
 }
@@ -177,6 +178,7 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   }
   result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
   if (options_.lines) result.lines = lines_.extract(frame.gray, frame.depth, camera_);
+  if (options_.photometric) result.photometric = make_photometric_image(frame.gray);
   result.thumbnail = make_thumbnail(frame.gray);
   result.thumbnail_depth = make_thumbnail_depth(frame.depth, result.thumbnail.size());
   return result;

@@ -112,6 +112,7 @@ void Slam::start_map(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {
   tracking::TrackResult origin;
   report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, 0.0);
+  remember_picture(frame, report.keyframe);
   report.reference = report.keyframe;
   report.state = tracking::TrackState::kTracked;
   rule_.keyframe_made();
@@ -207,9 +208,10 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, shear_rate());
   report.reference = report.keyframe;
   if (options_.mapper.edges && options_.tracker.depth) {
-    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_.depth_from_camera,
+    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_, tracker_.photometric(),
                               tracker_.local_map().keyframes);
   }
+  remember_picture(frame, report.keyframe);
   mapper_.refine(map_, report.keyframe);
   rule_.keyframe_made();
   tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
@@ -217,6 +219,14 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   if (!options_.mapper.bundle || shear_rate() > options_.mapper.bundle_max_turn_rate) return;
   bundle_.request(map_, report.keyframe, clock_);
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
+}
+
+void Slam::remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe) {
+  if (!options_.tracker.photometric || last_track_.photometric.front().empty()) return;
+  tracker_.add_photometric(
+      keyframe,
+      std::make_shared<const features::PhotometricSamples>(features::sample_photometric(
+          last_track_.photometric, frame.depth, camera_, last_track_.depth_from_camera.inverse())));
 }
 
 void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {

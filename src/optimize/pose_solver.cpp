@@ -120,6 +120,12 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
     if constexpr (kDerivatives) sums.add(j1, r, options.plane_weight * robust.weight);
   }
   sums.move_to(n);
+  for (const PhotometricFamily& family : problem.photometric) {
+    const PhotometricSums seen = sum_photometric(family, pose, options.photometric_loss);
+    n.h += options.photometric_weight * seen.h;
+    n.g += options.photometric_weight * seen.g;
+    n.cost += options.photometric_weight * seen.cost;
+  }
   return n;
 }
 
@@ -157,9 +163,13 @@ void PoseSolverOptions::declare(core::OptionTable& table) {
                "Huber threshold of lines, standard deviations");
   table.number("solver.plane_loss", plane_loss, {0.1, 100.0}, "",
                "Huber threshold of depth, standard deviations");
+  table.number("solver.photometric_loss", photometric_loss, {0.1, 100.0}, "",
+               "Huber threshold of grey values, standard deviations");
   table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
   table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
   table.number("solver.plane_weight", plane_weight, {0.0, 100.0}, "", "Weight of all depth samples together");
+  table.number("solver.photometric_weight", photometric_weight, {0.0, 100.0}, "",
+               "Weight of all grey values together");
 }
 
 PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_world,
@@ -211,6 +221,11 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
     planes.push_back(r * r);
   }
   summary.planes = summarise(planes, kGateSq);
+  std::vector<double> grey;
+  for (const PhotometricFamily& family : problem.photometric) {
+    for (const float r : photometric_residuals(family, pose)) grey.push_back(static_cast<double>(r) * static_cast<double>(r));
+  }
+  summary.photometric = summarise(grey, kGateSq);
   return summary;
 }
 

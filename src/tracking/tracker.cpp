@@ -80,6 +80,7 @@ Tracker::Features without_picture(const features::FrameFeatures& features,
                                   const std::vector<PointMatch>& matches) {
   auto kept = std::make_shared<features::FrameFeatures>(features);
   kept->levels.clear();
+  kept->photometric = {};
   for (const PointMatch& m : matches) {
     if (!m.aligned) continue;
     const auto i = static_cast<std::size_t>(m.feature);
@@ -107,6 +108,7 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("points", points, "Track ORB points, and look for a lost place by them");
   table.boolean("lines", lines, "Track lines");
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
+  table.boolean("photometric", photometric, "Align grey values with keyframes directly");
   table.boolean("align_stamps", align_stamps,
                 "Bring colour and depth stamped apart together with the motion model");
   table.number(
@@ -134,16 +136,69 @@ Rigid3 Tracker::depth_from_camera(const sensor::RgbdFrame& frame) const {
   return geometry::exp_se3(velocity_ * dt);
 }
 
-std::vector<Rigid3> Tracker::guesses(const features::FrameFeatures& features, double stamp) const {
+std::vector<Rigid3> Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                     const features::FrameFeatures& features) const {
   std::vector<Rigid3> result;
-  const Rigid3 predicted = predict(stamp);
+  const Rigid3 predicted = predict(frame.stamp);
   const ThumbnailAlignment alignment =
       align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
                        predicted * last_.camera_from_world.inverse());
   if (alignment.better) result.push_back(alignment.current_from_previous * last_.camera_from_world);
   result.push_back(predicted);
   result.push_back(last_.camera_from_world);
+  if (options_.photometric) put_likeliest_first(map, {&features.photometric, &frame.depth, {}, camera_}, result);
   return result;
+}
+
+/// Before a bare wall thumbnails fit anywhere, and the motion model lags behind: grain tells which guess is
+/// the best, or how far to the side of it the camera looks.
+void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& view,
+                                  std::vector<Rigid3>& guesses) const {
+  constexpr std::size_t kCoarse = 1;
+  constexpr double kGood = 0.8;     // correlation
+  constexpr double kBetter = 0.05;  // by so much
+  constexpr double kSure = 0.3;
+  std::size_t best = 0;
+  std::vector<double> agreement;
+  std::optional<optimize::PhotometricFamily> family_of_best;
+  for (std::size_t i = 0; i < guesses.size(); ++i) {
+    std::vector<optimize::PhotometricFamily> families = photometric_families(map, view, kCoarse, guesses[i]);
+    agreement.push_back(families.empty() ? 0.0
+                                         : optimize::photometric_correlation(families.front(), guesses[i],
+                                                                             kMinPhotometric));
+    if (i > 0 && agreement[i] < agreement[best] + kBetter) continue;
+    best = i;
+    family_of_best.reset();
+    if (!families.empty()) family_of_best = std::move(families.front());
+  }
+  const Rigid3 likeliest = guesses[best];
+  if (best > 0) {
+    guesses.erase(guesses.begin() + static_cast<std::ptrdiff_t>(best));
+    guesses.insert(guesses.begin(), likeliest);
+  }
+  if (!family_of_best || agreement[best] >= kGood) return;
+  const ShiftedPose shifted = search_shift(*family_of_best, likeliest);
+  if (shifted.correlation < std::max(kSure, agreement[best] + kBetter)) return;
+  guesses.insert(guesses.begin(), shifted.camera_from_world);
+}
+
+/// The surroundings' samples that the picture shows from a pose: of the reference keyframe, or of the first
+/// that has enough in view.
+std::vector<optimize::PhotometricFamily> Tracker::photometric_families(const maps::Map& map,
+                                                                       const PhotometricView& view,
+                                                                       std::size_t level,
+                                                                       const Rigid3& camera_from_world) const {
+  std::vector<optimize::PhotometricFamily> families;
+  for (const core::KeyframeId id : local_map_.keyframes) {
+    const auto samples = photometric_.find(id);
+    if (samples == nullptr) continue;
+    auto family =
+        associate_photometric(*samples, level, view, map.camera_from_world(id), camera_from_world);
+    if (!family) continue;
+    families.push_back(*std::move(family));
+    break;
+  }
+  return families;
 }
 
 TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
@@ -165,14 +220,16 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     double radius;
     double surface_distance;
     int surface_samples;
+    std::size_t photometric_level;
     bool rematch;
     bool gate;
   };
-  const Round rounds[] = {{radius, 0.15, 500, true, false},
-                          {radius, 0.08, 700, false, false},
-                          {kSecondRadius, 0.05, 1200, true, true},
-                          {kSecondRadius, 0.03, 2400, false, true},
-                          {kSecondRadius, 0.03, 2400, false, false}};
+  const Round rounds[] = {{radius, 0.15, 500, 1, true, false},
+                          {radius, 0.08, 700, 1, false, false},
+                          {kSecondRadius, 0.05, 1200, 0, true, true},
+                          {kSecondRadius, 0.03, 2400, 0, false, true},
+                          {kSecondRadius, 0.03, 2400, 0, false, false}};
+  const PhotometricView view{&features.photometric, &frame.depth, depth_from_colour, camera_};
   bool stiff = !motion_refuted_;
   bool surface_alone = false;
   const auto run = [&](const Round& round) {
@@ -198,10 +255,19 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
       problem.planes = associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour,
                                          surface, &result.surface_in_view);
     }
+    if (options_.photometric)
+      problem.photometric = photometric_families(map, view, round.photometric_level, pose);
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
+    const auto disagrees = [&](const optimize::PhotometricFamily& family) {
+      return !photometric_agrees(family, result.estimate.camera_from_world);
+    };
+    if (std::any_of(problem.photometric.begin(), problem.photometric.end(), disagrees)) {
+      problem.photometric.clear();
+      result.estimate = optimize::solve_pose(problem, pose, solver);
+    }
     pose = result.estimate.camera_from_world;
-    surface_alone = uses_features() &&
+    surface_alone = uses_features() && problem.photometric.empty() &&
                     result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
     const Motion motion = !stiff                      ? Motion::kUnknown
                           : surface_alone             ? Motion::kAlone
@@ -228,7 +294,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
 std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
                                               const features::FrameFeatures& features) const {
   if (lost_frames_ >= 30) return std::nullopt;
-  for (const Rigid3& guess : guesses(features, frame.stamp)) {
+  for (const Rigid3& guess : guesses(map, frame, features)) {
     TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
     if (attempt.state == TrackState::kTracked) return attempt;
   }
@@ -285,6 +351,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   if (map.keyframe_count() == 0) {
     result.state = TrackState::kInitialising;
     result.features = without_picture(*features, {});
+    result.photometric = features->photometric;
     remember(frame, *features, result);
     return result;
   }
@@ -304,6 +371,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   }
   found->features = still;
   settle_shutter(map, frame, features, *found);
+  found->photometric = found->features->photometric;
   found->features = without_picture(*found->features, found->points);
   remember(frame, *found->features, *found);
   return *std::move(found);

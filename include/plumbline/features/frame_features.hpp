@@ -9,6 +9,7 @@
 #include "plumbline/core/options.hpp"
 #include "plumbline/features/line_extractor.hpp"
 #include "plumbline/features/orb.hpp"
+#include "plumbline/features/photometric.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/frame.hpp"
 
@@ -36,6 +37,7 @@ struct FrameFeatures {
   std::vector<Descriptor256> descriptors;  ///< of points
   std::vector<CornerPatch> patches;        ///< of points; no elements: not known
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave; empty once the frame is tracked
+  PhotometricImage photometric;  ///< for direct alignment; empty once the frame is tracked
   PointGrid grid;
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
@@ -46,6 +48,7 @@ constexpr int kThumbnailWidth = 80;
 struct FeatureOptions {
   bool points = true;
   bool lines = true;
+  bool photometric = true;
   OrbOptions orb;
   LineOptions line;
   void declare(core::OptionTable& table);

@@ -96,6 +96,7 @@ class Slam {
   void start_map(const sensor::RgbdFrame& frame,
                  const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   /// Instead of making a keyframe.
+  void remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe);
   void return_to_known_ground(FrameReport& report);
   void make_keyframe(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);

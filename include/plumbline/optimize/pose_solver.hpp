@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pose of one camera from points, lines and surfaces of the map together: Levenberg-Marquardt with robust
+// Pose of one camera from points, lines, surfaces and grey values of the map together: Levenberg-Marquardt with robust
 // losses over 6 unknowns (METHOD section 2). Small and allocation-free; many poses together are the work of
 // bundle_adjustment.
 #include <cstddef>
@@ -11,6 +11,7 @@
 
 #include "plumbline/core/options.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/optimize/photometric_terms.hpp"
 #include "plumbline/optimize/pose_terms.hpp"
 #include "plumbline/sensor/camera.hpp"
 
@@ -27,6 +28,7 @@ struct PoseProblem {
   std::vector<PointTerm> points;
   std::vector<LineTerm> lines;
   std::vector<PlaneTerm> planes;
+  std::vector<PhotometricFamily> photometric;  ///< one for each picture that this one is aligned with
   std::optional<PosePrior> prior;
 };
 
@@ -39,6 +41,8 @@ struct PoseSolverOptions {
   double point_weight = 1.0;  ///< of the whole family: its terms are not quite independent
   double line_weight = 1.0;
   double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
+  double photometric_loss = 1.5;
+  double photometric_weight = 0.02;  ///< grey values of neighbouring pixels are all but the same
   double min_step = 1e-6;      ///< metres and radians: a smaller step ends the iteration
 
   void declare(core::OptionTable& table);
@@ -55,6 +59,7 @@ struct PoseSummary {
   FamilySummary points;
   FamilySummary lines;
   FamilySummary planes;
+  FamilySummary photometric;
   double initial_cost = 0.0;
   double final_cost = 0.0;
   int iterations = 0;

@@ -18,6 +18,7 @@
 #include "plumbline/sensor/frame.hpp"
 #include "plumbline/tracking/association.hpp"
 #include "plumbline/tracking/local_map.hpp"
+#include "plumbline/tracking/photometric_alignment.hpp"
 #include "plumbline/tracking/relocalise.hpp"
 
 namespace plumbline::tracking {
@@ -29,6 +30,7 @@ struct TrackerOptions {
   bool points = true;
   bool lines = true;
   bool depth = true;
+  bool photometric = true;
   bool align_stamps = true;
   /// Time from the first to the last row of a picture, s; 0: all at once. What it shears is put right before
   /// a frame is tracked (features::undo_rolling_shutter), with the motion model's turn, and again with the
@@ -64,6 +66,7 @@ struct TrackResult {
   geometry::Matrix6d unheld = geometry::Matrix6d::Zero();
   bool motion_refuted = false;  ///< surfaces are all but alone, and have spoken against the motion model
   bool relocalised = false;
+  features::PhotometricImage photometric;  ///< of the frame
   /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
   /// what was matched, and what a keyframe should keep.
   std::shared_ptr<const features::FrameFeatures> features;
@@ -84,6 +87,12 @@ class Tracker {
   /// The map has changed (keyframe added, poses corrected). `corrected_from_old`: where the last pose went.
   void map_changed(const maps::Map& map, core::KeyframeId reference,
                    const geometry::Rigid3& last_camera_from_world);
+
+  /// A keyframe's samples, for direct alignment of what comes next.
+  void add_photometric(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples) {
+    photometric_.add(id, std::move(samples));
+  }
+  [[nodiscard]] const PhotometricKeyframes& photometric() const { return photometric_; }
 
   /// Goes on where another tracker left `map`: it had just tracked the keyframe `reference` at
   /// `camera_from_world`, with this motion of camera_from_world per second.
@@ -137,8 +146,10 @@ class Tracker {
     velocity_.setZero();
     steps_ = 0;
   }
-  [[nodiscard]] std::vector<geometry::Rigid3> guesses(const features::FrameFeatures& features,
-                                                      double stamp) const;
+  [[nodiscard]] std::vector<geometry::Rigid3> guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                                      const features::FrameFeatures& features) const;
+  void put_likeliest_first(const maps::Map& map, const PhotometricView& view,
+                           std::vector<geometry::Rigid3>& guesses) const;
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
                                      const features::FrameFeatures& features, const geometry::Rigid3& guess,
                                      double radius) const;
@@ -160,12 +171,16 @@ class Tracker {
   [[nodiscard]] bool refutes_motion(optimize::PoseProblem problem, const optimize::PoseSummary& held,
                                     const geometry::Rigid3& predicted, geometry::Rigid3& pose) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;
+  [[nodiscard]] std::vector<optimize::PhotometricFamily> photometric_families(
+      const maps::Map& map, const PhotometricView& view, std::size_t level,
+      const geometry::Rigid3& camera_from_world) const;
   void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                 const TrackResult& result);
 
   TrackerOptions options_;
   sensor::Pinhole camera_;
   LocalMap local_map_;
+  PhotometricKeyframes photometric_;
   PlaceFinder find_places_;
   PlaceJudge is_place_;
   Last last_;

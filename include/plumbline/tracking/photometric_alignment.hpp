@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Direct alignment with keyframes: which of their samples a camera sees, and whether what it sees is the same.
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/ids.hpp"
+#include "plumbline/features/photometric.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/optimize/photometric_terms.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::tracking {
+
+/// Samples of the keyframes that were made last; those of older ones are forgotten, so that memory does not
+/// grow with the map.
+class PhotometricKeyframes {
+ public:
+  void add(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples);
+  /// Null: not known, or forgotten.
+  [[nodiscard]] std::shared_ptr<const features::PhotometricSamples> find(core::KeyframeId id) const;
+
+ private:
+  static constexpr std::size_t kMost = 24;
+  std::vector<std::pair<core::KeyframeId, std::shared_ptr<const features::PhotometricSamples>>> kept_;
+};
+
+/// A picture to align, and the depth image that came with it.
+struct PhotometricView {
+  const features::PhotometricImage* image = nullptr;
+  const cv::Mat* depth = nullptr;  ///< CV_32FC1, metres
+  geometry::Rigid3 depth_from_camera;
+  sensor::Pinhole camera;  ///< of the full picture
+};
+
+/// The samples of a level that the view shows from a pose: in the picture, and not hidden by what its depth
+/// image measured. None when there are fewer than kMinPhotometric. Gain and noise are those found at the pose.
+std::optional<optimize::PhotometricFamily> associate_photometric(
+    const features::PhotometricSamples& samples, std::size_t level, const PhotometricView& view,
+    const geometry::Rigid3& reference_from_world, const geometry::Rigid3& camera_from_world);
+constexpr int kMinPhotometric = 500;
+
+/// Whether the picture is the expected one, as far as that can be told at a pose.
+bool photometric_agrees(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
+
+struct ShiftedPose {
+  geometry::Rigid3 camera_from_world;
+  double correlation = -1.0;
+};
+/// The pose, up to six pixels of the family's picture to the side of this one, at which the picture fits best.
+ShiftedPose search_shift(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
+
+}  // namespace plumbline::tracking

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/features/photometric.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::features {
+namespace {
+
+constexpr int kBorder = 3;  // pixels of a level without samples along the picture's edge
+constexpr std::array<int, kPhotometricLevels> kCell{3, 2};
+constexpr float kNear = 0.25F;  // metres
+
+/// Depth at full resolution in the middle of a level's pixel, 0 where it is missing or jumps within reach.
+float continuous_depth(const cv::Mat& depth, int x, int y, int reach) {
+  const float here = depth.at<float>(y, x);
+  if (!(here > kNear)) return 0.0F;
+  const float tolerance = 0.02F + 6.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
+  for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
+    for (int r = reach / 2; r <= reach; r += std::max(1, reach - reach / 2)) {
+      const int xa = x + r * dx, ya = y + r * dy, xb = x - r * dx, yb = y - r * dy;
+      if (std::min({xa, xb, ya, yb}) < 0 || std::max(xa, xb) >= depth.cols ||
+          std::max(ya, yb) >= depth.rows) {
+        return 0.0F;
+      }
+      const float a = depth.at<float>(ya, xa), b = depth.at<float>(yb, xb);
+      // On a plane inverse depth on opposite sides has its mean in the middle.
+      if (!(a > 0.0F) || !(b > 0.0F) || std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance) return 0.0F;
+    }
+  }
+  return here;
+}
+
+struct Spot {
+  int x = -1;
+  int y = -1;
+  float steepness = -1.0F;
+};
+
+float steepness(const cv::Mat& image, int x, int y) {
+  const float gx = image.at<float>(y, x + 1) - image.at<float>(y, x - 1);
+  const float gy = image.at<float>(y + 1, x) - image.at<float>(y - 1, x);
+  return gx * gx + gy * gy;
+}
+
+float bilinear(const cv::Mat& image, float x, float y) {
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
+  const float* top = image.ptr<float>(iy) + ix;
+  const float* low = image.ptr<float>(iy + 1) + ix;
+  const float t = top[0] + sx * (top[1] - top[0]), l = low[0] + sx * (low[1] - low[0]);
+  return t + sy * (l - t);
+}
+
+}  // namespace
+
+PhotometricImage make_photometric_image(const cv::Mat& gray) {
+  PhotometricImage result;
+  if (gray.cols < 64 || gray.rows < 64) return result;
+  cv::Mat half;
+  gray.convertTo(half, CV_32F);
+  for (cv::Mat& level : result) {
+    cv::resize(half, half, {half.cols / 2, half.rows / 2}, 0, 0, cv::INTER_AREA);
+    cv::Mat smooth, mean;
+    cv::GaussianBlur(half, smooth, {3, 3}, 0.6);
+    // Two boxes of 7 have the spread of a Gaussian of 2.8 pixels.
+    cv::boxFilter(half, mean, CV_32F, {7, 7});
+    cv::boxFilter(mean, mean, CV_32F, {7, 7});
+    level = smooth - mean;
+  }
+  return result;
+}
+
+sensor::Pinhole photometric_camera(const sensor::Pinhole& camera, std::size_t level) {
+  sensor::Pinhole result = camera;
+  for (std::size_t i = 0; i <= level; ++i) {
+    const int width = result.width / 2, height = result.height / 2;
+    const double sx = static_cast<double>(width) / result.width, sy = static_cast<double>(height) / result.height;
+    result = {width, height, result.fx * sx, result.fy * sy, (result.cx + 0.5) * sx - 0.5, (result.cy + 0.5) * sy - 0.5};
+  }
+  return result;
+}
+
+PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::Mat& depth,
+                                      const sensor::Pinhole& camera,
+                                      const geometry::Rigid3& camera_from_depth) {
+  PhotometricSamples result;
+  if (depth.empty()) return result;
+  for (std::size_t level = 0; level < kPhotometricLevels; ++level) {
+    const cv::Mat& picture = image[level];
+    if (picture.empty()) continue;
+    const sensor::Pinhole small = photometric_camera(camera, level);
+    const float per_x = static_cast<float>(depth.cols) / static_cast<float>(picture.cols);
+    const float per_y = static_cast<float>(depth.rows) / static_cast<float>(picture.rows);
+    const int reach = static_cast<int>(2.5F * per_x + 0.5F);
+    const int cell = kCell[level];
+    const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
+    const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+    for (int cy = kBorder; cy + cell <= picture.rows - kBorder; cy += cell) {
+      for (int cx = kBorder; cx + cell <= picture.cols - kBorder; cx += cell) {
+        Spot best;
+        for (int y = cy; y < cy + cell; ++y) {
+          for (int x = cx; x < cx + cell; ++x) {
+            const float s = steepness(picture, x, y);
+            if (s > best.steepness) best = {x, y, s};
+          }
+        }
+        const int full_x = static_cast<int>((static_cast<float>(best.x) + 0.5F) * per_x);
+        const int full_y = static_cast<int>((static_cast<float>(best.y) + 0.5F) * per_y);
+        const float z = continuous_depth(depth, full_x, full_y, reach);
+        if (!(z > 0.0F)) continue;
+        const Eigen::Vector3f in_depth =
+            camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();
+        const Eigen::Vector3f p = rotation * in_depth + translation;
+        if (p.z() < kNear) continue;
+        const Eigen::Vector2f pixel = small.project(p.cast<double>()).cast<float>();
+        if (pixel.x() < 1.0F || pixel.y() < 1.0F || pixel.x() > static_cast<float>(picture.cols - 3) ||
+            pixel.y() > static_cast<float>(picture.rows - 3)) {
+          continue;
+        }
+        const float u = pixel.x(), v = pixel.y();
+        result[level].push_back({p,
+                                 bilinear(picture, u, v),
+                                 {0.5F * (bilinear(picture, u + 1.0F, v) - bilinear(picture, u - 1.0F, v)),
+                                  0.5F * (bilinear(picture, u, v + 1.0F) - bilinear(picture, u, v - 1.0F))}});
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace plumbline::features

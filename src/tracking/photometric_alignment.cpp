@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/tracking/photometric_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::tracking {
+namespace {
+
+using geometry::Rigid3;
+
+constexpr double kMinCorrelation = 0.3;  // noise alone has 0.02 of 2000 samples
+constexpr double kMinSigma = 0.3;        // grey values: what rounding leaves
+constexpr double kLargestGain = 4.0;
+
+/// Whether the depth image measured something before the point.
+bool hidden(const PhotometricView& view, const Eigen::Vector3f& in_depth) {
+  const Eigen::Vector2d pixel = view.camera.project(in_depth.cast<double>());
+  if (!view.camera.contains(pixel)) return false;
+  const float z = view.depth->at<float>(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5));
+  return z > 0.0F && z < in_depth.z() - 0.03F - 4.0F * static_cast<float>(sensor::depth_sigma(static_cast<double>(in_depth.z())));
+}
+
+double median_of(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
+}  // namespace
+
+void PhotometricKeyframes::add(core::KeyframeId id,
+                               std::shared_ptr<const features::PhotometricSamples> samples) {
+  if (kept_.size() >= kMost) kept_.erase(kept_.begin());
+  kept_.emplace_back(id, std::move(samples));
+}
+
+std::shared_ptr<const features::PhotometricSamples> PhotometricKeyframes::find(core::KeyframeId id) const {
+  for (auto it = kept_.rbegin(); it != kept_.rend(); ++it) {
+    if (it->first == id) return it->second;
+  }
+  return nullptr;
+}
+
+std::optional<optimize::PhotometricFamily> associate_photometric(
+    const features::PhotometricSamples& samples, std::size_t level, const PhotometricView& view,
+    const Rigid3& reference_from_world, const Rigid3& camera_from_world) {
+  const cv::Mat& picture = (*view.image)[level];
+  if (picture.empty() || static_cast<int>(samples[level].size()) < kMinPhotometric) return std::nullopt;
+  optimize::PhotometricFamily family;
+  family.picture = picture;
+  family.camera = features::photometric_camera(view.camera, level);
+  family.reference_from_world = reference_from_world;
+  const sensor::Pinhole reference = family.camera;
+  const Rigid3 camera_from_reference = camera_from_world * reference_from_world.inverse();
+  const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();
+  const Eigen::Vector3f translation = camera_from_reference.translation.cast<float>();
+  const Eigen::Matrix3f depth_rotation = view.depth_from_camera.rotation.cast<float>();
+  const Eigen::Vector3f depth_translation = view.depth_from_camera.translation.cast<float>();
+  const auto fx = static_cast<float>(reference.fx), fy = static_cast<float>(reference.fy);
+  const bool with_depth = view.depth != nullptr && !view.depth->empty();
+  family.terms.reserve(samples[level].size());
+  for (const features::PhotometricSample& s : samples[level]) {
+    const Eigen::Vector3f p = rotation * s.point + translation;
+    if (!(p.z() > 0.1F)) continue;
+    if (!family.camera.contains(family.camera.project(p.cast<double>()), 2.0)) continue;
+    if (with_depth && hidden(view, depth_rotation * p + depth_translation)) continue;
+    optimize::PhotometricTerm term;
+    term.point = s.point;
+    term.value = s.value;
+    const float per_z = 1.0F / s.point.z();
+    const Eigen::Vector3f by_point(
+        s.gradient.x() * fx * per_z, s.gradient.y() * fy * per_z,
+        -(s.gradient.x() * fx * s.point.x() + s.gradient.y() * fy * s.point.y()) * per_z * per_z);
+    term.derivative.head<3>() = by_point;
+    term.derivative.tail<3>() = s.point.cross(by_point);
+    family.terms.push_back(term);
+  }
+  if (static_cast<int>(family.terms.size()) < kMinPhotometric) return std::nullopt;
+  // Gain and noise as they are here: with sigma and gain 1 residuals are grey values.
+  family.gain = 0.0;
+  std::vector<float> seen = optimize::photometric_residuals(family, camera_from_world);
+  std::vector<float> sizes, expected_sizes;
+  sizes.reserve(seen.size());
+  expected_sizes.reserve(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (std::isnan(seen[i])) continue;
+    sizes.push_back(std::abs(seen[i]));
+    expected_sizes.push_back(std::abs(family.terms[i].value));
+  }
+  if (static_cast<int>(sizes.size()) < kMinPhotometric) return std::nullopt;
+  family.gain = std::clamp(median_of(sizes) / std::max(median_of(expected_sizes), 1e-3), 1.0 / kLargestGain,
+                           kLargestGain);
+  sizes.clear();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (std::isnan(seen[i])) continue;
+    sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
+  }
+  family.sigma = std::max(kMinSigma, 1.4826 * median_of(sizes));
+  return family;
+}
+
+ShiftedPose search_shift(const optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
+  constexpr int kReach = 6;  // pixels
+  const Rigid3 camera_from_reference = camera_from_world * family.reference_from_world.inverse();
+  double distance = 0.0;
+  for (const optimize::PhotometricTerm& term : family.terms)
+    distance += (camera_from_reference * term.point.cast<double>()).z();
+  distance /= static_cast<double>(std::max<std::size_t>(1, family.terms.size()));
+  ShiftedPose best;
+  for (int dy = -kReach; dy <= kReach; ++dy) {
+    for (int dx = -kReach; dx <= kReach; ++dx) {
+      Rigid3 pose = camera_from_world;
+      pose.translation += Eigen::Vector3d(dx * distance / family.camera.fx, dy * distance / family.camera.fy, 0.0);
+      const double correlation = optimize::photometric_correlation(family, pose, kMinPhotometric);
+      if (correlation > best.correlation) best = {pose, correlation};
+    }
+  }
+  return best;
+}
+
+bool photometric_agrees(const optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
+  return optimize::photometric_correlation(family, camera_from_world, kMinPhotometric) >= kMinCorrelation;
+}
+
+}  // namespace plumbline::tracking
