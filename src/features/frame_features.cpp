@@ -178,7 +178,8 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   }
   result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
   if (options_.lines) result.lines = lines_.extract(frame.gray, frame.depth, camera_);
-  if (options_.photometric) result.photometric = make_photometric_image(frame.gray);
+  if (options_.photometric)
+    result.photometric = std::make_shared<const PhotometricImage>(make_photometric_image(frame.gray));
   result.thumbnail = make_thumbnail(frame.gray);
   result.thumbnail_depth = make_thumbnail_depth(frame.depth, result.thumbnail.size());
   return result;

@@ -14,11 +14,13 @@ constexpr int kBorder = 3;  // pixels of a level without samples along the pictu
 constexpr std::array<int, kPhotometricLevels> kCell{3, 2};
 constexpr float kNear = 0.25F;  // metres
 
-/// Depth at full resolution in the middle of a level's pixel, 0 where it is missing or jumps within reach.
+/// Depth at a pixel, the mean over the surface around it; 0 where it is missing or jumps within reach.
 float continuous_depth(const cv::Mat& depth, int x, int y, int reach) {
   const float here = depth.at<float>(y, x);
   if (!(here > kNear)) return 0.0F;
   const float tolerance = 0.02F + 6.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
+  float sum = 1.0F / here;
+  int count = 1;
   for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
     for (int r = reach / 2; r <= reach; r += std::max(1, reach - reach / 2)) {
       const int xa = x + r * dx, ya = y + r * dy, xb = x - r * dx, yb = y - r * dy;
@@ -28,10 +30,13 @@ float continuous_depth(const cv::Mat& depth, int x, int y, int reach) {
       }
       const float a = depth.at<float>(ya, xa), b = depth.at<float>(yb, xb);
       // On a plane inverse depth on opposite sides has its mean in the middle.
-      if (!(a > 0.0F) || !(b > 0.0F) || std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance) return 0.0F;
+      if (!(a > 0.0F) || !(b > 0.0F) || std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance)
+        return 0.0F;
+      sum += 1.0F / a + 1.0F / b;
+      count += 2;
     }
   }
-  return here;
+  return static_cast<float>(count) / sum;
 }
 
 struct Spot {
@@ -78,8 +83,14 @@ sensor::Pinhole photometric_camera(const sensor::Pinhole& camera, std::size_t le
   sensor::Pinhole result = camera;
   for (std::size_t i = 0; i <= level; ++i) {
     const int width = result.width / 2, height = result.height / 2;
-    const double sx = static_cast<double>(width) / result.width, sy = static_cast<double>(height) / result.height;
-    result = {width, height, result.fx * sx, result.fy * sy, (result.cx + 0.5) * sx - 0.5, (result.cy + 0.5) * sy - 0.5};
+    const double sx = static_cast<double>(width) / result.width,
+                 sy = static_cast<double>(height) / result.height;
+    result = {width,
+              height,
+              result.fx * sx,
+              result.fy * sy,
+              (result.cx + 0.5) * sx - 0.5,
+              (result.cy + 0.5) * sy - 0.5};
   }
   return result;
 }

@@ -70,7 +70,6 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                 "Neighbours that a new keyframe is aligned with");
   table.number("edges.min_overlap", edge_min_overlap, {0.0, 1.0}, "",
                "Share of a neighbour's surface in view that must be confirmed");
-  table.boolean("edges.photometric", edge_photometric, "Align their grey values, too");
   bundle_options.declare(table);
   surface.declare(table);
 }
@@ -151,18 +150,15 @@ void LocalMapper::count_sightings(maps::Map& map, const tracking::TrackResult& t
 }
 
 void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const cv::Mat& depth,
-                                    const tracking::TrackResult& track,
-                                    const tracking::PhotometricKeyframes& pictures,
+                                    const geometry::Rigid3& depth_from_camera,
                                     const std::vector<core::KeyframeId>& neighbours) {
   int made = 0;
   for (core::KeyframeId other : neighbours) {
     if (made >= options_.edge_keyframes) break;
     if (other == id) continue;
     const geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
-    const auto seen = options_.edge_photometric ? pictures.find(other) : nullptr;
-    const auto edge =
-        align_surface_edge(map.keyframe(other), id, depth, id_from_other, track.depth_from_camera, camera_,
-                           {options_.edge_min_overlap}, {seen.get(), &track.photometric});
+    const auto edge = align_surface_edge(map.keyframe(other), id, depth, id_from_other, depth_from_camera,
+                                         camera_, {options_.edge_min_overlap});
     if (!edge) continue;
     map.add_edge(*edge);
     ++made;

@@ -174,6 +174,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.points = track.estimate.points;
   report.lines = track.estimate.lines;
   report.surface = track.estimate.planes;
+  report.photometric = track.estimate.photometric;
   report.min_eigenvalue = track.min_eigenvalue;
   report.weak_directions = track.weak_directions;
   report.relocalised = track.relocalised;
@@ -208,7 +209,7 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, shear_rate());
   report.reference = report.keyframe;
   if (options_.mapper.edges && options_.tracker.depth) {
-    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_, tracker_.photometric(),
+    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_.depth_from_camera,
                               tracker_.local_map().keyframes);
   }
   remember_picture(frame, report.keyframe);
@@ -222,11 +223,11 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
 }
 
 void Slam::remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe) {
-  if (!options_.tracker.photometric || last_track_.photometric.front().empty()) return;
+  if (!options_.tracker.photometric || last_track_.photometric == nullptr) return;
   tracker_.add_photometric(
       keyframe,
       std::make_shared<const features::PhotometricSamples>(features::sample_photometric(
-          last_track_.photometric, frame.depth, camera_, last_track_.depth_from_camera.inverse())));
+          *last_track_.photometric, frame.depth, camera_, last_track_.depth_from_camera.inverse())));
 }
 
 void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {

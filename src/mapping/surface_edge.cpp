@@ -6,7 +6,6 @@
 
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/tracking/association.hpp"
-#include "plumbline/tracking/photometric_alignment.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -67,8 +66,7 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
                                                     const cv::Mat& depth_of_b, const Rigid3& b_from_a,
                                                     const Rigid3& depth_from_camera,
                                                     const sensor::Pinhole& camera,
-                                                    const SurfaceEdgeOptions& options,
-                                                    const EdgePictures& pictures) {
+                                                    const SurfaceEdgeOptions& options) {
   if (a.surface.empty()) return std::nullopt;
   const std::vector<tracking::WorldSurface> surface = surface_of(a);
   optimize::PoseProblem problem;
@@ -78,25 +76,12 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   solver.max_iterations = 3;
   optimize::PoseSummary summary;
   Rigid3 pose = b_from_a;
-  const tracking::PhotometricView view{pictures.of_b, &depth_of_b, depth_from_camera, camera};
-  bool aligned = pictures.of_a != nullptr && pictures.of_b != nullptr;
   for (const double distance : {0.08, 0.05, 0.03, 0.03, 0.03}) {
     tracking::SurfaceAssociationOptions association;
     association.max_distance_m = distance;
-    problem.photometric.clear();
-    if (aligned) {
-      const std::size_t level = distance > 0.06 ? 1 : 0;
-      auto family = tracking::associate_photometric(*pictures.of_a, level, view, {}, pose);
-      if (family) problem.photometric.push_back(*std::move(family));
-    }
     problem.planes =
         tracking::associate_surface(surface, depth_of_b, camera, pose, depth_from_camera, association);
     summary = optimize::solve_pose(problem, pose, solver);
-    if (!problem.photometric.empty() &&
-        !tracking::photometric_agrees(problem.photometric.front(), summary.camera_from_world)) {
-      problem.photometric.clear();
-      summary = optimize::solve_pose(problem, pose, solver);
-    }
     pose = summary.camera_from_world;
   }
   const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());

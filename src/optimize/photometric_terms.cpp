@@ -16,7 +16,9 @@ using geometry::Rigid3;
 class Lookup {
  public:
   Lookup(const PhotometricFamily& family, const Rigid3& camera_from_world)
-      : picture_(family.picture), last_x_(static_cast<float>(picture_.cols) - 2.0F), last_y_(static_cast<float>(picture_.rows) - 2.0F) {
+      : picture_(family.picture),
+        last_x_(static_cast<float>(picture_.cols) - 2.0F),
+        last_y_(static_cast<float>(picture_.rows) - 2.0F) {
     const Rigid3 camera_from_reference = camera_from_world * family.reference_from_world.inverse();
     rotation_ = camera_from_reference.rotation.cast<float>();
     translation_ = camera_from_reference.translation.cast<float>();
@@ -68,7 +70,9 @@ std::vector<float> photometric_residuals(const PhotometricFamily& family, const 
   std::vector<float> result(family.terms.size(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < result.size(); ++i) {
     float value = 0.0F;
-    if (picture.at(family.terms[i].point, value)) result[i] = (value - gain * family.terms[i].value) * per_sigma;
+    if (picture.at(family.terms[i].point, value)) {
+      result[i] = (value - gain * family.terms[i].value) * family.terms[i].weight * per_sigma;
+    }
   }
   return result;
 }
@@ -78,7 +82,6 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
   constexpr std::size_t kBlock = 512;  // summed in single precision
   const Lookup picture(family, camera_from_world);
   const auto gain = static_cast<float>(family.gain), per_sigma = static_cast<float>(1.0 / family.sigma);
-  const float scale = gain * per_sigma;
   const auto threshold = static_cast<float>(loss);
   PhotometricSums sums;
   for (std::size_t from = 0; from < family.terms.size(); from += kBlock) {
@@ -92,13 +95,14 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
         cost += 0.5F;
         continue;
       }
-      const float e = (value - gain * term.value) * per_sigma;
+      const float e = (value - gain * term.value) * term.weight * per_sigma;
       const float size = std::abs(e);
       const float w = size <= threshold ? 1.0F : threshold / size;
       cost += size <= threshold ? 0.5F * e * e : threshold * (size - 0.5F * threshold);
       const auto& d = term.derivative;
-      alignas(32) const float row[8] = {scale * d(0), scale * d(1), scale * d(2), scale * d(3),
-                                        scale * d(4), scale * d(5), e,            0.0F};
+      const float scale = gain * term.weight * per_sigma;
+      alignas(32) const float row[8] = {
+          scale * d(0), scale * d(1), scale * d(2), scale * d(3), scale * d(4), scale * d(5), e, 0.0F};
       block.add(row, w);
     }
     for (int a = 0; a < 6; ++a) {

@@ -223,7 +223,8 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   summary.planes = summarise(planes, kGateSq);
   std::vector<double> grey;
   for (const PhotometricFamily& family : problem.photometric) {
-    for (const float r : photometric_residuals(family, pose)) grey.push_back(static_cast<double>(r) * static_cast<double>(r));
+    for (const float r : photometric_residuals(family, pose))
+      grey.push_back(static_cast<double>(r) * static_cast<double>(r));
   }
   summary.photometric = summarise(grey, kGateSq);
   return summary;

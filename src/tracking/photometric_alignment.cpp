@@ -20,7 +20,33 @@ bool hidden(const PhotometricView& view, const Eigen::Vector3f& in_depth) {
   const Eigen::Vector2d pixel = view.camera.project(in_depth.cast<double>());
   if (!view.camera.contains(pixel)) return false;
   const float z = view.depth->at<float>(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5));
-  return z > 0.0F && z < in_depth.z() - 0.03F - 4.0F * static_cast<float>(sensor::depth_sigma(static_cast<double>(in_depth.z())));
+  return z > 0.0F &&
+         z < in_depth.z() - 0.03F -
+                 4.0F * static_cast<float>(sensor::depth_sigma(static_cast<double>(in_depth.z())));
+}
+
+/// Depth is not exact: where the camera has moved, a steep edge lies a fraction of a pixel off, and all of it
+/// the same way.
+void weigh_by_depth(const Rigid3& camera_from_reference, optimize::PhotometricFamily& family) {
+  constexpr float kCommon = 2.0F;  // neighbours have their noise in common
+  const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();
+  const Eigen::Vector3f translation = camera_from_reference.translation.cast<float>();
+  const auto fx = static_cast<float>(family.camera.fx), fy = static_cast<float>(family.camera.fy);
+  const auto per_sigma = static_cast<float>(family.gain / family.sigma);
+  for (optimize::PhotometricTerm& term : family.terms) {
+    const float z = term.point.z();
+    const Eigen::Vector3f along = rotation * (term.point / z);
+    const Eigen::Vector3f p = along * z + translation;
+    const float per_z = 1.0F / p.z();
+    // Of the pixel by the sample's depth.
+    const Eigen::Vector2f shift(fx * (along.x() - p.x() * per_z * along.z()) * per_z,
+                                fy * (along.y() - p.y() * per_z * along.z()) * per_z);
+    // by_point = gradient times focal length over depth
+    const Eigen::Vector2f gradient(term.derivative(0) * z / fx, term.derivative(1) * z / fy);
+    const float grey = kCommon * gradient.dot(shift) *
+                       static_cast<float>(sensor::depth_sigma(static_cast<double>(z))) * per_sigma;
+    term.weight = 1.0F / std::sqrt(1.0F + grey * grey);
+  }
 }
 
 double median_of(std::vector<float>& values) {
@@ -44,22 +70,23 @@ std::shared_ptr<const features::PhotometricSamples> PhotometricKeyframes::find(c
   return nullptr;
 }
 
-std::optional<optimize::PhotometricFamily> associate_photometric(
-    const features::PhotometricSamples& samples, std::size_t level, const PhotometricView& view,
-    const Rigid3& reference_from_world, const Rigid3& camera_from_world) {
+std::optional<optimize::PhotometricFamily> associate_photometric(const features::PhotometricSamples& samples,
+                                                                 std::size_t level,
+                                                                 const PhotometricView& view,
+                                                                 const Rigid3& reference_from_world,
+                                                                 const Rigid3& camera_from_world) {
   const cv::Mat& picture = (*view.image)[level];
   if (picture.empty() || static_cast<int>(samples[level].size()) < kMinPhotometric) return std::nullopt;
   optimize::PhotometricFamily family;
   family.picture = picture;
   family.camera = features::photometric_camera(view.camera, level);
   family.reference_from_world = reference_from_world;
-  const sensor::Pinhole reference = family.camera;
   const Rigid3 camera_from_reference = camera_from_world * reference_from_world.inverse();
   const Eigen::Matrix3f rotation = camera_from_reference.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_reference.translation.cast<float>();
   const Eigen::Matrix3f depth_rotation = view.depth_from_camera.rotation.cast<float>();
   const Eigen::Vector3f depth_translation = view.depth_from_camera.translation.cast<float>();
-  const auto fx = static_cast<float>(reference.fx), fy = static_cast<float>(reference.fy);
+  const auto fx = static_cast<float>(family.camera.fx), fy = static_cast<float>(family.camera.fy);
   const bool with_depth = view.depth != nullptr && !view.depth->empty();
   family.terms.reserve(samples[level].size());
   for (const features::PhotometricSample& s : samples[level]) {
@@ -79,27 +106,33 @@ std::optional<optimize::PhotometricFamily> associate_photometric(
     family.terms.push_back(term);
   }
   if (static_cast<int>(family.terms.size()) < kMinPhotometric) return std::nullopt;
-  // Gain and noise as they are here: with sigma and gain 1 residuals are grey values.
-  family.gain = 0.0;
-  std::vector<float> seen = optimize::photometric_residuals(family, camera_from_world);
-  std::vector<float> sizes, expected_sizes;
+  return settle_photometric(family, camera_from_world) ? std::optional(std::move(family)) : std::nullopt;
+}
+
+bool settle_photometric(optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
+  family.gain = 0.0;  // residuals are what is seen, in grey values
+  family.sigma = 1.0;
+  for (optimize::PhotometricTerm& term : family.terms) term.weight = 1.0F;
+  const std::vector<float> seen = optimize::photometric_residuals(family, camera_from_world);
+  std::vector<float> sizes, expected;
   sizes.reserve(seen.size());
-  expected_sizes.reserve(seen.size());
+  expected.reserve(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (std::isnan(seen[i])) continue;
     sizes.push_back(std::abs(seen[i]));
-    expected_sizes.push_back(std::abs(family.terms[i].value));
+    expected.push_back(std::abs(family.terms[i].value));
   }
-  if (static_cast<int>(sizes.size()) < kMinPhotometric) return std::nullopt;
-  family.gain = std::clamp(median_of(sizes) / std::max(median_of(expected_sizes), 1e-3), 1.0 / kLargestGain,
-                           kLargestGain);
+  if (static_cast<int>(sizes.size()) < kMinPhotometric) return false;
+  family.gain =
+      std::clamp(median_of(sizes) / std::max(median_of(expected), 1e-3), 1.0 / kLargestGain, kLargestGain);
   sizes.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (std::isnan(seen[i])) continue;
-    sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
+    if (!std::isnan(seen[i]))
+      sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
   }
   family.sigma = std::max(kMinSigma, 1.4826 * median_of(sizes));
-  return family;
+  weigh_by_depth(camera_from_world * family.reference_from_world.inverse(), family);
+  return true;
 }
 
 ShiftedPose search_shift(const optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
@@ -113,7 +146,8 @@ ShiftedPose search_shift(const optimize::PhotometricFamily& family, const Rigid3
   for (int dy = -kReach; dy <= kReach; ++dy) {
     for (int dx = -kReach; dx <= kReach; ++dx) {
       Rigid3 pose = camera_from_world;
-      pose.translation += Eigen::Vector3d(dx * distance / family.camera.fx, dy * distance / family.camera.fy, 0.0);
+      pose.translation +=
+          Eigen::Vector3d(dx * distance / family.camera.fx, dy * distance / family.camera.fy, 0.0);
       const double correlation = optimize::photometric_correlation(family, pose, kMinPhotometric);
       if (correlation > best.correlation) best = {pose, correlation};
     }

@@ -77,16 +77,17 @@ void drop_outliers(const std::vector<double>& errors, double gate, std::vector<M
 
 /// What is left of a frame's features once it is tracked: corners lie where they were aligned.
 Tracker::Features without_picture(const features::FrameFeatures& features,
-                                  const std::vector<PointMatch>& matches) {
+                                  const std::vector<PointMatch>& matches, const sensor::Pinhole& camera) {
   auto kept = std::make_shared<features::FrameFeatures>(features);
   kept->levels.clear();
-  kept->photometric = {};
+  kept->photometric.reset();
   for (const PointMatch& m : matches) {
     if (!m.aligned) continue;
     const auto i = static_cast<std::size_t>(m.feature);
     kept->points[i].pixel += m.shift;
     kept->patches[i].offset = m.shift;
   }
+  kept->grid = features::PointGrid(kept->points, camera.width, camera.height);
   return kept;
 }
 
@@ -146,7 +147,8 @@ std::vector<Rigid3> Tracker::guesses(const maps::Map& map, const sensor::RgbdFra
   if (alignment.better) result.push_back(alignment.current_from_previous * last_.camera_from_world);
   result.push_back(predicted);
   result.push_back(last_.camera_from_world);
-  if (options_.photometric) put_likeliest_first(map, {&features.photometric, &frame.depth, {}, camera_}, result);
+  if (options_.photometric)
+    put_likeliest_first(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
   return result;
 }
 
@@ -163,9 +165,9 @@ void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& v
   std::optional<optimize::PhotometricFamily> family_of_best;
   for (std::size_t i = 0; i < guesses.size(); ++i) {
     std::vector<optimize::PhotometricFamily> families = photometric_families(map, view, kCoarse, guesses[i]);
-    agreement.push_back(families.empty() ? 0.0
-                                         : optimize::photometric_correlation(families.front(), guesses[i],
-                                                                             kMinPhotometric));
+    agreement.push_back(
+        families.empty() ? 0.0
+                         : optimize::photometric_correlation(families.front(), guesses[i], kMinPhotometric));
     if (i > 0 && agreement[i] < agreement[best] + kBetter) continue;
     best = i;
     family_of_best.reset();
@@ -184,16 +186,15 @@ void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& v
 
 /// The surroundings' samples that the picture shows from a pose: of the reference keyframe, or of the first
 /// that has enough in view.
-std::vector<optimize::PhotometricFamily> Tracker::photometric_families(const maps::Map& map,
-                                                                       const PhotometricView& view,
-                                                                       std::size_t level,
-                                                                       const Rigid3& camera_from_world) const {
+std::vector<optimize::PhotometricFamily> Tracker::photometric_families(
+    const maps::Map& map, const PhotometricView& view, std::size_t level,
+    const Rigid3& camera_from_world) const {
   std::vector<optimize::PhotometricFamily> families;
+  if (view.image == nullptr) return families;
   for (const core::KeyframeId id : local_map_.keyframes) {
     const auto samples = photometric_.find(id);
     if (samples == nullptr) continue;
-    auto family =
-        associate_photometric(*samples, level, view, map.camera_from_world(id), camera_from_world);
+    auto family = associate_photometric(*samples, level, view, map.camera_from_world(id), camera_from_world);
     if (!family) continue;
     families.push_back(*std::move(family));
     break;
@@ -229,9 +230,16 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
                           {kSecondRadius, 0.05, 1200, 0, true, true},
                           {kSecondRadius, 0.03, 2400, 0, false, true},
                           {kSecondRadius, 0.03, 2400, 0, false, false}};
-  const PhotometricView view{&features.photometric, &frame.depth, depth_from_colour, camera_};
+  const PhotometricView view{features.photometric.get(), &frame.depth, depth_from_colour, camera_};
   bool stiff = !motion_refuted_;
   bool surface_alone = false;
+  std::optional<std::size_t> level_of_grey;  // what problem.photometric was made for
+  const auto see_grey = [&](std::size_t level) {
+    const bool again = level_of_grey == level && !problem.photometric.empty() &&
+                       settle_photometric(problem.photometric.front(), pose);
+    if (!again) problem.photometric = photometric_families(map, view, level, pose);
+    level_of_grey = level;
+  };
   const auto run = [&](const Round& round) {
     if (round.rematch) {
       result.visible_points.clear();
@@ -255,8 +263,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
       problem.planes = associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour,
                                          surface, &result.surface_in_view);
     }
-    if (options_.photometric)
-      problem.photometric = photometric_families(map, view, round.photometric_level, pose);
+    if (options_.photometric) see_grey(round.photometric_level);
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
     const auto disagrees = [&](const optimize::PhotometricFamily& family) {
@@ -350,7 +357,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   TrackResult result;
   if (map.keyframe_count() == 0) {
     result.state = TrackState::kInitialising;
-    result.features = without_picture(*features, {});
+    result.features = without_picture(*features, {}, camera_);
     result.photometric = features->photometric;
     remember(frame, *features, result);
     return result;
@@ -372,7 +379,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   found->features = still;
   settle_shutter(map, frame, features, *found);
   found->photometric = found->features->photometric;
-  found->features = without_picture(*found->features, found->points);
+  found->features = without_picture(*found->features, found->points, camera_);
   remember(frame, *found->features, *found);
   return *std::move(found);
 }

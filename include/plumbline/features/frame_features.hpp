@@ -3,6 +3,7 @@
 
 // Everything the tracker and the map need to know of one picture; the picture itself is kept only until the
 // frame is tracked.
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -37,7 +38,7 @@ struct FrameFeatures {
   std::vector<Descriptor256> descriptors;  ///< of points
   std::vector<CornerPatch> patches;        ///< of points; no elements: not known
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave; empty once the frame is tracked
-  PhotometricImage photometric;  ///< for direct alignment; empty once the frame is tracked
+  std::shared_ptr<const PhotometricImage> photometric;  ///< for direct alignment; null once it is tracked
   PointGrid grid;
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values

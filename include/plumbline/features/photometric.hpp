@@ -33,9 +33,9 @@ struct PhotometricSample {
 };
 using PhotometricSamples = std::array<std::vector<PhotometricSample>, kPhotometricLevels>;
 
-/// Of each cell of a level's picture the pixel with the steepest gradient, where depth is continuous. `depth`: CV_32FC1, metres, 0 =
-/// none, of the picture's size, registered to it; `camera_from_depth` carries the depth camera to where the
-/// picture was taken (they are stamped apart).
+/// Of each cell of a level's picture the pixel with the steepest gradient, where depth is continuous.
+/// `depth`: CV_32FC1, metres, 0 = none, of the picture's size, registered to it; `camera_from_depth` carries
+/// the depth camera to where the picture was taken (they are stamped apart).
 PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::Mat& depth,
                                       const sensor::Pinhole& camera,
                                       const geometry::Rigid3& camera_from_depth);

@@ -35,7 +35,6 @@ struct LocalMapperOptions {
   SightingNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
   bool edges = true;
   int edge_keyframes = 5;
-  bool edge_photometric = true;
   double edge_min_overlap = 0.4;
   optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
@@ -66,7 +65,7 @@ class LocalMapper {
   /// Aligns the surfaces of neighbouring keyframes with the depth image of the new one; what they say about
   /// its pose stays in the map as edges.
   void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
-                         const tracking::TrackResult& track, const tracking::PhotometricKeyframes& pictures,
+                         const geometry::Rigid3& depth_from_camera,
                          const std::vector<core::KeyframeId>& neighbours);
 
   /// What a new keyframe has to say about the map around it, in this order: landmarks without depth are

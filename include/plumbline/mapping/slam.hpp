@@ -44,6 +44,7 @@ struct FrameReport {
   optimize::FamilySummary points;
   optimize::FamilySummary lines;
   optimize::FamilySummary surface;
+  optimize::FamilySummary photometric;
   double min_eigenvalue = 0.0;
   int weak_directions = 0;
   bool relocalised = false;

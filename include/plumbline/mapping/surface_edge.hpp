@@ -8,19 +8,12 @@
 
 #include "plumbline/maps/map.hpp"
 #include "plumbline/sensor/camera.hpp"
-#include "plumbline/features/photometric.hpp"
 
 namespace plumbline::mapping {
 
 struct SurfaceEdgeOptions {
   double min_overlap = 0.4;  ///< share of a's samples that b's depth must confirm
   double hold_m = 0.01;      ///< see align_surface_edge
-};
-
-/// What two keyframes' pictures say beside their surfaces.
-struct EdgePictures {
-  const features::PhotometricSamples* of_a = nullptr;  ///< null: nothing
-  const features::PhotometricImage* of_b = nullptr;
 };
 
 /// `a` lies `b_from_a` before `b`, whose depth image (CV_32FC1, metres) is `depth_of_b`; `depth_from_camera`
@@ -34,7 +27,6 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
                                                     const geometry::Rigid3& b_from_a,
                                                     const geometry::Rigid3& depth_from_camera,
                                                     const sensor::Pinhole& camera,
-                                                    const SurfaceEdgeOptions& options,
-                                                    const EdgePictures& pictures = {});
+                                                    const SurfaceEdgeOptions& options);
 
 }  // namespace plumbline::mapping

@@ -17,6 +17,7 @@ namespace plumbline::optimize {
 struct PhotometricTerm {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< reference camera, metres
   float value = 0.0F;                               ///< grey value that is expected, of the reference picture
+  float weight = 1.0F;  ///< standard deviation of the family over that of the term
   /// Of the expected grey value by xi = (rho, phi), camera_from_reference <- camera_from_reference Exp(xi).
   Eigen::Matrix<float, 6, 1> derivative = Eigen::Matrix<float, 6, 1>::Zero();
 };
@@ -30,7 +31,7 @@ struct PhotometricFamily {
   double sigma = 1.0;  ///< of a residual, grey values
 };
 
-/// e = (I(pi(T_cr p)) - gain v) / sigma, for each term; NaN where it is not in the picture.
+/// e = weight (I(pi(T_cr p)) - gain v) / sigma, for each term; NaN where it is not in the picture.
 std::vector<float> photometric_residuals(const PhotometricFamily& family,
                                          const geometry::Rigid3& camera_from_world);
 

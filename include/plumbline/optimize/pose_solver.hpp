@@ -42,7 +42,7 @@ struct PoseSolverOptions {
   double line_weight = 1.0;
   double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
   double photometric_loss = 1.5;
-  double photometric_weight = 0.02;  ///< grey values of neighbouring pixels are all but the same
+  double photometric_weight = 0.04;  ///< grey values of neighbouring pixels are all but the same
   double min_step = 1e-6;      ///< metres and radians: a smaller step ends the iteration
 
   void declare(core::OptionTable& table);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Direct alignment with keyframes: which of their samples a camera sees, and whether what it sees is the same.
+// Direct alignment with keyframes: which of their samples a camera sees, and whether what it sees is the
+// same.
 #include <memory>
 #include <optional>
 #include <utility>
@@ -37,11 +38,18 @@ struct PhotometricView {
 };
 
 /// The samples of a level that the view shows from a pose: in the picture, and not hidden by what its depth
-/// image measured. None when there are fewer than kMinPhotometric. Gain and noise are those found at the pose.
-std::optional<optimize::PhotometricFamily> associate_photometric(
-    const features::PhotometricSamples& samples, std::size_t level, const PhotometricView& view,
-    const geometry::Rigid3& reference_from_world, const geometry::Rigid3& camera_from_world);
+/// image measured. None when there are fewer than kMinPhotometric. Gain and noise are those found at the
+/// pose.
+std::optional<optimize::PhotometricFamily> associate_photometric(const features::PhotometricSamples& samples,
+                                                                 std::size_t level,
+                                                                 const PhotometricView& view,
+                                                                 const geometry::Rigid3& reference_from_world,
+                                                                 const geometry::Rigid3& camera_from_world);
 constexpr int kMinPhotometric = 500;
+
+/// Gain, noise and weights as they are at a pose; false when fewer than kMinPhotometric terms are in view.
+/// A term weighs less the further an error of its depth would move it across its gradient.
+bool settle_photometric(optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
 
 /// Whether the picture is the expected one, as far as that can be told at a pose.
 bool photometric_agrees(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
@@ -50,7 +58,9 @@ struct ShiftedPose {
   geometry::Rigid3 camera_from_world;
   double correlation = -1.0;
 };
-/// The pose, up to six pixels of the family's picture to the side of this one, at which the picture fits best.
-ShiftedPose search_shift(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
+/// The pose, up to six pixels of the family's picture to the side of this one, at which the picture fits
+/// best.
+ShiftedPose search_shift(const optimize::PhotometricFamily& family,
+                         const geometry::Rigid3& camera_from_world);
 
 }  // namespace plumbline::tracking

@@ -66,7 +66,7 @@ struct TrackResult {
   geometry::Matrix6d unheld = geometry::Matrix6d::Zero();
   bool motion_refuted = false;  ///< surfaces are all but alone, and have spoken against the motion model
   bool relocalised = false;
-  features::PhotometricImage photometric;  ///< of the frame
+  std::shared_ptr<const features::PhotometricImage> photometric;  ///< of the frame; null: none was made
   /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
   /// what was matched, and what a keyframe should keep.
   std::shared_ptr<const features::FrameFeatures> features;
@@ -92,7 +92,6 @@ class Tracker {
   void add_photometric(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples) {
     photometric_.add(id, std::move(samples));
   }
-  [[nodiscard]] const PhotometricKeyframes& photometric() const { return photometric_; }
 
   /// Goes on where another tracker left `map`: it had just tracked the keyframe `reference` at
   /// `camera_from_world`, with this motion of camera_from_world per second.
