@@ -48,8 +48,9 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
   return result;
 }
 
-/// Whether depth jumps within `reach` pixels of a corner, or is missing (as in the shadow behind a border):
-/// on a plane, inverse depth on opposite sides has its mean in the middle.
+/// Whether depth jumps within `reach` pixels of a corner, or is missing in part (as at a border's shadow): on
+/// a plane, inverse depth on opposite sides has its mean in the middle. Where all of it is missing nothing is
+/// known.
 bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) {
   const auto at = [&](const Eigen::Vector2f& p) {
     const int u = cvRound(p.x());
@@ -63,7 +64,14 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
       Eigen::Vector2f(-kDiagonal, kDiagonal)};
   constexpr std::size_t kPairs = 16;
   const float here = at(pixel);
-  if (!(here > 0.0F)) return true;
+  if (!(here > 0.0F)) {
+    for (const float ring : kRings) {
+      for (const Eigen::Vector2f& way : ways) {
+        if (at(pixel + ring * reach * way) > 0.0F || at(pixel - ring * reach * way) > 0.0F) return true;
+      }
+    }
+    return false;
+  }
   const float tolerance = 0.01F + 4.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
   std::size_t seen = 0;
   for (const float ring : kRings) {

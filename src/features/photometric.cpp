@@ -12,26 +12,38 @@ namespace {
 
 constexpr int kBorder = 3;  // pixels of a level without samples along the picture's edge
 constexpr std::array<int, kPhotometricLevels> kCell{3, 2};
-constexpr float kNear = 0.25F;  // metres
+constexpr float kNear = 0.25F;                  // metres
+constexpr int kBox = 7;                         // pixels of a level
+constexpr float kHalo = 0.5F + 2 * (kBox / 2);  // how far two such boxes reach
 
-/// Depth at a pixel, the mean over the surface around it; 0 where it is missing or jumps within reach.
-float continuous_depth(const cv::Mat& depth, int x, int y, int reach) {
+/// Full pixels of a depth image around one of a level.
+struct Surroundings {
+  int near_px;  ///< whose depth is averaged
+  int far_px;   ///< that the local mean took grey values from
+};
+
+/// Depth at a pixel, the mean over the surface near it; 0 where it is missing or jumps around it: what the
+/// picture holds of another surface, if only in the local mean, moves with that.
+float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& around) {
   const float here = depth.at<float>(y, x);
   if (!(here > kNear)) return 0.0F;
   const float tolerance = 0.02F + 6.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
+  const int near = around.near_px, far = around.far_px;
   float sum = 1.0F / here;
   int count = 1;
-  for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
-    for (int r = reach / 2; r <= reach; r += std::max(1, reach - reach / 2)) {
+  for (const int r : {near / 2, near, (near + far) / 2, far}) {
+    for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
       const int xa = x + r * dx, ya = y + r * dy, xb = x - r * dx, yb = y - r * dy;
       if (std::min({xa, xb, ya, yb}) < 0 || std::max(xa, xb) >= depth.cols ||
           std::max(ya, yb) >= depth.rows) {
+        if (r > near) continue;
         return 0.0F;
       }
       const float a = depth.at<float>(ya, xa), b = depth.at<float>(yb, xb);
       // On a plane inverse depth on opposite sides has its mean in the middle.
       if (!(a > 0.0F) || !(b > 0.0F) || std::abs(0.5F * (here / a + here / b) - 1.0F) > tolerance)
         return 0.0F;
+      if (r > near) continue;
       sum += 1.0F / a + 1.0F / b;
       count += 2;
     }
@@ -71,9 +83,9 @@ PhotometricImage make_photometric_image(const cv::Mat& gray) {
     cv::resize(half, half, {half.cols / 2, half.rows / 2}, 0, 0, cv::INTER_AREA);
     cv::Mat smooth, mean;
     cv::GaussianBlur(half, smooth, {3, 3}, 0.6);
-    // Two boxes of 7 have the spread of a Gaussian of 2.8 pixels.
-    cv::boxFilter(half, mean, CV_32F, {7, 7});
-    cv::boxFilter(mean, mean, CV_32F, {7, 7});
+    // Two boxes have the spread of a Gaussian of 2.8 pixels.
+    cv::boxFilter(half, mean, CV_32F, {kBox, kBox});
+    cv::boxFilter(mean, mean, CV_32F, {kBox, kBox});
     level = smooth - mean;
   }
   return result;
@@ -106,7 +118,7 @@ PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::M
     const sensor::Pinhole small = photometric_camera(camera, level);
     const float per_x = static_cast<float>(depth.cols) / static_cast<float>(picture.cols);
     const float per_y = static_cast<float>(depth.rows) / static_cast<float>(picture.rows);
-    const int reach = static_cast<int>(2.5F * per_x + 0.5F);
+    const Surroundings around{static_cast<int>(2.5F * per_x + 0.5F), static_cast<int>(kHalo * per_x + 0.5F)};
     const int cell = kCell[level];
     const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
@@ -121,7 +133,7 @@ PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::M
         }
         const int full_x = static_cast<int>((static_cast<float>(best.x) + 0.5F) * per_x);
         const int full_y = static_cast<int>((static_cast<float>(best.y) + 0.5F) * per_y);
-        const float z = continuous_depth(depth, full_x, full_y, reach);
+        const float z = continuous_depth(depth, full_x, full_y, around);
         if (!(z > 0.0F)) continue;
         const Eigen::Vector3f in_depth =
             camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();

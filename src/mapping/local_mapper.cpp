@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "plumbline/features/depth_delay.hpp"
+#include "plumbline/mapping/earlier_sightings.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
 #include "plumbline/mapping/surface_edge.hpp"
 
@@ -26,15 +27,6 @@ bool still(const geometry::Rigid3& motion) {
 /// A keyframe's pose is that of its colour image. What its depth image measured a little later or earlier is
 /// carried there: left where it is, every keyframe would be a few milliseconds of motion off what the next
 /// ones see, all in the direction of travel.
-std::shared_ptr<const features::FrameFeatures> with_lines_of(
-    const std::shared_ptr<const features::FrameFeatures>& features, const cv::Mat& depth,
-    const sensor::Pinhole& camera, const geometry::Rigid3& depth_from_camera) {
-  if (still(depth_from_camera)) return features;
-  auto together = std::make_shared<features::FrameFeatures>(*features);
-  features::undo_line_depth_delay(*together, depth, camera, depth_from_camera);
-  return together;
-}
-
 void move(std::vector<maps::SurfaceSample>& surface, const geometry::Rigid3& camera_from_depth) {
   if (still(camera_from_depth)) return;
   const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
@@ -54,6 +46,8 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
   table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
   triangulation.declare(table);
   table.boolean("fuse", fuse, "Look for landmarks in neighbouring keyframes and merge doubles");
+  table.boolean("fuse.earlier", earlier_sightings,
+                "Look for new landmarks where older keyframes saw a corner without depth, and align them");
   fusion.declare(table);
   table.boolean("redundant", cull_keyframes, "Take redundant keyframes out of the map");
   keyframe_culling.declare(table);
@@ -70,19 +64,24 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                 "Neighbours that a new keyframe is aligned with");
   table.number("edges.min_overlap", edge_min_overlap, {0.0, 1.0}, "",
                "Share of a neighbour's surface in view that must be confirmed");
+  table.boolean("edges.photometric", edge_photometric, "Align their grey values, too");
   bundle_options.declare(table);
   surface.declare(table);
 }
 
 core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                                      const std::shared_ptr<const features::FrameFeatures>& features,
-                                     const tracking::TrackResult& track, double turn_rate) {
+                                     const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
+                                     double turn_rate) {
   auto keyframe = std::make_shared<maps::Keyframe>();
   keyframe->id = map.next_keyframe_id(robot);
   keyframe->frame_index = frame.index;
   keyframe->stamp = frame.stamp;
   keyframe->turn_rate = turn_rate;
-  keyframe->features = with_lines_of(features, frame.depth, camera_, track.depth_from_camera);
+  auto own = std::make_shared<features::FrameFeatures>(*features);
+  if (!still(track.depth_from_camera))
+    features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
+  keyframe->features = own;
   keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
   move(keyframe->surface, track.depth_from_camera.inverse());
   const core::KeyframeId id = map.add_keyframe(keyframe, track.camera_from_world);
@@ -90,13 +89,17 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
     if (map.observe(m.point, id, m.feature, m.aligned)) map.refresh_point(m.point);
   }
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
-  add_points(map, id);
+  const std::vector<core::PointId> made = add_points(map, id);
   add_lines(map, id);
   map.attach(id);
+  if (options_.fuse && options_.earlier_sightings && !sheared(map, id))
+    add_earlier_sightings(map, made, id, nearest_sharp(map, id, options_.fusion.keyframes), levels, camera_,
+                          options_.fusion.association, *own);
   return id;
 }
 
-void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
+std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
+  std::vector<core::PointId> made;
   const features::FrameFeatures& features = *map.keyframe(id).features;
   const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
   const SurfaceNormals normals(map.keyframe(id).surface, camera_);
@@ -120,7 +123,9 @@ void LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
     const core::PointId point_id = map.add_point(id.robot, point);
     map.observe(point_id, id, static_cast<int>(i), true);
     culler_.watch(point_id, id);
+    made.push_back(point_id);
   }
+  return made;
 }
 
 void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
@@ -150,15 +155,18 @@ void LocalMapper::count_sightings(maps::Map& map, const tracking::TrackResult& t
 }
 
 void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const cv::Mat& depth,
-                                    const geometry::Rigid3& depth_from_camera,
+                                    const tracking::TrackResult& track,
+                                    const tracking::PhotometricKeyframes& pictures,
                                     const std::vector<core::KeyframeId>& neighbours) {
   int made = 0;
   for (core::KeyframeId other : neighbours) {
     if (made >= options_.edge_keyframes) break;
     if (other == id) continue;
     const geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
-    const auto edge = align_surface_edge(map.keyframe(other), id, depth, id_from_other, depth_from_camera,
-                                         camera_, {options_.edge_min_overlap});
+    const auto seen = options_.edge_photometric ? pictures.find(other) : nullptr;
+    const auto edge =
+        align_surface_edge(map.keyframe(other), id, depth, id_from_other, track.depth_from_camera, camera_,
+                           {options_.edge_min_overlap}, {seen.get(), track.photometric.get()});
     if (!edge) continue;
     map.add_edge(*edge);
     ++made;

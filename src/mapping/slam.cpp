@@ -111,7 +111,7 @@ bool Slam::is_place(const sensor::RgbdFrame& frame, const features::FrameFeature
 void Slam::start_map(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {
   tracking::TrackResult origin;
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, 0.0);
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, {}, 0.0);
   remember_picture(frame, report.keyframe);
   report.reference = report.keyframe;
   report.state = tracking::TrackState::kTracked;
@@ -160,6 +160,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.stamp = frame.stamp;
   ++clock_;
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);
+  const std::shared_ptr<const features::FrameFeatures> taken = features;
   last_track_ = tracker_.track(map_, frame, features);
   if (last_track_.features != nullptr) features = last_track_.features;
   const tracking::TrackResult& track = last_track_;
@@ -188,7 +189,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
       rule_.decide(map_, tracker_.reference(), track, camera_,
                    {static_cast<int>(features->points.size()), bundle_.idle(), points_with_depth(*features)});
   if (report.decision.wanted && !report.decision.urgent) return_to_known_ground(report);
-  if (report.decision.wanted) make_keyframe(frame, features, report);
+  if (report.decision.wanted) make_keyframe(frame, features, taken->levels, report);
   remember_pose(frame.stamp, last_camera_from_world_, true);
   if (options_.tracker.align_stamps) report.depth_from_camera = motion_to_depth(frame, frames_, map_);
   return report;
@@ -205,11 +206,11 @@ void Slam::return_to_known_ground(FrameReport& report) {
 
 void Slam::make_keyframe(const sensor::RgbdFrame& frame,
                          const std::shared_ptr<const features::FrameFeatures>& features,
-                         FrameReport& report) {
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, shear_rate());
+                         const std::vector<cv::Mat>& levels, FrameReport& report) {
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, levels, shear_rate());
   report.reference = report.keyframe;
   if (options_.mapper.edges && options_.tracker.depth) {
-    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_.depth_from_camera,
+    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_, tracker_.photometric(),
                               tracker_.local_map().keyframes);
   }
   remember_picture(frame, report.keyframe);

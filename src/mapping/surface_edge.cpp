@@ -6,6 +6,7 @@
 
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/tracking/association.hpp"
+#include "plumbline/tracking/photometric_alignment.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -14,6 +15,8 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
+/// Of all grey values: what one pair of pictures says goes into the bundle, where others bear it out.
+constexpr double kPhotometricWeight = 0.02;
 constexpr double kHeld = 2500.0;  // information of a standard deviation of 2 cm: less is no hold
 
 std::vector<tracking::WorldSurface> surface_of(const maps::Keyframe& keyframe) {
@@ -66,7 +69,8 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
                                                     const cv::Mat& depth_of_b, const Rigid3& b_from_a,
                                                     const Rigid3& depth_from_camera,
                                                     const sensor::Pinhole& camera,
-                                                    const SurfaceEdgeOptions& options) {
+                                                    const SurfaceEdgeOptions& options,
+                                                    const EdgePictures& pictures) {
   if (a.surface.empty()) return std::nullopt;
   const std::vector<tracking::WorldSurface> surface = surface_of(a);
   optimize::PoseProblem problem;
@@ -74,14 +78,26 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   problem.prior = hold(b_from_a, middle_in_view(surface, b_from_a, camera), options.hold_m);
   optimize::PoseSolverOptions solver;
   solver.max_iterations = 3;
+  solver.photometric_weight = kPhotometricWeight;
   optimize::PoseSummary summary;
   Rigid3 pose = b_from_a;
+  const tracking::PhotometricView view{pictures.of_b, &depth_of_b, depth_from_camera, camera};
   for (const double distance : {0.08, 0.05, 0.03, 0.03, 0.03}) {
     tracking::SurfaceAssociationOptions association;
     association.max_distance_m = distance;
+    problem.photometric.reset();
+    if (pictures.of_a != nullptr && pictures.of_b != nullptr) {
+      const std::size_t level = distance > 0.06 ? 1 : 0;
+      problem.photometric = tracking::associate_photometric(*pictures.of_a, level, view, {}, pose);
+    }
     problem.planes =
         tracking::associate_surface(surface, depth_of_b, camera, pose, depth_from_camera, association);
     summary = optimize::solve_pose(problem, pose, solver);
+    if (problem.photometric &&
+        !tracking::photometric_agrees(*problem.photometric, summary.camera_from_world)) {
+      problem.photometric.reset();
+      summary = optimize::solve_pose(problem, pose, solver);
+    }
     pose = summary.camera_from_world;
   }
   const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());

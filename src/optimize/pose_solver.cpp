@@ -120,8 +120,8 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
     if constexpr (kDerivatives) sums.add(j1, r, options.plane_weight * robust.weight);
   }
   sums.move_to(n);
-  for (const PhotometricFamily& family : problem.photometric) {
-    const PhotometricSums seen = sum_photometric(family, pose, options.photometric_loss);
+  if (problem.photometric) {
+    const PhotometricSums seen = sum_photometric(*problem.photometric, pose, options.photometric_loss);
     n.h += options.photometric_weight * seen.h;
     n.g += options.photometric_weight * seen.g;
     n.cost += options.photometric_weight * seen.cost;
@@ -222,8 +222,8 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   }
   summary.planes = summarise(planes, kGateSq);
   std::vector<double> grey;
-  for (const PhotometricFamily& family : problem.photometric) {
-    for (const float r : photometric_residuals(family, pose))
+  if (problem.photometric) {
+    for (const float r : photometric_residuals(*problem.photometric, pose))
       grey.push_back(static_cast<double>(r) * static_cast<double>(r));
   }
   summary.photometric = summarise(grey, kGateSq);

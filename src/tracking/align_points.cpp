@@ -16,41 +16,68 @@ struct Sight {
   Eigen::Matrix2f frame_from_patch;  ///< distances of pixels of the full pictures
 };
 
-/// The first keyframe that saw the landmark from a direction and at a distance not too different: newer ones
-/// were aligned with older ones, and add up what each is off.
-bool find_sight(const maps::Map& map, const maps::MapPoint& point, const sensor::Pinhole& camera,
-                const geometry::Rigid3& camera_from_world, double log_scale, Sight& sight) {
+/// None when the keyframe saw it from a direction or at a distance that is too different.
+std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& seen,
+                              const Eigen::Vector3d& position, const sensor::Pinhole& camera,
+                              const geometry::Rigid3& camera_from_world, double log_scale) {
   constexpr double kLeastCosine = 0.9;
   constexpr double kMostOctaves = 3.5;
   constexpr double kNearest_m = 0.05;
-  const Eigen::Vector3d here = camera_from_world * point.position;
+  const maps::Keyframe& keyframe = map.keyframe(seen.keyframe);
+  const auto feature = static_cast<std::size_t>(seen.feature);
+  if (keyframe.features == nullptr || feature >= keyframe.features->patches.size()) return std::nullopt;
+  const geometry::Rigid3& there_from_world = map.camera_from_world(seen.keyframe);
+  const Eigen::Vector3d here = camera_from_world * position;
+  const Eigen::Vector3d there = there_from_world * position;
+  if (there.z() < kNearest_m) return std::nullopt;
+  const geometry::Rigid3 here_from_there = camera_from_world * there_from_world.inverse();
+  if ((here_from_there.rotation * there).dot(here) < kLeastCosine * there.norm() * here.norm())
+    return std::nullopt;
+  Sight sight;
+  sight.farther = std::log(here.norm() / there.norm()) / log_scale;
+  if (std::abs(sight.farther) > kMostOctaves) return std::nullopt;
+  // A plane across the line of sight there, seen from here: one pixel each way.
+  const Eigen::Vector2d at = camera.project(there);
+  const auto carried = [&](double du, double dv) {
+    const Eigen::Vector3d ray = camera.unproject(at.x() + du, at.y() + dv, 1.0);
+    return Eigen::Vector2d(camera.project(here_from_there * (ray * (there.squaredNorm() / there.dot(ray)))));
+  };
+  sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
+  sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
+  sight.patch = &keyframe.features->patches[feature];
+  sight.octave = keyframe.features->points[feature].octave;
+  return sight;
+}
+
+/// The first keyframe that saw the landmark from a direction and at a distance not too different: newer ones
+/// were aligned with older ones, and add up what each is off.
+std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& point,
+                                 const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world,
+                                 double log_scale) {
   for (const maps::Observation& o : point.observations) {
     if (!o.aligned) continue;
-    const maps::Keyframe& keyframe = map.keyframe(o.keyframe);
-    const auto feature = static_cast<std::size_t>(o.feature);
-    if (keyframe.features == nullptr || feature >= keyframe.features->patches.size()) continue;
-    const geometry::Rigid3& there_from_world = map.camera_from_world(o.keyframe);
-    const Eigen::Vector3d there = there_from_world * point.position;
-    if (there.z() < kNearest_m) continue;
-    const geometry::Rigid3 here_from_there = camera_from_world * there_from_world.inverse();
-    if ((here_from_there.rotation * there).dot(here) < kLeastCosine * there.norm() * here.norm()) continue;
-    const double farther = std::log(here.norm() / there.norm()) / log_scale;
-    if (std::abs(farther) > kMostOctaves) continue;
-    // A plane across the line of sight there, seen from here: one pixel each way.
-    const Eigen::Vector2d at = camera.project(there);
-    const auto carried = [&](double du, double dv) {
-      const Eigen::Vector3d ray = camera.unproject(at.x() + du, at.y() + dv, 1.0);
-      return Eigen::Vector2d(
-          camera.project(here_from_there * (ray * (there.squaredNorm() / there.dot(ray)))));
-    };
-    sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
-    sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
-    sight.patch = &keyframe.features->patches[feature];
-    sight.octave = keyframe.features->points[feature].octave;
-    sight.farther = farther;
-    return sight.frame_from_patch.allFinite();
+    const auto sight = sight_of(map, o, point.position, camera, camera_from_world, log_scale);
+    if (sight) return sight->frame_from_patch.allFinite() ? sight : std::nullopt;
   }
-  return false;
+  return std::nullopt;
+}
+
+/// Where the picture shows what the patch stands for, pixels of the full picture; `start`: where it may be.
+std::optional<Eigen::Vector2f> align(const Sight& sight, const std::vector<cv::Mat>& levels,
+                                     const Eigen::Vector2f& start, double scale_factor) {
+  const int last = static_cast<int>(levels.size()) - 1;
+  const int octave = std::clamp(static_cast<int>(std::lround(sight.octave - sight.farther)), 0, last);
+  const cv::Mat& level = levels[static_cast<std::size_t>(octave)];
+  const Eigen::Array2f shrink(static_cast<float>(level.cols) / static_cast<float>(levels.front().cols),
+                              static_cast<float>(level.rows) / static_cast<float>(levels.front().rows));
+  const auto patch_pixel = static_cast<float>(std::pow(scale_factor, sight.octave));
+  const Eigen::Matrix2f level_from_patch =
+      shrink.matrix().asDiagonal() * sight.frame_from_patch * patch_pixel;
+  const Eigen::Vector2f beside = sight.frame_from_patch * sight.patch->offset;
+  const Eigen::Vector2f from = (((start - beside).array() + 0.5F) * shrink - 0.5F).matrix();
+  const auto found = features::align_patch(*sight.patch, level, from, level_from_patch);
+  if (!found) return std::nullopt;
+  return ((found->array() + 0.5F) / shrink - 0.5F).matrix() + beside;
 }
 
 }  // namespace
@@ -64,29 +91,27 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
   }
   if (frame.levels.empty() || frame.patches.size() != frame.points.size()) return;
   const double log_scale = std::log(scale_factor);
-  const int last = static_cast<int>(frame.levels.size()) - 1;
   for (PointMatch& m : matches) {
-    Sight sight;
-    if (!find_sight(map, map.point(m.point), camera, camera_from_world, log_scale, sight)) continue;
-    const int octave = std::clamp(static_cast<int>(std::lround(sight.octave - sight.farther)), 0, last);
-    const cv::Mat& level = frame.levels[static_cast<std::size_t>(octave)];
-    const Eigen::Array2f shrink(
-        static_cast<float>(level.cols) / static_cast<float>(frame.levels.front().cols),
-        static_cast<float>(level.rows) / static_cast<float>(frame.levels.front().rows));
-    const auto to_level = [&](const Eigen::Vector2f& p) {
-      return Eigen::Vector2f(((p.array() + 0.5F) * shrink - 0.5F).matrix());
-    };
-    const auto patch_pixel = static_cast<float>(std::pow(scale_factor, sight.octave));
-    const Eigen::Matrix2f level_from_patch =
-        shrink.matrix().asDiagonal() * sight.frame_from_patch * patch_pixel;
+    const auto sight = first_sight(map, map.point(m.point), camera, camera_from_world, log_scale);
+    if (!sight) continue;
     const Eigen::Vector2f& corner = frame.patches[static_cast<std::size_t>(m.feature)].middle;
-    const Eigen::Vector2f beside = sight.frame_from_patch * sight.patch->offset;
-    const auto found =
-        features::align_patch(*sight.patch, level, to_level(corner - beside), level_from_patch);
+    const auto found = align(*sight, frame.levels, corner, scale_factor);
     if (!found) continue;
-    m.shift = ((found->array() + 0.5F) / shrink - 0.5F).matrix() + beside - corner;
+    m.shift = *found - corner;
     m.aligned = true;
   }
+}
+
+std::optional<Eigen::Vector2f> align_sighting(const maps::Map& map, const maps::Observation& seen,
+                                              const Eigen::Vector3d& position,
+                                              const std::vector<cv::Mat>& levels,
+                                              const Eigen::Vector2f& start, const sensor::Pinhole& camera,
+                                              const geometry::Rigid3& camera_from_world,
+                                              double scale_factor) {
+  if (levels.empty()) return std::nullopt;
+  const auto sight = sight_of(map, seen, position, camera, camera_from_world, std::log(scale_factor));
+  if (!sight || !sight->frame_from_patch.allFinite() || sight->patch->empty()) return std::nullopt;
+  return align(*sight, levels, start, scale_factor);
 }
 
 }  // namespace plumbline::tracking

@@ -137,16 +137,16 @@ Rigid3 Tracker::depth_from_camera(const sensor::RgbdFrame& frame) const {
   return geometry::exp_se3(velocity_ * dt);
 }
 
-std::vector<Rigid3> Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                     const features::FrameFeatures& features) const {
-  std::vector<Rigid3> result;
+Tracker::Guesses Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                  const features::FrameFeatures& features) const {
+  Guesses result;
   const Rigid3 predicted = predict(frame.stamp);
   const ThumbnailAlignment alignment =
       align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
                        predicted * last_.camera_from_world.inverse());
-  if (alignment.better) result.push_back(alignment.current_from_previous * last_.camera_from_world);
-  result.push_back(predicted);
-  result.push_back(last_.camera_from_world);
+  if (alignment.better) result.poses.push_back(alignment.current_from_previous * last_.camera_from_world);
+  result.poses.push_back(predicted);
+  result.poses.push_back(last_.camera_from_world);
   if (options_.photometric)
     put_likeliest_first(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
   return result;
@@ -185,9 +185,9 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
   bool surface_alone = false;
   std::optional<std::size_t> level_of_grey;  // what problem.photometric was made for
   const auto see_grey = [&](std::size_t level) {
-    const bool again = level_of_grey == level && !problem.photometric.empty() &&
-                       settle_photometric(problem.photometric.front(), pose);
-    if (!again) problem.photometric = photometric_families(map, view, level, pose);
+    const bool again =
+        level_of_grey == level && problem.photometric && settle_photometric(*problem.photometric, pose);
+    if (!again) problem.photometric = photometric_family(map, view, level, pose);
     level_of_grey = level;
   };
   const auto run = [&](const Round& round) {
@@ -216,15 +216,12 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     if (options_.photometric) see_grey(round.photometric_level);
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
-    const auto disagrees = [&](const optimize::PhotometricFamily& family) {
-      return !photometric_agrees(family, result.estimate.camera_from_world);
-    };
-    if (std::any_of(problem.photometric.begin(), problem.photometric.end(), disagrees)) {
-      problem.photometric.clear();
+    if (problem.photometric && !photometric_agrees(*problem.photometric, result.estimate.camera_from_world)) {
+      problem.photometric.reset();
       result.estimate = optimize::solve_pose(problem, pose, solver);
     }
     pose = result.estimate.camera_from_world;
-    surface_alone = uses_features() && problem.photometric.empty() &&
+    surface_alone = uses_features() && !problem.photometric &&
                     result.estimate.points.inliers + 2 * result.estimate.lines.inliers < options_.min_inliers;
     const Motion motion = !stiff                      ? Motion::kUnknown
                           : surface_alone             ? Motion::kAlone
@@ -248,14 +245,27 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
   return result;
 }
 
+/// Terms that bear a pose out, each family with its weight.
+double Tracker::evidence(const TrackResult& result) const {
+  const optimize::PoseSummary& seen = result.estimate;
+  const optimize::PoseSolverOptions& weights = options_.solver;
+  return weights.point_weight * seen.points.inliers + weights.line_weight * 2 * seen.lines.inliers +
+         weights.plane_weight * seen.planes.inliers + weights.photometric_weight * seen.photometric.inliers;
+}
+
 std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
                                               const features::FrameFeatures& features) const {
   if (lost_frames_ >= 30) return std::nullopt;
-  for (const Rigid3& guess : guesses(map, frame, features)) {
-    TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
-    if (attempt.state == TrackState::kTracked) return attempt;
+  const Guesses guesses = this->guesses(map, frame, features);
+  std::optional<TrackResult> best;
+  for (std::size_t i = 0; i < guesses.poses.size(); ++i) {
+    TrackResult attempt =
+        estimate(map, frame, features, guesses.poses[i], 12.0 + 4.0 * std::min(lost_frames_, 5));
+    if (attempt.state != TrackState::kTracked) continue;
+    if (!best || evidence(attempt) > evidence(*best)) best = std::move(attempt);
+    if (i > 0 || !guesses.sought) break;
   }
-  return std::nullopt;
+  return best;
 }
 
 std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <random>
 #include <vector>
 
@@ -48,6 +49,35 @@ cv::Mat look(const std::vector<Wall>& walls, const Rigid3& camera_from_first, un
   return depth;
 }
 
+/// Picture of kOneWall, which has a grain of a hand's width and is painted over by `seed`; with noise.
+cv::Mat picture(const Rigid3& camera_from_first, unsigned paint = 5) {
+  struct Wave {
+    Eigen::Vector2d k;
+    double phase;
+  };
+  std::mt19937 random(paint);
+  std::uniform_real_distribution<double> angle(0.0, 6.283), length(0.06, 0.15);
+  std::vector<Wave> waves;
+  for (int i = 0; i < 12; ++i) {
+    const double a = angle(random), k = 6.283 / length(random);
+    waves.push_back({{k * std::cos(a), k * std::sin(a)}, angle(random)});
+  }
+  std::normal_distribution<double> noise;
+  const Rigid3 first_from_camera = camera_from_first.inverse();
+  cv::Mat gray(kCamera.height, kCamera.width, CV_8UC1);
+  for (int v = 0; v < gray.rows; ++v) {
+    for (int u = 0; u < gray.cols; ++u) {
+      const Eigen::Vector3d ray = first_from_camera.rotation * kCamera.unproject(u, v, 1.0);
+      const Eigen::Vector3d p =
+          first_from_camera.translation + ray * ((2.0 - first_from_camera.translation.z()) / ray.z());
+      double value = 128.0;
+      for (const Wave& w : waves) value += 4.0 * std::sin(w.k.dot(p.head<2>()) + w.phase);
+      gray.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(value + noise(random));
+    }
+  }
+  return gray;
+}
+
 maps::Keyframe first_view(const std::vector<Wall>& walls) {
   maps::Keyframe keyframe;
   keyframe.id = {0, 0};
@@ -86,6 +116,30 @@ TEST(SurfaceEdge, WhatTheSurfacesLeaveOpenStaysWhereItWas) {
       << "towards it";
 }
 
+TEST(SurfaceEdge, GreyValuesHoldWhatTheSurfacesLeaveOpen) {
+  const auto samples = features::sample_photometric(features::make_photometric_image(picture({})),
+                                                    look(kOneWall, {}, 1), kCamera, {});
+  const auto aligned = [&](const cv::Mat& second) {
+    const features::PhotometricImage image = features::make_photometric_image(second);
+    return align_surface_edge(first_view(kOneWall), {0, 1}, look(kOneWall, kTruth, 2), kOff * kTruth, {},
+                              kCamera, {}, {&samples, &image});
+  };
+  const auto alone = align_surface_edge(first_view(kOneWall), {0, 1}, look(kOneWall, kTruth, 2),
+                                        kOff * kTruth, {}, kCamera, {});
+  const auto edge = aligned(picture(kTruth));
+  const auto repainted = aligned(picture(kTruth, 6));
+  ASSERT_TRUE(alone && edge && repainted);
+  const Eigen::Vector3d middle(0.0, 0.0, 2.0);
+  const auto slid = [&](const maps::SurfaceEdge& e) {
+    return (e.b_from_a * middle - kTruth * middle).head<2>().norm();
+  };
+  EXPECT_GT(slid(*alone), 0.01);
+  EXPECT_LT(slid(*edge), 0.001);
+  const geometry::Vector6d error = geometry::log_se3(kTruth * edge->b_from_a.inverse());
+  EXPECT_LT(error.dot(edge->information * error), 6.0 * 9.0) << "as exact as it says";
+  EXPECT_NEAR(slid(*repainted), slid(*alone), 1e-9) << "a picture of something else is not believed";
+}
+
 TEST(SurfaceEdge, ADepthImageTakenLaterIsAlignedWhereItWasTaken) {
   const Rigid3 later(geometry::exp_so3({0.0, 0.01, 0.0}), Eigen::Vector3d(0.004, 0.0, -0.006));
   const auto edge = align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, later * kTruth, 2), kTruth,
@@ -117,7 +171,7 @@ TEST(SurfaceEdge, AKeyframesSurfaceIsThatOfItsColourImage) {
   tracking::TrackResult track;
   track.depth_from_camera = later;
   const core::KeyframeId id =
-      mapper.insert(map, 0, frame, std::make_shared<features::FrameFeatures>(), track, 0.0);
+      mapper.insert(map, 0, frame, std::make_shared<features::FrameFeatures>(), track, {}, 0.0);
   int near = 0;
   for (const maps::SurfaceSample& s : map.keyframe(id).surface) {
     double least = 1.0;

@@ -99,7 +99,7 @@ Rigid3 solve(const Pair& pair, const Rigid3& start) {
     auto family = tracking::associate_photometric(pair.samples, level, pair.view(), {}, pose);
     EXPECT_TRUE(family.has_value());
     if (!family) return pose;
-    problem.photometric.push_back(*std::move(family));
+    problem.photometric = std::move(family);
     for (int y = 20; y < 480; y += 40) {
       for (int x = 20; x < 640; x += 40) {
         const double z = static_cast<double>(pair.second.depth(y, x));
@@ -202,8 +202,9 @@ TEST(Photometric, SamplesLeaveOutJumpsAndMissingDepth) {
   ASSERT_FALSE(samples[0].empty());
   for (const features::PhotometricSample& s : samples[0]) {
     const double u = kCamera.project(s.point.cast<double>()).x();
-    EXPECT_LT(u, 399.0);
-    EXPECT_GT(std::abs(u - 199.5), 1.5);
+    // The local mean of what lies within 13 pixels of a border holds grey values from beyond.
+    EXPECT_LT(u, 387.5);
+    EXPECT_GT(std::abs(u - 199.5), 11.5);
   }
   EXPECT_TRUE(
       features::sample_photometric(features::make_photometric_image(first.gray), {}, kCamera, {})[0].empty());

@@ -26,6 +26,7 @@ struct LocalMapperOptions {
   bool triangulate = true;
   TriangulationOptions triangulation;
   bool fuse = true;
+  bool earlier_sightings = true;
   FusionOptions fusion;
   bool cull_keyframes = false;
   KeyframeCullingOptions keyframe_culling;
@@ -35,6 +36,7 @@ struct LocalMapperOptions {
   SightingNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
   bool edges = true;
   int edge_keyframes = 5;
+  bool edge_photometric = true;
   double edge_min_overlap = 0.4;
   optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
@@ -54,18 +56,20 @@ class LocalMapper {
   /// Goes on where another mapper left `map`, whose newest keyframe is `newest`.
   void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
 
-  /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth.
+  /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, and where
+  /// older keyframes saw these. `levels`: the pyramid of its picture; empty: none.
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                           const std::shared_ptr<const features::FrameFeatures>& features,
-                          const tracking::TrackResult& track, double turn_rate);
+                          const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
+                          double turn_rate);
 
   /// Counts which landmarks a tracked frame should have seen and did.
   void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
 
-  /// Aligns the surfaces of neighbouring keyframes with the depth image of the new one; what they say about
-  /// its pose stays in the map as edges.
+  /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
+  /// image and the picture of the new one; what they say about its pose stays in the map as edges.
   void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
-                         const geometry::Rigid3& depth_from_camera,
+                         const tracking::TrackResult& track, const tracking::PhotometricKeyframes& pictures,
                          const std::vector<core::KeyframeId>& neighbours);
 
   /// What a new keyframe has to say about the map around it, in this order: landmarks without depth are
@@ -74,7 +78,7 @@ class LocalMapper {
   void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:
-  void add_points(maps::Map& map, core::KeyframeId keyframe);
+  std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
   void triangulate(maps::Map& map, core::KeyframeId keyframe);
   [[nodiscard]] bool sheared(const maps::Map& map, core::KeyframeId keyframe) const;

@@ -2,10 +2,12 @@
 #pragma once
 
 // How two keyframes lie to each other as their surfaces say: samples of one are aligned, point to plane, with
-// the depth image of the other (METHOD section 2), for local bundle adjustment.
+// the depth image of the other (METHOD section 2), and its grey values with the other's picture, for local
+// bundle adjustment.
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
+#include "plumbline/features/photometric.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/sensor/camera.hpp"
 
@@ -16,17 +18,21 @@ struct SurfaceEdgeOptions {
   double hold_m = 0.01;      ///< see align_surface_edge
 };
 
+/// What two keyframes' pictures say beside their surfaces: nothing when one is null.
+struct EdgePictures {
+  const features::PhotometricSamples* of_a = nullptr;
+  const features::PhotometricImage* of_b = nullptr;
+};
+
 /// `a` lies `b_from_a` before `b`, whose depth image (CV_32FC1, metres) is `depth_of_b`; `depth_from_camera`
 /// carries b's colour camera to its depth camera. The start is held to `hold_m` metres, and as much at the
 /// middle of what both see when turned: along what the surfaces leave open, a wall's length, they would
 /// otherwise slide by decimetres on noise alone, and an edge whose free directions have run away is wrong in
 /// those that are held, too. The edge itself is freed of this hold: where the surfaces say anything it is
 /// what they say. None when they overlap by less than min_overlap.
-std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, core::KeyframeId b,
-                                                    const cv::Mat& depth_of_b,
-                                                    const geometry::Rigid3& b_from_a,
-                                                    const geometry::Rigid3& depth_from_camera,
-                                                    const sensor::Pinhole& camera,
-                                                    const SurfaceEdgeOptions& options);
+std::optional<maps::SurfaceEdge> align_surface_edge(
+    const maps::Keyframe& a, core::KeyframeId b, const cv::Mat& depth_of_b, const geometry::Rigid3& b_from_a,
+    const geometry::Rigid3& depth_from_camera, const sensor::Pinhole& camera,
+    const SurfaceEdgeOptions& options, const EdgePictures& pictures = {});
 
 }  // namespace plumbline::mapping

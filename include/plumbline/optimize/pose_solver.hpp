@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pose of one camera from points, lines, surfaces and grey values of the map together: Levenberg-Marquardt with robust
-// losses over 6 unknowns (METHOD section 2). Small and allocation-free; many poses together are the work of
-// bundle_adjustment.
+// Pose of one camera from points, lines, surfaces and grey values of the map together: Levenberg-Marquardt
+// with robust losses over 6 unknowns (METHOD section 2). Small and allocation-free; many poses together are
+// the work of bundle_adjustment.
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -28,7 +28,7 @@ struct PoseProblem {
   std::vector<PointTerm> points;
   std::vector<LineTerm> lines;
   std::vector<PlaneTerm> planes;
-  std::vector<PhotometricFamily> photometric;  ///< one for each picture that this one is aligned with
+  std::optional<PhotometricFamily> photometric;
   std::optional<PosePrior> prior;
 };
 
@@ -43,7 +43,7 @@ struct PoseSolverOptions {
   double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
   double photometric_loss = 1.5;
   double photometric_weight = 0.04;  ///< grey values of neighbouring pixels are all but the same
-  double min_step = 1e-6;      ///< metres and radians: a smaller step ends the iteration
+  double min_step = 1e-6;            ///< metres and radians: a smaller step ends the iteration
 
   void declare(core::OptionTable& table);
 };

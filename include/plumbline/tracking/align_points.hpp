@@ -2,6 +2,7 @@
 #pragma once
 
 // Matched corners to a tenth of a pixel: aligned with what their landmark looked like when it was first seen.
+#include <optional>
 #include <vector>
 
 #include "plumbline/tracking/association.hpp"
@@ -14,5 +15,14 @@ namespace plumbline::tracking {
 void align_points(const maps::Map& map, const features::FrameFeatures& frame, const sensor::Pinhole& camera,
                   const geometry::Rigid3& camera_from_world, double scale_factor,
                   std::vector<PointMatch>& matches);
+
+/// Where a picture (`levels`, of `camera_from_world`) shows the corner that a keyframe saw of what lies at
+/// `position`, pixels of the full picture; `start`: where it should be, to two pixels of the corner's octave.
+/// None when the keyframe saw it too differently, or the pictures do not agree.
+std::optional<Eigen::Vector2f> align_sighting(const maps::Map& map, const maps::Observation& seen,
+                                              const Eigen::Vector3d& position,
+                                              const std::vector<cv::Mat>& levels,
+                                              const Eigen::Vector2f& start, const sensor::Pinhole& camera,
+                                              const geometry::Rigid3& camera_from_world, double scale_factor);
 
 }  // namespace plumbline::tracking

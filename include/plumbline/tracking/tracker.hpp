@@ -92,6 +92,7 @@ class Tracker {
   void add_photometric(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples) {
     photometric_.add(id, std::move(samples));
   }
+  [[nodiscard]] const PhotometricKeyframes& photometric() const { return photometric_; }
 
   /// Goes on where another tracker left `map`: it had just tracked the keyframe `reference` at
   /// `camera_from_world`, with this motion of camera_from_world per second.
@@ -145,10 +146,15 @@ class Tracker {
     velocity_.setZero();
     steps_ = 0;
   }
-  [[nodiscard]] std::vector<geometry::Rigid3> guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                                      const features::FrameFeatures& features) const;
-  void put_likeliest_first(const maps::Map& map, const PhotometricView& view,
-                           std::vector<geometry::Rigid3>& guesses) const;
+  /// Where the camera may be by now, the likeliest first.
+  struct Guesses {
+    std::vector<geometry::Rigid3> poses;
+    bool sought = false;  ///< the first was looked for in the picture: it may be a look-alike of the next
+  };
+  [[nodiscard]] Guesses guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                const features::FrameFeatures& features) const;
+  void put_likeliest_first(const maps::Map& map, const PhotometricView& view, Guesses& guesses) const;
+  [[nodiscard]] double evidence(const TrackResult& result) const;
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
                                      const features::FrameFeatures& features, const geometry::Rigid3& guess,
                                      double radius) const;
@@ -170,7 +176,7 @@ class Tracker {
   [[nodiscard]] bool refutes_motion(optimize::PoseProblem problem, const optimize::PoseSummary& held,
                                     const geometry::Rigid3& predicted, geometry::Rigid3& pose) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;
-  [[nodiscard]] std::vector<optimize::PhotometricFamily> photometric_families(
+  [[nodiscard]] std::optional<optimize::PhotometricFamily> photometric_family(
       const maps::Map& map, const PhotometricView& view, std::size_t level,
       const geometry::Rigid3& camera_from_world) const;
   void remember(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
