@@ -100,7 +100,8 @@ class Slam {
   void remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe);
   void return_to_known_ground(FrameReport& report);
   void make_keyframe(const sensor::RgbdFrame& frame,
-                     const std::shared_ptr<const features::FrameFeatures>& features, const std::vector<cv::Mat>& levels, FrameReport& report);
+                     const std::shared_ptr<const features::FrameFeatures>& features,
+                     const std::vector<cv::Mat>& levels, FrameReport& report);
   void put_back_bundle(BundleReport& report);
   [[nodiscard]] double shear_rate() const;
   void settle_bundles();
