@@ -155,7 +155,8 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
                                                           core::Log& log) {
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) {
-    return core::input_error(fmt::format("{}: no such folder", folder.string()));
+    return core::input_error(
+        fmt::format("{}: no such folder; give the folder of a recording", folder.string()));
   }
   if (!fs::is_directory(folder, ignored)) {
     return core::input_error(fmt::format("{}: is a file; give the recording's folder", folder.string()));

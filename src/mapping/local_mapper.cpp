@@ -46,8 +46,9 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
   table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
   triangulation.declare(table);
   table.boolean("fuse", fuse, "Look for landmarks in neighbouring keyframes and merge doubles");
-  table.boolean("fuse.earlier", earlier_sightings,
-                "Look for new landmarks where older keyframes saw a corner without depth, and align them");
+  table.boolean(
+      "fuse.earlier", earlier_sightings,
+      "Look for new landmarks among corners of older keyframes that see none, as where depth was missing");
   fusion.declare(table);
   table.boolean("redundant", cull_keyframes, "Take redundant keyframes out of the map");
   keyframe_culling.declare(table);

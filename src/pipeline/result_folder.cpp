@@ -18,7 +18,8 @@ core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
         fmt::format("{}: is a file; give the result folder of plumbline map", folder.string()));
   }
   if (!std::filesystem::is_directory(folder, ec)) {
-    return core::input_error(fmt::format("{}: no such folder", folder.string()));
+    return core::input_error(
+        fmt::format("{}: no such folder; give the result folder of plumbline map", folder.string()));
   }
   if (!is_result_folder(folder)) {
     return core::input_error(fmt::format(

@@ -159,4 +159,14 @@ bool photometric_agrees(const optimize::PhotometricFamily& family, const Rigid3&
   return optimize::photometric_correlation(family, camera_from_world, kMinPhotometric) >= kMinCorrelation;
 }
 
+std::size_t likeliest_guess(const std::vector<std::optional<double>>& agreement) {
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < agreement.size(); ++i) {
+    if (!agreement[i]) continue;
+    const double least = agreement[best] ? *agreement[best] + kBetterAgreement : kGoodAgreement;
+    if (*agreement[i] >= least) best = i;
+  }
+  return best;
+}
+
 }  // namespace plumbline::tracking

@@ -12,28 +12,25 @@ using geometry::Rigid3;
 /// the best, or how far to the side of it the camera looks.
 void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& view, Guesses& guesses) const {
   constexpr std::size_t kCoarse = 1;
-  constexpr double kGood = 0.8;     // correlation
-  constexpr double kBetter = 0.05;  // by so much
-  constexpr double kSure = 0.3;
+  constexpr double kSure = 0.3;  // correlation of what is looked for
   std::vector<Rigid3>& poses = guesses.poses;
-  std::size_t best = 0;
-  std::vector<double> agreement;
-  std::optional<optimize::PhotometricFamily> family_of_best;
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    std::optional<optimize::PhotometricFamily> family = photometric_family(map, view, kCoarse, poses[i]);
-    agreement.push_back(family ? optimize::photometric_correlation(*family, poses[i], kMinPhotometric) : 0.0);
-    if (i > 0 && agreement[i] < agreement[best] + kBetter) continue;
-    best = i;
-    family_of_best = std::move(family);
+  std::vector<std::optional<double>> agreement;
+  std::vector<std::optional<optimize::PhotometricFamily>> families;
+  for (const Rigid3& pose : poses) {
+    const auto& family = families.emplace_back(photometric_family(map, view, kCoarse, pose));
+    agreement.push_back(family
+                            ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
+                            : std::nullopt);
   }
+  const std::size_t best = likeliest_guess(agreement);
   const Rigid3 likeliest = poses[best];
   if (best > 0) {
     poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(best));
     poses.insert(poses.begin(), likeliest);
   }
-  if (!family_of_best || agreement[best] >= kGood) return;
-  const ShiftedPose shifted = search_shift(*family_of_best, likeliest);
-  if (shifted.correlation < std::max(kSure, agreement[best] + kBetter)) return;
+  if (!families[best] || *agreement[best] >= kGoodAgreement) return;
+  const ShiftedPose shifted = search_shift(*families[best], likeliest);
+  if (shifted.correlation < std::max(kSure, *agreement[best] + kBetterAgreement)) return;
   poses.insert(poses.begin(), shifted.camera_from_world);
   guesses.sought = true;
 }

@@ -168,6 +168,17 @@ TEST(Photometric, LooksToTheSideForTheBestFit) {
   EXPECT_LT(optimize::photometric_correlation(*family, start, 500), 0.3);
 }
 
+TEST(Photometric, AGuessThatNothingIsKnownOfGivesWayToAGoodOneOnly) {
+  using tracking::likeliest_guess;
+  EXPECT_EQ(likeliest_guess({std::nullopt, std::nullopt, 0.4}), 0U);  // where the camera was: a look-alike
+  EXPECT_EQ(likeliest_guess({std::nullopt, std::nullopt, 0.9}), 2U);
+  EXPECT_EQ(likeliest_guess({std::nullopt, 0.85, 0.95}), 2U);
+  EXPECT_EQ(likeliest_guess({0.5, 0.6, std::nullopt}), 1U);
+  EXPECT_EQ(likeliest_guess({0.5, 0.53, 0.52}), 0U);  // no better to speak of
+  EXPECT_EQ(likeliest_guess({-0.1, 0.0}), 1U);
+  EXPECT_EQ(likeliest_guess({std::nullopt}), 0U);
+}
+
 TEST(Photometric, WhatStandsBeforeTheWallHidesIt) {
   Pair pair = make_pair(kTruth, 10.0);
   const auto all = tracking::associate_photometric(pair.samples, 0, pair.view(), {}, kTruth);

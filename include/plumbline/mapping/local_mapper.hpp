@@ -37,7 +37,7 @@ struct LocalMapperOptions {
   bool edges = true;
   int edge_keyframes = 5;
   bool edge_photometric = true;
-  double edge_min_overlap = 0.4;
+  double edge_min_overlap = 0.25;
   optimize::BundleOptions bundle_options;
   tracking::SurfaceSamplerOptions surface;
   LocalMapperOptions() {

@@ -14,7 +14,7 @@
 namespace plumbline::mapping {
 
 struct SurfaceEdgeOptions {
-  double min_overlap = 0.4;  ///< share of a's samples that b's depth must confirm
+  double min_overlap = 0.25;  ///< share of a's samples that b's depth must confirm
   double hold_m = 0.01;      ///< see align_surface_edge
 };
 

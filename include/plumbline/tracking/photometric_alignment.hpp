@@ -63,4 +63,11 @@ struct ShiftedPose {
 ShiftedPose search_shift(const optimize::PhotometricFamily& family,
                          const geometry::Rigid3& camera_from_world);
 
+constexpr double kGoodAgreement = 0.8;     ///< correlation of grey values at a guess that needs no search
+constexpr double kBetterAgreement = 0.05;  ///< by so much another guess must agree better to be tried first
+/// Which of some guesses to try first, by how well grey values agree at each (correlation; none: nothing that
+/// can be compared is in view from there). The first, unless another agrees better; one of which nothing is
+/// known gives way to a good one only. `agreement` must not be empty.
+std::size_t likeliest_guess(const std::vector<std::optional<double>>& agreement);
+
 }  // namespace plumbline::tracking

@@ -149,7 +149,7 @@ class Tracker {
   /// Where the camera may be by now, the likeliest first.
   struct Guesses {
     std::vector<geometry::Rigid3> poses;
-    bool sought = false;  ///< the first was looked for in the picture: it may be a look-alike of the next
+    bool sought = false;  ///< the first was looked for in the picture: it may be a look-alike
   };
   [[nodiscard]] Guesses guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
                                 const features::FrameFeatures& features) const;

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the tracker looks for the camera, and which of the poses found from there it takes.
+#include <algorithm>
+
+#include "plumbline/tracking/thumbnail_alignment.hpp"
+#include "plumbline/tracking/tracker.hpp"
+
+namespace plumbline::tracking {
+
+using geometry::Rigid3;
+
+Tracker::Guesses Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                  const features::FrameFeatures& features) const {
+  Guesses result;
+  const Rigid3 predicted = predict(frame.stamp);
+  const ThumbnailAlignment alignment =
+      align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
+                       predicted * last_.camera_from_world.inverse());
+  if (alignment.better) result.poses.push_back(alignment.current_from_previous * last_.camera_from_world);
+  result.poses.push_back(predicted);
+  result.poses.push_back(last_.camera_from_world);
+  if (options_.photometric)
+    put_likeliest_first(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
+  return result;
+}
+
+/// Terms that bear a pose out, each family with its weight.
+double Tracker::evidence(const TrackResult& result) const {
+  const optimize::PoseSummary& seen = result.estimate;
+  const optimize::PoseSolverOptions& weights = options_.solver;
+  return weights.point_weight * seen.points.inliers + weights.line_weight * 2 * seen.lines.inliers +
+         weights.plane_weight * seen.planes.inliers + weights.photometric_weight * seen.photometric.inliers;
+}
+
+std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                              const features::FrameFeatures& features) const {
+  if (lost_frames_ >= 30) return std::nullopt;
+  const Guesses guesses = this->guesses(map, frame, features);
+  std::optional<TrackResult> best;
+  for (std::size_t i = 0; i < guesses.poses.size(); ++i) {
+    TrackResult attempt =
+        estimate(map, frame, features, guesses.poses[i], 12.0 + 4.0 * std::min(lost_frames_, 5));
+    if (attempt.state != TrackState::kTracked) continue;
+    if (!best || evidence(attempt) > evidence(*best)) best = std::move(attempt);
+    if (!guesses.sought) break;
+  }
+  return best;
+}
+
+std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,
+                                                        const features::FrameFeatures& features) const {
+  constexpr int kLookAlikes = 24;
+  constexpr std::size_t kAligned = 3;
+  const std::vector<LookAlike> alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
+  std::vector<Guess> guesses;
+  if (options_.points) {
+    std::vector<core::KeyframeId> candidates;
+    const auto add = [&candidates](core::KeyframeId id) {
+      if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
+    };
+    for (core::KeyframeId id : local_map_.keyframes) add(id);
+    if (find_places_) {
+      for (core::KeyframeId id : find_places_(features)) add(id);
+    }
+    for (const LookAlike& a : alike) add(a.keyframe);
+    const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers);
+    if (seen) guesses.push_back({seen->keyframe, seen->camera_from_world, false});
+  }
+  for (std::size_t i = 0; i < std::min(kAligned, alike.size()); ++i) {
+    const core::KeyframeId id = alike[i].keyframe;
+    guesses.push_back({id, align_look_alike(map, id, features, camera_), true});
+  }
+  return guesses;
+}
+
+std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                               const features::FrameFeatures& features) {
+  const std::vector<Guess> guesses = guesses_by_picture(map, features);
+  LocalMap before = std::move(local_map_);
+  for (const Guess& guess : guesses) {
+    local_map_ = build_local_map(map, guess.keyframe, options_.local_map);
+    TrackResult attempt = estimate(map, frame, features, guess.camera_from_world, guess.rough ? 24.0 : 10.0);
+    if (attempt.state != TrackState::kTracked || attempt.held_by_motion) continue;
+    if (guess.rough && !beyond_doubt(attempt)) continue;
+    if (is_place_ && !is_place_(frame, features, guess.keyframe, attempt.camera_from_world)) continue;
+    attempt.relocalised = true;
+    stand();
+    last_.valid = false;
+    return attempt;
+  }
+  local_map_ = std::move(before);  // a mistake must not take the surroundings away
+  return std::nullopt;
+}
+
+}  // namespace plumbline::tracking
