@@ -15,7 +15,7 @@ namespace plumbline::mapping {
 
 struct SurfaceEdgeOptions {
   double min_overlap = 0.25;  ///< share of a's samples that b's depth must confirm
-  double hold_m = 0.01;      ///< see align_surface_edge
+  double hold_m = 0.01;       ///< see align_surface_edge
 };
 
 /// What two keyframes' pictures say beside their surfaces: nothing when one is null.
