@@ -78,9 +78,7 @@ int add_earlier_sightings(maps::Map& map, const std::vector<PointId>& landmarks,
                                                camera, pose, options.scale_factor);
       if (!at) continue;
       if (!map.observe(m.point, other, m.feature, true)) continue;
-      const Eigen::Vector2f shift = *at - middle;
-      newest.points[corner].pixel += shift;
-      newest.patches[corner].offset = shift;
+      newest.move_point(corner, *at - middle);
       point.position = pose.inverse() * camera.unproject(static_cast<double>(newest.points[corner].pixel.x()),
                                                          static_cast<double>(newest.points[corner].pixel.y()),
                                                          static_cast<double>(newest.points[corner].depth));

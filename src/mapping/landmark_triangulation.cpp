@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "plumbline/tracking/align_points.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -81,16 +83,16 @@ class PairSearch {
     return clear ? best : -1;
   }
 
-  /// Where the rays of both corners meet, in the first camera's frame; none when they do not, or too far away
-  /// to say where.
-  [[nodiscard]] std::optional<Eigen::Vector3d> meet(int i, int j) const {
-    const features::PointFeature& f = a_.features.points[static_cast<std::size_t>(i)];
-    const features::PointFeature& g = b_.features.points[static_cast<std::size_t>(j)];
+  /// Where the rays of corner `f` of the first picture and of corner `g` of the second meet, in the first
+  /// camera's frame; none when they do not, or too far away to say where. `noise`: of both, over that of
+  /// corners as they are found.
+  [[nodiscard]] std::optional<Eigen::Vector3d> meet(const features::PointFeature& f,
+                                                    const features::PointFeature& g, double noise) const {
     const Eigen::Vector3d ray_a = ray(f);
     const Eigen::Vector3d ray_b = b_from_a_.rotation.transpose() * ray(g);
     const Eigen::Vector3d centre_b = b_from_a_.inverse().translation;
     const double parallax = std::atan2(ray_a.cross(ray_b).norm(), ray_a.dot(ray_b));
-    const double ray_sigma = std::hypot(sigma(f), sigma(g)) / camera_.fx;
+    const double ray_sigma = noise * std::hypot(sigma(f), sigma(g)) / camera_.fx;
     if (!(ray_sigma < options_.max_relative_sigma * parallax)) return std::nullopt;
     // Nearest points of the two rays: s along a, t along b.
     const double c = ray_a.dot(ray_b);
@@ -140,6 +142,46 @@ class PairSearch {
   double roll_deg_ = 0.0;
 };
 
+struct Corner {
+  KeyframeId keyframe;
+  int feature = -1;
+};
+
+struct Meeting {
+  Eigen::Vector3d point;                 ///< in the newest camera's frame
+  std::optional<Eigen::Vector2f> shift;  ///< px, of the newest corner to what the older one shows
+};
+
+/// Where two corners' rays meet. Corners as they are found say so after a long way only; the newest one is
+/// looked for again by the older one's patch.
+std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, const Corner& newest,
+                            const Corner& older, const sensor::Pinhole& camera,
+                            const TriangulationOptions& options, const NewestPicture* picture) {
+  const auto point_of = [&](const Corner& c) -> const features::PointFeature& {
+    return map.keyframe(c.keyframe).features->points[static_cast<std::size_t>(c.feature)];
+  };
+  const auto alone = [&]() -> std::optional<Meeting> {
+    const auto point = search.meet(point_of(newest), point_of(older), 1.0);
+    if (!point) return std::nullopt;
+    return Meeting{*point, std::nullopt};
+  };
+  if (picture == nullptr) return alone();
+  const features::CornerPatch& patch = picture->newest.patches[static_cast<std::size_t>(newest.feature)];
+  if (patch.empty()) return alone();
+  const auto rough = search.meet(point_of(newest), point_of(older), options.aligned);
+  if (!rough) return std::nullopt;
+  const Rigid3& pose = map.camera_from_world(newest.keyframe);
+  const auto at = tracking::align_sighting(map, {older.keyframe, older.feature}, pose.inverse() * *rough,
+                                           picture->levels, patch.middle, camera, pose, options.scale_factor);
+  if (!at) return alone();
+  const Eigen::Vector2f shift = *at - patch.middle;
+  features::PointFeature moved = point_of(newest);
+  moved.pixel += shift;
+  const auto point = search.meet(moved, point_of(older), options.aligned);
+  if (!point) return std::nullopt;
+  return Meeting{*point, shift};
+}
+
 core::PointId add_landmark(maps::Map& map, KeyframeId keyframe, int feature,
                            const Eigen::Vector3d& in_camera) {
   const features::FrameFeatures& features = *map.keyframe(keyframe).features;
@@ -173,8 +215,13 @@ void TriangulationOptions::declare(core::OptionTable& table) {
 std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyframe,
                                               const std::vector<KeyframeId>& neighbours,
                                               double max_measured_m, const sensor::Pinhole& camera,
-                                              const TriangulationOptions& options) {
+                                              const TriangulationOptions& options,
+                                              const NewestPicture* picture) {
   std::vector<core::PointId> made;
+  const bool aligns = picture != nullptr && !picture->levels.empty() &&
+                      picture->newest.patches.size() == picture->newest.points.size();
+  const NewestPicture* const shown = aligns ? picture : nullptr;
+  bool moved = false;
   for (KeyframeId other : neighbours) {
     const View a = view_of(map, keyframe, max_measured_m);
     const View b = view_of(map, other, max_measured_m);
@@ -182,14 +229,19 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
     for (int i : a.free) {
       const int j = search.partner(i);
       if (j < 0 || map.point_of(other, j).valid()) continue;
-      const auto point = search.meet(i, j);
-      if (!point) continue;
-      const core::PointId id = add_landmark(map, keyframe, i, *point);
-      map.observe(id, other, j);
+      const auto found = meet(map, search, {keyframe, i}, {other, j}, camera, options, shown);
+      if (!found) continue;
+      if (found->shift) {
+        shown->newest.move_point(static_cast<std::size_t>(i), *found->shift);
+        moved = true;
+      }
+      const core::PointId id = add_landmark(map, keyframe, i, found->point);
+      map.observe(id, other, j, found->shift.has_value());
       map.refresh_point(id);
       made.push_back(id);
     }
   }
+  if (moved) shown->newest.grid = features::PointGrid(shown->newest.points, camera.width, camera.height);
   return made;
 }
 

@@ -96,6 +96,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
   if (options_.fuse && options_.earlier_sightings && !sheared(map, id))
     add_earlier_sightings(map, made, id, nearest_sharp(map, id, options_.fusion.keyframes), levels, camera_,
                           options_.fusion.association, *own);
+  if (options_.triangulate && !sheared(map, id)) triangulate(map, id, {levels, *own});
   return id;
 }
 
@@ -188,19 +189,17 @@ std::vector<core::KeyframeId> LocalMapper::nearest_sharp(const maps::Map& map, c
   return neighbours;
 }
 
-void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id) {
+void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestPicture& picture) {
   const std::vector<core::KeyframeId> neighbours = nearest_sharp(map, id, options_.triangulation.keyframes);
   const TriangulationOptions& how = options_.triangulation;
   const double measured = options_.max_landmark_depth_m;
-  for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how))
+  for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how, &picture))
     culler_.watch(p, id);
   for (core::LineId l : triangulate_lines(map, id, neighbours, measured, camera_, how)) culler_.watch(l, id);
 }
 
 void LocalMapper::refine(maps::Map& map, core::KeyframeId id) {
-  const bool speaks = !sheared(map, id);
-  if (options_.triangulate && speaks) triangulate(map, id);
-  if (options_.fuse && speaks) {
+  if (options_.fuse && !sheared(map, id)) {
     const std::vector<core::KeyframeId> neighbours = nearest_sharp(map, id, options_.fusion.keyframes);
     fuse_points(map, id, neighbours, camera_, options_.fusion);
     fuse_lines(map, id, neighbours, camera_, options_.fusion);

@@ -41,6 +41,14 @@ static SightingNoise noise_of(const SlamOptions& options) {
   return noise;
 }
 
+/// The mapper's corners are as exact when triangulated as in bundles.
+static LocalMapperOptions mapper_of(const SlamOptions& options) {
+  LocalMapperOptions mapper = options.mapper;
+  mapper.triangulation.scale_factor = options.tracker.association.scale_factor;
+  mapper.triangulation.aligned = options.mapper.bundle_noise.aligned;
+  return mapper;
+}
+
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
            const core::Executor& executor, core::Log& log)
     : options_(options),
@@ -49,7 +57,7 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       log_(&log),
       tracker_(options.tracker, camera),
       rule_(options.keyframe),
-      mapper_(options.mapper, camera),
+      mapper_(mapper_of(options), camera),
       bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate, noise_of(options)},
               options.mapper.bundle_options, options.bundle_lag, camera, executor),
       closer_(options.loops, camera, &executor) {

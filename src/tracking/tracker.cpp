@@ -81,10 +81,7 @@ Tracker::Features without_picture(const features::FrameFeatures& features,
   kept->levels.clear();
   kept->photometric.reset();
   for (const PointMatch& m : matches) {
-    if (!m.aligned) continue;
-    const auto i = static_cast<std::size_t>(m.feature);
-    kept->points[i].pixel += m.shift;
-    kept->patches[i].offset = m.shift;
+    if (m.aligned) kept->move_point(static_cast<std::size_t>(m.feature), m.shift);
   }
   kept->grid = features::PointGrid(kept->points, camera.width, camera.height);
   return kept;
@@ -238,13 +235,9 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     remember(frame, *features, result);
     return result;
   }
-  // After a while without a pose the last one says little: surfaces near it fit by chance, so the picture
-  // goes first.
-  constexpr int kStaleFrames = 5;
-  const bool stale = lost_frames_ >= kStaleFrames;
   const Features still = at_one_moment(frame, features, turning());
-  std::optional<TrackResult> found = stale ? by_picture(map, frame, *still) : by_motion(map, frame, *still);
-  if (!found) found = stale ? by_motion(map, frame, *still) : by_picture(map, frame, *still);
+  std::optional<TrackResult> found = stale() ? by_picture(map, frame, *still) : by_motion(map, frame, *still);
+  if (!found) found = stale() ? by_motion(map, frame, *still) : by_picture(map, frame, *still);
   if (!found) {
     result.state = TrackState::kLost;
     result.camera_from_world = predict(frame.stamp);

@@ -40,7 +40,7 @@ std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor
   for (std::size_t i = 0; i < guesses.poses.size(); ++i) {
     TrackResult attempt =
         estimate(map, frame, features, guesses.poses[i], 12.0 + 4.0 * std::min(lost_frames_, 5));
-    if (attempt.state != TrackState::kTracked) continue;
+    if (attempt.state != TrackState::kTracked || (stale() && !beyond_doubt(attempt))) continue;
     if (!best || evidence(attempt) > evidence(*best)) best = std::move(attempt);
     if (!guesses.sought) break;
   }

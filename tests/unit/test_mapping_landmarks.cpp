@@ -8,6 +8,7 @@
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
 #include "plumbline/mapping/landmark_triangulation.hpp"
+#include "two_views_of_a_wall.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -97,6 +98,58 @@ TEST(Triangulation, DoublesThatLookAlikeAreNotTrusted) {
   triangulate_points(world.map, b, {a}, 8.0, world.camera, {});
   EXPECT_FALSE(world.map.point_of(b, 0).valid());
   EXPECT_FALSE(world.map.point_of(b, 1).valid());
+}
+
+TEST(Triangulation, CornersAlignedByTheirPatchesNeedAThirdOfTheWay) {
+  tests::TwoViewsOfAWall views;
+  const KeyframeId older = views.add_keyframe({}, views.older);
+  const KeyframeId newer = views.add_keyframe(views.newer_from_world, views.newer);
+  TriangulationOptions options;
+  options.max_relative_sigma = 0.04;
+  const auto triangulate = [&](const NewestPicture* picture) {
+    return triangulate_points(views.map, newer, {older}, 8.0, tests::kTestCamera, options, picture);
+  };
+  EXPECT_TRUE(triangulate(nullptr).empty()) << "a pixel over 12 cm says little about what is 2 m away";
+  EXPECT_GT(views.mean_off(), 0.25);
+  const std::vector<Eigen::Vector2f> found = [&] {
+    std::vector<Eigen::Vector2f> result;
+    for (const features::PointFeature& p : views.newer->points) result.push_back(p.pixel);
+    return result;
+  }();
+  const std::vector<cv::Mat> levels = views.newer->levels;
+  const NewestPicture picture{levels, *views.newer};
+  const auto made = triangulate(&picture);
+  EXPECT_GT(made.size(), 2 * views.wall.size() / 3) << "all but those ahead";
+  for (core::PointId id : made) {
+    const maps::MapPoint& p = views.map.point(id);
+    ASSERT_EQ(p.observations.size(), 2U);
+    EXPECT_EQ(p.observations[0].feature, p.observations[1].feature) << "a wrong match";
+    EXPECT_TRUE(p.observations[0].aligned && p.observations[1].aligned);
+    const auto i = static_cast<std::size_t>(p.observations[0].feature);
+    EXPECT_LT(views.off(i), 0.15);
+    EXPECT_LT((views.newer->points[i].pixel - found[i] - views.newer->patches[i].offset).norm(), 1e-4F);
+    EXPECT_LT((p.position - views.wall[i]).norm(), 0.06 * views.wall[i].norm());
+  }
+  std::vector<int> near;
+  const Eigen::Vector2f& moved = views.newer->points[0].pixel;
+  views.newer->grid.within(views.newer->points, moved.x(), moved.y(), 0.01F, near);
+  EXPECT_EQ(near, std::vector<int>{0}) << "the grid has followed";
+}
+
+TEST(Triangulation, CornersAreNotAlignedWithPatchesAtBorders) {
+  tests::TwoViewsOfAWall views;
+  const KeyframeId older = views.add_keyframe({}, views.older);
+  const KeyframeId newer = views.add_keyframe(views.newer_from_world, views.newer);
+  for (features::CornerPatch& p : views.older->patches) p.gray.fill(0);
+  const std::vector<cv::Mat> levels = views.newer->levels;
+  const NewestPicture picture{levels, *views.newer};
+  TriangulationOptions options;
+  options.max_relative_sigma = 0.04;
+  const auto triangulate = [&](const NewestPicture& p) {
+    return triangulate_points(views.map, newer, {older}, 8.0, tests::kTestCamera, options, &p);
+  };
+  EXPECT_TRUE(triangulate(picture).empty());
+  EXPECT_TRUE(triangulate({{}, *views.newer}).empty()) << "nor without a picture";
 }
 
 TEST(Triangulation, LinesNeedThreeViewsThatAgree) {

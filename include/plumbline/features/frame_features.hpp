@@ -43,6 +43,13 @@ struct FrameFeatures {
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
+
+  /// Point `i` stands for what lies `shift` (pixels) beside where it was found. Its patch stays what it is
+  /// and knows how far beside. `grid` is as before: make it anew once all points have moved.
+  void move_point(std::size_t i, const Eigen::Vector2f& shift) {
+    points[i].pixel += shift;
+    patches[i].offset = shift;
+  }
 };
 constexpr int kThumbnailWidth = 80;
 

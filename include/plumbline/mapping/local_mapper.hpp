@@ -56,8 +56,9 @@ class LocalMapper {
   /// Goes on where another mapper left `map`, whose newest keyframe is `newest`.
   void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
 
-  /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, and where
-  /// older keyframes saw these. `levels`: the pyramid of its picture; empty: none.
+  /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older
+  /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its picture;
+  /// empty: none.
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                           const std::shared_ptr<const features::FrameFeatures>& features,
                           const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
@@ -72,15 +73,14 @@ class LocalMapper {
                          const tracking::TrackResult& track, const tracking::PhotometricKeyframes& pictures,
                          const std::vector<core::KeyframeId>& neighbours);
 
-  /// What a new keyframe has to say about the map around it, in this order: landmarks without depth are
-  /// triangulated, doubles are fused, landmarks that did not prove themselves go, and so do keyframes that
-  /// others make redundant (never the new one).
+  /// What a new keyframe has to say about the map around it, in this order: doubles are fused, landmarks
+  /// that did not prove themselves go, and so do keyframes that others make redundant (never the new one).
   void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:
   std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
-  void triangulate(maps::Map& map, core::KeyframeId keyframe);
+  void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestPicture& picture);
   [[nodiscard]] bool sheared(const maps::Map& map, core::KeyframeId keyframe) const;
   [[nodiscard]] std::vector<core::KeyframeId> nearest_sharp(const maps::Map& map, core::KeyframeId keyframe,
                                                             int count) const;

@@ -168,6 +168,11 @@ class Tracker {
                                                       const features::FrameFeatures& features);
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] bool uses_features() const { return options_.points || options_.lines; }
+  /// After a while without a pose the last one says little: surfaces near it fit by chance.
+  [[nodiscard]] bool stale() const {
+    constexpr int kStaleFrames = 5;
+    return lost_frames_ >= kStaleFrames;
+  }
   [[nodiscard]] bool beyond_doubt(const TrackResult& result) const;
   [[nodiscard]] Features at_one_moment(const sensor::RgbdFrame& frame, const Features& features,
                                        const Eigen::Vector3d& turn_rate) const;
