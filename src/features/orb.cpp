@@ -132,8 +132,6 @@ std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int hig
 
 void OrbOptions::declare(core::OptionTable& table) {
   table.integer("orb.count", count, {50, 20000}, "", "ORB points per picture");
-  table.number("orb.scale_factor", scale_factor, {1.05, 2.0}, "",
-               "Size ratio of neighbouring pyramid levels");
   table.integer("orb.levels", levels, {1, 12}, "", "Pyramid levels");
   table.integer("orb.fast_threshold", fast_threshold, {1, 200}, "", "FAST threshold, grey values");
   table.integer("orb.fast_threshold_min", fast_threshold_min, {1, 200}, "",
