@@ -272,6 +272,9 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
 GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
+  // How a robot's rooms lie to each other is held a million times less than any one pose: damped more than
+  // that, ten iterations move it by half of what is wanted.
+  bundle_options.first_radius = 1e7;
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;
 }

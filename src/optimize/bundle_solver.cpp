@@ -160,7 +160,7 @@ RoundSummary BundleRound::run(BundleState& state) {
   constexpr double kLargestRadius = 1e16;
   constexpr double kSmallestRadius = 1e-32;
   RoundSummary summary;
-  double radius = 1e4;
+  double radius = options_.first_radius;
   double shrink = 2.0;
   double now = linearise(state);
   summary.initial_cost = summary.final_cost = now;

@@ -153,6 +153,7 @@ inline CeresCosts solve_with_ceres(optimize::BundleProblem& problem, const optim
   ceres::Solver::Options solver;
   solver.linear_solver_type = problem.poses.size() <= 60 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
   solver.max_num_iterations = options.max_iterations;
+  solver.initial_trust_region_radius = options.first_radius;
   solver.function_tolerance = std::max(options.tolerance, 1e-14);
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
