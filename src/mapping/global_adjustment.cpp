@@ -272,8 +272,8 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
 GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
-  // How a robot's rooms lie to each other is held a million times less than any one pose: damped more than
-  // that, ten iterations move it by half of what is wanted.
+  // How the rooms of several robots lie to each other is what moves last: from a region of 1e4 it is short of
+  // the minimum when the iterations end (docs/fusion.md).
   bundle_options.first_radius = 1e7;
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;

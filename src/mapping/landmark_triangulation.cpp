@@ -142,11 +142,6 @@ class PairSearch {
   double roll_deg_ = 0.0;
 };
 
-struct Corner {
-  KeyframeId keyframe;
-  int feature = -1;
-};
-
 struct Meeting {
   Eigen::Vector3d point;                 ///< in the newest camera's frame
   std::optional<Eigen::Vector2f> shift;  ///< px, of the newest corner to what the older one shows
@@ -154,10 +149,10 @@ struct Meeting {
 
 /// Where two corners' rays meet. Corners as they are found say so after a long way only; the newest one is
 /// looked for again by the older one's patch.
-std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, const Corner& newest,
-                            const Corner& older, const sensor::Pinhole& camera,
+std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, const maps::Observation& newest,
+                            const maps::Observation& older, const sensor::Pinhole& camera,
                             const TriangulationOptions& options, const NewestPicture* picture) {
-  const auto point_of = [&](const Corner& c) -> const features::PointFeature& {
+  const auto point_of = [&](const maps::Observation& c) -> const features::PointFeature& {
     return map.keyframe(c.keyframe).features->points[static_cast<std::size_t>(c.feature)];
   };
   const auto alone = [&]() -> std::optional<Meeting> {
@@ -171,8 +166,8 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
   const auto rough = search.meet(point_of(newest), point_of(older), options.aligned);
   if (!rough) return std::nullopt;
   const Rigid3& pose = map.camera_from_world(newest.keyframe);
-  const auto at = tracking::align_sighting(map, {older.keyframe, older.feature}, pose.inverse() * *rough,
-                                           picture->levels, patch.middle, camera, pose, options.scale_factor);
+  const auto at = tracking::align_sighting(map, older, pose.inverse() * *rough, picture->levels, patch.middle,
+                                           camera, pose, options.scale_factor);
   if (!at) return alone();
   const Eigen::Vector2f shift = *at - patch.middle;
   features::PointFeature moved = point_of(newest);
