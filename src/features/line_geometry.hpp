@@ -30,7 +30,7 @@ inline float bilinear(const cv::Mat& gray, float x, float y) {
 /// Puts the darker side on the right; response = mean step across the line over +-2 px, per pixel.
 void orient(LineSegment& segment, const cv::Mat& gray);
 
-/// Moves the segment across itself onto the gradient's centroid (sub-pixel, full resolution).
+/// Moves the segment across itself onto the centroid of its squared gradient (sub-pixel, full resolution).
 void refine(LineSegment& segment, const cv::Mat& gray);
 
 /// Longest first, ties by position: the fixed order of every list of segments.

@@ -70,19 +70,24 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
       const Eigen::Vector2f p = segment.start + s * (segment.end - segment.start);
       Eigen::Vector2f q = p - static_cast<float>(kReach) * normal;
       float before = bilinear(gray, q.x(), q.y());
+      float total = 0.0F;
       float sum = 0.0F;
       float moment = 0.0F;
       for (int i = 0; i < 2 * kReach; ++i) {
         q += normal;
         const float after = bilinear(gray, q.x(), q.y());
-        // Only steps from bright (left) to dark (right) belong to this line.
-        const float w = weights[static_cast<std::size_t>(i)] * std::max(0.0F, before - after);
+        // Only steps from bright (left) to dark (right) belong to this line. Walls darken towards their
+        // corners, on one side of an edge: squared, these small steps hardly pull.
+        const float step = std::max(0.0F, before - after);
+        const float windowed = weights[static_cast<std::size_t>(i)] * step;
+        const float w = windowed * step;
+        total += windowed;
         sum += w;
         moment += w * (static_cast<float>(i - kReach) + 0.5F);
         before = after;
       }
       // Saturating weight: one strong spot must not outvote the rest of the line.
-      if (sum > 0.5F) fit.add(2.0F * s - 1.0F, moment / sum, std::min(sum, 20.0F));
+      if (total > 0.5F) fit.add(2.0F * s - 1.0F, moment / sum, std::min(total, 20.0F));
     }
     float a = 0.0F;
     float b = 0.0F;

@@ -270,6 +270,10 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
 }  // namespace
 
 GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
+  // As they scatter at true poses. Lines that are off by more are so for a reason, such as a shadow along an
+  // edge, and all alike in neighbouring views: small deviations count fully, large ones are held down.
+  noise.aligned = 0.15;
+  noise.line_sigma_px = 0.1;
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
   // How the rooms of several robots lie to each other is what moves last: from a region of 1e4 it is short of

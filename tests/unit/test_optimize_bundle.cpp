@@ -218,5 +218,39 @@ TEST(AdjustBundle, EdgesAloneHoldPosesAndFreeDirectionsStay) {
   EXPECT_NEAR(after(0), before(0), 0.01);
 }
 
+TEST(AdjustBundle, AWideFirstRegionMovesManyTogetherInFewIterations) {
+  // Thirty keyframes that hold each other firmly hang on the first one by a weaker edge: only all
+  // together they can follow it.
+  Scenario scenario;
+  scenario.keyframes = 31;
+  scenario.points = 0;
+  scenario.lines = 0;
+  scenario.pose_error_m = 0.0;
+  scenario.pose_error_rad = 0.0;
+  World world = make_world(scenario);
+  constexpr double kAsk_m = 0.05;
+  for (std::size_t i = 0; i + 1 < world.problem.poses.size(); ++i) {
+    Rigid3 b_from_a =
+        world.truth.poses[i + 1].camera_from_world * world.truth.poses[i].camera_from_world.inverse();
+    if (i == 0) b_from_a.translation.x() += kAsk_m;
+    world.problem.edges.push_back({static_cast<int>(i), static_cast<int>(i) + 1, b_from_a,
+                                   (i == 0 ? 1e4 : 1e8) * geometry::Matrix6d::Identity()});
+  }
+  const auto moved_m = [&](double first_radius) {
+    BundleProblem problem = world.problem;
+    BundleOptions options;
+    options.max_iterations = 3;
+    options.rounds = 1;
+    options.tolerance = 0.0;
+    options.first_radius = first_radius;
+    EXPECT_TRUE(adjust_bundle(problem, options).usable);
+    return (problem.poses.back().camera_from_world.inverse().translation -
+            world.truth.poses.back().camera_from_world.inverse().translation)
+        .norm();
+  };
+  EXPECT_NEAR(moved_m(1e7), kAsk_m, 0.02 * kAsk_m);
+  EXPECT_LT(moved_m(1e4), 0.5 * kAsk_m);
+}
+
 }  // namespace
 }  // namespace plumbline::optimize
