@@ -51,15 +51,17 @@ class FitSum {
   double sum_ = 0.0;
 };
 
-/// What is off by more squared standard deviations than a gate is an outlier.
+/// What is off by more squared standard deviations than a gate, and by more than `least_px`, is an outlier.
 class Gate {
  public:
-  Gate(const BundleState& state, const sensor::Pinhole& camera, double point_gate, double line_gate)
+  Gate(const BundleState& state, const sensor::Pinhole& camera, double point_gate, double line_gate,
+       double least_px)
       : state_(state),
         camera_(camera),
         projection_(geometry::line_projection(camera.fx, camera.fy, camera.cx, camera.cy)),
         point_gate_(point_gate),
-        line_gate_(line_gate) {
+        line_gate_(line_gate),
+        least_px2_(least_px * least_px) {
     for (const geometry::OrthonormalLine& line : state.lines) lines_.push_back(geometry::to_plucker(line));
   }
 
@@ -71,7 +73,7 @@ class Gate {
     const int rows =
         point_residual(term, state_.poses[static_cast<std::size_t>(o.pose)], camera_, r, nullptr);
     const double squared = rows == 0 ? kInfinity : r.head<2>().squaredNorm();
-    o.outlier = !(squared <= point_gate_);
+    o.outlier = !(squared <= std::max(point_gate_, least_px2_ / (o.pixel_sigma * o.pixel_sigma)));
     return squared;
   }
   /// A line through the camera's centre has no image: it cannot be what was seen there.
@@ -85,7 +87,7 @@ class Gate {
     const Rigid3& pose = state_.poses[static_cast<std::size_t>(o.pose)];
     const bool has_image = line_residual(term, pose, projection_, r, nullptr);
     const double squared = has_image ? r.squaredNorm() : kInfinity;
-    o.outlier = !(squared <= line_gate_);
+    o.outlier = !(squared <= std::max(line_gate_, least_px2_ / (o.pixel_sigma * o.pixel_sigma)));
     return squared;
   }
 
@@ -97,6 +99,7 @@ class Gate {
   Eigen::Matrix3d projection_;
   double point_gate_;
   double line_gate_;
+  double least_px2_;
   std::vector<geometry::PluckerLine> lines_;
 };
 
@@ -113,8 +116,8 @@ BundleFit fit_of_edges(const BundleProblem& problem, const BundleState& state) {
 
 /// Puts what is beyond the gates aside. Tells how well all fits, by the gates of the options.
 BundleFits mark_outliers(BundleProblem& problem, const BundleState& state, const BundleOptions& options,
-                         double point_gate, double line_gate) {
-  const Gate gate(state, problem.camera, point_gate, line_gate);
+                         double point_gate, double line_gate, double least_px) {
+  const Gate gate(state, problem.camera, point_gate, line_gate, least_px);
   FitSum points, lines;
   for (BundlePointObservation& o : problem.point_observations) {
     const double squared = gate.mark(o);
@@ -142,6 +145,12 @@ void BundleOptions::declare(core::OptionTable& table) {
                "Huber threshold of relative poses, standard deviations");
 }
 
+namespace {
+// What slid along is off by more. Corners and lines that are known to a tenth of a pixel would otherwise
+// nearly all wait when what came before is wrong by a few millimetres.
+constexpr double kLeastFirstGate_px = 0.8;
+}  // namespace
+
 BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options,
                             const core::Executor* executor) {
   BundleSummary summary;
@@ -155,7 +164,7 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
   core::Crew crew(executor);
   if (options.first_gate > 0.0) {
     const double gate = options.first_gate * options.first_gate;
-    summary.before = mark_outliers(problem, state, options, gate, gate);
+    summary.before = mark_outliers(problem, state, options, gate, gate, kLeastFirstGate_px);
   }
   for (int round = 0; round < options.rounds; ++round) {
     const RoundSummary done = solve_bundle_round(problem, options, crew, state);
@@ -164,7 +173,7 @@ BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options
     if (!done.usable) return summary;
     summary.final_cost = done.final_cost;
     summary.iterations += done.iterations;
-    summary.after = mark_outliers(problem, state, options, options.point_gate, options.line_gate);
+    summary.after = mark_outliers(problem, state, options, options.point_gate, options.line_gate, 0.0);
   }
   write_back(state, problem);
   summary.usable = true;

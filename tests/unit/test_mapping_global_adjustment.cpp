@@ -197,7 +197,7 @@ TEST(AdjustMap, LandmarksThatSlidAlongDoNotUndoWhatEdgesCorrect) {
   ASSERT_GT(RingMap(0.0, 40, 1000, 20).rmse(), 0.06);
   const double undone = adjusted(0.0);
   EXPECT_GT(undone, 0.02);
-  EXPECT_LT(adjusted(3.0), 0.5 * undone);
+  EXPECT_LT(adjusted(GlobalAdjustmentOptions().first_gate), 0.5 * undone);
 }
 
 TEST(AdjustMap, RobotsMayHaveDifferentCameras) {
