@@ -51,6 +51,10 @@ class FitSum {
   double sum_ = 0.0;
 };
 
+/// What slid along is off by more than this: corners and lines that are known to a tenth of a pixel do not
+/// wait for a third of one.
+constexpr double kLeastFirstGate_px = 0.8;
+
 /// What is off by more squared standard deviations than a gate, and by more than `least_px`, is an outlier.
 class Gate {
  public:
@@ -73,7 +77,7 @@ class Gate {
     const int rows =
         point_residual(term, state_.poses[static_cast<std::size_t>(o.pose)], camera_, r, nullptr);
     const double squared = rows == 0 ? kInfinity : r.head<2>().squaredNorm();
-    o.outlier = !(squared <= std::max(point_gate_, least_px2_ / (o.pixel_sigma * o.pixel_sigma)));
+    o.outlier = beyond(squared, point_gate_, o.pixel_sigma);
     return squared;
   }
   /// A line through the camera's centre has no image: it cannot be what was seen there.
@@ -87,13 +91,17 @@ class Gate {
     const Rigid3& pose = state_.poses[static_cast<std::size_t>(o.pose)];
     const bool has_image = line_residual(term, pose, projection_, r, nullptr);
     const double squared = has_image ? r.squaredNorm() : kInfinity;
-    o.outlier = !(squared <= std::max(line_gate_, least_px2_ / (o.pixel_sigma * o.pixel_sigma)));
+    o.outlier = beyond(squared, line_gate_, o.pixel_sigma);
     return squared;
   }
 
  private:
   using Rigid3 = geometry::Rigid3;
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  /// Also what is no number.
+  [[nodiscard]] bool beyond(double squared, double gate, double pixel_sigma) const {
+    return !(squared <= std::max(gate, least_px2_ / (pixel_sigma * pixel_sigma)));
+  }
   const BundleState& state_;
   const sensor::Pinhole& camera_;
   Eigen::Matrix3d projection_;
@@ -144,12 +152,6 @@ void BundleOptions::declare(core::OptionTable& table) {
   table.number("bundle.edge_loss", edge_loss, {0.1, 1000.0}, "",
                "Huber threshold of relative poses, standard deviations");
 }
-
-namespace {
-// What slid along is off by more. Corners and lines that are known to a tenth of a pixel would otherwise
-// nearly all wait when what came before is wrong by a few millimetres.
-constexpr double kLeastFirstGate_px = 0.8;
-}  // namespace
 
 BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options,
                             const core::Executor* executor) {

@@ -180,14 +180,19 @@ TEST(AdjustBundle, ALineWithoutAnImageIsAnOutlier) {
   EXPECT_EQ(summary.line_outliers, 1);
 }
 
-TEST(AdjustBundle, EdgesAloneHoldPosesAndFreeDirectionsStay) {
+/// Poses alone.
+World bare_world(int keyframes, double pose_error_m, double pose_error_rad) {
   Scenario s;
-  s.keyframes = 5;
+  s.keyframes = keyframes;
   s.points = 0;
   s.lines = 0;
-  s.pose_error_m = 0.05;
-  s.pose_error_rad = 0.03;
-  World world = make_world(s);
+  s.pose_error_m = pose_error_m;
+  s.pose_error_rad = pose_error_rad;
+  return make_world(s);
+}
+
+TEST(AdjustBundle, EdgesAloneHoldPosesAndFreeDirectionsStay) {
+  World world = bare_world(5, 0.05, 0.03);
   for (int i = 0; i + 1 < 5; ++i) {
     const auto a = static_cast<std::size_t>(i);
     world.problem.edges.push_back(
@@ -221,13 +226,7 @@ TEST(AdjustBundle, EdgesAloneHoldPosesAndFreeDirectionsStay) {
 TEST(AdjustBundle, AWideFirstRegionMovesManyTogetherInFewIterations) {
   // Thirty keyframes that hold each other firmly hang on the first one by a weaker edge: only all
   // together they can follow it.
-  Scenario scenario;
-  scenario.keyframes = 31;
-  scenario.points = 0;
-  scenario.lines = 0;
-  scenario.pose_error_m = 0.0;
-  scenario.pose_error_rad = 0.0;
-  World world = make_world(scenario);
+  World world = bare_world(31, 0.0, 0.0);
   constexpr double kAsk_m = 0.05;
   for (std::size_t i = 0; i + 1 < world.problem.poses.size(); ++i) {
     Rigid3 b_from_a =

@@ -72,7 +72,8 @@ struct GlobalAdjustmentOptions {
   double surface_weight = 0.3;  ///< of the map's surface edges: their samples are alike from one to the next
   /// Standard deviations. Where a tracker slid along a wall, it is the landmarks of that moment that agree on
   /// it, all alike: in a bundle they would undo what edges from elsewhere have corrected. What is further off
-  /// than this at the poses of the graph waits for the second round (optimize::BundleOptions); 0: none waits.
+  /// than this, and 0.8 px, at the poses of the graph waits for the second round (optimize::BundleOptions);
+  /// 0: none waits.
   double first_gate = 3.0;
   optimize::PoseGraphOptions graph;
   optimize::BundleOptions bundle_options;
