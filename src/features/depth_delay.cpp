@@ -23,12 +23,13 @@ class Delay {
     const Eigen::Vector3d p = depth_from_camera_ * ray(pixel, z);
     return p.z() < kNear ? pixel : Eigen::Vector2f(camera_.project(p).cast<float>());
   }
-  [[nodiscard]] float point_depth(const PointFeature& point) const {
+  [[nodiscard]] CornerDepth point_depth(const PointFeature& point) const {
     const Eigen::Vector2f there = in_depth(point.pixel, static_cast<double>(point.depth));
-    const float z = corner_depth(depth_, there.x(), there.y());
-    if (!(z > 0.0F)) return 0.0F;
-    const double back = (camera_from_depth_ * ray(there, static_cast<double>(z))).z();
-    return back < kNear ? 0.0F : static_cast<float>(back);
+    const CornerDepth found = corner_depth(depth_, there.x(), there.y());
+    if (!(found.z > 0.0F)) return {};
+    const double back = (camera_from_depth_ * ray(there, static_cast<double>(found.z))).z();
+    if (back < kNear) return {};
+    return {static_cast<float>(back), found.slant};
   }
   [[nodiscard]] std::optional<Line3> line_depth(const LineFeature& line,
                                                 const LineDepthOptions& options) const {
@@ -61,7 +62,10 @@ void undo_point_depth_delay(FrameFeatures& features, const cv::Mat& depth, const
   if (depth.empty()) return;
   const Delay delay(depth, camera, depth_from_camera);
   for (PointFeature& point : features.points) {
-    if (point.depth > 0.0F) point.depth = delay.point_depth(point);
+    if (!(point.depth > 0.0F)) continue;
+    const CornerDepth found = delay.point_depth(point);
+    point.depth = found.z;
+    point.slant = found.slant;
   }
 }
 

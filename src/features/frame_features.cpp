@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/features/frame_features.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "depth_roughness.hpp"
 #include "plumbline/features/line_border.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -89,9 +91,25 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
 /// What lies behind a border moves apart from what lies before: patches there are left empty.
 void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extractor, OrbFeatures& orb) {
   if (depth.empty()) return;
+  constexpr int kSteps = 5;  // from the corner to the end of what is asked
+  std::vector<float> roughness;
+  std::vector<std::size_t> asked;
   for (std::size_t i = 0; i < orb.points.size(); ++i) {
+    const Eigen::Vector2f& pixel = orb.points[i].pixel;
     const auto reach = static_cast<float>(CornerPatch::kReach) * extractor.sigma(orb.points[i].octave);
-    if (at_border(depth, orb.points[i].pixel, reach)) orb.patches[i].gray.fill(0);
+    if (at_border(depth, pixel, reach)) {
+      orb.patches[i].gray.fill(0);
+      continue;
+    }
+    const int x = std::clamp(cvRound(pixel.x()), 0, depth.cols - 1);
+    const int y = std::clamp(cvRound(pixel.y()), 0, depth.rows - 1);
+    if (!(depth.at<float>(y, x) > 0.0F)) continue;  // nothing is known
+    roughness.push_back(depth_roughness(depth, x, y, cvRound(reach), std::max(1, cvRound(reach) / kSteps)));
+    asked.push_back(i);
+  }
+  const float limit = roughness_limit(roughness);
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    if (roughness[k] > limit) orb.patches[asked[k]].gray.fill(0);
   }
 }
 
@@ -135,15 +153,16 @@ void PointGrid::within(const std::vector<PointFeature>& points, float x, float y
   }
 }
 
-float corner_depth(const cv::Mat& depth, float x, float y) {
-  if (depth.empty()) return 0.0F;
+CornerDepth corner_depth(const cv::Mat& depth, float x, float y) {
+  if (depth.empty()) return {};
   const int cx = cvRound(x);
   const int cy = cvRound(y);
   constexpr int kRadius = 2;
   float nearest = 1e30F;
   float farthest = 0.0F;
-  float sum = 0.0F;
   int count = 0;
+  Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
+  Eigen::Vector3f right = Eigen::Vector3f::Zero();
   for (int v = std::max(0, cy - kRadius); v <= std::min(depth.rows - 1, cy + kRadius); ++v) {
     const float* row = depth.ptr<float>(v);
     for (int u = std::max(0, cx - kRadius); u <= std::min(depth.cols - 1, cx + kRadius); ++u) {
@@ -151,14 +170,20 @@ float corner_depth(const cv::Mat& depth, float x, float y) {
       if (!(z > 0.0F)) continue;
       nearest = std::min(nearest, z);
       farthest = std::max(farthest, z);
-      sum += z;
+      const Eigen::Vector3f basis(1.0F, static_cast<float>(u) - x, static_cast<float>(v) - y);
+      normal += basis * basis.transpose();
+      right += basis / z;
       ++count;
     }
   }
-  if (count < 8) return 0.0F;
+  if (count < 8) return {};
   const double tolerance = 0.01 * nearest + 6.0 * sensor::depth_sigma(nearest);
-  if (farthest - nearest > tolerance) return 0.0F;
-  return sum / static_cast<float>(count);
+  if (farthest - nearest > tolerance) return {};
+  const Eigen::Vector3f plane = normal.ldlt().solve(right);
+  const float z = 1.0F / plane.x();
+  // Too few beside each other to tell a slant.
+  if (!(z >= nearest - tolerance && z <= farthest + tolerance)) return {};
+  return {z, plane.tail<2>()};
 }
 
 void FeatureOptions::declare(core::OptionTable& table) {
@@ -177,7 +202,11 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   if (frame.gray.empty()) return result;
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
-    for (PointFeature& p : orb.points) p.depth = corner_depth(frame.depth, p.pixel.x(), p.pixel.y());
+    for (PointFeature& p : orb.points) {
+      const CornerDepth found = corner_depth(frame.depth, p.pixel.x(), p.pixel.y());
+      p.depth = found.z;
+      p.slant = found.slant;
+    }
     empty_patches_at_borders(frame.depth, orb_, orb);
     result.points = std::move(orb.points);
     result.descriptors = std::move(orb.descriptors);

@@ -18,9 +18,11 @@ struct Sight {
 
 /// None when the keyframe saw it from a direction or at a distance that is too different.
 std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& seen,
-                              const Eigen::Vector3d& position, const sensor::Pinhole& camera,
-                              const geometry::Rigid3& camera_from_world, double log_scale) {
+                              const Eigen::Vector3d& position, const Eigen::Vector3d& normal,
+                              const sensor::Pinhole& camera, const geometry::Rigid3& camera_from_world,
+                              double log_scale) {
   constexpr double kLeastCosine = 0.9;
+  constexpr double kMostOblique = 0.15;  // cosine: normals are not known well enough
   constexpr double kMostOctaves = 3.5;
   constexpr double kNearest_m = 0.05;
   const maps::Keyframe& keyframe = map.keyframe(seen.keyframe);
@@ -36,11 +38,14 @@ std::optional<Sight> sight_of(const maps::Map& map, const maps::Observation& see
   Sight sight;
   sight.farther = std::log(here.norm() / there.norm()) / log_scale;
   if (std::abs(sight.farther) > kMostOctaves) return std::nullopt;
-  // A plane across the line of sight there, seen from here: one pixel each way.
+  // Its surface there, or a plane across the line of sight, seen from here: one pixel each way.
+  const Eigen::Vector3d facing = there_from_world.rotation * normal;
+  const bool slanted = -facing.dot(there) > kMostOblique * there.norm();
+  const Eigen::Vector3d across = slanted ? facing : there;
   const Eigen::Vector2d at = camera.project(there);
   const auto carried = [&](double du, double dv) {
     const Eigen::Vector3d ray = camera.unproject(at.x() + du, at.y() + dv, 1.0);
-    return Eigen::Vector2d(camera.project(here_from_there * (ray * (there.squaredNorm() / there.dot(ray)))));
+    return Eigen::Vector2d(camera.project(here_from_there * (ray * (across.dot(there) / across.dot(ray)))));
   };
   sight.frame_from_patch.col(0) = (0.5 * (carried(1.0, 0.0) - carried(-1.0, 0.0))).cast<float>();
   sight.frame_from_patch.col(1) = (0.5 * (carried(0.0, 1.0) - carried(0.0, -1.0))).cast<float>();
@@ -56,7 +61,7 @@ std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& poi
                                  double log_scale) {
   for (const maps::Observation& o : point.observations) {
     if (!o.aligned) continue;
-    const auto sight = sight_of(map, o, point.position, camera, camera_from_world, log_scale);
+    const auto sight = sight_of(map, o, point.position, point.normal, camera, camera_from_world, log_scale);
     if (sight) return sight->frame_from_patch.allFinite() ? sight : std::nullopt;
   }
   return std::nullopt;
@@ -109,7 +114,8 @@ std::optional<Eigen::Vector2f> align_sighting(const maps::Map& map, const maps::
                                               const geometry::Rigid3& camera_from_world,
                                               double scale_factor) {
   if (levels.empty()) return std::nullopt;
-  const auto sight = sight_of(map, seen, position, camera, camera_from_world, std::log(scale_factor));
+  const auto sight = sight_of(map, seen, position, Eigen::Vector3d::Zero(), camera, camera_from_world,
+                              std::log(scale_factor));
   if (!sight || !sight->frame_from_patch.allFinite() || sight->patch->empty()) return std::nullopt;
   return align(*sight, levels, start, scale_factor);
 }

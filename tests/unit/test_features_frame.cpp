@@ -7,7 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "depth_roughness.hpp"
 #include "plumbline/features/frame_features.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::features {
 namespace {
@@ -50,26 +52,84 @@ TEST(PointGrid, EmptyOnesFindNothing) {
 
 TEST(CornerDepth, IsTheMeanOfOneSurfaceOnly) {
   cv::Mat depth(100, 100, CV_32FC1, cv::Scalar(2.0F));
-  EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F), 2.0F);
-  EXPECT_FLOAT_EQ(corner_depth(depth, 0.0F, 0.0F), 2.0F) << "the corner of the picture still has nine pixels";
+  EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F).z, 2.0F);
+  EXPECT_FLOAT_EQ(corner_depth(depth, 0.0F, 0.0F).z, 2.0F)
+      << "the corner of the picture still has nine pixels";
   depth.at<float>(50, 50) = 0.0F;
-  EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F), 2.0F) << "a hole in the middle is bridged";
+  EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F).z, 2.0F) << "a hole in the middle is bridged";
   depth(cv::Rect(52, 0, 48, 100)).setTo(3.0F);
-  EXPECT_EQ(corner_depth(depth, 50.0F, 50.0F), 0.0F) << "over a border";
-  EXPECT_FLOAT_EQ(corner_depth(depth, 49.0F, 50.0F), 2.0F) << "just beside it";
+  EXPECT_EQ(corner_depth(depth, 50.0F, 50.0F).z, 0.0F) << "over a border";
+  EXPECT_FLOAT_EQ(corner_depth(depth, 49.0F, 50.0F).z, 2.0F) << "just beside it";
+}
+
+TEST(CornerDepth, SlantedSurfacesAreReadBetweenPixels) {
+  cv::Mat depth(100, 100, CV_32FC1);
+  const auto z = [](float u, float v) { return 1.0F / (0.4F - 0.0012F * u + 0.0009F * v); };
+  for (int v = 0; v < 100; ++v) {
+    for (int u = 0; u < 100; ++u) depth.at<float>(v, u) = z(static_cast<float>(u), static_cast<float>(v));
+  }
+  depth.at<float>(51, 48) = 0.0F;
+  PointFeature corner;
+  corner.pixel = {49.6F, 50.3F};
+  const CornerDepth found = corner_depth(depth, corner.pixel.x(), corner.pixel.y());
+  EXPECT_NEAR(found.z, z(49.6F, 50.3F), 1e-5F);
+  corner.depth = found.z;
+  corner.slant = found.slant;
+  EXPECT_NEAR(corner.depth_beside({3.0F, -2.0F}), z(52.6F, 48.3F), 1e-4F);
+  EXPECT_EQ(corner.depth_beside({400.0F, 0.0F}), 0.0F) << "beyond the horizon of the surface";
+  FrameFeatures features;
+  features.points = {corner};
+  features.patches.resize(1);
+  features.move_point(0, {-2.0F, 1.5F});
+  EXPECT_NEAR(features.points[0].depth, z(47.6F, 51.8F), 1e-4F) << "moved corners take their depth along";
+}
+
+/// Depth of a wall at 2.2 m, slanted, with the noise of a sensor; right of column 50 it is nearer by
+/// `step_m`.
+cv::Mat noisy_wall(float step_m, double noise) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0.0, noise);
+  cv::Mat depth(100, 100, CV_32FC1);
+  for (int v = 0; v < 100; ++v) {
+    for (int u = 0; u < 100; ++u) {
+      const double z = 1.0 / (0.45 - 0.0008 * u) - (u > 50 ? static_cast<double>(step_m) : 0.0);
+      depth.at<float>(v, u) = static_cast<float>(z + normal(random) * sensor::depth_sigma(z));
+    }
+  }
+  return depth;
+}
+
+TEST(DepthRoughness, TellsLowBordersFromNoiseOfAnySize) {
+  for (const double noise : {0.1, 0.5, 1.0}) {
+    const auto roughness_at = [&](const cv::Mat& depth, int u) {
+      return depth_roughness(depth, u, 40, 5, 1);
+    };
+    const cv::Mat plain = noisy_wall(0.0F, noise);
+    std::vector<float> most;
+    for (int u = 10; u < 90; ++u) most.push_back(roughness_at(plain, u));
+    const float limit = roughness_limit(most);
+    EXPECT_LT(*std::max_element(most.begin(), most.end()), limit) << "noise " << noise;
+    const cv::Mat stepped = noisy_wall(0.07F, noise);
+    for (int u = 47; u < 55; ++u) EXPECT_GT(roughness_at(stepped, u), limit) << u << ", noise " << noise;
+    EXPECT_LT(roughness_at(stepped, 42), limit) << "well beside it";
+  }
+  EXPECT_NEAR(roughness_limit({}), 2.0F, 1e-6F) << "the sensor's model, where nothing was seen";
+  EXPECT_GT(depth_roughness(cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.0)), 10, 10, 5, 1), 100.0F);
+  EXPECT_GT(depth_roughness(cv::Mat(20, 20, CV_32FC1, cv::Scalar(2.0)), 0, 0, 5, 1), 100.0F)
+      << "in the picture's corner nothing lies opposite";
 }
 
 TEST(CornerDepth, BadDepthIsNoDepth) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(corner_depth({}, 5.0F, 5.0F), 0.0F);
+  EXPECT_EQ(corner_depth({}, 5.0F, 5.0F).z, 0.0F);
   for (float bad : {0.0F, -1.0F, nan, infinity}) {
     cv::Mat depth(20, 20, CV_32FC1, cv::Scalar(static_cast<double>(bad)));
-    EXPECT_EQ(corner_depth(depth, 10.0F, 10.0F), 0.0F) << bad;
+    EXPECT_EQ(corner_depth(depth, 10.0F, 10.0F).z, 0.0F) << bad;
   }
   cv::Mat depth(20, 20, CV_32FC1, cv::Scalar(static_cast<double>(nan)));
   depth(cv::Rect(8, 8, 3, 2)).setTo(1.5F);
-  EXPECT_EQ(corner_depth(depth, 10.0F, 10.0F), 0.0F) << "too few";
+  EXPECT_EQ(corner_depth(depth, 10.0F, 10.0F).z, 0.0F) << "too few";
 }
 
 sensor::RgbdFrame textured_frame() {

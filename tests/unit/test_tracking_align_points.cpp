@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/tracking/align_points.hpp"
 #include "smooth_picture.hpp"
@@ -14,7 +16,7 @@ using tests::kTestCamera;
 
 constexpr double kDistance = 2.0;  // m, of the wall that all pictures show
 
-/// A wall of waves, square to the first camera, that only moves sideways and back.
+/// A wall of waves, square to the first camera unless it is slanted. The camera only moves sideways and back.
 class WallWorld : public testing::Test {
  protected:
   static Rigid3 camera_at(double x, double y, double back) {
@@ -23,11 +25,16 @@ class WallWorld : public testing::Test {
 
   cv::Mat film(const Rigid3& camera_from_world) const {
     return tests::draw(kTestCamera.width, kTestCamera.height, [&](double u, double v) {
-      const Eigen::Vector3d ray = kTestCamera.unproject(u, v, 1.0);
-      const Eigen::Vector3d p =
-          camera_from_world.inverse() * (ray * (kDistance + camera_from_world.translation.z()));
+      const Eigen::Vector3d p = on_wall(camera_from_world, u, v);
       return waves_(p.x() * 250.0, p.y() * 250.0);
     });
+  }
+  /// What of the wall a pixel shows, world.
+  Eigen::Vector3d on_wall(const Rigid3& camera_from_world, double u, double v) const {
+    const Rigid3 world_from_camera = camera_from_world.inverse();
+    const Eigen::Vector3d ray = world_from_camera.rotation * kTestCamera.unproject(u, v, 1.0);
+    const Eigen::Vector3d to_wall = Eigen::Vector3d(0, 0, kDistance) - world_from_camera.translation;
+    return world_from_camera.translation + ray * (normal_.dot(to_wall) / normal_.dot(ray));
   }
   /// Features with a corner at each of these whole pixels, in octave 0.
   features::FrameFeatures features_of(const Rigid3& pose, const std::vector<Eigen::Vector2i>& corners) const {
@@ -55,9 +62,7 @@ class WallWorld : public testing::Test {
     for (std::size_t i = 0; i < points.size(); ++i) {
       maps::MapPoint point;
       const Eigen::Vector2d pixel = points[i].pixel.cast<double>();
-      point.position =
-          map_.camera_from_world(id).inverse() *
-          kTestCamera.unproject(pixel.x(), pixel.y(), kDistance + map_.camera_from_world(id).translation.z());
+      point.position = on_wall(map_.camera_from_world(id), pixel.x(), pixel.y());
       ids_.push_back(map_.add_point(0, point));
       map_.observe(ids_.back(), id, static_cast<int>(i), true);
     }
@@ -98,6 +103,7 @@ class WallWorld : public testing::Test {
   }
 
   tests::Waves waves_{7};
+  Eigen::Vector3d normal_ = -Eigen::Vector3d::UnitZ();  ///< of the wall, towards the camera
   maps::Map map_;
   std::vector<core::PointId> ids_;
 };
@@ -123,6 +129,29 @@ TEST_F(WallWorld, CornersMoveFromWholePixelsToTheLandmarks) {
   EXPECT_GT(aligned, 9 * static_cast<int>(ids_.size()) / 10);
   for (PointMatch& m : matches) m.shift.setZero();
   EXPECT_GT(error(frame, pose, matches, aligned), 0.2) << "corners were as good before";
+}
+
+TEST_F(WallWorld, SlantedSurfacesAreForeshortenedAsTheyAre) {
+  normal_ = Eigen::Vector3d(1.0, 0.3, -0.6).normalized();
+  const Rigid3 first = camera_at(0, 0, 0);
+  std::vector<Eigen::Vector2i> corners = grid();
+  // The wall's far end is out of reach.
+  corners.erase(std::remove_if(corners.begin(), corners.end(),
+                               [](const Eigen::Vector2i& c) { return c.x() > kTestCamera.width / 2; }),
+                corners.end());
+  found(add_keyframe(first, features_of(first, corners)));
+  const Rigid3 pose = camera_at(-0.25, 0.0, -0.1);
+  const features::FrameFeatures frame = features_of(pose, corners_at(pose));
+  std::vector<PointMatch> matches = all_matches();
+  int aligned = 0, across = 0;
+  align_points(map_, frame, kTestCamera, pose, 1.2, matches);
+  const double error_across = error(frame, pose, matches, across);
+  for (const core::PointId id : ids_) map_.point(id).normal = normal_;
+  align_points(map_, frame, kTestCamera, pose, 1.2, matches);
+  EXPECT_LT(error(frame, pose, matches, aligned), 0.06);
+  EXPECT_GT(error_across, 0.1) << "planes across the line of sight would do as well";
+  EXPECT_GT(aligned, across);
+  EXPECT_GT(aligned, 8 * static_cast<int>(ids_.size()) / 10);
 }
 
 TEST_F(WallWorld, WhatWasAlignedOnceIsAlignedWithWhenItsKeyframeIsTheOldestLeft) {

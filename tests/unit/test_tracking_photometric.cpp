@@ -7,6 +7,7 @@
 #include <random>
 
 #include "plumbline/optimize/pose_solver.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/photometric_alignment.hpp"
 
 namespace plumbline {
@@ -219,6 +220,25 @@ TEST(Photometric, SamplesLeaveOutJumpsAndMissingDepth) {
   }
   EXPECT_TRUE(
       features::sample_photometric(features::make_photometric_image(first.gray), {}, kCamera, {})[0].empty());
+}
+
+TEST(Photometric, SamplesLeaveOutBordersTooLowForOnePixelToTell) {
+  Look first = look({}, 10.0, 1);
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0.0F, 1.0F);
+  for (float& z : first.depth) {
+    z += 0.8F * noise(random) * static_cast<float>(sensor::depth_sigma(static_cast<double>(z)));
+  }
+  first.depth.colRange(320, 640) -= 0.1F;
+  const auto samples =
+      features::sample_photometric(features::make_photometric_image(first.gray), first.depth, kCamera, {});
+  int left = 0;
+  for (const features::PhotometricSample& s : samples[0]) {
+    const double u = kCamera.project(s.point.cast<double>()).x();
+    EXPECT_GT(std::abs(u - 319.5), 2.0);
+    if (u < 310.0) ++left;
+  }
+  EXPECT_GT(left, 2000) << "noise is no border";
 }
 
 TEST(Photometric, KeyframesAreForgottenWhenThereAreMany) {

@@ -47,6 +47,7 @@ struct FrameFeatures {
   /// Point `i` stands for what lies `shift` (pixels) beside where it was found. Its patch stays what it is
   /// and knows how far beside. `grid` is as before: make it anew once all points have moved.
   void move_point(std::size_t i, const Eigen::Vector2f& shift) {
+    points[i].depth = points[i].depth_beside(shift);
     points[i].pixel += shift;
     patches[i].offset = shift;
   }
@@ -75,8 +76,13 @@ class FeatureExtractor {
   LineExtractor lines_;
 };
 
-/// Depth of a corner, metres: the mean of the valid pixels around it that belong to one surface; 0 when there
-/// are too few or they spread over a depth border.
-float corner_depth(const cv::Mat& depth, float x, float y);
+/// What depth says of a corner.
+struct CornerDepth {
+  float z = 0.0F;                                   ///< metres; 0: unknown
+  Eigen::Vector2f slant = Eigen::Vector2f::Zero();  ///< as PointFeature::slant
+};
+/// Depth at a place between pixels: the plane (affine inverse depth) through the valid pixels around it.
+/// Unknown when there are too few or they spread over a depth border.
+CornerDepth corner_depth(const cv::Mat& depth, float x, float y);
 
 }  // namespace plumbline::features
