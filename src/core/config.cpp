@@ -130,7 +130,9 @@ std::string did_you_mean(const std::string& word, const std::vector<std::string>
 }
 
 std::string hint(const std::string& word, const std::vector<std::string>& allowed) {
+  constexpr std::size_t kReadable = 16;  // names; nobody looks for one among a hundred when it was guessed
   const std::string near = did_you_mean(word, allowed);
+  if (!near.empty() && allowed.size() > kReadable) return fmt::format("; did you mean {}?", near);
   return fmt::format("{} (allowed: {})", near.empty() ? "" : fmt::format("; did you mean {}?", near),
                      allowed.empty() ? "nothing" : fmt::format("{}", fmt::join(allowed, ", ")));
 }

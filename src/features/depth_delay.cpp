@@ -61,11 +61,13 @@ void undo_point_depth_delay(FrameFeatures& features, const cv::Mat& depth, const
                             const Rigid3& depth_from_camera) {
   if (depth.empty()) return;
   const Delay delay(depth, camera, depth_from_camera);
-  for (PointFeature& point : features.points) {
+  features.slants.resize(features.points.size(), Eigen::Vector2f::Zero());
+  for (std::size_t i = 0; i < features.points.size(); ++i) {
+    PointFeature& point = features.points[i];
     if (!(point.depth > 0.0F)) continue;
     const CornerDepth found = delay.point_depth(point);
     point.depth = found.z;
-    point.slant = found.slant;
+    features.slants[i] = found.slant;
   }
 }
 

@@ -202,10 +202,11 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   if (frame.gray.empty()) return result;
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
+    result.slants.reserve(orb.points.size());
     for (PointFeature& p : orb.points) {
       const CornerDepth found = corner_depth(frame.depth, p.pixel.x(), p.pixel.y());
       p.depth = found.z;
-      p.slant = found.slant;
+      result.slants.push_back(found.slant);
     }
     empty_patches_at_borders(frame.depth, orb_, orb);
     result.points = std::move(orb.points);

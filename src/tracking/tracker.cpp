@@ -32,7 +32,8 @@ std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::ve
     term.pixel = (f.pixel + match.shift).cast<double>();
     term.pixel_sigma =
         std::pow(options.scale_factor, f.octave) * (match.aligned ? options.aligned_sigma : 1.0);
-    if (const float depth = f.depth_beside(match.shift); depth > 0.0F) {
+    const float depth = features.depth_beside(static_cast<std::size_t>(match.feature), match.shift);
+    if (depth > 0.0F) {
       term.depth = static_cast<double>(depth);
       // The landmark's own depth is no better than the measurement.
       term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);

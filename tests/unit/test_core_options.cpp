@@ -160,6 +160,10 @@ TEST(Options, ForgottenGroupsAreSuggested) {
   EXPECT_EQ(hint("voxl", {"voxel", "filters"}), "; did you mean voxel? (allowed: voxel, filters)");
   EXPECT_EQ(hint("banana", {"voxel"}), " (allowed: voxel)");
   EXPECT_EQ(hint("banana", {}), " (allowed: nothing)");
+  std::vector<std::string> many{"voxel"};
+  for (char c = 'a'; c <= 'z'; ++c) many.push_back(std::string("filter_") + c);
+  EXPECT_EQ(hint("voxl", many), "; did you mean voxel?");
+  EXPECT_NE(hint("banana", many).find("filter_z"), std::string::npos) << "without a guess all are named";
 }
 
 TEST(Options, SchemaOfEveryType) {

@@ -36,9 +36,7 @@ FrameFeatures seen_in(const cv::Mat& depth) {
     for (int u = 40; u < 280; u += 20) {
       PointFeature point;
       point.pixel = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
-      const CornerDepth found = corner_depth(depth, point.pixel.x(), point.pixel.y());
-      point.depth = found.z;
-      point.slant = found.slant;
+      point.depth = corner_depth(depth, point.pixel.x(), point.pixel.y()).z;
       features.points.push_back(point);
     }
   }

@@ -69,17 +69,17 @@ TEST(CornerDepth, SlantedSurfacesAreReadBetweenPixels) {
     for (int u = 0; u < 100; ++u) depth.at<float>(v, u) = z(static_cast<float>(u), static_cast<float>(v));
   }
   depth.at<float>(51, 48) = 0.0F;
-  PointFeature corner;
-  corner.pixel = {49.6F, 50.3F};
-  const CornerDepth found = corner_depth(depth, corner.pixel.x(), corner.pixel.y());
+  const CornerDepth found = corner_depth(depth, 49.6F, 50.3F);
   EXPECT_NEAR(found.z, z(49.6F, 50.3F), 1e-5F);
-  corner.depth = found.z;
-  corner.slant = found.slant;
-  EXPECT_NEAR(corner.depth_beside({3.0F, -2.0F}), z(52.6F, 48.3F), 1e-4F);
-  EXPECT_EQ(corner.depth_beside({400.0F, 0.0F}), 0.0F) << "beyond the horizon of the surface";
   FrameFeatures features;
-  features.points = {corner};
+  features.points.resize(1);
+  features.points[0].pixel = {49.6F, 50.3F};
+  features.points[0].depth = found.z;
   features.patches.resize(1);
+  EXPECT_EQ(features.depth_beside(0, {3.0F, -2.0F}), found.z) << "no slant is known";
+  features.slants = {found.slant};
+  EXPECT_NEAR(features.depth_beside(0, {3.0F, -2.0F}), z(52.6F, 48.3F), 1e-4F);
+  EXPECT_EQ(features.depth_beside(0, {400.0F, 0.0F}), 0.0F) << "beyond the horizon of the surface";
   features.move_point(0, {-2.0F, 1.5F});
   EXPECT_NEAR(features.points[0].depth, z(47.6F, 51.8F), 1e-4F) << "moved corners take their depth along";
 }

@@ -66,7 +66,8 @@ std::string to_flow_yaml(const ConfigNode& node);
 /// candidates the last part alone will do.
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates);
 
-/// What follows "unknown key": "; did you mean voxel? (allowed: voxel, filters)".
+/// What follows "unknown key": "; did you mean voxel? (allowed: voxel, filters)". Of many that are allowed
+/// only the one that is near, if one is.
 std::string hint(const std::string& word, const std::vector<std::string>& allowed);
 
 }  // namespace plumbline::core

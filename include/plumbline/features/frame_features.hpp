@@ -39,15 +39,26 @@ struct FrameFeatures {
   std::vector<CornerPatch> patches;        ///< of points; no elements: not known
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave; empty once the frame is tracked
   std::shared_ptr<const PhotometricImage> photometric;  ///< for direct alignment; null once it is tracked
+  /// Of points: how the surface slants, change of the inverse depth per pixel (1/m). No elements: not known;
+  /// keyframes give theirs up once all of their corners lie where they belong.
+  std::vector<Eigen::Vector2f> slants;
   PointGrid grid;
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
 
+  /// Depth of point `i`'s surface `shift` pixels beside it, metres; 0 where there is none.
+  [[nodiscard]] float depth_beside(std::size_t i, const Eigen::Vector2f& shift) const {
+    const float depth = points[i].depth;
+    if (slants.size() != points.size()) return depth;
+    const float scale = 1.0F + depth * slants[i].dot(shift);
+    return scale > 0.0F ? depth / scale : 0.0F;
+  }
+
   /// Point `i` stands for what lies `shift` (pixels) beside where it was found. Its patch stays what it is
   /// and knows how far beside. `grid` is as before: make it anew once all points have moved.
   void move_point(std::size_t i, const Eigen::Vector2f& shift) {
-    points[i].depth = points[i].depth_beside(shift);
+    points[i].depth = depth_beside(i, shift);
     points[i].pixel += shift;
     patches[i].offset = shift;
   }
@@ -79,7 +90,7 @@ class FeatureExtractor {
 /// What depth says of a corner.
 struct CornerDepth {
   float z = 0.0F;                                   ///< metres; 0: unknown
-  Eigen::Vector2f slant = Eigen::Vector2f::Zero();  ///< as PointFeature::slant
+  Eigen::Vector2f slant = Eigen::Vector2f::Zero();  ///< as FrameFeatures::slants
 };
 /// Depth at a place between pixels: the plane (affine inverse depth) through the valid pixels around it.
 /// Unknown when there are too few or they spread over a depth border.

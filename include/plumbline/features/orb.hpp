@@ -20,15 +20,6 @@ struct PointFeature {
   float angle = 0.0F;     ///< orientation, degrees [0, 360)
   float response = 0.0F;  ///< FAST score
   std::int32_t octave = 0;
-  /// Of the inverse depth, per metre and pixel: how the surface slants. Not kept with a map: known while a
-  /// frame is tracked.
-  Eigen::Vector2f slant = Eigen::Vector2f::Zero();
-
-  /// Depth of the same surface `shift` pixels beside; 0 where there is none.
-  [[nodiscard]] float depth_beside(const Eigen::Vector2f& shift) const {
-    const float scale = 1.0F + depth * slant.dot(shift);
-    return scale > 0.0F ? depth / scale : 0.0F;
-  }
 };
 
 struct OrbOptions {
