@@ -297,8 +297,8 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
                "A round ends with an iteration that lowers the cost by a smaller share");
   table.number("adjust.first_gate", first_gate, {0.0, 1000.0}, "",
                "Observations further off than so many standard deviations, and 0.8 px, where the pose graph "
-               "has put the "
-               "keyframes wait for the second round: those that caused a drift would restore it; 0: none");
+               "has put the keyframes wait for the second round: those that caused a drift would restore it; "
+               "0: none");
   noise.declare(table, "adjust.");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");

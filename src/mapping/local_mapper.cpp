@@ -97,7 +97,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
     add_earlier_sightings(map, made, id, nearest_sharp(map, id, options_.fusion.keyframes), levels, camera_,
                           options_.fusion.association, *own);
   if (options_.triangulate && !sheared(map, id)) triangulate(map, id, {levels, *own});
-  own->slants = {};
+  own->slants = {};  // corners stay where they are from here on
   return id;
 }
 

@@ -50,7 +50,7 @@ TEST(PointGrid, EmptyOnesFindNothing) {
   EXPECT_TRUE(found.empty());
 }
 
-TEST(CornerDepth, IsTheMeanOfOneSurfaceOnly) {
+TEST(CornerDepth, IsThatOfOneSurfaceOnly) {
   cv::Mat depth(100, 100, CV_32FC1, cv::Scalar(2.0F));
   EXPECT_FLOAT_EQ(corner_depth(depth, 50.0F, 50.0F).z, 2.0F);
   EXPECT_FLOAT_EQ(corner_depth(depth, 0.0F, 0.0F).z, 2.0F)
