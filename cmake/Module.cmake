@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# plumbline_module(NAME [DEPENDS module...] [LINK library...] [PRIVATE_LINK library...] [EXCEPT source...] [PCH header...])
-# One folder = one static library = one layer. Sources are all *.cpp of the folder, except those of a part.
+# plumbline_module(NAME [DEPENDS module...] [LINK library...] [PRIVATE_LINK library...] [EXCEPT source...]
+#                  [PCH header... | PCH_FROM module])
+# One folder = one static library = one layer. Sources are all *.cpp of the folder, except those of a part. A module
+# may take the precompiled header of another whose macros are no more than its own.
 function(plumbline_module name)
-  cmake_parse_arguments(ARG "" "" "DEPENDS;LINK;PRIVATE_LINK;EXCEPT;PCH" ${ARGN})
+  cmake_parse_arguments(ARG "" "PCH_FROM" "DEPENDS;LINK;PRIVATE_LINK;EXCEPT;PCH" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   list(TRANSFORM ARG_EXCEPT PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
   list(REMOVE_ITEM sources ${ARG_EXCEPT})
@@ -15,6 +17,8 @@ function(plumbline_module name)
                           PRIVATE ${ARG_PRIVATE_LINK} $<BUILD_INTERFACE:plumbline_warnings>)
     if(ARG_PCH)
       target_precompile_headers(plumbline_${name} PRIVATE ${ARG_PCH})
+    elseif(ARG_PCH_FROM)
+      target_precompile_headers(plumbline_${name} REUSE_FROM plumbline_${ARG_PCH_FROM})
     endif()
   else()
     add_library(plumbline_${name} INTERFACE)
@@ -56,6 +60,11 @@ function(plumbline_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES} ${PROJECT_SOURCE_DIR}/tests/scratch_folder.cpp)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main plumbline_warnings)
+  if(name STREQUAL test_core) # the fewest macros
+    target_precompile_headers(${name} PRIVATE ${PROJECT_SOURCE_DIR}/cmake/test_pch.hpp)
+  else()
+    target_precompile_headers(${name} REUSE_FROM test_core)
+  endif()
   target_compile_definitions(${name} PRIVATE PLUMBLINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 300)

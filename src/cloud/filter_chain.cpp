@@ -163,6 +163,13 @@ std::vector<std::string> FilterChain::writes() const {
   return files;
 }
 
+std::vector<std::string> FilterChain::types() const {
+  std::vector<std::string> types;
+  types.reserve(filters_.size());
+  for (const Step& step : filters_) types.push_back(step.type);
+  return types;
+}
+
 core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterContext& context,
                                           std::vector<FilterReport>* reports,
                                           const ChainProgress& progress) const {

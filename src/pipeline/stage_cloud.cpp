@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cloud: the filtered cloud of every keyframe.
+#include <algorithm>
+#include <atomic>
 #include <memory>
+#include <opencv2/core/mat.hpp>
 #include <utility>
 #include <vector>
 
@@ -12,10 +15,49 @@
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/summary.hpp"
 #include "stages.hpp"
 
 namespace plumbline::pipeline {
 namespace {
+
+/// Points that were measured, and those that each step left out; frames may be counted side by side.
+class LeftOut {
+ public:
+  void start(std::size_t filters) { by_filter_ = std::vector<std::atomic<std::size_t>>(filters); }
+  void count_measured(const cv::Mat& depth, const cloud::KeyframeCloudOptions& options) {
+    const auto least = static_cast<float>(options.min_depth_m);
+    const auto most = static_cast<float>(options.max_depth_m);
+    std::size_t measured = 0;
+    std::size_t within = 0;
+    for (int v = 0; v < depth.rows; v += options.stride_px) {
+      const float* row = depth.ptr<float>(v);
+      for (int u = 0; u < depth.cols; u += options.stride_px) {
+        measured += row[u] > 0.0F ? 1U : 0U;
+        within += row[u] >= least && row[u] <= most ? 1U : 0U;
+      }
+    }
+    measured_ += measured;
+    by_depth_ += measured - within;
+  }
+  void count_filtered(const std::vector<cloud::FilterReport>& reports) {
+    for (std::size_t i = 0; i < std::min(reports.size(), by_filter_.size()); ++i) {
+      const cloud::FilterReport& report = reports[i];
+      by_filter_[i] += report.points_in - std::min(report.points_in, report.points_out);
+    }
+  }
+  void tell(const cloud::FilterChain& chain, RunSummary& summary) const {
+    summary.measured_points = measured_;
+    summary.left_out = {{"depth_limits", by_depth_}};
+    const std::vector<std::string> types = chain.types();
+    for (std::size_t i = 0; i < by_filter_.size(); ++i) summary.left_out.push_back({types[i], by_filter_[i]});
+  }
+
+ private:
+  std::atomic<std::size_t> measured_{0};
+  std::atomic<std::size_t> by_depth_{0};
+  std::vector<std::atomic<std::size_t>> by_filter_;
+};
 
 class CloudStage : public Stage {
  public:
@@ -37,6 +79,7 @@ class CloudStage : public Stage {
     camera_ = context.source->camera().color;
     frames_ = context.source->size();
     recordings_ = context.recordings;
+    left_out_.start(filters_.chain().size());
     return {};
   }
 
@@ -73,14 +116,19 @@ class CloudStage : public Stage {
     io.output<KeyframeCloud>("cloud", result);
     return {};
   }
+  void summarise(RunSummary& summary) const override { left_out_.tell(filters_.chain(), summary); }
 
  private:
   core::Result<cloud::CloudPtr> filtered(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,
-                                         core::KeyframeId keyframe) const {
+                                         core::KeyframeId keyframe) {
     cloud::FilterContext context;
     context.viewpoint = Eigen::Vector3f::Zero();
     context.run = std::to_string(keyframe.index);
-    return filters_.chain().apply(cloud::organised_cloud(frame, camera, options_), context);
+    std::vector<cloud::FilterReport> reports;
+    auto cloud = filters_.chain().apply(cloud::organised_cloud(frame, camera, options_), context, &reports);
+    left_out_.count_measured(frame.depth, options_);
+    left_out_.count_filtered(reports);
+    return cloud;
   }
 
   cloud::KeyframeCloudOptions options_;
@@ -88,6 +136,7 @@ class CloudStage : public Stage {
   int looks_ = 3;
   std::size_t frames_ = 0;
   ChainOption filters_{"filters/keyframe.yaml"};
+  LeftOut left_out_;
   sensor::Pinhole camera_;
   const RobotRecordings* recordings_ = nullptr;  ///< null: one robot
 };

@@ -73,6 +73,31 @@ nlohmann::ordered_json traffic_of(const RunSummary& summary) {
   return list;
 }
 
+nlohmann::ordered_json cloud_of(const RunSummary& summary) {
+  nlohmann::ordered_json cloud = {{"points", summary.cloud_points}, {"voxel_m", summary.voxel_m}};
+  if (summary.measured_points == 0) return cloud;
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::LeftOut& part : summary.left_out) {
+    list.push_back({{"by", part.by}, {"points", part.points}});
+  }
+  cloud["measured"] = summary.measured_points;
+  cloud["left_out"] = list;
+  return cloud;
+}
+
+/// What keyframes measured and the cloud does not hold, in words; empty: hardly anything.
+std::string left_out_text(const RunSummary& summary) {
+  constexpr double kWorthTelling_percent = 1.0;
+  std::string text;
+  for (const RunSummary::LeftOut& part : summary.left_out) {
+    const double percent = 100.0 * static_cast<double>(part.points) /
+                           static_cast<double>(std::max<std::size_t>(1, summary.measured_points));
+    if (percent < kWorthTelling_percent) continue;
+    text += fmt::format("{}{:.0f} % by {}", text.empty() ? "" : ", ", percent, part.by);
+  }
+  return text.empty() ? text : text + ", of what keyframes measured (stage cloud)";
+}
+
 nlohmann::ordered_json laid(const mapping::LaidOver& fit) {
   return {{"expected", fit.expected},
           {"matched", fit.matched},
@@ -194,7 +219,9 @@ void judge(RunSummary& summary) {
         all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
         frames.longest_loss);
   } else if (all > 0 && summary.voxel_m > 0.0 && summary.cloud_points == 0) {
-    summary.reason = "the cloud is empty: no keyframe had usable depth";
+    const std::string without = left_out_text(summary);
+    summary.reason = "the cloud is empty: " +
+                     (without.empty() ? "no keyframe had usable depth" : "left out were " + without);
   } else {
     summary.reason = summary.unconnected;
   }
@@ -250,7 +277,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"after", fits_of(s.refine.after)}}},
       {"merges", merges_of(s)},
       {"robots", traffic_of(s)},
-      {"cloud", {{"points", s.cloud_points}, {"voxel_m", s.voxel_m}}},
+      {"cloud", cloud_of(s)},
       {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
       {"depth_fields", depth_fields_of(s)},
       {"timing",
@@ -302,6 +329,9 @@ std::string to_text(const RunSummary& s) {
   text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n", s.keyframes, s.points,
                       s.lines, s.loops.accepted);
   text += fmt::format("cloud      {} points, {:g} mm voxels\n", s.cloud_points, s.voxel_m * 1000.0);
+  if (const std::string without = left_out_text(s); !without.empty()) {
+    text += fmt::format("left out   {}\n", without);
+  }
   text +=
       fmt::format("time       {:.1f} s in all, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n",
                   s.wall_s, s.map_s, s.fps(), s.export_s);

@@ -43,6 +43,7 @@ class FilterChain {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t size() const { return filters_.size(); }
+  [[nodiscard]] std::vector<std::string> types() const;  ///< of the filters, in their order
   /// The chain with every option spelt out, as YAML that `load` accepts.
   [[nodiscard]] std::string to_yaml() const;
 

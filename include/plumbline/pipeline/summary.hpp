@@ -79,7 +79,14 @@ struct RunSummary {
   std::vector<Traffic> traffic;
   std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
-  double voxel_m = 0.0;              ///< of the merged cloud; 0: none was to be made
+  double voxel_m = 0.0;             ///< of the merged cloud; 0: none was to be made
+  std::size_t measured_points = 0;  ///< depths on the grid of the keyframes' clouds; 0: not known
+  /// What became no point of these clouds.
+  struct LeftOut {
+    std::string by;  ///< a filter's type, or "depth_limits": outside min_depth and max_depth
+    std::size_t points = 0;
+  };
+  std::vector<LeftOut> left_out;     ///< in the order in which it was left out
   std::string up = "none";           ///< what the output's frame stands on: floor, camera or none
   geometry::Rigid3 output_from_map;  ///< to that frame from the one that tracking began in
   double wall_s = 0.0;               ///< the whole run
