@@ -10,6 +10,7 @@
 #include <cstring>
 #include <optional>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "debug_video.hpp"
@@ -77,6 +78,30 @@ std::string input_text(const dataset::FrameSource& source) {
   return text + fmt::format("stamps: {:016x}\n", hash);
 }
 
+/// The same request for any order of its recordings: by name, and by folder where names are alike.
+MapRequest in_order(MapRequest request) {
+  if (request.others.empty()) return request;
+  struct Input {
+    std::string name;
+    std::string folder;
+    std::string given;
+  };
+  std::vector<Input> inputs;
+  request.others.push_back(request.input);
+  for (const std::string& given : request.others) {
+    std::error_code ec;
+    const std::filesystem::path folder = std::filesystem::weakly_canonical(given, ec);
+    inputs.push_back({folder.filename().string(), folder.string(), given});
+  }
+  std::sort(inputs.begin(), inputs.end(), [](const Input& a, const Input& b) {
+    return std::tie(a.name, a.folder, a.given) < std::tie(b.name, b.folder, b.given);
+  });
+  request.input = inputs.front().given;
+  for (std::size_t i = 1; i < inputs.size(); ++i) request.others[i - 1] = inputs[i].given;
+  request.others.pop_back();
+  return request;
+}
+
 /// The recording, or several side by side; these are `recordings`, too.
 core::Result<std::unique_ptr<dataset::FrameSource>> open_inputs(const MapRequest& request,
                                                                 const core::Executor& executor,
@@ -136,11 +161,12 @@ bool is_finished(const std::filesystem::path& out) {
   return is_result_folder(out) && !std::filesystem::exists(OutputFolder::partial_of(out), ec);
 }
 
-core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
-                                       core::Log& log, const core::StopToken& stop,
-                                       const Progress& progress, Leftovers* leftovers) {
+core::Result<RunSummary> map_recording(const MapRequest& given, const core::Executor& executor,
+                                       core::Log& log, const core::StopToken& stop, const Progress& progress,
+                                       Leftovers* leftovers) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
+  const MapRequest request = in_order(given);
 
   const bool several = !request.others.empty();
   const std::string pipeline = several && request.pipeline == "rgbd" ? "robots" : request.pipeline;

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
+#include <string>
 
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
@@ -156,6 +158,40 @@ TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {
     EXPECT_EQ(slurp(path("two") / file), slurp(path("again") / file)) << file;
   }
   EXPECT_EQ(run("map world/robot0 twin -o x -p depth_only").code, 2);
+}
+
+TEST_F(Fuse, RobotsSideBySideInAnyOrder) {
+  ASSERT_EQ(
+      run("synth room -o world --frames 30 --fps 10 --width 320 --height 240 --reference-spacing 10cm -q")
+          .code,
+      0);
+  // A second robot that saw all but the first second.
+  fs::create_directory(path("late"));
+  for (const char* part : {"rgb", "depth"})
+    fs::create_directory_symlink(path("world/robot0") / part, path("late") / part);
+  fs::copy(path("world/robot0/camera.yaml"), path("late/camera.yaml"));
+  for (const char* list : {"rgb.txt", "depth.txt", "associations.txt"}) {
+    std::istringstream all(slurp(path("world/robot0") / list));
+    std::string kept;
+    int frame = 0;
+    for (std::string line; std::getline(all, line);) {
+      if (line.front() == '#' || frame++ >= 10) kept += line + "\n";
+    }
+    write(std::string("late/") + list, kept);
+  }
+  const std::string lean =
+      " -q --set output.views= --set fuse.voxel=3cm --set cloud.filters=[] --set robots.merge.min_pairs=3";
+  const Outcome one = run("map late world/robot0 -o one --threads 2" + lean);
+  ASSERT_EQ(one.code, 0) << one;
+  const Outcome other = run("map world/robot0/ late -o other --threads 1" + lean);
+  ASSERT_EQ(other.code, 0) << other;
+  const auto summary = read_json(path("other/summary.json"));
+  ASSERT_EQ(summary["robots"].size(), 2U);
+  EXPECT_EQ(summary["robots"][0]["name"], "late");
+  for (const char* file : {"map.ply", "map.pcd", "frames.csv", "lines.ply", "robots/robot0/trajectory.txt",
+                           "robots/late/trajectory.txt"}) {
+    EXPECT_EQ(slurp(path("one") / file), slurp(path("other") / file)) << file;
+  }
 }
 
 TEST_F(Fuse, WhatIsNoMapIsRefused) {

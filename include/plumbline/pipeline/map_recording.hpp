@@ -35,11 +35,13 @@ struct MapRequest {
 /// Whether there is nothing to go on with: OUT is whole and no run was interrupted since.
 bool is_finished(const std::filesystem::path& out);
 
-/// With `others`, `rgbd` stands for the shipped pipeline for several robots, `robots`.
-/// Checks everything first (pipeline: kUsage, recording: kInput, output folder: kOutput), then maps. When the
-/// result is written but should not be trusted, the summary's `reason` says why. Errors leave an earlier
-/// result untouched; what a run that failed on the way had stored stays in OUT.partial. `resume` with another
-/// input or configuration than that run's is kUsage. `progress` may be empty, `leftovers` null.
+/// Robots are numbered by the names of their folders (where these are alike, by the folders that they lie
+/// in): the order of `input` and `others` changes nothing. With `others`, `rgbd` stands for the shipped
+/// pipeline for several robots, `robots`. Checks everything first (pipeline: kUsage, recording: kInput,
+/// output folder: kOutput), then maps. When the result is written but should not be trusted, the summary's
+/// `reason` says why. Errors leave an earlier result untouched; what a run that failed on the way had stored
+/// stays in OUT.partial. `resume` with another input or configuration than that run's is kUsage. `progress`
+/// may be empty, `leftovers` null.
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop, const Progress& progress,
                                        Leftovers* leftovers = nullptr);
