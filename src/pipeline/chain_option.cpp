@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "command_line.hpp"
+
 namespace plumbline::pipeline {
 namespace {
 
@@ -40,9 +42,10 @@ void ChainOption::check(const CheckContext& context, const std::string& path,
   } else if (!value_.scalar.empty()) {
     const std::filesystem::path file = context.find(value_.scalar, value_.mark);
     if (file.empty()) {
-      problems.push_back(
-          {value_.mark, path + ".filters",
-           fmt::format("{}: no such file beside the pipeline or among the shipped ones", value_.scalar)});
+      problems.push_back({value_.mark, path + ".filters",
+                          fmt::format("{}: no such file {} or among the shipped ones", value_.scalar,
+                                      value_.mark.file == kCommandLineFile ? "here, beside the pipeline"
+                                                                           : "beside the pipeline")});
       return;
     }
     const auto tree = core::read_yaml(file, problems);

@@ -2,6 +2,7 @@
 // "--set stage.key=value".
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "graph_parts.hpp"
 
 namespace plumbline::pipeline {
@@ -11,7 +12,7 @@ using core::ConfigMark;
 using core::ConfigNode;
 using core::ConfigProblems;
 
-const ConfigMark kCommandLine{"--set", 0, 0};
+const ConfigMark kCommandLine{kCommandLineFile, 0, 0};
 
 void place_on_command_line(ConfigNode& node) {
   node.mark = kCommandLine;

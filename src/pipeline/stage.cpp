@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "command_line.hpp"
+
 namespace plumbline::pipeline {
 
 std::filesystem::path CheckContext::find(const std::string& file) const {
@@ -17,6 +19,11 @@ std::filesystem::path CheckContext::find(const std::string& file) const {
 }
 
 std::filesystem::path CheckContext::find(const std::string& file, const core::ConfigMark& mark) const {
+  if (mark.file == kCommandLineFile) {
+    std::error_code ignored;
+    const std::filesystem::path candidate = std::filesystem::current_path(ignored) / file;
+    if (!file.empty() && std::filesystem::is_regular_file(candidate, ignored)) return candidate;
+  }
   const bool in_a_file = mark.line > 0 && !mark.file.empty();
   return CheckContext{in_a_file ? std::filesystem::path(mark.file).parent_path() : pipeline_folder,
                       pipelines_folder, filters}

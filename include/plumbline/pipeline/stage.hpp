@@ -132,7 +132,7 @@ struct CheckContext {
 
   /// A file named in a pipeline: absolute, beside the pipeline file, or shipped. Empty when there is none.
   [[nodiscard]] std::filesystem::path find(const std::string& file) const;
-  /// The same for a value that stands in a file of its own, such as an included pipeline: beside that.
+  /// For a value of an included pipeline: beside that one; of --set: first where the program runs.
   [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 
