@@ -2,6 +2,8 @@
 #include "plumbline/maps/frame_pose.hpp"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "plumbline/maps/map.hpp"
 
@@ -15,6 +17,34 @@ geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map&
     result.push_back({frame.stamp, camera_from_world.inverse()});
   }
   return result;
+}
+
+bool beyond_noise(double off_m, double off_rad, double sigma_m) {
+  constexpr double kLeast_m = 0.03;
+  constexpr double kLeast_rad = 0.035;  // 2 degrees
+  constexpr double kSigmas = 4.0;
+  return off_m > std::max(kLeast_m, kSigmas * sigma_m) ||
+         off_rad > std::max(kLeast_rad, kSigmas * 0.5 * sigma_m);
+}
+
+PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
+  PathCheck check;
+  std::map<std::int32_t, const FramePose*> last;  // by robot
+  for (const FramePose& frame : frames) {
+    if (!frame.reference.valid()) continue;
+    const FramePose* before = std::exchange(last[frame.reference.robot], &frame);
+    if (before == nullptr || !before->tracked || !frame.tracked || !frame.camera_from_previous) continue;
+    if (before->reference == frame.reference) continue;
+    const geometry::Rigid3 step = frame.camera_from_reference * map.pose_of(frame.reference) *
+                                  (before->camera_from_reference * map.pose_of(before->reference)).inverse();
+    const geometry::Rigid3 off = step * frame.camera_from_previous->inverse();
+    const PathStep seen{frame.stamp, before->reference, frame.reference, off.translation.norm(),
+                        geometry::rotation_angle(off.rotation)};
+    check.largest_m = std::max(check.largest_m, seen.off_m);
+    check.largest_rad = std::max(check.largest_rad, seen.off_rad);
+    if (beyond_noise(seen.off_m, seen.off_rad, frame.step_sigma_m)) check.tears.push_back(seen);
+  }
+  return check;
 }
 
 geometry::Trajectory keyframe_trajectory(const Map& map) {

@@ -188,6 +188,9 @@ void encode(const FramePose& frame, ByteWriter& to) {
   to.put(frame.reference);
   to.put(frame.camera_from_reference);
   to.flag(frame.tracked);
+  to.flag(frame.camera_from_previous.has_value());
+  if (frame.camera_from_previous) to.put(*frame.camera_from_previous);
+  to.put(frame.step_sigma_m);
 }
 void decode_page(const Bytes& bytes, std::vector<FramePose>& frames) {
   for (ByteReader from(bytes); !from.at_end();) {
@@ -196,6 +199,8 @@ void decode_page(const Bytes& bytes, std::vector<FramePose>& frames) {
     from.get(frame.reference);
     from.get(frame.camera_from_reference);
     frame.tracked = from.flag();
+    if (from.flag()) from.get(frame.camera_from_previous.emplace());
+    from.get(frame.step_sigma_m);
     frames.push_back(frame);
   }
 }
@@ -224,11 +229,8 @@ sensor::Camera decode_camera(const Bytes& bytes) {
   from.get(camera.fps);
   if (from.flag()) from.get(camera.color_from_depth.emplace());
   if (from.flag()) read(from, camera.depth.emplace());
-  // Stores of old do not tell these.
-  if (!from.at_end() && from.flag()) from.get(camera.readout_s.emplace());
-  if (!from.at_end()) {
-    for (double& slope : camera.depth_slope) from.get(slope);
-  }
+  if (from.flag()) from.get(camera.readout_s.emplace());
+  for (double& slope : camera.depth_slope) from.get(slope);
   from.expect_end();
   return camera;
 }

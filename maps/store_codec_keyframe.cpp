@@ -189,6 +189,9 @@ void encode(const Keyframe& keyframe, ByteWriter& to) {
   to.put(keyframe.frame_index);
   to.put(keyframe.stamp);
   to.put(keyframe.turn_rate);
+  to.put(keyframe.reference);
+  to.put(keyframe.camera_from_reference);
+  to.put(keyframe.reference_sigma_m);
   to.flag(keyframe.features != nullptr);
   if (keyframe.features != nullptr) write_features(*keyframe.features, to);
   to.count(keyframe.surface.size());
@@ -203,11 +206,14 @@ std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor
   from.get(keyframe->frame_index);
   from.get(keyframe->stamp);
   from.get(keyframe->turn_rate);
+  from.get(keyframe->reference);
+  from.get(keyframe->camera_from_reference);
+  from.get(keyframe->reference_sigma_m);
   std::shared_ptr<FrameFeatures> features;
   if (from.flag()) features = std::make_shared<FrameFeatures>(read_features(from, picture));
   keyframe->surface.resize(from.count(7 * sizeof(float)));
   surface_columns(column_reader<float>(keyframe->surface, from));
-  if (features != nullptr && !from.at_end()) read_patches(from, *features);  // none up to format 3
+  if (features != nullptr) read_patches(from, *features);
   keyframe->features = features;
   from.expect_end();
   return keyframe;

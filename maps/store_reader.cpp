@@ -147,8 +147,8 @@ struct StoreReader::Impl {
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> blob(const char* sql, std::int64_t robot,
                                                              std::int64_t number,
                                                              const std::string& what) const;
-  /// What stores of `format` and above may keep of a cloud; empty: this one does not.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> extra(int format, const char* sql, std::int64_t robot,
+  /// What a store may keep of a cloud beside it; empty: this one does not.
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> extra(const char* sql, std::int64_t robot,
                                                               std::int64_t number) const;
   [[nodiscard]] core::Result<cloud::CloudPtr> decode(const core::Result<std::vector<std::uint8_t>>& bytes,
                                                      const std::string& what) const;
@@ -237,11 +237,9 @@ core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
   return impl_->decode(cloud_bytes(keyframe), "keyframe " + name_of(keyframe));
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::Impl::extra(int format, const char* sql,
-                                                                 std::int64_t robot,
+core::Result<std::vector<std::uint8_t>> StoreReader::Impl::extra(const char* sql, std::int64_t robot,
                                                                  std::int64_t number) const {
   return guarded(file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
-    if (header.format < format) return {};
     Statement row(*database, sql);
     if (!row.bind(1, robot).bind(2, number).step()) return {};
     return row.blob(0);
@@ -249,17 +247,17 @@ core::Result<std::vector<std::uint8_t>> StoreReader::Impl::extra(int format, con
 }
 
 core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId keyframe) const {
-  return impl_->extra(2, "SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe.robot,
+  return impl_->extra("SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe.robot,
                       keyframe.index);
 }
 
 core::Result<std::vector<std::uint8_t>> StoreReader::summary_bytes(KeyframeId keyframe) const {
-  return impl_->extra(3, "SELECT data FROM summary WHERE robot = ? AND number = ?", keyframe.robot,
+  return impl_->extra("SELECT data FROM summary WHERE robot = ? AND number = ?", keyframe.robot,
                       keyframe.index);
 }
 
 core::Result<std::vector<std::uint8_t>> StoreReader::frame_summary_bytes(std::size_t frame) const {
-  return impl_->extra(3, "SELECT data FROM frame_summary WHERE robot = ? AND number = ?", 0,
+  return impl_->extra("SELECT data FROM frame_summary WHERE robot = ? AND number = ?", 0,
                       static_cast<std::int64_t>(frame));
 }
 

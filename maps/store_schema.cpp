@@ -8,10 +8,9 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line",
-                                   "edge",     "frame", "log",     "cloud", "frame_cloud"};
-constexpr const char* kTablesOfFormat2[] = {"surface"};
-constexpr const char* kTablesOfFormat3[] = {"summary", "frame_summary"};
+constexpr const char* kTables[] = {"keyframe",    "state",   "retired",      "point", "line",
+                                   "edge",        "frame",   "log",          "cloud", "surface",
+                                   "frame_cloud", "summary", "frame_summary"};
 
 void create_table(Database& database, const char* name) {
   database.run((std::string("CREATE TABLE ") + name +
@@ -37,7 +36,7 @@ void create_tables(Database& database, const StoreHeader& header) {
   database.run("CREATE TABLE header (key TEXT PRIMARY KEY, value NOT NULL)");
   database.run("CREATE TABLE attachment (name TEXT PRIMARY KEY, data BLOB NOT NULL)");
   for (const char* table : kTables) create_table(database, table);
-  raise_format(database);
+  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
   put_text(database, "robot", header.robot);
   put_text(database, "input", header.input);
   put_text(database, "program", header.program_version);
@@ -46,17 +45,6 @@ void create_tables(Database& database, const StoreHeader& header) {
   encode(header.camera, camera);
   const Bytes packed = pack(camera.bytes());
   Statement(database, "INSERT INTO header VALUES ('camera', ?)").bind(1, packed).run();
-}
-
-void raise_format(Database& database) {
-  const std::int64_t format = database.number("PRAGMA user_version");
-  if (format < 2) {
-    for (const char* table : kTablesOfFormat2) create_table(database, table);
-  }
-  if (format < 3) {
-    for (const char* table : kTablesOfFormat3) create_table(database, table);
-  }
-  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
 }
 
 bool is_blank(Database& database) {
@@ -81,6 +69,12 @@ void check_store(Database& database) {
                                                     std::to_string(kStoreFormat) + "; use a newer Plumbline");
   }
   if (format < 1) throw BadBytes("its format number is wrong");
+  if (format < kStoreFormat) {
+    throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
+                                                    " by an older Plumbline, this program reads format " +
+                                                    std::to_string(kStoreFormat) +
+                                                    "; map the recording again");
+  }
 }
 
 StoreHeader read_header(Database& database) {

@@ -12,11 +12,9 @@ namespace plumbline::maps {
 constexpr std::int64_t kStoreApplication = 0x504c4d53;  ///< "PLMS", in the head of the SQLite file
 
 void create_tables(Database& database, const StoreHeader& header);
-/// Gives a store of a lower format what it has not.
-void raise_format(Database& database);
 /// Nothing was ever committed.
 bool is_blank(Database& database);
-/// Throws a StoreFailure for a foreign, unfinished or newer file.
+/// Throws a StoreFailure for a foreign, unfinished, older or newer file.
 void check_store(Database& database);
 StoreHeader read_header(Database& database);
 void put_result_frame(Database& database, const ResultFrame& frame);

@@ -282,11 +282,6 @@ core::Result<StoreWriter> StoreWriter::resume(const std::filesystem::path& file)
     auto database = std::make_unique<Database>(file, Database::Access::kWrite);
     check_store(*database);
     use_log(*database);
-    {
-      Transaction transaction(*database, true);
-      raise_format(*database);
-      transaction.commit();
-    }
     return StoreWriter(std::make_unique<Impl>(file, std::move(database)));
   });
 }

@@ -48,7 +48,7 @@ std::optional<MapCorrection> BackgroundBundle::commit(maps::Map& map, std::int64
   report.summary = done->summary;
   report.solve_ms = done->solve_ms;
   std::optional<MapCorrection> correction;
-  if (done->summary.usable) correction = put_back(done->bundle, map);
+  if (done->summary.usable) correction = put_back(done->bundle, map, &report.refused);
   begin(map, frame);
   return correction;
 }

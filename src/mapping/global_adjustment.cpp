@@ -56,8 +56,7 @@ class GlobalBuilder {
     bundle_.problem.camera = cameras.at(anchor.robot);
     for (const KeyframeId id : map.keyframe_ids()) {
       index_.insert(id, static_cast<int>(bundle_.keyframes.size()));
-      const double ratio = map.keyframe(id).turn_rate / options.turn_rate;
-      unrest_.push_back(std::hypot(1.0, ratio * ratio));
+      unrest_.push_back(options.noise.unrest_of(map.keyframe(id).turn_rate));
       bundle_.keyframes.push_back(id);
       bundle_.problem.poses.push_back({map.camera_from_world(id), id == anchor});
     }
@@ -214,12 +213,25 @@ void drop_outliers(const GlobalBundle& bundle, maps::Map& map) {
   }
 }
 
-void put_back(const GlobalBundle& bundle, maps::Map& map) {
+/// Whether the poses may be put into the map; told if not.
+bool may_move(const maps::Map& map, const KeyframePoses& poses, GlobalAdjustmentSummary& summary) {
+  const auto wrong = contradiction(map, poses);
+  if (!wrong) return true;
+  ++summary.refused;
+  summary.message = wrong->text();
+  return false;
+}
+
+KeyframePoses poses_of(const GlobalBundle& bundle) {
   KeyframePoses poses;
   for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
     poses.emplace_back(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
   }
-  move_keyframes(map, poses);  // and with them what the bundle left out
+  return poses;
+}
+
+void put_back(const GlobalBundle& bundle, maps::Map& map) {
+  move_keyframes(map, poses_of(bundle));  // and with them what the bundle left out
   for (std::size_t i = 0; i < bundle.points.size(); ++i) {
     map.point(bundle.points[i]).position = bundle.problem.points[i];
   }
@@ -239,6 +251,7 @@ void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
   if (!graph.summary.usable) return;
   summary.extra = graph.summary.edges;
   for (const optimize::EdgeVerdict& verdict : summary.extra) summary.rejected += verdict.rejected ? 1 : 0;
+  if (!may_move(map, graph.poses, summary)) return;
   move_keyframes(map, graph.poses);
   summary.changed = true;
 }
@@ -262,7 +275,7 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
   if (!extra.empty()) bundle_options.first_gate = options.first_gate;
   summary.bundle = optimize::adjust_bundle(bundle.problem, bundle_options, executor);
   summary.message = summary.bundle.message;
-  if (!summary.bundle.usable) return;
+  if (!summary.bundle.usable || !may_move(map, poses_of(bundle), summary)) return;
   put_back(bundle, map);
   summary.changed = true;
 }
@@ -302,8 +315,6 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
   noise.declare(table, "adjust.");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");
-  table.number("adjust.turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
-               "What a picture says counts for half when the camera turned this fast");
   table.choice<optimize::EdgeRobustness>(
       "adjust.robust", graph.robust,
       {{"none", optimize::EdgeRobustness::kNone}, {"graduated", optimize::EdgeRobustness::kGraduated}},

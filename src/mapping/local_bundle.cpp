@@ -9,9 +9,21 @@ namespace plumbline::mapping {
 namespace {
 
 using core::KeyframeId;
+using geometry::Matrix6d;
 using geometry::Rigid3;
 
 constexpr int kMaxHeld = 20;
+
+/// How exactly the tracker knows the way from one keyframe to the next. No keyframe is freer than this,
+/// whatever it shares with others: what hangs on a handful of wrong matches would go where these pull it.
+Matrix6d tracked_information() {
+  constexpr double kSigma_m = 0.01;
+  constexpr double kSigma_rad = 0.007;
+  geometry::Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(1.0 / (kSigma_m * kSigma_m)),
+      Eigen::Vector3d::Constant(1.0 / (kSigma_rad * kSigma_rad));
+  return diagonal.asDiagonal();
+}
 
 /// The keyframe, those not adjusted yet, those its surface is aligned with, and those that share most with
 /// it.
@@ -48,10 +60,24 @@ class Builder {
     }
     return found->second;
   }
-  [[nodiscard]] bool calm(KeyframeId id) const {
-    return map_.keyframe(id).turn_rate <= options_.max_turn_rate;
-  }
   [[nodiscard]] bool has(KeyframeId id) const { return index_.count(id) != 0; }
+
+  /// Those before and after in the tracker's way: so every keyframe that moves is tied to one that is held,
+  /// and moves away from no neighbour unseen.
+  void hold_neighbours_on_the_way() {
+    const std::vector<KeyframeId> window = bundle_.keyframes;
+    for (const KeyframeId id : window) {
+      const KeyframeId before = map_.keyframe(id).reference;
+      if (before.valid() && map_.has_keyframe(before)) add_pose(before, true);
+    }
+    KeyframeId id = *std::min_element(window.begin(), window.end());
+    const std::int32_t end = map_.next_keyframe_id(id.robot).index;
+    for (; id.index < end; ++id.index) {
+      if (!map_.has_keyframe(id)) continue;
+      const KeyframeId before = map_.keyframe(id).reference;
+      if (std::find(window.begin(), window.end(), before) != window.end()) add_pose(id, true);
+    }
+  }
 
   /// The landmarks of the window; keyframes outside that see them are held.
   void add_landmarks(const std::vector<KeyframeId>& window) {
@@ -75,30 +101,24 @@ class Builder {
   /// A sheared picture's depth is sheared, too: its surfaces say as little about where it was as its corners.
   void add_edges() {
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {
+      const maps::Keyframe& keyframe = map_.keyframe(id);
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
-        if (edge.b != id || !has(edge.a)) continue;  // each edge once, at its newer end
-        if (!calm(edge.a) || !calm(edge.b)) continue;
-        const int a = index_.at(edge.a);
-        const int b = index_.at(edge.b);
-        if (pose_fixed(a) && pose_fixed(b)) continue;
-        bundle_.problem.edges.push_back({a, b, edge.b_from_a, edge.information});
+        if (edge.b != id) continue;  // each edge once, at its newer end
+        add_edge(edge.a, id, edge.b_from_a, edge.information / (unrest(edge.a) * unrest(id)));
       }
+      if (!keyframe.reference.valid() || !map_.has_keyframe(keyframe.reference)) continue;
+      const double turning =
+          unrest(keyframe.reference) * unrest(id);  // what they see holds them all the less
+      add_edge(keyframe.reference, id, keyframe.camera_from_reference,
+               turning * turning * tracked_information());
     }
   }
 
-  /// Without a keyframe that is held and speaks, the oldest that speaks is held: all could drift otherwise.
+  /// The first keyframe of a map hangs on nothing; in a window without another that is held the oldest is.
   LocalBundle take() {
-    hold_loose_poses();
-    KeyframeId oldest;
-    bool anchored = false;
-    for (std::size_t i = 0; i < bundle_.keyframes.size(); ++i) {
-      const KeyframeId id = bundle_.keyframes[i];
-      if (!calm(id)) continue;
-      anchored = anchored || bundle_.problem.poses[i].fixed;
-      if (!oldest.valid() || id < oldest) oldest = id;
-    }
-    if (!anchored && oldest.valid()) {
-      bundle_.problem.poses[static_cast<std::size_t>(index_.at(oldest))].fixed = true;
+    std::vector<optimize::BundlePose>& poses = bundle_.problem.poses;
+    if (std::none_of(poses.begin(), poses.end(), [](const auto& pose) { return pose.fixed; })) {
+      poses[static_cast<std::size_t>(index_.begin()->second)].fixed = true;
     }
     return std::move(bundle_);
   }
@@ -113,31 +133,15 @@ class Builder {
     return bundle_.problem.poses[static_cast<std::size_t>(i)].fixed;
   }
 
-  /// A pose that little ties to those that speak goes where a few wrong matches pull it: it stays.
-  void hold_loose_poses() {
-    constexpr int kFewest = 40;  // points that another sees, too
-    std::vector<int> ties(bundle_.keyframes.size(), 0);
-    const auto tie = [&ties](const auto& observations, auto landmark, int worth) {
-      for (std::size_t begin = 0, end = 0; begin < observations.size(); begin = end) {
-        while (end < observations.size() && landmark(observations[end]) == landmark(observations[begin]))
-          ++end;
-        if (end - begin < 2) continue;
-        for (std::size_t i = begin; i < end; ++i)
-          ties[static_cast<std::size_t>(observations[i].pose)] += worth;
-      }
-    };
-    const optimize::BundleProblem& problem = bundle_.problem;
-    tie(
-        problem.point_observations, [](const auto& o) { return o.point; }, 1);
-    tie(
-        problem.line_observations, [](const auto& o) { return o.line; }, 2);
-    for (const optimize::BundleEdge& edge : problem.edges) {
-      ties[static_cast<std::size_t>(edge.a)] += kFewest;
-      ties[static_cast<std::size_t>(edge.b)] += kFewest;
-    }
-    for (std::size_t i = 0; i < ties.size(); ++i) {
-      if (ties[i] < kFewest) bundle_.problem.poses[i].fixed = true;
-    }
+  [[nodiscard]] double unrest(KeyframeId id) const {
+    return options_.noise.unrest_of(map_.keyframe(id).turn_rate);
+  }
+  void add_edge(KeyframeId from, KeyframeId to, const Rigid3& to_from_from, const Matrix6d& information) {
+    if (!has(from)) return;
+    const int a = index_.at(from);
+    const int b = index_.at(to);
+    if (pose_fixed(a) && pose_fixed(b)) return;
+    bundle_.problem.edges.push_back({a, b, to_from_from, information});
   }
 
   void hold_others(const std::vector<core::PointId>& points, const std::vector<core::LineId>& lines) {
@@ -167,10 +171,10 @@ class Builder {
     bundle_.points.push_back(id);
     bundle_.problem.points.push_back(point.position);
     for (const maps::Observation& o : point.observations) {
-      if (!has(o.keyframe) || !calm(o.keyframe)) continue;
+      if (!has(o.keyframe)) continue;
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen = options_.noise.of(f, o.aligned);
+      optimize::BundlePointObservation seen = options_.noise.of(f, o.aligned, unrest(o.keyframe));
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
       bundle_.problem.point_observations.push_back(seen);
@@ -184,10 +188,10 @@ class Builder {
     bundle_.lines.push_back(id);
     bundle_.problem.lines.push_back(geometry::line_through(line.start, line.end));
     for (const maps::Observation& o : line.observations) {
-      if (!has(o.keyframe) || !calm(o.keyframe)) continue;
+      if (!has(o.keyframe)) continue;
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
-      optimize::BundleLineObservation seen = options_.noise.of(f);
+      optimize::BundleLineObservation seen = options_.noise.of(f, unrest(o.keyframe));
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
       bundle_.problem.line_observations.push_back(seen);
@@ -301,7 +305,8 @@ LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const s
                               const LocalBundleOptions& options, const std::vector<KeyframeId>& also) {
   Builder builder(map, camera, options);
   const std::vector<KeyframeId> window = window_of(map, keyframe, also, options.keyframes);
-  for (KeyframeId id : window) builder.add_pose(id, id.index == 0 || !builder.calm(id));
+  for (KeyframeId id : window) builder.add_pose(id, id.index == 0);
+  builder.hold_neighbours_on_the_way();
   builder.add_landmarks(window);
   builder.add_edges();
   LocalBundle bundle = builder.take();
@@ -309,21 +314,35 @@ LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const s
   return bundle;
 }
 
-std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map) {
+/// Poses of the bundle's keyframes, and of those made after the take.
+static KeyframePoses poses_after(const LocalBundle& bundle, const MapCorrection& correction,
+                                 const maps::Map& map) {
+  KeyframePoses poses;
+  for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
+    if (!bundle.problem.poses[i].fixed && map.has_keyframe(bundle.keyframes[i]))
+      poses.emplace_back(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
+  }
+  for (const auto& [id, new_from_old_world] : correction) {
+    if (id.robot == bundle.next.robot && id.index >= bundle.next.index && map.has_keyframe(id))
+      poses.emplace_back(id, map.camera_from_world(id) * new_from_old_world.inverse());
+  }
+  return poses;
+}
+
+std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map,
+                                      std::optional<Contradiction>* refused) {
   if (moved_otherwise(bundle, map)) return std::nullopt;
   MapCorrection correction = CorrectionFinder(bundle, map).take();
+  const KeyframePoses poses = poses_after(bundle, correction, map);
+  if (const auto wrong = contradiction(map, poses)) {
+    if (refused != nullptr) *refused = wrong;
+    return std::nullopt;
+  }
   for (const auto& [id, new_from_old_world] : correction) {
     if (map.has_keyframe(id)) carry_landmarks(bundle, id, new_from_old_world, map);
   }
   put_back_landmarks(bundle, map);
-  for (const auto& [id, new_from_old_world] : correction) {  // those made after the take
-    if (id.robot == bundle.next.robot && id.index >= bundle.next.index && map.has_keyframe(id))
-      map.set_pose(id, map.camera_from_world(id) * new_from_old_world.inverse());
-  }
-  for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
-    if (!bundle.problem.poses[i].fixed && map.has_keyframe(bundle.keyframes[i]))
-      map.set_pose(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
-  }
+  for (const auto& [id, pose] : poses) map.set_pose(id, pose);
   drop_outliers(bundle, map);
   return correction;
 }

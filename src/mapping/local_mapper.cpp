@@ -42,6 +42,10 @@ void move(std::vector<maps::SurfaceSample>& surface, const geometry::Rigid3& cam
 void LocalMapperOptions::declare(core::OptionTable& table) {
   table.number("landmark.max_depth", max_landmark_depth_m, {0.5, 100.0}, "m",
                "Landmarks are made of depth up to here");
+  table.number("landmark.max_turn_rate", max_landmark_turn_rate, {0.0, 100.0}, "rad/s",
+               "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: no "
+               "landmark is "
+               "triangulated, looked for or merged with them");
   culling.declare(table);
   table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
   triangulation.declare(table);
@@ -54,10 +58,6 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
   keyframe_culling.declare(table);
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
-  table.number(
-      "bundle.max_turn_rate", bundle_max_turn_rate, {0.0, 100.0}, "rad/s",
-      "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: they keep "
-      "the pose of the tracker and move no landmark");
   bundle_noise.declare(table, "bundle.");
   table.boolean("edges", edges,
                 "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
@@ -73,12 +73,17 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
 core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                                      const std::shared_ptr<const features::FrameFeatures>& features,
                                      const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
-                                     double turn_rate) {
+                                     core::KeyframeId reference, double turn_rate) {
   auto keyframe = std::make_shared<maps::Keyframe>();
   keyframe->id = map.next_keyframe_id(robot);
   keyframe->frame_index = frame.index;
   keyframe->stamp = frame.stamp;
   keyframe->turn_rate = turn_rate;
+  if (reference.valid()) {
+    keyframe->reference = reference;
+    keyframe->camera_from_reference = track.camera_from_world * map.camera_from_world(reference).inverse();
+    keyframe->reference_sigma_m = track.sigma_m();
+  }
   auto own = std::make_shared<features::FrameFeatures>(*features);
   if (!still(track.depth_from_camera))
     features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
@@ -179,7 +184,7 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
 /// Pictures taken while turning fast are sheared: their rays lie, and what they show does not lie where it
 /// seems to.
 bool LocalMapper::sheared(const maps::Map& map, core::KeyframeId id) const {
-  return map.keyframe(id).turn_rate > options_.bundle_max_turn_rate;
+  return map.keyframe(id).turn_rate > options_.max_landmark_turn_rate;
 }
 
 std::vector<core::KeyframeId> LocalMapper::nearest_sharp(const maps::Map& map, core::KeyframeId id,

@@ -192,11 +192,12 @@ void LoopCloser::merge_doubles(maps::Map& map, const PoseEdge& edge) const {
   }
 }
 
-void LoopCloser::note_verdict(const PoseEdge& edge, bool believed) {
+/// `refused`: why it was not closed; empty: it was.
+void LoopCloser::note_verdict(const PoseEdge& edge, const std::string& refused) {
   for (auto trial = trials_.rbegin(); trial != trials_.rend(); ++trial) {
     if (trial->loop.match != edge.a || trial->loop.query != edge.b) continue;
-    trial->closed = believed;
-    if (!believed) trial->refused = "the pose graph took it for wrong";
+    trial->closed = refused.empty();
+    trial->refused = refused;
     return;
   }
 }
@@ -212,11 +213,16 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   graph.robust = options_.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
   const MapGraphResult solved = solve_map_graph(map, all, graph, {}, executor_);
   if (!solved.summary.usable) return false;
+  if (const auto wrong = contradiction(map, solved.poses)) {
+    ++counts_.refused;
+    for (const PoseEdge& edge : edges) note_verdict(edge, wrong->text());
+    return false;
+  }
   std::vector<PoseEdge> believed;
   std::vector<PoseEdge> fresh;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool wrong = i < solved.summary.edges.size() && solved.summary.edges[i].rejected;
-    if (i >= known) note_verdict(all[i], !wrong);
+    if (i >= known) note_verdict(all[i], wrong ? "the pose graph took it for wrong" : "");
     if (wrong) {
       ++counts_.rejected;
       continue;

@@ -35,6 +35,7 @@ class PartsCollector {
     for (const KeyframeId id : map.keyframe_ids()) {
       auto data = std::make_shared<maps::Keyframe>(map.keyframe(id));
       data->id = renamed(id, to);
+      data->reference = renamed(data->reference, to);
       parts_.keyframes.push_back(
           {data, stays ? map.camera_from_world(id) : map.camera_from_world(id) * map_from_world,
            renamed(map.parent(id), to)});

@@ -18,6 +18,13 @@ void SightingNoise::declare(core::OptionTable& table, const std::string& prefix)
   table.number(
       prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
       "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
+  table.number(prefix + "turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
+               "What a picture says counts for half when the camera turned this fast");
+}
+
+double SightingNoise::unrest_of(double rate) const {
+  const double ratio = rate / turn_rate;
+  return std::hypot(1.0, ratio * ratio);
 }
 
 double SightingNoise::octave_px(int octave) const { return std::pow(orb_scale_factor, octave); }

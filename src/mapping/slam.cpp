@@ -58,8 +58,8 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       tracker_(options.tracker, camera),
       rule_(options.keyframe),
       mapper_(mapper_of(options), camera),
-      bundle_({options.mapper.bundle_keyframes, options.mapper.bundle_max_turn_rate, noise_of(options)},
-              options.mapper.bundle_options, options.bundle_lag, camera, executor),
+      bundle_({options.mapper.bundle_keyframes, noise_of(options)}, options.mapper.bundle_options,
+              options.bundle_lag, camera, executor),
       closer_(options.loops, camera, &executor) {
   if (!options.loops.enabled) return;
   constexpr std::size_t kLookAlikes = 12;
@@ -119,7 +119,7 @@ bool Slam::is_place(const sensor::RgbdFrame& frame, const features::FrameFeature
 void Slam::start_map(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {
   tracking::TrackResult origin;
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, {}, 0.0);
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, {}, {}, 0.0);
   remember_picture(frame, report.keyframe);
   report.reference = report.keyframe;
   report.state = tracking::TrackState::kTracked;
@@ -133,6 +133,10 @@ void Slam::start_map(const sensor::RgbdFrame& frame,
 /// the world's place does not matter to it.
 void Slam::put_back_bundle(BundleReport& report) {
   const std::optional<MapCorrection> correction = bundle_.commit(map_, clock_, report);
+  if (report.refused) {
+    ++refused_bundles_;
+    log_->warning("a local bundle was not put into the map: " + report.refused->text());
+  }
   if (!correction) return;
   const auto moved = correction->find(tracker_.reference());
   if (moved != correction->end()) last_camera_from_world_ = last_camera_from_world_ * moved->second.inverse();
@@ -192,6 +196,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
     return report;
   }
   last_camera_from_world_ = track.camera_from_world;
+  const auto step = motion_since_last(track.camera_from_world);  // in the map that it was tracked in
   mapper_.count_sightings(map_, track);
   report.decision =
       rule_.decide(map_, tracker_.reference(), track, camera_,
@@ -199,6 +204,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   if (report.decision.wanted && !report.decision.urgent) return_to_known_ground(report);
   if (report.decision.wanted) make_keyframe(frame, features, taken->levels, report);
   remember_pose(frame.stamp, last_camera_from_world_, true);
+  frames_.back().camera_from_previous = step;
+  frames_.back().step_sigma_m = track.sigma_m();
   if (options_.tracker.align_stamps) report.depth_from_camera = motion_to_depth(frame, frames_, map_);
   return report;
 }
@@ -215,7 +222,8 @@ void Slam::return_to_known_ground(FrameReport& report) {
 void Slam::make_keyframe(const sensor::RgbdFrame& frame,
                          const std::shared_ptr<const features::FrameFeatures>& features,
                          const std::vector<cv::Mat>& levels, FrameReport& report) {
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, levels, shear_rate());
+  report.keyframe =
+      mapper_.insert(map_, robot_, frame, features, last_track_, levels, tracker_.reference(), shear_rate());
   report.reference = report.keyframe;
   if (options_.mapper.edges && options_.tracker.depth) {
     mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_, tracker_.photometric(),
@@ -226,7 +234,7 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   rule_.keyframe_made();
   tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
   if (options_.loops.enabled) close_loops(report.keyframe);
-  if (!options_.mapper.bundle || shear_rate() > options_.mapper.bundle_max_turn_rate) return;
+  if (!options_.mapper.bundle) return;
   bundle_.request(map_, report.keyframe, clock_);
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
 }
@@ -250,14 +258,24 @@ void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {
   rule_.keyframe_made();
   mapper_.restore(map_, newest);
   if (options_.loops.enabled) closer_.restore(map_, newest);
-  const bool calm = map_.keyframe(newest).turn_rate <= options_.mapper.bundle_max_turn_rate;
-  if (options_.mapper.bundle && calm) bundle_.request(map_, newest, clock_);
+  if (options_.mapper.bundle) bundle_.request(map_, newest, clock_);
+}
+
+/// The frame before lies where its keyframe does now.
+std::optional<Rigid3> Slam::motion_since_last(const Rigid3& camera_from_world) const {
+  if (frames_.empty() || !frames_.back().tracked) return std::nullopt;
+  const maps::FramePose& last = frames_.back();
+  return camera_from_world * (last.camera_from_reference * map_.pose_of(last.reference)).inverse();
 }
 
 void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
   const core::KeyframeId reference = tracker_.reference();
-  frames_.push_back(
-      {stamp, reference, camera_from_world * map_.camera_from_world(reference).inverse(), tracked});
+  maps::FramePose pose;
+  pose.stamp = stamp;
+  pose.reference = reference;
+  pose.camera_from_reference = camera_from_world * map_.camera_from_world(reference).inverse();
+  pose.tracked = tracked;
+  frames_.push_back(pose);
 }
 
 void Slam::settle_bundles() {

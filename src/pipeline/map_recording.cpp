@@ -235,6 +235,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   context.input = input_text(**source);
   context.pace_hz = request.pace_hz;
   context.keep_changes = keeps;
+  context.alter_map = request.alter_map;
   if (resumed) context.resumed = &*resumed;
   const auto report = run_graph(*graph, context, progress);
   if (!report) return fail(with_what_is_kept(report.error(), *output));

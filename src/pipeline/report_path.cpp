@@ -24,6 +24,13 @@ double longest_step(const geometry::Trajectory& poses) {
   return std::max(0.25, 5.0 * *middle);
 }
 
+/// Empty in results of programs that did not look for any.
+nlohmann::ordered_json tears_of(const nlohmann::ordered_json& summary) {
+  const auto path = summary.find("path");
+  return path != summary.end() && path->contains("tears") ? path->at("tears")
+                                                          : nlohmann::ordered_json::array();
+}
+
 class PathChart {
  public:
   explicit PathChart(const ReportData& data) : data_(data), axes_(plan_axes(data)) {
@@ -47,6 +54,7 @@ class PathChart {
     for (const ReportPath& path : data_.paths) add_truth(path);
     add_loops();
     for (const ReportPath& path : data_.paths) add(path);
+    add_tears();
     if (!lost_.x.empty()) chart_.lines.push_back(lost_);
     for (viz::SvgDots* dots : {&start_, &end_}) {
       if (!dots->x.empty()) chart_.dots.push_back(*dots);
@@ -122,6 +130,27 @@ class PathChart {
       lift(line);
     }
     chart_.lines.push_back(std::move(line));
+  }
+
+  /// Where the path jumps though the tracker saw no jump.
+  void add_tears() {
+    viz::SvgDots torn;
+    torn.label = "torn";
+    torn.kind = "lost";
+    torn.radius_px = 7.0;
+    torn.ring = true;
+    for (const auto& tear : tears_of(data_.summary)) {
+      for (const ReportPath& path : data_.paths) {
+        if (data_.paths.size() > 1 && path.number != static_cast<std::size_t>(tear.value("robot", 0)))
+          continue;
+        const double stamp = tear.value("stamp", 0.0);
+        const auto at =
+            std::lower_bound(path.poses.begin(), path.poses.end(), stamp - 1e-6,
+                             [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
+        if (at != path.poses.end()) put(torn, at->world_from_camera.translation);
+      }
+    }
+    if (!torn.x.empty()) chart_.dots.push_back(std::move(torn));
   }
 
   const ReportData& data_;

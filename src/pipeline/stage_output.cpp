@@ -16,7 +16,9 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
+#include "plumbline/pipeline/summary.hpp"
 #include "plumbline/viz/snapshot.hpp"
 #include "stages.hpp"
 
@@ -74,7 +76,9 @@ class OutputStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     const auto dense = io.input<DenseCloud>("cloud");
-    const MapResult map = moved(*io.input<MapResult>("map"), dense->output_from_map);
+    const auto given = io.input<MapResult>("map");
+    if (given->map != nullptr) path_ = maps::check_path(given->frame_poses, *given->map);
+    const MapResult map = moved(*given, dense->output_from_map);
     const std::filesystem::path& folder = context_->output_folder;
     const cloud::CloudColumns& columns = dense->columns;
     const core::Result<void> nothing;
@@ -93,6 +97,8 @@ class OutputStage : public Stage {
     }
     return write_snapshots(folder / "snapshots", map, *dense);
   }
+
+  void summarise(RunSummary& summary) const override { summary.path.check = path_; }
 
  private:
   /// Poses and lines in the output's frame.
@@ -247,6 +253,7 @@ class OutputStage : public Stage {
   int height_px_ = 1200;
   std::vector<viz::View> chosen_;
   const RunContext* context_ = nullptr;
+  maps::PathCheck path_;
 };
 
 }  // namespace

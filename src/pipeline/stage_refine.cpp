@@ -60,7 +60,10 @@ class RefineStage : public Stage {
     return {};
   }
 
-  void summarise(RunSummary& summary) const override { summary.refine = counts_; }
+  void summarise(RunSummary& summary) const override {
+    summary.refine = counts_;
+    summary.path.refused += refused_;
+  }
 
  private:
   /// As it came, when it has our voxels.
@@ -104,6 +107,8 @@ class RefineStage : public Stage {
     counts_.max_shift_m = summary.max_shift_m;
     counts_.before = summary.bundle.before;
     counts_.after = summary.bundle.after;
+    refused_ = static_cast<std::size_t>(summary.refused);
+    if (summary.refused > 0) log_->warning("refine: not put into the map: " + summary.message);
     if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
     log_->debug(fmt::format(
         "refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "
@@ -144,6 +149,7 @@ class RefineStage : public Stage {
   std::mutex one_at_a_time_;
   std::map<core::KeyframeId, mapping::CoarseSurface> surfaces_;  ///< under the mutex while frames come
   RunSummary::Refine counts_;
+  std::size_t refused_ = 0;
   core::Executor::Job clearing_;  ///< goes first: it uses the others
 };
 

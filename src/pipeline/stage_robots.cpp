@@ -104,6 +104,7 @@ class RobotsStage : public Stage {
       summary.loops.candidates += static_cast<std::size_t>(loops.candidates);
       summary.loops.verified += static_cast<std::size_t>(loops.verified);
       summary.loops.accepted += static_cast<std::size_t>(loops.accepted);
+      summary.path.refused += static_cast<std::size_t>(slams_[r]->refused());
       const mapping::FusionEnd::Traffic& traffic = end_->traffic(r);
       summary.traffic.push_back({robot.name, traffic.messages, traffic.bytes, traffic.most});
     }

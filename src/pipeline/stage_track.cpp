@@ -26,6 +26,7 @@ class TrackStage : public Stage {
     camera_ = context.source->camera().color;
     debug_folder_ = context.debug_folder;
     keep_changes_ = context.keep_changes;
+    alter_map_ = context.alter_map;
     if (auto loaded = options_.loops.load(); !loaded) return loaded;
     slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
     slam_->set_shutter(context.source->camera().readout_s);
@@ -62,7 +63,9 @@ class TrackStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     slam_->finish();
     auto result = std::make_shared<MapResult>();
-    result->map = std::make_shared<maps::Map>(slam_->map());
+    auto map = std::make_shared<maps::Map>(slam_->map());
+    if (alter_map_) alter_map_(*map);
+    result->map = map;
     result->frame_poses = slam_->frame_poses();
     take_poses_from_map(*result);
     result->frame_columns = kRowColumns;
@@ -84,6 +87,7 @@ class TrackStage : public Stage {
     summary.loops = {static_cast<std::size_t>(loops.candidates), static_cast<std::size_t>(loops.verified),
                      static_cast<std::size_t>(loops.accepted), static_cast<std::size_t>(loops.rejected),
                      slam_->loop_trials()};
+    summary.path.refused += static_cast<std::size_t>(slam_->refused());
     summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
     summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
   }
@@ -106,6 +110,7 @@ class TrackStage : public Stage {
   std::vector<float> bundle_ms_;
   std::size_t lines_ = 0;
   bool keep_changes_ = false;
+  std::function<void(maps::Map&)> alter_map_;
   maps::MapMoment moment_;  ///< of the map, up to which changes were told
 };
 

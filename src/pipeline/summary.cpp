@@ -183,6 +183,34 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
   return list;
 }
 
+nlohmann::ordered_json path_of(const RunSummary& summary) {
+  nlohmann::ordered_json tears = nlohmann::ordered_json::array();
+  for (const maps::PathStep& step : summary.path.check.tears) {
+    tears.push_back({{"stamp", step.stamp},
+                     {"robot", step.to.robot},
+                     {"from_keyframe", step.from.index},
+                     {"to_keyframe", step.to.index},
+                     {"off_m", rounded(step.off_m)},
+                     {"off_rad", rounded(step.off_rad)}});
+  }
+  return {{"largest_step_m", rounded(summary.path.check.largest_m)},
+          {"largest_step_rad", rounded(summary.path.check.largest_rad)},
+          {"refused_adjustments", summary.path.refused},
+          {"tears", tears}};
+}
+
+/// The worst place where the path is torn, and how many there are.
+std::string torn_text(const maps::PathCheck& check) {
+  const auto& worst = *std::max_element(check.tears.begin(), check.tears.end(),
+                                        [](const auto& a, const auto& b) { return a.off_m < b.off_m; });
+  return fmt::format(
+      "the map is torn: at {:.3f} s, between keyframes {} and {}, the path jumps by {:.1f} cm and {:.1f} "
+      "degrees "
+      "that the tracker did not see{}",
+      worst.stamp, worst.from.index, worst.to.index, 100.0 * worst.off_m, worst.off_rad * 180.0 / M_PI,
+      check.tears.size() > 1 ? fmt::format("; {} such places in all", check.tears.size()) : "");
+}
+
 }  // namespace
 
 double RunSummary::Frames::tracked_percent() const {
@@ -218,6 +246,8 @@ void judge(RunSummary& summary) {
         "longest loss is {} frames",
         all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
         frames.longest_loss);
+  } else if (!summary.path.check.tears.empty()) {
+    summary.reason = torn_text(summary.path.check);
   } else if (all > 0 && summary.voxel_m > 0.0 && summary.cloud_points == 0) {
     const std::string without = left_out_text(summary);
     summary.reason = "the cloud is empty: " +
@@ -275,6 +305,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"max_shift_m", rounded(s.refine.max_shift_m)},
         {"before", fits_of(s.refine.before)},
         {"after", fits_of(s.refine.after)}}},
+      {"path", path_of(s)},
       {"merges", merges_of(s)},
       {"robots", traffic_of(s)},
       {"cloud", cloud_of(s)},

@@ -14,10 +14,10 @@ std::string columns_of(const mapping::ConeTerms& c) {
 }
 
 std::string columns_of(const mapping::BundleReport& b) {
-  if (!b.keyframe.valid()) return "-1,,";
+  if (!b.keyframe.valid()) return "-1,,,0";
   const double ratio = b.summary.initial_cost > 0.0 ? b.summary.final_cost / b.summary.initial_cost : 1.0;
-  return fmt::format("{},{:.4f},{}", b.keyframe.index, ratio,
-                     b.summary.point_outliers + b.summary.line_outliers);
+  return fmt::format("{},{:.4f},{},{}", b.keyframe.index, ratio,
+                     b.summary.point_outliers + b.summary.line_outliers, b.refused ? 1 : 0);
 }
 
 }  // namespace
@@ -29,7 +29,7 @@ const char* const kRowColumns =
     "weak_directions,frames_since_keyframe,shared,overlap,parallax,rotation_rad,mapper_idle,cone_candidate,"
     "cone_shared,cone_matched,cone_all,cone_changed,cone_theta,cone_beta,cone_alpha,cone_initial,cone_"
     "adaptive,"
-    "cone_ecog,cone_offset,wanted,urgent,bundle,bundle_cost,bundle_outliers";
+    "cone_ecog,cone_offset,wanted,urgent,bundle,bundle_cost,bundle_outliers,bundle_refused";
 
 std::string row_columns(const mapping::FrameReport& r) {
   const mapping::KeyframeDecision& d = r.decision;

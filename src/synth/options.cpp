@@ -29,6 +29,9 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("height", height, {48, 4096}, "px", "Picture height");
   table.number("fps", fps, {1.0, 240.0}, "Hz", "Frames a second");
   table.number("speed", speed, {0.05, 20.0}, "", "Times the scene's own speed");
+  table.number(
+      "readout", readout_s, {0.0, 0.1}, "s",
+      "Rolling shutter of the colour camera: from the first row to the last; a stamp is the middle row's");
   table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
                "Distance between samples of reference.ply; 0 = 5 mm, more for large scenes");
   table.number("visible_range", visible_range, {0.5, 20.0}, "m",

@@ -143,6 +143,7 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"height", o.height},
           {"fps", o.fps},
           {"speed", o.speed},
+          {"readout", o.readout_s},
           {"visible_range", o.visible_range},
           {"events", o.events}};
 }

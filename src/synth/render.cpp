@@ -130,9 +130,10 @@ class Shader {
       const TexelScale s = texel_scale(world, i);
       scales_.push_back({static_cast<float>(1.0 / s.u), static_cast<float>(1.0 / s.v)});
     }
-    const double cx = 0.5 * view.camera.width, cy = 0.5 * view.camera.height;
+    const int rows = view.picture_rows > 0 ? view.picture_rows : view.camera.height;
+    const double cx = 0.5 * view.camera.width, cy = 0.5 * rows;
     center_x_ = static_cast<float>(cx);
-    center_y_ = static_cast<float>(cy);
+    center_y_ = static_cast<float>(cy - view.first_row);
     per_radius2_ = static_cast<float>(1.0 / (cx * cx + cy * cy));
   }
 

@@ -24,6 +24,8 @@ struct View {
   geometry::Rigid3 world_from_camera;
   std::vector<FaceView> faces;
   cv::Mat1i ids;               ///< face per pixel, -1 = nothing
+  int first_row = 0;           ///< of the whole picture, of which this may be a strip
+  int picture_rows = 0;        ///< of the whole picture; 0: this is it
   std::optional<double> time;  ///< s after the first frame: walkers are where they are then; none: no walkers
 };
 

@@ -93,6 +93,7 @@ struct SynthSource::Impl {
   void set_exposure();
   [[nodiscard]] float gain(std::int64_t number) const;
   [[nodiscard]] cv::Mat3b color(const Stamps& at) const;
+  [[nodiscard]] cv::Mat3b rolling(const Stamps& at, const Exposure& exposure) const;
   [[nodiscard]] cv::Mat2f flow(const View& view, const Stamps& at, double extra_px) const;
 };
 
@@ -180,6 +181,24 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
   return out;
 }
 
+/// A few rows at a time, each from where the camera was when they were read out.
+cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure) const {
+  constexpr int kRows = 8;
+  cv::Mat3b image(camera.color.height, camera.color.width);
+  for (int first = 0; first < image.rows; first += kRows) {
+    sensor::Pinhole strip = camera.color;
+    strip.height = std::min(kRows, image.rows - first);
+    strip.cy -= first;
+    const double middle = (first + 0.5 * strip.height) / image.rows - 0.5;
+    const double stamp = at.color + middle * world->options.readout_s;
+    View view = look(*world, strip, pose(stamp), stamp - kFirstStamp);
+    view.first_row = first;
+    view.picture_rows = image.rows;
+    shade(*world, view, exposure).copyTo(image.rowRange(first, first + strip.height));
+  }
+  return image;
+}
+
 cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   const Sensor sensor = world->options.sensor;
   const View view = look(*world, camera.color, pose(at.color), at.color - kFirstStamp);
@@ -188,7 +207,7 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   if (event(EventKind::kLampOff, at.color) != 0.0) exposure.gain *= 0.08F;
   if (event(EventKind::kCover, at.color) != 0.0) exposure.gain *= 0.004F;
   if (event(EventKind::kWhiteout, at.color) != 0.0) exposure.gain *= 60.0F;
-  cv::Mat3b image = shade(*world, view, exposure);
+  cv::Mat3b image = world->options.readout_s > 0.0 ? rolling(at, exposure) : shade(*world, view, exposure);
   const double blur = event(EventKind::kBlur, at.color);
   if (real) {
     cv::GaussianBlur(image, image, {3, 3}, 0.6);  // lens and mosaic
@@ -220,6 +239,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->robot = robot;
   impl->name = o.robots > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
+  impl->camera.readout_s = o.readout_s;
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
   CameraPath::Options motion;
   motion.speed = o.speed;

@@ -15,10 +15,9 @@ using geometry::Vector6d;
 
 namespace {
 
-constexpr double kSecondRadius = 6.0;  // px, once the pose is roughly known
-constexpr double kPointGate = 7.8;     // chi-square, 2 degrees of freedom, 98 %
-constexpr double kLineGate = 9.2;      // 99 %: line ends are less exact than corners
-constexpr double kDoubt = 0.75;        // of a change of motion in directions that hardly anything else holds
+constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
+constexpr double kLineGate = 9.2;   // 99 %: line ends are less exact than corners
+constexpr double kDoubt = 0.75;     // of a change of motion in directions that hardly anything else holds
 
 std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
                                              const features::FrameFeatures& features,
@@ -159,9 +158,10 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
   };
   const Round rounds[] = {{radius, 0.15, 500, 1, true, false},
                           {radius, 0.08, 700, 1, false, false},
-                          {kSecondRadius, 0.05, 1200, 0, true, true},
-                          {kSecondRadius, 0.03, 2400, 0, false, true},
-                          {kSecondRadius, 0.03, 2400, 0, false, false}};
+                          {kFineRadius_px, 0.05, 1200, 0, true, true},
+                          {kFineRadius_px, 0.03, 2400, 0, false, true},
+                          {kFineRadius_px, 0.03, 2400, 0, false, false}};
+  constexpr std::size_t kFine = 2;  // the first of the fine rounds
   const PhotometricView view{features.photometric.get(), &frame.depth, depth_from_colour, camera_};
   bool stiff = !motion_refuted_;
   bool surface_alone = false;
@@ -215,10 +215,10 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
       drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);
     }
   };
-  for (const Round& round : rounds) run(round);
+  for (std::size_t i = radius > 0.0 ? 0 : kFine; i < std::size(rounds); ++i) run(rounds[i]);
   if (stiff && surface_alone && problem.prior && refutes_motion(problem, result.estimate, predicted, pose)) {
     stiff = false;
-    for (std::size_t i = 2; i < std::size(rounds); ++i) run(rounds[i]);
+    for (std::size_t i = kFine; i < std::size(rounds); ++i) run(rounds[i]);
   }
   result.motion_refuted =
       surface_alone && !stiff && !motion_prior(result.estimate.information, predicted, Motion::kUnknown);
@@ -268,7 +268,7 @@ void Tracker::settle_shutter(const maps::Map& map, const sensor::RgbdFrame& fram
   const Eigen::Vector3d now = before.isZero(0.0) ? mean : Eigen::Vector3d(mean + 0.5 * (mean - before));
   if ((now - before).norm() * 0.5 * options_.readout_s * camera_.fx < kVisible_px) return;
   const Features still = at_one_moment(frame, features, now);
-  TrackResult again = estimate(map, frame, *still, found.camera_from_world, kSecondRadius);
+  TrackResult again = estimate(map, frame, *still, found.camera_from_world, kFineRadius_px);
   if (again.state != TrackState::kTracked) return;
   again.relocalised = found.relocalised;
   again.features = still;

@@ -32,17 +32,36 @@ double Tracker::evidence(const TrackResult& result) const {
          weights.plane_weight * seen.planes.inliers + weights.photometric_weight * seen.photometric.inliers;
 }
 
+/// Whether the camera would have been jolted as no hand or wheel does between two frames.
+bool Tracker::leaps(double stamp, const Rigid3& camera_from_world) const {
+  constexpr double kMost_m = 0.03;
+  constexpr double kMost_rad = 0.03;
+  if (!knows_motion(stamp)) return false;
+  const Rigid3 leap = camera_from_world * predict(stamp).inverse();
+  return leap.translation.norm() > kMost_m || geometry::rotation_angle(leap.rotation) > kMost_rad;
+}
+
 std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
                                               const features::FrameFeatures& features) const {
+  constexpr double kClearly = 1.15;  // more must bear a leap out than what is near the guess
   if (lost_frames_ >= 30) return std::nullopt;
   const Guesses guesses = this->guesses(map, frame, features);
+  const auto tracked = [&](const TrackResult& attempt) {
+    return attempt.state == TrackState::kTracked && (!stale() || beyond_doubt(attempt));
+  };
   std::optional<TrackResult> best;
   for (std::size_t i = 0; i < guesses.poses.size(); ++i) {
-    TrackResult attempt =
-        estimate(map, frame, features, guesses.poses[i], 12.0 + 4.0 * std::min(lost_frames_, 5));
-    if (attempt.state != TrackState::kTracked || (stale() && !beyond_doubt(attempt))) continue;
-    if (!best || evidence(attempt) > evidence(*best)) best = std::move(attempt);
-    if (!guesses.sought) break;
+    const Rigid3& guess = guesses.poses[i];
+    TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
+    // Among look-alikes, the keys of a keyboard, wrong matches of the wide search can pull the pose further
+    // than the fine rounds look: the right ones around the guess would never be tried.
+    if (leaps(frame.stamp, attempt.camera_from_world)) {
+      TrackResult near = estimate(map, frame, features, guess, 0.0);
+      if (tracked(near) && !(tracked(attempt) && evidence(attempt) > kClearly * evidence(near)))
+        attempt = std::move(near);
+    }
+    if (tracked(attempt) && (!best || evidence(attempt) > evidence(*best))) best = std::move(attempt);
+    if (best && !guesses.sought) break;
   }
   return best;
 }

@@ -209,13 +209,25 @@ TEST(Slam, ALaterPutBackIsAsGoodAsOneOnTheSpot) {
   }
 }
 
-TEST(Slam, NoTurnIsTooFastForAShutterThatTakesAllRowsAtOnce) {
-  SlamOptions options;
-  options.bundle_lag = 6;
-  options.mapper.bundle_max_turn_rate = 1e-6;
-  EXPECT_EQ(run(Recording::get().shots, 1, options).bundles, 0) << "any picture may be sheared";
-  EXPECT_EQ(run(Recording::get().shots, 1, options, 0.01).bundles, 0);
-  EXPECT_GE(run(Recording::get().shots, 1, options, 0.0).bundles, 2);
+TEST(Slam, EveryFrameKnowsItsStepAndEveryKeyframeItsWay) {
+  const core::Executor executor(1);
+  const auto log = core::null_log();
+  Slam slam({}, Recording::get().camera, 0, executor, *log);
+  for (const Shot& shot : Recording::get().shots) slam.process(shot.frame, shot.features);
+  slam.finish();
+  const std::vector<maps::FramePose>& frames = slam.frame_poses();
+  ASSERT_EQ(frames.size(), 36U);
+  EXPECT_FALSE(frames.front().camera_from_previous);
+  for (std::size_t i = 1; i < frames.size(); ++i) ASSERT_TRUE(frames[i].camera_from_previous) << i;
+  const std::vector<core::KeyframeId> ids = slam.map().keyframe_ids();
+  ASSERT_GE(ids.size(), 2U);
+  EXPECT_FALSE(slam.map().keyframe(ids[0]).reference.valid());
+  for (std::size_t i = 1; i < ids.size(); ++i)
+    EXPECT_TRUE(slam.map().keyframe(ids[i]).reference.valid()) << i;
+  EXPECT_EQ(slam.refused(), 0);
+  const maps::PathCheck check = maps::check_path(frames, slam.map());
+  EXPECT_TRUE(check.tears.empty());
+  EXPECT_GT(check.largest_m, 0.0) << "bundles do move keyframes";
 }
 
 TEST(Slam, BlackBlindAndRepeatedFramesAreSurvived) {

@@ -125,46 +125,18 @@ TEST(StoreSurface, SummariesAreKeptBesideTheirClouds) {
     EXPECT_TRUE(reader->frame_summary_bytes(5)->empty());
     EXPECT_TRUE(reader->summary_bytes({keyframe.robot, keyframe.index + 1})->empty());
   }
-  run_sql(folder.file(), "DROP TABLE summary; DROP TABLE frame_summary; PRAGMA user_version = 2");
-  const auto reader = StoreReader::open(folder.file());
-  ASSERT_TRUE(reader);
-  EXPECT_TRUE(reader->summary_bytes(keyframe)->empty());
-  EXPECT_TRUE(reader->frame_summary_bytes(4)->empty());
 }
 
-TEST(StoreSurface, StoresOfTheFirstFormatHaveNoneAndGetThemWhenARunGoesOn) {
+TEST(StoreSurface, StoresOfAnOlderFormatAreRefusedWithTheRemedy) {
   const StoreFolder folder;
   StoreWorld world(6);
-  const std::vector<KeyframeId> ids = write_store(folder.file(), world, 3);
-  run_sql(folder.file(), "DROP TABLE surface; DROP TABLE summary; DROP TABLE frame_summary; PRAGMA user_version = 1");
-  {
-    const auto reader = StoreReader::open(folder.file());
-    ASSERT_TRUE(reader) << reader.error().message;
-    EXPECT_EQ(reader->header().format, 1);
-    const auto bytes = reader->surface_bytes(ids[1]);
-    ASSERT_TRUE(bytes);
-    EXPECT_TRUE(bytes->empty());
-    const auto stored = reader->load();
-    ASSERT_TRUE(stored) << stored.error().message;
-    EXPECT_TRUE(equal(stored->map, world.map));
-  }
-  {
-    auto writer = StoreWriter::resume(folder.file());
-    ASSERT_TRUE(writer) << writer.error().message;
-    StoreStep step;
-    const KeyframeId id = world.step();
-    step.map = std::make_shared<MapChanges>(world.map.changes_since({}));
-    step.clouds.push_back({id, 0, std::make_shared<std::vector<std::uint8_t>>(4), surface_of(50)});
-    ASSERT_TRUE(writer->add(step));
-  }
+  write_store(folder.file(), world, 3);
+  run_sql(folder.file(), "PRAGMA user_version = " + std::to_string(kStoreFormat - 1));
   const auto reader = StoreReader::open(folder.file());
-  ASSERT_TRUE(reader);
-  EXPECT_EQ(reader->header().format, kStoreFormat);
-  const auto bytes = reader->surface_bytes(world.map.keyframe_ids().back());
-  ASSERT_TRUE(bytes);
-  const auto read = unpack_surface(*bytes);
-  ASSERT_TRUE(read);
-  EXPECT_EQ(read->samples.size(), 50U);
+  ASSERT_FALSE(reader);
+  EXPECT_NE(reader.error().message.find("map the recording again"), std::string::npos)
+      << reader.error().message;
+  EXPECT_FALSE(StoreWriter::resume(folder.file()));
 }
 
 }  // namespace

@@ -18,8 +18,9 @@ namespace plumbline::mapping {
 struct BundleReport {
   core::KeyframeId keyframe;  ///< around which; invalid: nothing was put back
   optimize::BundleSummary summary;
-  double wait_ms = 0.0;   ///< how long the tracker had to wait for it
-  double solve_ms = 0.0;  ///< wall time of the adjustment
+  std::optional<Contradiction> refused;  ///< why it was not put back
+  double wait_ms = 0.0;                  ///< how long the tracker had to wait for it
+  double solve_ms = 0.0;                 ///< wall time of the adjustment
 };
 
 /// One bundle is under way at a time. Of the keyframes that ask meanwhile, the newest gets the next one,

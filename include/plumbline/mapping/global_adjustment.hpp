@@ -13,6 +13,7 @@
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/mapping/sighting_noise.hpp"
+#include "plumbline/mapping/tracked_way.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/optimize/pose_graph.hpp"
@@ -32,9 +33,6 @@ struct PoseEdge {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
   bool trusted = false;  ///< never taken for wrong
 };
-
-/// What a keyframe's pose shall be: camera_from_world.
-using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>;
 
 /// How keyframes lie to each other in the map now: each to the one before it of its robot, to those it shares
 /// at least `min_shared` landmarks with (at most `max_neighbours`), and to those its surface is aligned with.
@@ -64,10 +62,6 @@ struct GlobalAdjustmentOptions {
   bool pose_graph = true;  ///< before bundle adjustment, when there are edges besides the map's own
   bool bundle = true;
   int observations = 250;  ///< points and lines that a keyframe is tied with at most; those seen most often
-  /// rad/s. Pictures taken while turning are sheared by the rolling shutter of common sensors, and their
-  /// depth is stamped apart: what they say counts for half at this rate and fades with the fourth power of
-  /// it.
-  double turn_rate = 0.4;
   SightingNoise noise;
   double surface_weight = 0.3;  ///< of the map's surface edges: their samples are alike from one to the next
   /// Standard deviations. Where a tracker slid along a wall, it is the landmarks of that moment that agree on
@@ -92,7 +86,8 @@ struct GlobalAdjustmentSummary {
   double mean_shift_m = 0.0;  ///< how far keyframes moved
   double max_shift_m = 0.0;
   bool changed = false;  ///< the map was moved
-  std::string message;   ///< why not, or what the solver said
+  int refused = 0;  ///< solutions that contradicted what the tracker had measured; `message` tells the last
+  std::string message;  ///< why not, or what the solver said
 };
 
 /// Moves all keyframes and landmarks of the map to where everything fits best, and takes observations that do

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plumbline/mapping/sighting_noise.hpp"
+#include "plumbline/mapping/tracked_way.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/camera.hpp"
@@ -31,14 +32,14 @@ struct LocalBundle {
 };
 
 struct LocalBundleOptions {
-  int keyframes = 12;          ///< how many may move
-  double max_turn_rate = 0.6;  ///< rad/s; keyframes taken while turning faster are held and silent
+  int keyframes = 12;  ///< how many may move
   SightingNoise noise;
 };
 
 /// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most
-/// with. Keyframes around these, that see the same landmarks, are held. Without any of these that speaks
-/// the oldest keyframe that does is held.
+/// with. Held are keyframes around these: those before and after on the tracker's way
+/// (maps::Keyframe::reference), so that all that moves is tied to something that does not by what the tracker
+/// saw between them, and those that see the same landmarks.
 LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, const sensor::Pinhole& camera,
                               const LocalBundleOptions& options,
                               const std::vector<core::KeyframeId>& also = {});
@@ -50,6 +51,8 @@ using MapCorrection = std::map<core::KeyframeId, geometry::Rigid3>;
 /// made after the take keep their pose relative to their parent in the spanning tree; landmarks that were not
 /// part of the bundle move with the keyframe that saw them first. Nothing is done when a keyframe's pose is
 /// not the one that was taken: somebody else has moved the map, and knew more.
-std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map);
+/// Nor when it contradicts what the tracker measured (tracked_way.hpp), which is told then.
+std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map,
+                                      std::optional<Contradiction>* refused = nullptr);
 
 }  // namespace plumbline::mapping

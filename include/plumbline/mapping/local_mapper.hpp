@@ -22,6 +22,8 @@ namespace plumbline::mapping {
 
 struct LocalMapperOptions {
   double max_landmark_depth_m = 8.0;
+  double max_landmark_turn_rate =
+      0.6;  ///< rad/s; pictures taken while turning faster make and merge no landmarks
   LandmarkCullingOptions culling;
   bool triangulate = true;
   TriangulationOptions triangulation;
@@ -32,7 +34,6 @@ struct LocalMapperOptions {
   KeyframeCullingOptions keyframe_culling;
   bool bundle = true;
   int bundle_keyframes = 12;
-  double bundle_max_turn_rate = 0.6;
   SightingNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
   bool edges = true;
   int edge_keyframes = 5;
@@ -62,7 +63,7 @@ class LocalMapper {
   core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
                           const std::shared_ptr<const features::FrameFeatures>& features,
                           const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
-                          double turn_rate);
+                          core::KeyframeId reference, double turn_rate);
 
   /// Counts which landmarks a tracked frame should have seen and did.
   void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;

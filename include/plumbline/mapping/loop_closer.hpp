@@ -50,6 +50,7 @@ struct LoopCounts {
   int verified = 0;    ///< with success
   int accepted = 0;    ///< loops that moved the map
   int rejected = 0;    ///< edges that the pose graph took for wrong
+  int refused = 0;     ///< closings that would have torn the map
 };
 
 /// A verified pair of keyframes.
@@ -112,7 +113,7 @@ class LoopCloser {
  private:
   [[nodiscard]] std::vector<Loop> verify(const maps::Map& map, core::KeyframeId keyframe,
                                          const std::vector<places::Candidate>& candidates);
-  void note_verdict(const PoseEdge& edge, bool believed);
+  void note_verdict(const PoseEdge& edge, const std::string& refused);
   void measure_correction(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::vector<Loop> confirmed(const maps::Map& map, core::KeyframeId keyframe) const;

@@ -16,6 +16,10 @@ struct SightingNoise {
   double aligned = 0.3;           ///< to so much of it where they were aligned (maps::Observation)
   double line_sigma_px = 0.25;    ///< of a line's ends, across it
   double depth_factor = 2.0;      ///< of the depth noise, for the depth of corners and lines
+  /// rad/s. Pictures taken while turning are sheared by the rolling shutter of common sensors, and their
+  /// depth is stamped apart: what they say counts for half at this rate and fades with the fourth power of
+  /// it.
+  double turn_rate = 0.4;
 
   /// All but the scale factor, which is that of the features.
   void declare(core::OptionTable& table, const std::string& prefix);
@@ -29,6 +33,8 @@ struct SightingNoise {
   /// The same for many: `corner_px` is octave_px() of its octave.
   [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
                                                     double unrest, double corner_px) const;
+  /// `unrest` of a keyframe that was taken while the camera turned at this rate, rad/s.
+  [[nodiscard]] double unrest_of(double rate) const;
   /// Standard deviation of a corner of this octave.
   [[nodiscard]] double octave_px(int octave) const;
   [[nodiscard]] optimize::BundleLineObservation of(const features::LineFeature& line,

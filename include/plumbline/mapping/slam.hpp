@@ -79,6 +79,8 @@ class Slam {
 
   [[nodiscard]] const maps::Map& map() const { return map_; }
   [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
+  /// Bundles and loops that would have torn the map, and were not put into it.
+  [[nodiscard]] int refused() const { return refused_bundles_ + closer_.counts().refused; }
   /// Every place that was verified, with its evidence.
   [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
   /// Keyframes by what they look like; empty without loops.
@@ -108,6 +110,8 @@ class Slam {
   void close_loops(core::KeyframeId keyframe);
   [[nodiscard]] bool is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                               core::KeyframeId keyframe, const geometry::Rigid3& camera_from_world) const;
+  [[nodiscard]] std::optional<geometry::Rigid3> motion_since_last(
+      const geometry::Rigid3& camera_from_world) const;
   void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;
@@ -125,6 +129,7 @@ class Slam {
   std::int64_t clock_ = 0;                   ///< frames so far: logical time
   geometry::Rigid3 last_camera_from_world_;  ///< of the last tracked frame, in the map as it is now
   std::vector<maps::FramePose> frames_;
+  int refused_bundles_ = 0;
 };
 
 }  // namespace plumbline::mapping

@@ -2,6 +2,7 @@
 #pragma once
 
 // Poses of frames that are not keyframes: kept relative to a keyframe, so that they move with it.
+#include <optional>
 #include <vector>
 
 #include "plumbline/core/ids.hpp"
@@ -17,7 +18,33 @@ struct FramePose {
   core::KeyframeId reference;
   geometry::Rigid3 camera_from_reference;
   bool tracked = false;
+  /// Motion since the frame before as the tracker saw it; none where one of the two was not tracked.
+  std::optional<geometry::Rigid3> camera_from_previous;
+  double step_sigma_m = 0.0;  ///< its standard deviation where it is known worst; half as much in radians
 };
+
+/// A step between neighbouring frames of the path as it lies now, beside the one that the tracker saw.
+struct PathStep {
+  double stamp = 0.0;     ///< of the later frame, seconds
+  core::KeyframeId from;  ///< reference of the earlier frame
+  core::KeyframeId to;    ///< of the later one
+  double off_m = 0.0;     ///< by how much they differ
+  double off_rad = 0.0;
+};
+
+struct PathCheck {
+  double largest_m = 0.0;  ///< by how much a step differs at most from the tracker's
+  double largest_rad = 0.0;
+  std::vector<PathStep> tears;  ///< beyond noise: 3 cm or 2 degrees, and 4 standard deviations
+};
+
+/// Whether the map has torn: the path must lead from frame to frame as the tracker saw it. Frames hang on
+/// keyframes, so that steps change only where the keyframe does, and a correction that is spread over the way
+/// changes each by little. The frames of each robot in order.
+PathCheck check_path(const std::vector<FramePose>& frames, const Map& map);
+
+/// Whether a step that the tracker knows to `sigma_m` cannot be off by so much.
+bool beyond_noise(double off_m, double off_rad, double sigma_m);
 
 /// World poses of the tracked frames, in the order given, as their keyframes lie in `map` now.
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map);

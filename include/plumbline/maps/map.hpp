@@ -35,6 +35,12 @@ struct Keyframe {
   std::int64_t frame_index = -1;
   double stamp = 0.0;      ///< seconds
   double turn_rate = 0.0;  ///< rad/s: how fast the camera turned; 0 when it takes all rows at once: no shear
+  /// The keyframe that the tracker followed when this one was made (invalid: it began a map), and how the two
+  /// lay to each other as the tracker saw it.
+  KeyframeId reference;
+  geometry::Rigid3 camera_from_reference;
+  double reference_sigma_m =
+      0.0;  ///< standard deviation of that where it is known worst; half as much in radians
   std::shared_ptr<const features::FrameFeatures> features;
   std::vector<SurfaceSample> surface;  ///< well spread over directions and over the picture
 };

@@ -18,9 +18,9 @@
 
 namespace plumbline::maps {
 
-/// Stores of this and of lower formats are read. 1: without surfaces. 2: without summaries of views. 3: without
-/// patches of corners.
-constexpr int kStoreFormat = 4;
+/// Stores of this and of lower formats are read. 1: without surfaces. 2: without summaries of views. 3:
+/// without patches of corners.
+constexpr int kStoreFormat = 5;
 
 /// What is written once, when a store is made.
 struct StoreHeader {

@@ -3,6 +3,7 @@
 
 // `plumbline map` as a call: a recording in, a result folder out.
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct MapRequest {
   bool resume = false;   ///< go on from what an interrupted run left in OUT.partial
   double pace_hz = 0.0;  ///< play each recording at so many frames a second, at most; 0: as fast as that goes
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
+  std::function<void(maps::Map&)>
+      alter_map;  ///< for tests: changes the map when tracking has ended; may be empty
 };
 
 /// Whether there is nothing to go on with: OUT is whole and no run was interrupted since.

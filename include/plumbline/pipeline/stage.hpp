@@ -31,6 +31,10 @@ namespace plumbline::dataset {
 class FrameSource;
 }
 
+namespace plumbline::maps {
+class Map;
+}
+
 namespace plumbline::pipeline {
 
 struct ResumedRun;
@@ -121,6 +125,8 @@ struct RunContext {
   std::string input;                    ///< what is mapped, as text that another recording does not give
   double pace_hz = 0.0;                 ///< frames of each recording a second, at most; 0: no matter
   bool keep_changes = false;            ///< some stage wants_map_changes
+  std::function<void(maps::Map&)>
+      alter_map;                        ///< for tests: changes the map when tracking has ended; may be empty
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
 };
 

@@ -13,6 +13,7 @@
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/pipeline/run.hpp"
 
@@ -69,6 +70,11 @@ struct RunSummary {
     mapping::MergeEvidence evidence;
   };
   std::vector<Merge> merges;
+  /// The path as it was written beside what the tracker saw from frame to frame.
+  struct Path {
+    maps::PathCheck check;
+    std::size_t refused = 0;  ///< adjustments of the map that would have torn it and were not used
+  } path;
   /// What a robot told the fusion end.
   struct Traffic {
     std::string robot;
@@ -112,8 +118,8 @@ struct RunSummary {
 /// Takes over counts and times of a run.
 void add_report(const RunReport& report, RunSummary& summary);
 
-/// Sets `reason` when tracking was lost for more than 10 % of the frames or the cloud that was to be made is
-/// empty.
+/// Sets `reason` when tracking was lost for more than 10 % of the frames, the map has torn or the cloud that
+/// was to be made is empty.
 void judge(RunSummary& summary);
 
 /// The one place that writes summary.json. Errors (kOutput) name the file.

@@ -3,6 +3,8 @@
 
 // Pose of every frame against the map: predict, guess, associate, estimate points, lines and depth together
 // (METHOD sections 1 and 2). Sees a const map; what changes the map is in mapping.
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -59,6 +61,8 @@ struct TrackResult {
   /// Of the information matrix of the families that are trusted, 1/m^2, rotations scaled by the scene's
   /// depth.
   double min_eigenvalue = 0.0;
+  /// Standard deviation of the pose where it is known worst, metres; half as much in radians.
+  [[nodiscard]] double sigma_m() const { return 1.0 / std::sqrt(std::max(min_eigenvalue, 1.0)); }
   int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
   bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
   /// What these directions have of a motion (left perturbation of camera_from_world), to multiply it with;
@@ -122,6 +126,8 @@ class Tracker {
   [[nodiscard]] const LocalMap& local_map() const { return local_map_; }
 
  private:
+  static constexpr double kFineRadius_px =
+      6.0;  ///< of the search for features once the pose is roughly known
   struct Last {
     double stamp = 0.0;
     geometry::Rigid3 camera_from_world;
@@ -155,9 +161,11 @@ class Tracker {
                                 const features::FrameFeatures& features) const;
   void put_likeliest_first(const maps::Map& map, const PhotometricView& view, Guesses& guesses) const;
   [[nodiscard]] double evidence(const TrackResult& result) const;
+  /// `radius`: px around the guess in which features are looked for at first; 0: the fine rounds alone.
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
                                      const features::FrameFeatures& features, const geometry::Rigid3& guess,
                                      double radius) const;
+  [[nodiscard]] bool leaps(double stamp, const geometry::Rigid3& camera_from_world) const;
   /// From where the camera should be by now; none when nothing there can be trusted.
   [[nodiscard]] std::optional<TrackResult> by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                      const features::FrameFeatures& features) const;

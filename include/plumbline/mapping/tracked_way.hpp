@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The way from keyframe to keyframe as the tracker saw it: what adjustments of the map must not contradict.
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::mapping {
+
+/// What a keyframe's pose shall be: camera_from_world.
+using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>;
+
+/// Two neighbours on the way that new poses would tear apart.
+struct Contradiction {
+  core::KeyframeId a;
+  core::KeyframeId b;
+  double off_m = 0.0;  ///< from what the tracker measured between them
+  double off_rad = 0.0;
+  [[nodiscard]] std::string text() const;
+};
+
+/// Whether `poses` contradict what the tracker measured between a keyframe and the one it followed then:
+/// beyond noise (maps::beyond_noise), and by more than the map as it is does. The worst; none: the poses may
+/// be put into the map. A correction that is spread over the way, as a loop's is, contradicts nothing.
+std::optional<Contradiction> contradiction(const maps::Map& map, const KeyframePoses& poses);
+
+}  // namespace plumbline::mapping
