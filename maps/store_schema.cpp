@@ -8,8 +8,8 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line",
-                                   "edge",     "frame", "log",     "cloud", "frame_cloud"};
+constexpr const char* kTables[] = {"keyframe", "state", "point", "line",       "edge",
+                                   "frame",    "log",   "cloud", "frame_cloud"};
 constexpr const char* kTablesOfFormat2[] = {"surface"};
 constexpr const char* kTablesOfFormat3[] = {"summary", "frame_summary"};
 

@@ -57,11 +57,6 @@ class PartsCollector {
       line.observations = renamed(std::move(line.observations), to);
       parts_.lines.push_back(std::move(line));
     }
-    for (const KeyframeId id : map.retired_ids()) {
-      maps::RetiredKeyframe retired = map.retired(id);
-      retired.heir = renamed(retired.heir, to);
-      parts_.retired.emplace_back(renamed(id, to), retired);
-    }
     const std::uint64_t first_edge = parts_.next.edge;
     for (const auto& [order, edge] : map.edges()) {
       maps::SurfaceEdge moved = edge;
@@ -85,8 +80,6 @@ class PartsCollector {
               [](const auto& a, const auto& b) { return a.data->id < b.data->id; });
     std::sort(parts_.points.begin(), parts_.points.end(), by_id);
     std::sort(parts_.lines.begin(), parts_.lines.end(), by_id);
-    std::sort(parts_.retired.begin(), parts_.retired.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
     std::sort(parts_.next.keyframes.begin(), parts_.next.keyframes.end());
     std::sort(parts_.next.points.begin(), parts_.next.points.end());
     std::sort(parts_.next.lines.begin(), parts_.next.lines.end());

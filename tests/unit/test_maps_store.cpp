@@ -57,8 +57,7 @@ TEST(MapStore, EveryCommitIsTheMapInEveryBit) {
     ASSERT_TRUE(same_all(stored->frames, world.frames));
     EXPECT_FALSE(stored->complete);
   }
-  ASSERT_GT(world.map.retired_ids().size(), 1U) << "the world is too simple";
-  ASSERT_GT(world.map.edges().size(), 5U);
+  ASSERT_GT(world.map.edges().size(), 5U) << "the world is too simple";
   ASSERT_FALSE(world.map.loops().empty());
 }
 
