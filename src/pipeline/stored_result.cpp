@@ -5,7 +5,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
 #include <mutex>
 #include <system_error>
 #include <utility>
