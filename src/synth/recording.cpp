@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "plumbline/core/version.hpp"
+#include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
-#include "png_writer.hpp"
 #include "reference.hpp"
 
 namespace plumbline::synth {
@@ -37,9 +37,11 @@ Result<void> make_folder(const fs::path& folder) {
 }
 
 std::string write_png(const fs::path& file, const cv::Mat& image) {
-  const std::vector<std::uint8_t> bytes = encode_png(image);
+  constexpr int kQuick = 1;
+  const auto bytes = dataset::encode_png(image, kQuick);
+  if (!bytes) return bytes.error().message;
   std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
   out.flush();
   return out ? "" : file.string() + ": cannot be written (disk full, no right?)";
 }
