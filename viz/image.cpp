@@ -52,9 +52,8 @@ core::Result<void> write_png(const Image& image, const std::filesystem::path& fi
     return core::output_error(file.string() + ": the picture cannot be encoded as PNG");
   }
   auto* bytes = writer->GetResult();
-  core::OutputFile out(file);
-  out.write(bytes->GetPointer(0), static_cast<std::size_t>(bytes->GetNumberOfValues()));
-  return out.commit();
+  return core::write_file(file, {reinterpret_cast<const char*>(bytes->GetPointer(0)),
+                                 static_cast<std::size_t>(bytes->GetNumberOfValues())});
 }
 
 }  // namespace plumbline::viz

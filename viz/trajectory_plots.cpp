@@ -258,13 +258,6 @@ SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& un
   return chart;
 }
 
-core::Result<void> write_charts(const std::vector<SvgChart>& charts, std::size_t columns,
-                                const std::filesystem::path& file) {
-  core::OutputFile out(file);
-  out.write(svg_document(charts, columns));
-  return out.commit();
-}
-
 }  // namespace
 
 std::vector<SvgChart> path_charts(const std::vector<TrajectoryComparison>& comparisons) {
@@ -378,11 +371,15 @@ core::Result<void> write_trajectory_plots(const std::vector<TrajectoryComparison
   std::error_code problem;
   std::filesystem::create_directories(folder, problem);
   if (problem) return core::output_error("cannot make folder " + folder.string() + ": " + problem.message());
-  if (auto done = write_charts(path_charts(comparisons), 2, folder / "path.svg"); !done) return done;
-  if (auto done = write_charts(pose_charts(comparisons), 2, folder / "poses.svg"); !done) return done;
+  if (auto done = core::write_file(folder / "path.svg", svg_document(path_charts(comparisons), 2)); !done)
+    return done;
+  if (auto done = core::write_file(folder / "poses.svg", svg_document(pose_charts(comparisons), 2)); !done)
+    return done;
   if (!with_errors) return {};  // without truth there is no error to draw
-  if (auto done = write_charts({error_chart(comparisons)}, 1, folder / "error.svg"); !done) return done;
-  return write_charts({error_distribution_chart(comparisons)}, 1, folder / "error_distribution.svg");
+  if (auto done = core::write_file(folder / "error.svg", svg_document({error_chart(comparisons)}, 1)); !done)
+    return done;
+  return core::write_file(folder / "error_distribution.svg",
+                          svg_document({error_distribution_chart(comparisons)}, 1));
 }
 
 }  // namespace plumbline::viz

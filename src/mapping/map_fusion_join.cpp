@@ -4,6 +4,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "plumbline/core/hash.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 
 namespace plumbline::mapping {
@@ -90,23 +91,6 @@ class PartsCollector {
   maps::MapParts parts_;
 };
 
-/// FNV-1a.
-class Hash {
- public:
-  void bytes(const void* data, std::size_t size) {
-    const auto* at = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ at[i]) * 0x100000001b3ULL;
-  }
-  template <typename T>
-  void number(T value) {
-    bytes(&value, sizeof value);
-  }
-  [[nodiscard]] std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325ULL;
-};
-
 }  // namespace
 
 maps::Map renumbered(const maps::Map& map, const RobotNumbers& to) {
@@ -123,7 +107,7 @@ maps::Map joined(const std::vector<const maps::Map*>& maps, const std::vector<Ri
 }
 
 std::uint64_t content_hash(const maps::Map& map) {
-  Hash hash;
+  core::Hash hash;
   for (const KeyframeId id : map.keyframe_ids()) {
     const maps::Keyframe& keyframe = map.keyframe(id);
     hash.number(keyframe.stamp);

@@ -10,6 +10,7 @@
 
 #include "place_bound.hpp"
 #include "place_p3p.hpp"
+#include "plumbline/core/random.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -137,21 +138,6 @@ std::optional<Rigid3> from_lines(const LinePair& one, const LinePair& two) {
   return pose;
 }
 
-/// Small, the same everywhere (splitmix64).
-class Draw {
- public:
-  explicit Draw(std::uint64_t seed) : state_(seed) {}
-  std::size_t below(std::size_t count) {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
-    z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27U)) * 0x94d049bb133111ebULL;
-    return static_cast<std::size_t>((z ^ (z >> 31U)) % count);
-  }
-
- private:
-  std::uint64_t state_;
-};
-
 /// Rounds until a sample of `size` inliers was drawn with 99.9 %.
 int rounds_needed(double inlier_share, int size, int at_most) {
   const double good = std::pow(inlier_share, size);
@@ -173,7 +159,7 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
   if (!by_points && !by_lines) return std::nullopt;
   const Inliers inliers(pairs, camera);
   const InlierBound bound(pairs, camera);
-  Draw draw(seed);
+  core::SplitMix draw(seed);
   std::optional<RansacPose> best;
   std::size_t best_count = 0;
   const auto try_pose = [&](const Rigid3& pose) {
