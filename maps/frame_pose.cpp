@@ -13,7 +13,8 @@ geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map&
   geometry::Trajectory result;
   for (const FramePose& frame : frames) {
     if (!frame.tracked) continue;
-    const geometry::Rigid3 camera_from_world = frame.camera_from_reference * map.pose_of(frame.reference);
+    const geometry::Rigid3 camera_from_world =
+        frame.camera_from_reference * map.camera_from_world(frame.reference);
     result.push_back({frame.stamp, camera_from_world.inverse()});
   }
   return result;
@@ -35,8 +36,8 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
     const FramePose* before = std::exchange(last[frame.reference.robot], &frame);
     if (before == nullptr || !before->tracked || !frame.tracked || !frame.camera_from_previous) continue;
     if (before->reference == frame.reference) continue;
-    const geometry::Rigid3 step = frame.camera_from_reference * map.pose_of(frame.reference) *
-                                  (before->camera_from_reference * map.pose_of(before->reference)).inverse();
+    const geometry::Rigid3 step = frame.camera_from_reference * map.camera_from_world(frame.reference) *
+                                  (before->camera_from_reference * map.camera_from_world(before->reference)).inverse();
     const geometry::Rigid3 off = step * frame.camera_from_previous->inverse();
     const PathStep seen{frame.stamp, before->reference, frame.reference, off.translation.norm(),
                         geometry::rotation_angle(off.rotation)};
@@ -49,18 +50,10 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
 
 geometry::Trajectory keyframe_trajectory(const Map& map) {
   geometry::Trajectory result;
-  for (const core::KeyframeId id : every_keyframe(map)) {
-    result.push_back({map.stamp_of(id), map.pose_of(id).inverse()});
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    result.push_back({map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
   }
   return result;
-}
-
-std::vector<core::KeyframeId> every_keyframe(const Map& map) {
-  const std::vector<core::KeyframeId> live = map.keyframe_ids();
-  const std::vector<core::KeyframeId> retired = map.retired_ids();
-  std::vector<core::KeyframeId> all(live.size() + retired.size());
-  std::merge(live.begin(), live.end(), retired.begin(), retired.end(), all.begin());
-  return all;
 }
 
 }  // namespace plumbline::maps

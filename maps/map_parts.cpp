@@ -69,7 +69,6 @@ MapChanges Map::changes_since(const MapMoment& moment) const {
     const KeyframeEntry& entry = keyframes_.at(id);
     changes.keyframes.push_back({entry.data, entry.pose, entry.parent});
   }
-  for (const KeyframeId id : retired_.ids()) changes.retired.emplace_back(id, retired_.at(id));
   changes.points = touched(points_, moment.points);
   changes.lines = touched(lines_, moment.lines);
   for (const auto& [number, edge] : edges_) changes.edge_names.emplace_back(number, edge.a.robot);
@@ -86,12 +85,6 @@ void Map::restore_tree(const MapParts& parts) {
     if (!part.parent.valid()) continue;
     require(has_keyframe(part.parent), "a parent is not there");
     set_parent(part.data->id, part.parent);
-  }
-  for (const auto& [id, retired] : parts.retired) {
-    require(id.valid() && !has_keyframe(id) && !retired_.contains(id), "a keyframe that left is still there");
-    require(has_keyframe(retired.heir), "an heir is not there");
-    retired_.insert(id, retired);
-    keyframes_.at(retired.heir).retired.push_back(id);
   }
 }
 

@@ -168,21 +168,6 @@ std::vector<LoopEdge> decode_loops(const Bytes& bytes) {
   return loops;
 }
 
-void encode(const RetiredKeyframe& retired, ByteWriter& to) {
-  to.put(retired.stamp);
-  to.put(retired.heir);
-  to.put(retired.camera_from_heir);
-}
-RetiredKeyframe decode_retired(const Bytes& bytes) {
-  ByteReader from(bytes);
-  RetiredKeyframe retired;
-  from.get(retired.stamp);
-  from.get(retired.heir);
-  from.get(retired.camera_from_heir);
-  from.expect_end();
-  return retired;
-}
-
 void encode(const FramePose& frame, ByteWriter& to) {
   to.put(frame.stamp);
   to.put(frame.reference);
@@ -236,8 +221,8 @@ sensor::Camera decode_camera(const Bytes& bytes) {
 }
 
 void encode(const Totals& totals, ByteWriter& to) {
-  for (const std::uint64_t value : {totals.keyframes, totals.retired, totals.points, totals.lines,
-                                    totals.edges, totals.frames, totals.log, totals.next.edge}) {
+  for (const std::uint64_t value : {totals.keyframes, totals.points, totals.lines, totals.edges,
+                                    totals.frames, totals.log, totals.next.edge}) {
     to.put(value);
   }
   write(totals.next.keyframes, to);
@@ -247,8 +232,8 @@ void encode(const Totals& totals, ByteWriter& to) {
 Totals decode_totals(const Bytes& bytes) {
   ByteReader from(bytes);
   Totals totals;
-  for (std::uint64_t* value : {&totals.keyframes, &totals.retired, &totals.points, &totals.lines,
-                               &totals.edges, &totals.frames, &totals.log, &totals.next.edge}) {
+  for (std::uint64_t* value : {&totals.keyframes, &totals.points, &totals.lines, &totals.edges,
+                               &totals.frames, &totals.log, &totals.next.edge}) {
     from.get(*value);
   }
   read(from, totals.next.keyframes);

@@ -44,8 +44,6 @@ void encode(const SurfaceEdge& edge, ByteWriter& to);
 SurfaceEdge decode_edge(const Bytes& bytes);
 void encode(const std::vector<LoopEdge>& loops, ByteWriter& to);
 std::vector<LoopEdge> decode_loops(const Bytes& bytes);
-void encode(const RetiredKeyframe& retired, ByteWriter& to);
-RetiredKeyframe decode_retired(const Bytes& bytes);
 
 void encode(const FramePose& frame, ByteWriter& to);
 void decode_page(const Bytes& bytes, std::vector<FramePose>& frames);
@@ -56,7 +54,6 @@ sensor::Camera decode_camera(const Bytes& bytes);
 /// How much of everything there must be: tells when rows were lost.
 struct Totals {
   std::uint64_t keyframes = 0;
-  std::uint64_t retired = 0;
   std::uint64_t points = 0;
   std::uint64_t lines = 0;
   std::uint64_t edges = 0;

@@ -78,7 +78,6 @@ void check_totals(const Totals& totals, const MapParts& parts, const StoredMap& 
     throw BadBytes("it holds " + std::to_string(found) + " of " + std::to_string(expected) + " " + what);
   };
   expect(totals.keyframes, parts.keyframes.size(), "keyframes");
-  expect(totals.retired, parts.retired.size(), "retired keyframes");
   expect(totals.points, parts.points.size(), "points");
   expect(totals.lines, parts.lines.size(), "lines");
   expect(totals.edges, parts.edges.size(), "edges");
@@ -87,10 +86,8 @@ void check_totals(const Totals& totals, const MapParts& parts, const StoredMap& 
 }
 
 void check_frames(const std::vector<FramePose>& frames, const Map& map) {
-  const std::vector<KeyframeId> retired = map.retired_ids();  // in order
   for (const FramePose& frame : frames) {
-    if (!frame.tracked || map.has_keyframe(frame.reference)) continue;
-    if (!std::binary_search(retired.begin(), retired.end(), frame.reference)) {
+    if (frame.tracked && !map.has_keyframe(frame.reference)) {
       throw BadBytes("a frame hangs on a keyframe that is not there");
     }
   }
@@ -112,9 +109,6 @@ StoredMap read_map(Database& database, const StoreHeader& header) {
   const Totals totals = read_totals(database);
   stored.complete = is_complete(database);
   read_keyframes(database, header.camera.color, parts);
-  read_table(database, "retired", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
-    parts.retired.emplace_back(id, decode_retired(bytes));
-  });
   read_landmarks(database, "point", parts.points);
   read_landmarks(database, "line", parts.lines);
   read_table(database, "edge", [&](KeyframeId, std::int64_t number, const Bytes& bytes) {
@@ -287,7 +281,6 @@ core::Result<StoreContents> StoreReader::contents() const {
     StoreContents contents;
     contents.complete = is_complete(database);
     contents.keyframes = totals.keyframes;
-    contents.retired = totals.retired;
     contents.points = totals.points;
     contents.lines = totals.lines;
     contents.edges = totals.edges;

@@ -8,9 +8,8 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr const char* kTables[] = {"keyframe",    "state",   "retired",      "point", "line",
-                                   "edge",        "frame",   "log",          "cloud", "surface",
-                                   "frame_cloud", "summary", "frame_summary"};
+constexpr const char* kTables[] = {"keyframe", "state",   "point",       "line",    "edge",         "frame", "log",
+                                   "cloud",    "surface", "frame_cloud", "summary", "frame_summary"};
 
 void create_table(Database& database, const char* name) {
   database.run((std::string("CREATE TABLE ") + name +

@@ -104,7 +104,6 @@ struct StoreWriter::Impl {
         database(std::move(opened)),
         keyframes(*database, "keyframe"),
         states(*database, "state"),
-        retired(*database, "retired"),
         points(*database, "point"),
         lines(*database, "line"),
         edges(*database, "edge"),
@@ -127,7 +126,7 @@ struct StoreWriter::Impl {
 
   std::filesystem::path file;
   std::unique_ptr<Database> database;
-  Mirror keyframes, states, retired, points, lines, edges, frames, log;
+  Mirror keyframes, states, points, lines, edges, frames, log;
   Bytes loops;                         ///< as in the file
   std::vector<FramePose> frame_list;   ///< as in the file
   std::vector<std::string> log_lines;  ///< as in the file
@@ -154,13 +153,6 @@ void StoreWriter::Impl::mirror_keyframes(const MapChanges& map) {
 
 void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
   ByteWriter bytes;
-  retired.begin();
-  for (const auto& [id, keyframe] : map.retired) {
-    bytes.clear();
-    encode(keyframe, bytes);
-    retired.put(key_of(id), bytes.bytes());
-  }
-  retired.end();
   mirror_landmarks(map.points, map.whole, points);
   mirror_landmarks(map.lines, map.whole, lines);
   edges.begin();
@@ -211,7 +203,6 @@ void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
 void StoreWriter::Impl::put_totals(const MapChanges& map, bool complete) {
   Totals totals;
   totals.keyframes = map.keyframes.size();
-  totals.retired = map.retired.size();
   totals.points = map.point_count;
   totals.lines = map.line_count;
   totals.edges = map.edge_names.size();
@@ -239,8 +230,7 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
   });
   if (done) return done;
   const core::Result<void> reread = guarded(file, ErrorKind::kOutput, [&] {
-    for (Mirror* mirror : {&keyframes, &states, &retired, &points, &lines, &edges, &frames, &log})
-      mirror->reread();
+    for (Mirror* mirror : {&keyframes, &states, &points, &lines, &edges, &frames, &log}) mirror->reread();
     loops = read_loops(*database);
     frame_list = read_frames(*database);
     log_lines = read_log(*database);

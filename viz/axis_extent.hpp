@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "plumbline/viz/figure.hpp"
+#include "plumbline/viz/svg_chart.hpp"
 
 namespace plumbline::viz {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The colour bar that snapshots and charts share.
+// The colour bar of snapshots.
 #include <Eigen/Core>
 #include <string>
 

@@ -21,14 +21,6 @@ core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& op
   return hand_on(&Drawing::render_snapshot, scene, options, file);
 }
 
-core::Result<void> write_figure_png(const Figure& figure, const std::filesystem::path& file) {
-  return hand_on(&Drawing::write_figure_png, figure, file);
-}
-
-core::Result<void> write_figure_svg(const Figure& figure, const std::filesystem::path& file) {
-  return hand_on(&Drawing::write_figure_svg, figure, file);
-}
-
 core::Result<void> draw_graph(const std::string& dot, const std::filesystem::path& file) {
   return hand_on(&Drawing::draw_graph, dot, file);
 }

@@ -4,7 +4,6 @@
 // What needs VTK, OSMesa or Graphviz: a part of its own (core/part.hpp). The functions are those of the
 // public headers.
 #include "plumbline/core/part.hpp"
-#include "plumbline/viz/figure.hpp"
 #include "plumbline/viz/graph_picture.hpp"
 #include "plumbline/viz/snapshot.hpp"
 
@@ -13,16 +12,13 @@ namespace plumbline::viz {
 struct Drawing {
   static constexpr const char* kPart = "viz";
   static constexpr std::uint64_t layout() {
-    return core::layout_of<Drawing, Scene, CameraPath, geometry::Trajectory, Segment, SnapshotOptions, Figure,
-                           Axes, LineSeries, ScatterSeries, ColoredPath, BoxSeries, HistogramSeries,
+    return core::layout_of<Drawing, Scene, CameraPath, geometry::Trajectory, Segment, SnapshotOptions,
                            std::filesystem::path>();
   }
   using GlFunction = void (*)();
 
   core::Result<void> (*render_snapshot)(const Scene& scene, const SnapshotOptions& options,
                                         const std::filesystem::path& file);
-  core::Result<void> (*write_figure_png)(const Figure& figure, const std::filesystem::path& file);
-  core::Result<void> (*write_figure_svg)(const Figure& figure, const std::filesystem::path& file);
   core::Result<void> (*draw_graph)(const std::string& dot, const std::filesystem::path& file);
   /// OSMesa's function of that name.
   GlFunction (*gl_function)(const char* name);

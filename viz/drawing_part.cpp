@@ -3,5 +3,5 @@
 
 #include "drawing.hpp"
 
-PLUMBLINE_PART(plumbline::viz::Drawing, &plumbline::viz::render_snapshot, &plumbline::viz::write_figure_png,
-               &plumbline::viz::write_figure_svg, &plumbline::viz::draw_graph, &OSMesaGetProcAddress)
+PLUMBLINE_PART(plumbline::viz::Drawing, &plumbline::viz::render_snapshot, &plumbline::viz::draw_graph,
+               &OSMesaGetProcAddress)

@@ -37,12 +37,6 @@ Image downsample(const Image& image, int factor) {
   return small;
 }
 
-core::Result<void> write_bytes(std::string_view bytes, const std::filesystem::path& file) {
-  core::OutputFile out(file);
-  out.write(bytes);
-  return out.commit();
-}
-
 core::Result<void> write_png(const Image& image, const std::filesystem::path& file) {
   vtkNew<vtkImageData> data;
   data->SetDimensions(image.width, image.height, 1);
@@ -58,9 +52,8 @@ core::Result<void> write_png(const Image& image, const std::filesystem::path& fi
     return core::output_error(file.string() + ": the picture cannot be encoded as PNG");
   }
   auto* bytes = writer->GetResult();
-  return write_bytes({reinterpret_cast<const char*>(bytes->GetPointer(0)),
-                      static_cast<std::size_t>(bytes->GetNumberOfValues())},
-                     file);
+  return core::write_file(file, {reinterpret_cast<const char*>(bytes->GetPointer(0)),
+                                 static_cast<std::size_t>(bytes->GetNumberOfValues())});
 }
 
 }  // namespace plumbline::viz

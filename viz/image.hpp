@@ -4,7 +4,6 @@
 // Pictures in memory and on disk.
 #include <cstdint>
 #include <filesystem>
-#include <string_view>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
@@ -22,7 +21,6 @@ struct Image {
 Image downsample(const Image& image, int factor);
 
 /// Writes beside the file first and renames, so that no half picture is ever seen. Errors name the file.
-core::Result<void> write_bytes(std::string_view bytes, const std::filesystem::path& file);
 core::Result<void> write_png(const Image& image, const std::filesystem::path& file);
 
 }  // namespace plumbline::viz

@@ -63,29 +63,6 @@ void Painter::polyline(const std::vector<Eigen::Vector2d>& points, const Rgb& co
   context_->DrawPoly(xy.data(), static_cast<int>(points.size()));
 }
 
-void Painter::dashed_line(const std::vector<Eigen::Vector2d>& points, const Rgb& color, double width_px) {
-  // Cut here: the painter's own dashes come out differently on the screen and in SVG.
-  const double dash = 8.0 * scale_, gap = 5.0 * scale_;
-  std::vector<Eigen::Vector2d> piece;
-  double left = dash;
-  bool drawn = true;
-  if (!points.empty()) piece.push_back(points.front());
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    Eigen::Vector2d from = points[i - 1];
-    for (double length = (points[i] - from).norm(); length > left; length = (points[i] - from).norm()) {
-      from += left / length * (points[i] - from);
-      piece.push_back(from);
-      if (drawn) polyline(piece, color, width_px);
-      piece.assign(1, from);
-      drawn = !drawn;
-      left = drawn ? dash : gap;
-    }
-    left -= (points[i] - from).norm();
-    piece.push_back(points[i]);
-  }
-  if (drawn) polyline(piece, color, width_px);
-}
-
 void Painter::rectangle(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, const Rgb& fill,
                         double opacity) {
   context_->GetPen()->SetLineType(vtkPen::NO_PEN);
@@ -113,15 +90,6 @@ void Painter::text(const Eigen::Vector2d& at, const std::string& text, double si
   vtkTextProperty* property = context_->GetTextProp();
   if (anchor == Anchor::kCentre) property->SetJustificationToCentered();
   if (anchor == Anchor::kRight) property->SetJustificationToRight();
-  context_->DrawString(static_cast<float>(at.x()), static_cast<float>(at.y()), text.c_str());
-}
-
-void Painter::vertical_text(const Eigen::Vector2d& at, const std::string& text, double size_px,
-                            const Rgb& color) {
-  if (text.empty()) return;
-  set_text(context_, size_px * scale_, color, false);
-  context_->GetTextProp()->SetOrientation(90.0);
-  context_->GetTextProp()->SetJustificationToCentered();
   context_->DrawString(static_cast<float>(at.x()), static_cast<float>(at.y()), text.c_str());
 }
 

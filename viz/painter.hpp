@@ -21,7 +21,6 @@ class Painter {
 
   void polyline(const std::vector<Eigen::Vector2d>& points, const Rgb& color, double width_px,
                 double opacity = 1.0);
-  void dashed_line(const std::vector<Eigen::Vector2d>& points, const Rgb& color, double width_px);
   void rectangle(const Eigen::Vector2d& corner, const Eigen::Vector2d& size, const Rgb& fill,
                  double opacity = 1.0);
   void disc(const Eigen::Vector2d& centre, double radius_px, const Rgb& fill);
@@ -29,8 +28,6 @@ class Painter {
   /// `at` is the middle of the text's height.
   void text(const Eigen::Vector2d& at, const std::string& text, double size_px, const Rgb& color,
             Anchor anchor = Anchor::kLeft, bool bold = false);
-  /// Reads upwards; `at` is the middle of the text.
-  void vertical_text(const Eigen::Vector2d& at, const std::string& text, double size_px, const Rgb& color);
   double text_width(const std::string& text, double size_px, bool bold = false);
   [[nodiscard]] double scale() const { return scale_; }
 

@@ -10,6 +10,8 @@
 #include <optional>
 #include <unordered_map>
 
+#include "plumbline/core/numbers.hpp"
+
 namespace plumbline::viz {
 namespace {
 
@@ -219,9 +221,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
   }
   count.erase(std::remove(count.begin(), count.end(), 0U), count.end());
   if (count.empty()) return side;
-  const auto middle = count.begin() + static_cast<std::ptrdiff_t>(count.size() / 2);
-  std::nth_element(count.begin(), middle, count.end());
-  return side * std::sqrt(1.2 / static_cast<double>(*middle));
+  return side * std::sqrt(1.2 / static_cast<double>(core::median(std::move(count))));
 }
 
 PointColors color_points(const Scene& scene, const std::vector<std::uint32_t>& points,

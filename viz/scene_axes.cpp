@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "plumbline/cloud/floor.hpp"
 #include "view_frame.hpp"
 
 namespace plumbline::viz {
@@ -27,16 +28,6 @@ std::vector<Eigen::Vector3d> sample_normals(const Scene& scene) {
     if (std::isfinite(length) && length > 0.1) normals.push_back(n / length);
   }
   return normals;
-}
-
-Eigen::Vector3d mean_camera_up(const Scene& scene) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const CameraPath& path : scene.paths) {
-    for (const auto& pose : path.trajectory) {
-      if (pose.world_from_camera.rotation.allFinite()) sum -= pose.world_from_camera.rotation.col(1);
-    }
-  }
-  return sum.norm() > 1e-6 ? sum.normalized() : Eigen::Vector3d(0.0, -1.0, 0.0);
 }
 
 /// Mean horizontal direction of the optical axes; `otherwise` when they cancel out.
@@ -63,60 +54,6 @@ Eigen::Vector3d perpendicular(const Eigen::Vector3d& v, const Eigen::Vector3d& w
     if (flat.norm() > 0.1) return flat.normalized();
   }
   return v.unitOrthogonal();
-}
-
-/// Mean of the normals (sign ignored) within `angle` of `axis`; repeated, it climbs to the peak.
-Eigen::Vector3d climb(const std::vector<Eigen::Vector3d>& normals, Eigen::Vector3d axis, double angle) {
-  const double limit = std::cos(angle);
-  for (int round = 0; round < 5; ++round) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& n : normals) {
-      const double c = n.dot(axis);
-      if (std::abs(c) > limit) sum += c > 0.0 ? n : Eigen::Vector3d(-n);
-    }
-    if (sum.norm() < 1e-6) break;
-    axis = sum.normalized();
-  }
-  return axis;
-}
-
-/// Fullest 3-degree cell (with its neighbours) of normals within 45 degrees of `prior`, sign ignored.
-Eigen::Vector3d fullest_direction(const std::vector<Eigen::Vector3d>& normals, const Eigen::Vector3d& prior) {
-  constexpr int kCells = 33;
-  constexpr double kCell = 3.0 * kDegree;
-  const Eigen::Vector3d a = perpendicular(prior, Eigen::Vector3d(1, 0, 0));
-  const Eigen::Vector3d b = prior.cross(a);
-  std::array<std::array<int, kCells>, kCells> count{};
-  for (const Eigen::Vector3d& normal : normals) {
-    const Eigen::Vector3d n = normal.dot(prior) < 0.0 ? Eigen::Vector3d(-normal) : normal;
-    const double tilt = std::acos(std::clamp(n.dot(prior), -1.0, 1.0));
-    if (tilt > 45.0 * kDegree) continue;
-    const double azimuth = std::atan2(n.dot(b), n.dot(a));
-    const int u = kCells / 2 + static_cast<int>(std::lround(tilt * std::cos(azimuth) / kCell));
-    const int v = kCells / 2 + static_cast<int>(std::lround(tilt * std::sin(azimuth) / kCell));
-    ++count[static_cast<std::size_t>(u)][static_cast<std::size_t>(v)];
-  }
-  int best = -1;
-  Eigen::Vector3d direction = prior;
-  for (int u = 1; u + 1 < kCells; ++u) {
-    for (int v = 1; v + 1 < kCells; ++v) {
-      int sum = 0;
-      for (int du = -1; du <= 1; ++du) {
-        for (int dv = -1; dv <= 1; ++dv) {
-          sum += count[static_cast<std::size_t>(u + du)][static_cast<std::size_t>(v + dv)];
-        }
-      }
-      if (sum <= best) continue;
-      best = sum;
-      const double x = (u - kCells / 2) * kCell;
-      const double y = (v - kCells / 2) * kCell;
-      const double tilt = std::hypot(x, y);
-      direction = tilt < 1e-9
-                      ? prior
-                      : Eigen::Vector3d(std::cos(tilt) * prior + std::sin(tilt) / tilt * (x * a + y * b));
-    }
-  }
-  return direction;
 }
 
 /// Turns `forward` about `up` by at most 45 degrees to where walls at right angles put most normals; leaves
@@ -161,16 +98,22 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
 
 }  // namespace
 
+Eigen::Vector3d mean_camera_up(const std::vector<geometry::Trajectory>& paths) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const geometry::Trajectory& path : paths) {
+    for (const auto& pose : path) {
+      if (pose.world_from_camera.rotation.allFinite()) sum -= pose.world_from_camera.rotation.col(1);
+    }
+  }
+  return sum.norm() > 1e-6 ? sum.normalized() : Eigen::Vector3d(0.0, -1.0, 0.0);
+}
+
 Eigen::Vector3d estimate_up(const Scene& scene) {
-  const Eigen::Vector3d prior = mean_camera_up(scene);
-  const std::vector<Eigen::Vector3d> normals = sample_normals(scene);
-  if (normals.empty()) return prior;
-  const Eigen::Vector3d up = climb(normals, fullest_direction(normals, prior), 8.0 * kDegree);
-  const auto support = std::count_if(normals.begin(), normals.end(), [&up](const Eigen::Vector3d& n) {
-    return std::abs(n.dot(up)) > std::cos(8.0 * kDegree);
-  });
-  const bool enough = static_cast<double>(support) > 0.03 * static_cast<double>(normals.size());
-  return enough ? up : prior;
+  std::vector<geometry::Trajectory> paths;
+  for (const CameraPath& path : scene.paths) paths.push_back(path.trajectory);
+  const Eigen::Vector3d about = mean_camera_up(paths);
+  const auto floor = cloud::find_floor(scene.cloud, about);
+  return floor ? floor->normal : about;
 }
 
 SceneAxes scene_axes(const Scene& scene, const SnapshotOptions& options) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "axis_extent.hpp"
+#include "plumbline/viz/color.hpp"
 #include "ticks.hpp"
 
 namespace plumbline::viz {
@@ -175,38 +176,125 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
   return out;
 }
 
-std::string legend(const SvgChart& chart) {
-  std::string entries;
-  const auto add = [&](const std::string& label, const std::string& sample) {
-    if (label.empty()) return;
-    entries += "<li><svg width=\"22\" height=\"10\" viewBox=\"0 0 22 10\" aria-hidden=\"true\">" + sample +
-               "</svg>" + markup_text(label) + "</li>";
-  };
+/// What a legend explains: a sample of 22 x 10 pixels and its label.
+std::vector<std::pair<std::string, std::string>> legend_entries(const SvgChart& chart) {
+  std::vector<std::pair<std::string, std::string>> entries;
   for (const SvgLine& line : chart.lines) {
-    add(line.label, fmt::format("<path class=\"line {}\" d=\"M1,5h20\"/>", line.kind));
+    if (line.label.empty()) continue;
+    entries.emplace_back(fmt::format("<path class=\"line {}\" d=\"M1,5h20\"/>", line.kind), line.label);
   }
   for (const SvgDots& dots : chart.dots) {
-    add(dots.label, fmt::format("<circle class=\"{} {}\" cx=\"11\" cy=\"5\" r=\"{:g}\"/>",
-                                dots.ring ? "ring" : "dot", dots.kind, std::min(4.0, dots.radius_px)));
+    if (dots.label.empty()) continue;
+    entries.emplace_back(fmt::format("<circle class=\"{} {}\" cx=\"11\" cy=\"5\" r=\"{:g}\"/>",
+                                     dots.ring ? "ring" : "dot", dots.kind, std::min(4.0, dots.radius_px)),
+                         dots.label);
+  }
+  return entries;
+}
+
+std::string legend(const SvgChart& chart) {
+  std::string entries;
+  for (const auto& [sample, label] : legend_entries(chart)) {
+    entries += "<li><svg width=\"22\" height=\"10\" viewBox=\"0 0 22 10\" aria-hidden=\"true\">" + sample +
+               "</svg>" + markup_text(label) + "</li>";
   }
   return entries.empty() ? entries : "<ul class=\"legend\">" + entries + "</ul>";
 }
 
-}  // namespace
+/// A chart without its legend; its upper left corner is at 0, 0.
+struct Drawing {
+  std::string svg;
+  double height = 0.0;
+};
 
-std::string svg_chart(const SvgChart& chart) {
+Drawing draw(const SvgChart& chart) {
   Plot plot;
   const double below = kBelow + (chart.x_label.empty() ? 0.0 : kLabelBelow);
   plot.width = std::max(50.0, chart.width_px - kLeft - kRight);
   plot.height = std::max(10.0, chart.height_px - kTop - below);
   find_ranges(chart, plot);
   if (chart.equal_aspect) equalise(plot);
+  return {fmt::format("{}<svg x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\">{}</svg>"
+                      "<rect class=\"frame\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>",
+                      axes(chart, plot), kLeft, kTop, plot.width, plot.height, marks(chart, plot), kLeft,
+                      kTop, plot.width, plot.height),
+          kTop + plot.height + below};
+}
+
+std::string hex(const Rgb& color) { return fmt::format("#{:02x}{:02x}{:02x}", color.r, color.g, color.b); }
+
+/// As svg_chart_style() on white ground, without variables: not every viewer knows them.
+std::string document_style() {
+  std::string css =
+      "text{font:12px sans-serif;fill:#59606b}.title{font-size:14px;fill:#2d3036}"
+      ".grid,.frame{fill:none;stroke:#c9ced6}.grid{stroke-width:.7;opacity:.7}"
+      ".line{fill:none;stroke-width:1.6;stroke-linejoin:round;stroke-linecap:round}"
+      ".ring{fill:#fff;stroke-width:2}.line.truth{stroke-dasharray:5 4}";
+  const auto add = [&css](const std::string& kind, const std::string& color) {
+    css += fmt::format(".line.{0},.ring.{0}{{stroke:{1}}}.dot.{0}{{fill:{1}}}", kind, color);
+  };
+  for (std::size_t i = 0; i < 8; ++i) add(fmt::format("k{}", i), hex(category_color(i)));
+  for (std::size_t i = 0; i < 5; ++i) {
+    add(fmt::format("e{}", i), hex(sequential_color(0.23 * static_cast<double>(i))));
+  }
+  add("truth", "#868c94");
+  add("plain", "#2d3036");
+  return css;
+}
+
+/// Entries side by side, in as many rows as they need.
+Drawing legend_words(const SvgChart& chart) {
+  constexpr double kRow = 18.0, kLetter = 6.5;  // px; letters are about so wide
+  Drawing words;
+  double x = kLeft;
+  for (const auto& [sample, label] : legend_entries(chart)) {
+    const double width = 40.0 + kLetter * static_cast<double>(label.size());
+    if (words.height == 0.0 || x + width > chart.width_px) {
+      x = kLeft;
+      words.height += kRow;
+    }
+    words.svg +=
+        fmt::format("<g transform=\"translate({:.1f},{:.1f})\">{}<text x=\"27\" y=\"9\">{}</text></g>", x,
+                    words.height - kRow, sample, markup_text(label));
+    x += width;
+  }
+  return words;
+}
+
+}  // namespace
+
+std::string svg_chart(const SvgChart& chart) {
+  const Drawing drawing = draw(chart);
   return fmt::format(
-      "<figure class=\"chart\">{}<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\">{}"
-      "<svg x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\">{}</svg>"
-      "<rect class=\"frame\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></svg></figure>\n",
-      legend(chart), chart.width_px, kTop + plot.height + below, markup_text(chart.title), axes(chart, plot),
-      kLeft, kTop, plot.width, plot.height, marks(chart, plot), kLeft, kTop, plot.width, plot.height);
+      "<figure class=\"chart\">{}<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" "
+      "aria-label=\"{}\">{}</svg></figure>\n",
+      legend(chart), chart.width_px, drawing.height, markup_text(chart.title), drawing.svg);
+}
+
+std::string svg_document(const std::vector<SvgChart>& charts, std::size_t columns) {
+  constexpr double kTitle = 26.0;
+  std::string body;
+  double width = 0.0, x = 0.0, y = 0.0, row = 0.0;
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    if (i % columns == 0) {
+      x = 0.0;
+      y += row;
+      row = 0.0;
+    }
+    const Drawing words = legend_words(charts[i]);
+    const Drawing drawing = draw(charts[i]);
+    body += fmt::format(
+        "<g transform=\"translate({:.0f},{:.0f})\"><text class=\"title\" x=\"{:.0f}\" y=\"18\">{}</text>"
+        "<g transform=\"translate(0,{:.0f})\">{}</g><g transform=\"translate(0,{:.0f})\">{}</g></g>\n",
+        x, y, kLeft, markup_text(charts[i].title), kTitle, words.svg, kTitle + words.height, drawing.svg);
+    x += charts[i].width_px;
+    width = std::max(width, x);
+    row = std::max(row, kTitle + words.height + drawing.height);
+  }
+  return fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "
+      "{1:.0f}\"><style>{2}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
+      width, y + row, document_style(), body);
 }
 
 std::string svg_chart_style() {
@@ -226,9 +314,9 @@ std::string svg_chart_style() {
   std::string dark;
   for (std::size_t i = 0; i < 8; ++i) {
     const Rgb c = category_color(i);
-    css += fmt::format(".k{}{{--k:#{:02x}{:02x}{:02x}}}", i, c.r, c.g, c.b);
-    const auto lighter = [](std::uint8_t v) { return (6 * v + 4 * 255) / 10; };
-    dark += fmt::format(".k{}{{--k:#{:02x}{:02x}{:02x}}}", i, lighter(c.r), lighter(c.g), lighter(c.b));
+    css += fmt::format(".k{}{{--k:{}}}", i, hex(c));
+    const auto lighter = [](std::uint8_t v) { return static_cast<std::uint8_t>((6 * v + 4 * 255) / 10); };
+    dark += fmt::format(".k{}{{--k:{}}}", i, hex({lighter(c.r), lighter(c.g), lighter(c.b)}));
   }
   return css + "\n@media screen and (prefers-color-scheme:dark){.loop{--k:#d48fc8}" + dark + "}\n";
 }

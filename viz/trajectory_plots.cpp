@@ -9,15 +9,14 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
-#include <optional>
+
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::viz {
 namespace {
 
 using geometry::Trajectory;
 
-constexpr Rgb kTruth{120, 124, 130};
-constexpr Rgb kEstimate{0, 114, 178};
 constexpr std::array<const char*, 3> kAxisNames{"x", "y", "z"};
 
 std::vector<double> seconds(const Trajectory& trajectory, double start) {
@@ -180,9 +179,7 @@ LengthUnit unit_for(const std::vector<TrajectoryComparison>& comparisons) {
   return unit_for(all);
 }
 
-Rgb estimate_color(std::size_t index, std::size_t count) {
-  return count == 1 ? kEstimate : category_color(index);
-}
+std::string estimate_kind(std::size_t index) { return fmt::format("k{}", index % 8); }
 
 core::Result<void> check(const TrajectoryComparison& comparison) {
   const bool truth_fits = comparison.truth.empty() || comparison.truth.size() == comparison.estimate.size();
@@ -194,79 +191,91 @@ core::Result<void> check(const TrajectoryComparison& comparison) {
                   comparison.estimate.size(), comparison.truth.size(), comparison.error_m.size()));
 }
 
-}  // namespace
+constexpr std::size_t kErrorClasses = 5;
 
-namespace {
+/// The greatest error of all estimates, so that one colour means one error in all charts.
+double greatest_error(const std::vector<TrajectoryComparison>& comparisons) {
+  double most = 0.0;
+  for (const auto& c : comparisons) {
+    for (const double error : finite(errors_of(c))) most = std::max(most, error);
+  }
+  return most;
+}
+
+/// A path as one line for each class of error.
+void add_colored_path(const TrajectoryComparison& comparison, const std::vector<double>& x,
+                      const std::vector<double>& y, double greatest_m, const LengthUnit& unit,
+                      std::vector<SvgLine>& lines) {
+  const std::vector<double> errors = errors_of(comparison);
+  const std::vector<bool> gaps = gaps_in(comparison.estimate);
+  const double step = greatest_m / kErrorClasses;
+  const auto class_of = [&](std::size_t i) {
+    if (!std::isfinite(errors[i])) return kErrorClasses;
+    const double place = step > 0.0 ? errors[i] / step : 0.0;
+    return std::min(kErrorClasses - 1, static_cast<std::size_t>(place));
+  };
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t k = 0; k < kErrorClasses; ++k) {
+    const double most = static_cast<double>(k + 1) * step;
+    SvgLine line{
+        fmt::format("up to {:.1f} {}", unit.per_metre * most, unit.name), fmt::format("e{}", k), {}, {}};
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      // A class goes on to the first point of the next one.
+      const bool goes_on = i > 0 && !gaps[i] && class_of(i - 1) == k;
+      if (!goes_on && class_of(i) != k) continue;
+      if (!goes_on) {
+        line.x.push_back(kNaN);
+        line.y.push_back(kNaN);
+      }
+      line.x.push_back(x[i]);
+      line.y.push_back(y[i]);
+    }
+    lines.push_back(std::move(line));
+  }
+}
 
 /// The path of one estimate, seen along the axis that the truth moves least along.
-Axes path_panel(const TrajectoryComparison& comparison, const LengthUnit& unit,
-                const std::optional<AxisRange>& range) {
+SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& unit, double greatest_m) {
   const Trajectory& truth = drawn_truth(comparison);
   const auto [first, second] = widest_axes(truth.empty() ? comparison.estimate : truth);
-  Axes axes;
-  axes.equal_aspect = true;
-  axes.x_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(first)]);
-  axes.y_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(second)]);
+  SvgChart chart;
+  chart.title = comparison.name.empty() ? "Path" : "Path: " + comparison.name;
+  chart.equal_aspect = true;
+  chart.x_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(first)]);
+  chart.y_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(second)]);
   if (!truth.empty()) {
-    axes.lines.push_back({"truth", coordinate(truth, first), coordinate(truth, second), kTruth, 2.0, true});
+    chart.lines.push_back({"truth", "truth", coordinate(truth, first), coordinate(truth, second)});
   }
   const std::vector<double> x = coordinate(comparison.estimate, first);
   const std::vector<double> y = coordinate(comparison.estimate, second);
-  const std::vector<double> errors = errors_of(comparison);
-  const std::vector<bool> gaps = gaps_in(comparison.estimate);
-  if (!errors.empty() && errors.size() == x.size()) {
-    axes.colored_paths.push_back({with_breaks(x, gaps), with_breaks(y, gaps),
-                                  with_breaks(in_unit(errors, unit), gaps),
-                                  fmt::format("error ({})", unit.name), range, 4.0});
+  if (!x.empty() && errors_of(comparison).size() == x.size()) {
+    add_colored_path(comparison, x, y, greatest_m, unit, chart.lines);
   } else {
-    axes.lines.push_back({"estimate", with_breaks(x, gaps), with_breaks(y, gaps), kEstimate, 3.0, false});
+    const std::vector<bool> gaps = gaps_in(comparison.estimate);
+    chart.lines.push_back({"estimate", "k0", with_breaks(x, gaps), with_breaks(y, gaps)});
   }
-  if (!x.empty()) axes.scatter.push_back({"start", {x.front()}, {y.front()}, {45, 48, 54}, 11.0});
-  return axes;
-}
-
-/// The least and the greatest error of all estimates, so that one colour means one error in all panels.
-std::optional<AxisRange> shared_range(const std::vector<TrajectoryComparison>& comparisons,
-                                      const LengthUnit& unit) {
-  if (comparisons.size() < 2) return std::nullopt;
-  std::vector<double> all;
-  for (const auto& c : comparisons) {
-    const std::vector<double> errors = finite(in_unit(errors_of(c), unit));
-    all.insert(all.end(), errors.begin(), errors.end());
-  }
-  if (all.empty()) return std::nullopt;
-  const auto [low, high] = std::minmax_element(all.begin(), all.end());
-  return *low < *high ? std::optional<AxisRange>({*low, *high}) : std::nullopt;
+  if (!x.empty()) chart.dots.push_back({"start", "plain", {x.front()}, {y.front()}, 4.0, false});
+  return chart;
 }
 
 }  // namespace
 
-Figure path_figure(const std::vector<TrajectoryComparison>& comparisons) {
-  const LengthUnit unit = unit_for(comparisons);
-  Figure figure{titled("Path", comparisons), 1, 1200, 1000, {}};
-  const std::optional<AxisRange> range = shared_range(comparisons, unit);
-  for (const auto& c : comparisons) {
-    figure.panels.push_back(path_panel(c, unit, range));
-    if (comparisons.size() > 1) figure.panels.back().title = c.name;
-  }
-  if (comparisons.size() > 1) {
-    constexpr int kMostPixels = 8000;
-    const auto count = static_cast<int>(comparisons.size());
-    figure.columns = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(count))));
-    const int rows = (count + figure.columns - 1) / figure.columns;
-    figure.width_px = std::min(kMostPixels, 860 * figure.columns);
-    figure.height_px = std::min(kMostPixels, 60 + 720 * rows);
-  }
-  return figure;
+std::vector<SvgChart> path_charts(const std::vector<TrajectoryComparison>& comparisons) {
+  const double greatest_m = greatest_error(comparisons);
+  std::vector<SvgChart> charts;
+  for (const auto& c : comparisons) charts.push_back(path_chart(c, unit_for(comparisons), greatest_m));
+  return charts;
 }
 
-Figure error_figure(const std::vector<TrajectoryComparison>& comparisons) {
+SvgChart error_chart(const std::vector<TrajectoryComparison>& comparisons) {
   const LengthUnit unit = unit_for(comparisons);
   const double start = start_of(comparisons);
   const bool single = comparisons.size() == 1;
-  Axes axes;
-  axes.x_label = "time (s)";
-  axes.y_label = fmt::format("position error ({})", unit.name);
+  SvgChart chart;
+  chart.title = titled("Position error", comparisons);
+  chart.height_px = 400;
+  chart.x_label = "time (s)";
+  chart.y_label = fmt::format("position error ({})", unit.name);
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const std::vector<double> errors = in_unit(errors_of(comparisons[i]), unit);
     const std::vector<bool> gaps = gaps_in(comparisons[i].estimate);
@@ -275,35 +284,38 @@ Figure error_figure(const std::vector<TrajectoryComparison>& comparisons) {
     const std::vector<double> known = finite(errors);
     const std::string label =
         single ? "error" : fmt::format("{}: RMS {:.1f} {}", comparisons[i].name, rms(known), unit.name);
-    axes.lines.push_back({label, with_breaks(t, gaps), with_breaks(errors, gaps),
-                          estimate_color(i, comparisons.size()), 2.0, false});
+    chart.lines.push_back({label, estimate_kind(i), with_breaks(t, gaps), with_breaks(errors, gaps)});
     if (!single || known.empty()) continue;
-    const auto level = [&](const char* name, double value, const Rgb& color) {
+    const auto level = [&](const char* name, double value, const char* kind) {
       const std::string text = fmt::format("{} {:.1f} {}", name, value, unit.name);
-      axes.lines.push_back({text, {t.front(), t.back()}, {value, value}, color, 2.0, true});
+      chart.lines.push_back({text, kind, {t.front(), t.back()}, {value, value}});
     };
-    level("RMS", rms(known), category_color(1));
-    level("median", median(known), category_color(2));
+    level("RMS", rms(known), "k1");
+    level("median", median(known), "k2");
   }
-  return {titled("Position error", comparisons), 1, 1400, 640, {axes}};
+  return chart;
 }
 
-Figure pose_figure(const std::vector<TrajectoryComparison>& comparisons) {
+std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& comparisons) {
   constexpr std::array<const char*, 3> kAngleNames{"roll", "pitch", "yaw"};
-  Figure figure{titled("Pose", comparisons), 2, 1600, 1200, std::vector<Axes>(6)};
+  std::vector<SvgChart> charts(6);
   const double start = start_of(comparisons);
   const Trajectory truth = shared_truth(comparisons);
   const auto truth_angles = angles_of(truth);
   for (std::size_t k = 0; k < 3; ++k) {
-    figure.panels[2 * k].y_label = fmt::format("{} (m)", kAxisNames[k]);
-    figure.panels[2 * k + 1].y_label = fmt::format("{} (deg)", kAngleNames[k]);
-    if (k == 2) figure.panels[4].x_label = figure.panels[5].x_label = "time (s)";
+    charts[2 * k].y_label = fmt::format("{} (m)", kAxisNames[k]);
+    charts[2 * k + 1].y_label = fmt::format("{} (deg)", kAngleNames[k]);
+  }
+  charts[0].title = titled("Pose", comparisons);
+  charts[4].x_label = charts[5].x_label = "time (s)";
+  for (SvgChart& chart : charts) {
+    chart.width_px = 800;
+    chart.height_px = 300;
   }
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const TrajectoryComparison& c = comparisons[i];
     const std::vector<bool> gaps = gaps_in(c.estimate);
     const std::vector<double> t = with_breaks(seconds(c.estimate, start), gaps);
-    const Rgb color = estimate_color(i, comparisons.size());
     auto angles = angles_of(c.estimate);
     const auto own_truth = angles_of(c.truth);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -315,72 +327,37 @@ Figure pose_figure(const std::vector<TrajectoryComparison>& comparisons) {
         start_beside(angles[k], truth_angles[k][index]);
       }
       const std::string name = comparisons.size() == 1 ? "estimate" : c.name;
-      figure.panels[2 * k].lines.push_back({k == 0 ? name : "", t,
-                                            with_breaks(coordinate(c.estimate, static_cast<int>(k)), gaps),
-                                            color, 2.5, false});
-      figure.panels[2 * k + 1].lines.push_back({"", t, with_breaks(angles[k], gaps), color, 2.5, false});
+      charts[2 * k].lines.push_back({k == 0 ? name : "", estimate_kind(i), t,
+                                     with_breaks(coordinate(c.estimate, static_cast<int>(k)), gaps)});
+      charts[2 * k + 1].lines.push_back({"", estimate_kind(i), t, with_breaks(angles[k], gaps)});
     }
   }
   const std::vector<double> t_truth = seconds(truth, start);
   for (std::size_t k = 0; k < 3 && !truth.empty(); ++k) {
-    constexpr Rgb kInk{45, 48, 54};
-    figure.panels[2 * k].lines.push_back(
-        {k == 0 ? "truth" : "", t_truth, coordinate(truth, static_cast<int>(k)), kInk, 1.5, true});
-    figure.panels[2 * k + 1].lines.push_back({"", t_truth, truth_angles[k], kInk, 1.5, true});
+    charts[2 * k].lines.push_back(
+        {k == 0 ? "truth" : "", "truth", t_truth, coordinate(truth, static_cast<int>(k))});
+    charts[2 * k + 1].lines.push_back({"", "truth", t_truth, truth_angles[k]});
   }
-  return figure;
+  return charts;
 }
 
-Figure error_distribution_figure(const std::vector<TrajectoryComparison>& comparisons) {
+SvgChart error_distribution_chart(const std::vector<TrajectoryComparison>& comparisons) {
   const LengthUnit unit = unit_for(comparisons);
-  Axes boxes;
-  boxes.title = "Median, quartiles, whiskers, outliers";
-  boxes.y_label = fmt::format("position error ({})", unit.name);
-  Axes histogram;
-  histogram.title = "Histogram";
-  histogram.x_label = boxes.y_label;
-  histogram.y_label = "poses";
+  SvgChart chart;
+  chart.title = titled("Position error, distribution", comparisons);
+  chart.height_px = 400;
+  chart.x_label = fmt::format("position error ({})", unit.name);
+  chart.y_label = "poses with at most that (%)";
+  chart.y_range = {0.0, 100.0};
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
-    const std::vector<double> errors = in_unit(errors_of(comparisons[i]), unit);
-    boxes.boxes.push_back({comparisons[i].name, errors, category_color(i)});
-    histogram.histograms.push_back({comparisons[i].name, errors, category_color(i)});
-  }
-  return {"Position error", 2, 1600, 760, {boxes, histogram}};
-}
-
-Figure resources_figure(const std::vector<double>& frame_ms, const std::vector<double>& memory_mb) {
-  Figure figure{"Resources", 1, 1400, memory_mb.empty() ? 600 : 1000, {}};
-  const auto panel = [&figure](const std::vector<double>& values, const char* label, const Rgb& color) {
-    std::vector<double> frame(values.size());
-    std::iota(frame.begin(), frame.end(), 0.0);
-    Axes axes;
-    axes.x_label = "frame";
-    axes.y_label = label;
-    axes.lines.push_back({"", frame, values, color, 1.8, false});
-    const std::vector<double> known = finite(values);
-    if (!known.empty()) {
-      const double middle = median(known);
-      axes.lines.push_back({fmt::format("median {:.1f}", middle),
-                            {0.0, static_cast<double>(values.size() - 1)},
-                            {middle, middle},
-                            {45, 48, 54},
-                            1.8,
-                            true});
+    SvgLine line{comparisons[i].name, estimate_kind(i), finite(in_unit(errors_of(comparisons[i]), unit)), {}};
+    std::sort(line.x.begin(), line.x.end());
+    for (std::size_t k = 1; k <= line.x.size(); ++k) {
+      line.y.push_back(100.0 * static_cast<double>(k) / static_cast<double>(line.x.size()));
     }
-    figure.panels.push_back(std::move(axes));
-  };
-  panel(frame_ms, "time per frame (ms)", kEstimate);
-  if (!memory_mb.empty()) panel(memory_mb, "resident memory (MB)", category_color(1));
-  return figure;
-}
-
-core::Result<void> write_figure(const Figure& figure, const std::filesystem::path& folder,
-                                const std::string& name) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  if (problem) return core::output_error("cannot make folder " + folder.string() + ": " + problem.message());
-  if (auto png = write_figure_png(figure, folder / (name + ".png")); !png) return png;
-  return write_figure_svg(figure, folder / (name + ".svg"));
+    chart.lines.push_back(std::move(line));
+  }
+  return chart;
 }
 
 core::Result<void> write_trajectory_plots(const std::vector<TrajectoryComparison>& comparisons,
@@ -391,11 +368,18 @@ core::Result<void> write_trajectory_plots(const std::vector<TrajectoryComparison
     with_errors = with_errors || !errors_of(comparison).empty();
   }
   if (comparisons.empty()) return core::usage_error("trajectory plots: no estimate to draw");
-  if (auto done = write_figure(path_figure(comparisons), folder, "path"); !done) return done;
-  if (auto done = write_figure(pose_figure(comparisons), folder, "poses"); !done) return done;
+  std::error_code problem;
+  std::filesystem::create_directories(folder, problem);
+  if (problem) return core::output_error("cannot make folder " + folder.string() + ": " + problem.message());
+  if (auto done = core::write_file(folder / "path.svg", svg_document(path_charts(comparisons), 2)); !done)
+    return done;
+  if (auto done = core::write_file(folder / "poses.svg", svg_document(pose_charts(comparisons), 2)); !done)
+    return done;
   if (!with_errors) return {};  // without truth there is no error to draw
-  if (auto done = write_figure(error_figure(comparisons), folder, "error"); !done) return done;
-  return write_figure(error_distribution_figure(comparisons), folder, "error_distribution");
+  if (auto done = core::write_file(folder / "error.svg", svg_document({error_chart(comparisons)}, 1)); !done)
+    return done;
+  return core::write_file(folder / "error_distribution.svg",
+                          svg_document({error_distribution_chart(comparisons)}, 1));
 }
 
 }  // namespace plumbline::viz

@@ -116,7 +116,6 @@ int run(int argc, char** argv) {
   add_synth(app, session);
   add_filter(app, session);
   add_pipelines(app, session);
-  add_vocabulary(app, session);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -67,7 +67,6 @@ void add_evaluate_cloud(CLI::App& group, Session& session);  ///< the one below 
 void add_synth(CLI::App& app, Session& session);
 void add_filter(CLI::App& app, Session& session);
 void add_pipelines(CLI::App& app, Session& session);
-void add_vocabulary(CLI::App& app, Session& session);
 
 /// Parses, runs the command and returns the exit code (see core::ErrorKind).
 int run(int argc, char** argv);

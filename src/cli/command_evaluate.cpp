@@ -132,7 +132,7 @@ void add_trajectory(CLI::App& group, Session& session) {
   command->add_flag("--json", request->json, "Print JSON");
   command
       ->add_option("--plot", request->plots,
-                   "Write charts into this folder, PNG and SVG: path, error, poses, error_distribution")
+                   "Write charts into this folder as SVG: path, error, poses, error_distribution")
       ->type_name("DIR");
   request->flags = std::make_unique<OptionFlags>(*command, request->table);
 }

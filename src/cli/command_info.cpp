@@ -51,8 +51,8 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
              header.format, header.program_version, header.robot);
   fmt::print("store.complete: {}\n",
              contents->complete ? "yes" : "no; map --resume goes on from it, export and render read it");
-  fmt::print("store.keyframes: {}\nstore.keyframes_retired: {}\nstore.points: {}\nstore.lines: {}\n",
-             contents->keyframes, contents->retired, contents->points, contents->lines);
+  fmt::print("store.keyframes: {}\nstore.points: {}\nstore.lines: {}\n", contents->keyframes,
+             contents->points, contents->lines);
   fmt::print("store.surface_edges: {}\nstore.loops: {}\nstore.frames: {}\n", contents->edges, contents->loops,
              contents->frames);
   fmt::print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,

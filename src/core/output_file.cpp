@@ -103,4 +103,10 @@ Result<void> OutputFile::commit() {
   return output_error(problem_ + "; free space or choose another folder");
 }
 
+Result<void> write_file(const std::filesystem::path& file, std::string_view bytes) {
+  OutputFile out(file);
+  out.write(bytes);
+  return out.commit();
+}
+
 }  // namespace plumbline::core

@@ -6,6 +6,8 @@
 #include <initializer_list>
 #include <iterator>
 
+#include "plumbline/core/numbers.hpp"
+
 namespace plumbline::dataset {
 namespace {
 
@@ -25,10 +27,7 @@ void DepthStatistics::add(const cv::Mat& depth_m) {
 
 std::optional<double> DepthStatistics::median() const {
   if (measured_.empty()) return std::nullopt;
-  std::vector<float> values = measured_;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
+  return static_cast<double>(core::median(measured_));
 }
 
 double DepthStatistics::share_beyond(double depth_m) const {

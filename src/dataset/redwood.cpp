@@ -9,6 +9,7 @@
 #include <map>
 
 #include "layout.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "text_lines.hpp"
 
 namespace plumbline::dataset {
@@ -93,13 +94,13 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
   const auto lines = read_lines(file);
   if (!lines) return truth;
   for (std::size_t i = 0; i + 4 < lines->size(); i += 5) {
-    const std::optional<double> index = to_number((*lines)[i].words[0]);
+    const std::optional<double> index = core::to_number((*lines)[i].words[0]);
     Eigen::Matrix4d matrix = Eigen::Matrix4d::Zero();
     bool good = index && *index >= 0.0 && *index < static_cast<double>(pairs.size());
     for (std::size_t r = 0; r < 4; ++r) {
       const std::vector<std::string>& words = (*lines)[i + 1 + r].words;
       for (std::size_t c = 0; c < 4 && c < words.size(); ++c) {
-        matrix(static_cast<int>(r), static_cast<int>(c)) = to_number(words[c]).value_or(NAN);
+        matrix(static_cast<int>(r), static_cast<int>(c)) = core::to_number(words[c]).value_or(NAN);
       }
     }
     const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();

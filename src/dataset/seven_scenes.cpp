@@ -7,6 +7,7 @@
 #include <map>
 
 #include "layout.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "text_lines.hpp"
 
 namespace plumbline::dataset {
@@ -61,7 +62,7 @@ std::optional<geometry::Rigid3> read_pose(const std::string& file) {
     const std::vector<std::string>& words = (*lines)[r].words;
     if (words.size() != 4) return std::nullopt;
     for (std::size_t c = 0; c < 4; ++c) {
-      const std::optional<double> value = to_number(words[c]);
+      const std::optional<double> value = core::to_number(words[c]);
       if (!value || !std::isfinite(*value)) return std::nullopt;
       matrix(static_cast<int>(r), static_cast<int>(c)) = *value;
     }

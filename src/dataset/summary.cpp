@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "depth_statistics.hpp"
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -17,9 +18,8 @@ void describe_time(const FrameSource& source, RecordingSummary& summary) {
   for (std::size_t i = 1; i < source.size(); ++i)
     steps.push_back(source.info(i).stamp - source.info(i - 1).stamp);
   summary.longest_gap_s = *std::max_element(steps.begin(), steps.end());
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  if (*middle > 0.0) summary.fps = 1.0 / *middle;
+  const double usual = core::median(std::move(steps));
+  if (usual > 0.0) summary.fps = 1.0 / usual;
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 
 namespace plumbline::dataset {
@@ -29,14 +28,6 @@ core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file
     if (!line.words.empty() && line.words.front().front() != '#') lines.push_back(std::move(line));
   }
   return lines;
-}
-
-std::optional<double> to_number(std::string_view word) {
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
-  return value;
 }
 
 }  // namespace plumbline::dataset

@@ -3,7 +3,6 @@
 
 // Lines of a text file as words, the way every list in this module is read.
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,8 +19,5 @@ struct TextLine {
 /// Words are separated by blanks, tabs or commas. Comments ('#'), blank lines, a byte order mark and
 /// carriage returns are passed over.
 core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file);
-
-/// The whole word as a number, whatever the locale; "nan" and "inf" are numbers here.
-std::optional<double> to_number(std::string_view word);
 
 }  // namespace plumbline::dataset

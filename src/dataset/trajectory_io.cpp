@@ -8,6 +8,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "text_lines.hpp"
 
@@ -25,7 +26,7 @@ core::Result<geometry::StampedPose> read_pose(const std::string& file, const Tex
     return wrong(fmt::format("expected 'stamp tx ty tz qx qy qz qw', found {} words", line.words.size()));
   }
   for (std::size_t i = 0; i < n.size(); ++i) {
-    const std::optional<double> value = to_number(line.words[i]);
+    const std::optional<double> value = core::to_number(line.words[i]);
     if (!value) return wrong(fmt::format("'{}' is no number", line.words[i]));
     if (!std::isfinite(*value)) return wrong(fmt::format("'{}' is not finite", line.words[i]));
     n[i] = *value;

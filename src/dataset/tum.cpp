@@ -7,6 +7,7 @@
 #include <set>
 
 #include "layout.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "text_lines.hpp"
 
@@ -21,7 +22,7 @@ bool is_file(const fs::path& path) {
 }
 
 core::Result<double> read_stamp(const std::string& list, const TextLine& line, std::size_t word) {
-  const std::optional<double> stamp = to_number(line.words[word]);
+  const std::optional<double> stamp = core::to_number(line.words[word]);
   if (stamp && std::isfinite(*stamp)) return *stamp;
   return core::input_error(
       fmt::format("{}:{}: '{}' is no time in seconds", list, line.number, line.words[word]));

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "layers.hpp"
+#include "plumbline/core/random.hpp"
 #include "plumbline/evaluate/statistics.hpp"
 #include "point_index.hpp"
 #include "voxel_buckets.hpp"
@@ -35,21 +36,6 @@ struct Plane {
   [[nodiscard]] double height(const Eigen::Vector3f& p) const {
     return normal.dot(p.cast<double>() - center);
   }
-};
-
-/// Small, fixed sequence of random numbers (splitmix64), seeded by the voxel's rank.
-class Draw {
- public:
-  explicit Draw(std::uint64_t seed) : state_(seed) {}
-  std::size_t below(std::size_t n) {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return static_cast<std::size_t>((z ^ (z >> 31)) % n);
-  }
-
- private:
-  std::uint64_t state_;
 };
 
 /// Least squares for one layer, or for two parallel ones with a common normal; goes through the fuller one.
@@ -85,7 +71,8 @@ Indices within(const Points& points, const Indices& some, const Plane& plane, do
 }
 
 /// MSAC over at most 400 of the points.
-std::optional<Plane> main_plane(const Points& points, const Indices& voxel, double flatness_m, Draw draw) {
+std::optional<Plane> main_plane(const Points& points, const Indices& voxel, double flatness_m,
+                                core::SplitMix draw) {
   constexpr int kTrials = 80;
   Indices some;
   const std::size_t stride = (voxel.size() + 399) / 400;
@@ -127,7 +114,7 @@ class PatchMeasure {
   [[nodiscard]] std::optional<WallPatch> measure(std::size_t voxel) const {
     const Indices own = buckets_.points_of(voxel);
     if (own.size() < kLeastPatchPoints) return std::nullopt;
-    auto plane = main_plane(cloud_.points, own, options_.flatness_m, Draw(voxel));
+    auto plane = main_plane(cloud_.points, own, options_.flatness_m, core::SplitMix(voxel));
     if (!plane) return std::nullopt;
     const Indices main = within(cloud_.points, own, *plane, options_.flatness_m);
     if (main.size() < kLeastPatchPoints) return std::nullopt;

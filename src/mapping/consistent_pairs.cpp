@@ -12,10 +12,12 @@ using core::KeyframeId;
 using geometry::Rigid3;
 
 Rigid3 between(const maps::Map& map, KeyframeId from, KeyframeId to) {
-  return map.pose_of(to) * map.pose_of(from).inverse();
+  return map.camera_from_world(to) * map.camera_from_world(from).inverse();
 }
 
-Eigen::Vector3d centre(const maps::Map& map, KeyframeId id) { return map.pose_of(id).inverse().translation; }
+Eigen::Vector3d centre(const maps::Map& map, KeyframeId id) {
+  return map.camera_from_world(id).inverse().translation;
+}
 
 /// Branch and bound; as many colours as the rest can be painted with bound what it may still add (Tomita and
 /// Seki 2003).

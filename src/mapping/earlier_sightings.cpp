@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/tracking/align_points.hpp"
 
 namespace plumbline::mapping {
@@ -16,12 +17,6 @@ using tracking::PointMatch;
 constexpr double kRadius_px = 8.0;  // at octave 0; the older pose may be off by a quarter of a degree
 constexpr float kAlike_px = 2.0F;   // corners lie off their projections all alike, but for parallax
 constexpr std::size_t kFew = 8;     // matches do not bear each other out
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Takes out matches with corners that see something already, and those that do not lie off like the others.
 void keep_alike(const maps::Map& map, KeyframeId keyframe, const sensor::Pinhole& camera, double scale_factor,
@@ -44,7 +39,7 @@ void keep_alike(const maps::Map& map, KeyframeId keyframe, const sensor::Pinhole
     x.push_back(d.x());
     y.push_back(d.y());
   }
-  const Eigen::Vector2f middle(median(std::move(x)), median(std::move(y)));
+  const Eigen::Vector2f middle(core::median(std::move(x)), core::median(std::move(y)));
   const auto differs = [&](const PointMatch& m) {
     const int octave = features.points[static_cast<std::size_t>(m.feature)].octave;
     return (off(m) - middle).norm() > kAlike_px * static_cast<float>(std::pow(scale_factor, octave));

@@ -6,6 +6,8 @@
 #include <map>
 #include <vector>
 
+#include "plumbline/core/numbers.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -29,10 +31,8 @@ View view_of(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from
     const Eigen::Vector3d p = camera_from_keyframe * s.point.cast<double>();
     if (p.z() > 0.1 && camera.contains(camera.project(p))) ++inside;
   }
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
   return {static_cast<double>(inside) / static_cast<double>(keyframe.surface.size()),
-          static_cast<double>(*middle)};
+          static_cast<double>(core::median(std::move(depths)))};
 }
 
 bool sees(const std::vector<maps::Observation>& observations, core::KeyframeId keyframe) {

@@ -54,8 +54,6 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
       "fuse.earlier", earlier_sightings,
       "Look for new landmarks among corners of older keyframes that see none, as where depth was missing");
   fusion.declare(table);
-  table.boolean("redundant", cull_keyframes, "Take redundant keyframes out of the map");
-  keyframe_culling.declare(table);
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
   bundle_noise.declare(table, "bundle.");
@@ -211,7 +209,6 @@ void LocalMapper::refine(maps::Map& map, core::KeyframeId id) {
     fuse_lines(map, id, neighbours, camera_, options_.fusion);
   }
   culler_.judge(map, id);
-  if (options_.cull_keyframes) cull_keyframes(map, id, options_.keyframe_culling);
 }
 
 }  // namespace plumbline::mapping

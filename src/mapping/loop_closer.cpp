@@ -48,20 +48,9 @@ void LoopOptions::declare(core::OptionTable& table) {
                "Share of the way since a place was seen that a loop may correct; 10 cm are always allowed");
   table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
   table.boolean("loops.bundle", bundle, "Adjust the whole map after a loop");
-  table.text("loops.vocabulary", vocabulary_file,
-             "Trained vocabulary file (plumbline vocabulary train); none: it learns from the keyframes");
   vocabulary.declare(table);
   places.declare(table);
   verify.declare(table);
-}
-
-core::Result<void> LoopOptions::load() {
-  trained = nullptr;
-  if (!enabled || vocabulary_file.empty()) return {};
-  auto read = places::Vocabulary::read(vocabulary_file);
-  if (!read) return tl::unexpected<core::Error>(read.error());
-  trained = std::make_shared<const places::Vocabulary>(std::move(*read));
-  return {};
 }
 
 PoseEdge LoopCloser::to_edge(const Loop& loop) {

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "plumbline/core/hash.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 
 namespace plumbline::mapping {
@@ -58,11 +59,6 @@ class PartsCollector {
       line.observations = renamed(std::move(line.observations), to);
       parts_.lines.push_back(std::move(line));
     }
-    for (const KeyframeId id : map.retired_ids()) {
-      maps::RetiredKeyframe retired = map.retired(id);
-      retired.heir = renamed(retired.heir, to);
-      parts_.retired.emplace_back(renamed(id, to), retired);
-    }
     const std::uint64_t first_edge = parts_.next.edge;
     for (const auto& [order, edge] : map.edges()) {
       maps::SurfaceEdge moved = edge;
@@ -86,8 +82,6 @@ class PartsCollector {
               [](const auto& a, const auto& b) { return a.data->id < b.data->id; });
     std::sort(parts_.points.begin(), parts_.points.end(), by_id);
     std::sort(parts_.lines.begin(), parts_.lines.end(), by_id);
-    std::sort(parts_.retired.begin(), parts_.retired.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
     std::sort(parts_.next.keyframes.begin(), parts_.next.keyframes.end());
     std::sort(parts_.next.points.begin(), parts_.next.points.end());
     std::sort(parts_.next.lines.begin(), parts_.next.lines.end());
@@ -96,23 +90,6 @@ class PartsCollector {
 
  private:
   maps::MapParts parts_;
-};
-
-/// FNV-1a.
-class Hash {
- public:
-  void bytes(const void* data, std::size_t size) {
-    const auto* at = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ at[i]) * 0x100000001b3ULL;
-  }
-  template <typename T>
-  void number(T value) {
-    bytes(&value, sizeof value);
-  }
-  [[nodiscard]] std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325ULL;
 };
 
 }  // namespace
@@ -131,7 +108,7 @@ maps::Map joined(const std::vector<const maps::Map*>& maps, const std::vector<Ri
 }
 
 std::uint64_t content_hash(const maps::Map& map) {
-  Hash hash;
+  core::Hash hash;
   for (const KeyframeId id : map.keyframe_ids()) {
     const maps::Keyframe& keyframe = map.keyframe(id);
     hash.number(keyframe.stamp);

@@ -8,8 +8,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "place_bound.hpp"
-#include "place_p3p.hpp"
+#include "plumbline/core/random.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -17,6 +17,14 @@ namespace {
 using geometry::Rigid3;
 
 constexpr std::size_t kFewPoints = 60;
+
+// When a pair of points or lines fits a pose.
+constexpr double kNear_m = 0.1;  // nothing nearer to the camera fits
+constexpr double kPoint_px =
+    4.5;                          // at octave 0: 3 standard deviations of 1.5 px, the landmark's own among it
+constexpr double kLine_px = 5.0;  // between the ends of one line and the other
+constexpr double kLineCosine = 0.9;  // between their directions
+double depth_gate_m(double measured_m) { return 0.03 + 4.0 * sensor::depth_sigma(measured_m); }
 
 class Inliers {
  public:
@@ -37,24 +45,24 @@ class Inliers {
  private:
   [[nodiscard]] bool fits(const PointPair& pair, const Rigid3& pose) const {
     const Eigen::Vector3d p = pose * pair.match;
-    if (p.z() < pose_gate::kNear_m) return false;
-    if ((camera_.project(p) - pair.query).norm() > pose_gate::kPoint_px * pair.sigma) return false;
-    return !(pair.depth > 0.0) || std::abs(p.z() - pair.depth) < pose_gate::depth_m(pair.depth);
+    if (p.z() < kNear_m) return false;
+    if ((camera_.project(p) - pair.query).norm() > kPoint_px * pair.sigma) return false;
+    return !(pair.depth > 0.0) || std::abs(p.z() - pair.depth) < depth_gate_m(pair.depth);
   }
   [[nodiscard]] bool fits(const LinePair& pair, const Rigid3& pose) const {
     const Eigen::Vector3d a = pose * pair.match_start;
     const Eigen::Vector3d b = pose * pair.match_end;
-    if (a.z() < pose_gate::kNear_m || b.z() < pose_gate::kNear_m) return false;
+    if (a.z() < kNear_m || b.z() < kNear_m) return false;
     const Eigen::Vector2d pa = camera_.project(a);
     const Eigen::Vector2d d = (camera_.project(b) - pa).normalized();
     if (!d.allFinite()) return false;
     const Eigen::Vector2d s = pair.query.start.cast<double>();
     const Eigen::Vector2d e = pair.query.end.cast<double>();
-    if (d.dot((e - s).normalized()) < pose_gate::kLineCosine) return false;
+    if (d.dot((e - s).normalized()) < kLineCosine) return false;
     const auto across = [&](const Eigen::Vector2d& q) {
       return std::abs(d.x() * (q.y() - pa.y()) - d.y() * (q.x() - pa.x()));
     };
-    if (across(s) > pose_gate::kLine_px || across(e) > pose_gate::kLine_px) return false;
+    if (across(s) > kLine_px || across(e) > kLine_px) return false;
     if (!pair.in_space) return true;
     const Eigen::Vector3d middle = 0.5 * (pair.query_start + pair.query_end);
     const Eigen::Vector3d direction = (b - a).normalized();
@@ -78,7 +86,7 @@ std::vector<Rigid3> from_points(const Sample& sample, const sensor::Pinhole& cam
   const cv::Matx33d k(camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0);
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
-  cv::solveP3P(space, image, k, cv::noArray(), rotations, translations, cv::SOLVEPNP_P3P);
+  cv::solveP3P(space, image, k, cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
   std::vector<Rigid3> poses;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
     const auto r = [&](int row) { return rotations[i].at<double>(row); };
@@ -87,21 +95,6 @@ std::vector<Rigid3> from_points(const Sample& sample, const sensor::Pinhole& cam
     if (pose.rotation.allFinite() && pose.translation.allFinite()) poses.push_back(pose);
   }
   return poses;
-}
-
-/// Whether some pose from three points may have more than `count` inliers. OpenCV takes twenty times as long
-/// for the poses, and few samples are worth that.
-bool may_beat(std::size_t count, const Sample& sample, const sensor::Pinhole& camera,
-              const InlierBound& bound) {
-  std::array<Eigen::Vector3d, 3> space;
-  std::array<Eigen::Vector3d, 3> rays;
-  for (std::size_t k = 0; k < sample.size(); ++k) {
-    space[k] = sample[k]->match;
-    rays[k] = camera.unproject(sample[k]->query.x(), sample[k]->query.y(), 1.0).normalized();
-  }
-  const P3pPoses poses = poses_from_points(space, rays);
-  return std::any_of(poses.camera_from_world.begin(), poses.camera_from_world.begin() + poses.count,
-                     [&](const Rigid3& pose) { return bound.of(pose) > count; });
 }
 
 /// One pose from two lines in space that are not parallel: the directions give the rotation, the distances
@@ -137,21 +130,6 @@ std::optional<Rigid3> from_lines(const LinePair& one, const LinePair& two) {
   return pose;
 }
 
-/// Small, the same everywhere (splitmix64).
-class Draw {
- public:
-  explicit Draw(std::uint64_t seed) : state_(seed) {}
-  std::size_t below(std::size_t count) {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ULL);
-    z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27U)) * 0x94d049bb133111ebULL;
-    return static_cast<std::size_t>((z ^ (z >> 31U)) % count);
-  }
-
- private:
-  std::uint64_t state_;
-};
-
 /// Rounds until a sample of `size` inliers was drawn with 99.9 %.
 int rounds_needed(double inlier_share, int size, int at_most) {
   const double good = std::pow(inlier_share, size);
@@ -172,8 +150,7 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
   const bool by_lines = in_space.size() >= 3 && pairs.points.size() < kFewPoints;
   if (!by_points && !by_lines) return std::nullopt;
   const Inliers inliers(pairs, camera);
-  const InlierBound bound(pairs, camera);
-  Draw draw(seed);
+  core::SplitMix draw(seed);
   std::optional<RansacPose> best;
   std::size_t best_count = 0;
   const auto try_pose = [&](const Rigid3& pose) {
@@ -190,15 +167,13 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
       const std::array<std::size_t, 3> i{draw.below(n), draw.below(n), draw.below(n)};
       if (i[0] == i[1] || i[1] == i[2] || i[0] == i[2]) continue;
       const Sample sample{&pairs.points[i[0]], &pairs.points[i[1]], &pairs.points[i[2]]};
-      if (may_beat(best_count, sample, camera, bound)) {
-        for (const Rigid3& pose : from_points(sample, camera)) try_pose(pose);
-      }
+      for (const Rigid3& pose : from_points(sample, camera)) try_pose(pose);
     } else {
       const std::size_t i = draw.below(in_space.size());
       const std::size_t j = draw.below(in_space.size());
       if (i == j) continue;
       const auto pose = from_lines(*in_space[i], *in_space[j]);
-      if (pose && bound.of(*pose) > best_count) try_pose(*pose);
+      if (pose) try_pose(*pose);
     }
     const double share =
         static_cast<double>(best_count) / static_cast<double>(pairs.points.size() + pairs.lines.size());

@@ -151,8 +151,8 @@ static geometry::Vector6d last_motion(const std::vector<maps::FramePose>& frames
   constexpr double kLongest_s = 0.5;
   const double dt = now.stamp - before.stamp;
   if (!now.tracked || !before.tracked || !(dt > 1e-4 && dt < kLongest_s)) return geometry::Vector6d::Zero();
-  const Rigid3 now_from_world = now.camera_from_reference * map.pose_of(now.reference);
-  const Rigid3 before_from_world = before.camera_from_reference * map.pose_of(before.reference);
+  const Rigid3 now_from_world = now.camera_from_reference * map.camera_from_world(now.reference);
+  const Rigid3 before_from_world = before.camera_from_reference * map.camera_from_world(before.reference);
   return geometry::log_se3(now_from_world * before_from_world.inverse()) / dt;
 }
 

@@ -30,9 +30,8 @@ void take_poses_from_map(MapResult& result) {
   result.trajectory = maps::trajectory(result.frame_poses, map);
   result.lines = maps::line_segments(map);
   result.keyframes.clear();
-  // Clouds hang on keyframes that have left the map, too.
-  for (const core::KeyframeId id : maps::every_keyframe(map)) {
-    result.keyframes.push_back({id, map.stamp_of(id), map.pose_of(id).inverse()});
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    result.keyframes.push_back({id, map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
   }
 }
 

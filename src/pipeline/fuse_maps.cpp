@@ -27,12 +27,6 @@ std::string config_text(const FuseRequest& request, const StoredMaps& maps, cons
   return text + to_yaml(graph);
 }
 
-core::Result<void> write_text(const std::filesystem::path& file, const std::string& text) {
-  core::OutputFile out(file);
-  out.write(text);
-  return out.commit();
-}
-
 std::string names_of(const StoredMaps& maps) {
   std::string names;
   for (const StoredPart& part : maps.parts()) names += (names.empty() ? "" : " ") + part.name;
@@ -80,7 +74,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   context.output_folder = output->path();
   context.configuration = config_text(request, *maps, *graph);
   context.input = names_of(*maps);
-  if (auto written = write_text(output->path() / "config.yaml", context.configuration); !written) {
+  if (auto written = core::write_file(output->path() / "config.yaml", context.configuration); !written) {
     return fail(written.error());
   }
   const auto report = run_graph(*graph, context, progress);

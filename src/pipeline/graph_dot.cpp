@@ -2,19 +2,11 @@
 // A graph in Graphviz's DOT language.
 #include <fmt/format.h>
 
+#include "graph_parts.hpp"
 #include "plumbline/pipeline/graph.hpp"
 
 namespace plumbline::pipeline {
 namespace {
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
-  }
-  return out + "\"";
-}
 
 /// Stages of a name that tells their type need no second line.
 std::string label(const Node& node) {
@@ -33,6 +25,15 @@ std::string box(const Node& node) {
 }
 
 }  // namespace
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "\"";
+}
 
 std::string to_dot(const Graph& graph) {
   std::string text =

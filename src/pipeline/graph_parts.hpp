@@ -29,6 +29,9 @@ inline const std::vector<std::string> kTopKeys{"description", "include", "remove
 std::size_t find_draft(const Drafts& drafts, const std::string& name);
 std::vector<std::string> names_of(const Drafts& drafts);
 
+/// graph_dot.cpp: text between quotation marks, as Graphviz and YAML read it.
+std::string quoted(const std::string& text);
+
 /// graph_include.cpp: the file's tree with the stages and taps of what it includes; marks keep naming the
 /// file that each part stands in. None when too little can be read to go on.
 std::optional<core::ConfigNode> with_includes(core::ConfigNode own, const std::filesystem::path& file,

@@ -4,16 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cstdint>
-#include <cstring>
 #include <optional>
 #include <system_error>
 #include <tuple>
 #include <utility>
 
 #include "debug_video.hpp"
+#include "graph_parts.hpp"
+#include "plumbline/core/hash.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/pipeline/graph.hpp"
@@ -24,15 +23,6 @@
 
 namespace plumbline::pipeline {
 namespace {
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return out + "\"";
-}
 
 /// The effective configuration: a pipeline file that gives the same result again, and how it was run;
 /// `threads` 0: left out.
@@ -55,27 +45,16 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   return text + to_yaml(graph);
 }
 
-core::Result<void> write_config(const std::filesystem::path& file, const std::string& text) {
-  core::OutputFile out(file);
-  out.write(text);
-  return out.commit();
-}
-
 /// Tells recordings apart without reading their pictures.
 std::string input_text(const dataset::FrameSource& source) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a, 64 bits
-  const auto mix = [&](double value) {
-    std::array<unsigned char, sizeof(double)> bytes{};
-    std::memcpy(bytes.data(), &value, sizeof(double));
-    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3ULL;
-  };
-  for (std::size_t i = 0; i < source.size(); ++i) mix(source.info(i).stamp);
+  core::Hash hash;
+  for (std::size_t i = 0; i < source.size(); ++i) hash.number(source.info(i).stamp);
   std::string text = fmt::format("frames: {}\n", source.size());
   if (source.size() > 0) {
     text += fmt::format("first: {:.6f} s\nlast: {:.6f} s\n", source.info(0).stamp,
                         source.info(source.size() - 1).stamp);
   }
-  return text + fmt::format("stamps: {:016x}\n", hash);
+  return text + fmt::format("stamps: {:016x}\n", hash.value());
 }
 
 /// The same request for any order of its recordings: by name, and by folder where names are alike.
@@ -210,7 +189,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
     tell_resumed(output->path(), resumed, log);
   }
   if (auto written =
-          write_config(output->path() / "config.yaml", config_text(request, *graph, executor.threads()));
+          core::write_file(output->path() / "config.yaml", config_text(request, *graph, executor.threads()));
       !written) {
     return fail(written.error());
   }

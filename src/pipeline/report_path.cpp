@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "plumbline/core/numbers.hpp"
 #include "report_cloud.hpp"
 #include "report_sections.hpp"
 
@@ -19,9 +20,7 @@ double longest_step(const geometry::Trajectory& poses) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < poses.size(); ++i) steps.push_back(poses[i].stamp - poses[i - 1].stamp);
   if (steps.empty()) return 0.25;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return std::max(0.25, 5.0 * *middle);
+  return std::max(0.25, 5.0 * core::median(std::move(steps)));
 }
 
 /// Empty in results of programs that did not look for any.

@@ -4,10 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <limits>
 #include <sstream>
+
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::pipeline {
 
@@ -54,11 +55,7 @@ std::string_view CsvTable::text(std::size_t row, std::size_t column) const {
 }
 
 double CsvTable::number(std::size_t row, std::size_t column) const {
-  const std::string_view cell = text(row, column);
-  double value = 0.0;
-  const auto [end, problem] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  const bool whole = problem == std::errc() && end == cell.data() + cell.size() && !cell.empty();
-  return whole ? value : std::numeric_limits<double>::quiet_NaN();
+  return core::to_number(text(row, column)).value_or(std::numeric_limits<double>::quiet_NaN());
 }
 
 }  // namespace plumbline::pipeline

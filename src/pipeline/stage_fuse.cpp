@@ -132,7 +132,7 @@ class FuseStage : public Stage {
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
-    frame_ = find_up(up_, fused->cloud, map->trajectory, *context_->executor);
+    frame_ = find_up(up_, fused->cloud, map->trajectory);
     dense->output_from_map = frame_.output_from_map;
     dense->upright = frame_.up != "none";
     if (dense->upright) move_cloud(*fused->cloud, frame_.output_from_map, *context_->executor);

@@ -33,7 +33,6 @@ class RobotsStage : public Stage {
     if (recordings_ == nullptr) {
       return core::usage_error("a pipeline with a robots stage maps several recordings: name them all");
     }
-    if (auto loaded = slam_.loops.load(); !loaded) return loaded;
     fusion_.verify = slam_.loops.verify;
     for (const RobotInfo& robot : recordings_->robots()) {
       slams_.push_back(std::make_unique<mapping::Slam>(slam_, robot.camera.color, robot.number,

@@ -72,9 +72,6 @@ class StoreStage : public Stage {
     if (!writer_) return {};
     const auto map = io.input<MapResult>("map");
     if (map->map == nullptr) return {};
-    if (map->vocabulary != nullptr) {
-      if (auto kept = writer_->attach("vocabulary", map->vocabulary->to_bytes()); !kept) return kept;
-    }
     maps::ResultFrame frame;
     if (const auto dense = io.input<DenseCloud>("result")) {
       frame = {dense->output_from_map, dense->upright};

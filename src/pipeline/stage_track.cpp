@@ -27,7 +27,6 @@ class TrackStage : public Stage {
     debug_folder_ = context.debug_folder;
     keep_changes_ = context.keep_changes;
     alter_map_ = context.alter_map;
-    if (auto loaded = options_.loops.load(); !loaded) return loaded;
     slam_ = std::make_unique<mapping::Slam>(options_, camera_, kRobot, *context.executor, *context.log);
     slam_->set_shutter(context.source->camera().readout_s);
     if (context.resumed != nullptr) {
@@ -71,9 +70,6 @@ class TrackStage : public Stage {
     result->frame_columns = kRowColumns;
     result->frames = rows_;
     lines_ = result->lines.size();
-    if (options_.loops.enabled) {
-      result->vocabulary = std::make_shared<places::Vocabulary>(slam_->places().vocabulary());
-    }
     io.output<MapResult>("map", result);
     return {};
   }

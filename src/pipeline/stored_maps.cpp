@@ -185,7 +185,6 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
   const StoredPart& part = parts_[p];
   const auto ids = part.reader->cloud_ids();
   if (!ids) return tl::unexpected<core::Error>(ids.error());
-  const std::vector<KeyframeId> retired = part.map.retired_ids();
   for (const KeyframeId stored : *ids) {
     StoredCloud cloud;
     cloud.part = p;
@@ -194,9 +193,8 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
     if (found == part.numbers.end()) continue;
     cloud.robot = found->second;
     cloud.id = {cloud.robot, stored.index};
-    if (!part.map.has_keyframe(cloud.id) && !std::binary_search(retired.begin(), retired.end(), cloud.id))
-      continue;
-    cloud.stamp = part.map.stamp_of(cloud.id);
+    if (!part.map.has_keyframe(cloud.id)) continue;
+    cloud.stamp = part.map.keyframe(cloud.id).stamp;
     clouds_.push_back(cloud);
   }
   const auto frames = part.reader->frame_cloud_ids();

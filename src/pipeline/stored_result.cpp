@@ -5,7 +5,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
 #include <mutex>
 #include <system_error>
 #include <utility>
@@ -54,10 +53,9 @@ core::Result<Views> views_of(const maps::StoreReader& reader, const maps::Stored
   const auto frames = reader.frame_cloud_ids();
   if (!frames) return tl::unexpected<core::Error>(frames.error());
   Views views;
-  const std::vector<core::KeyframeId> known = maps::every_keyframe(stored.map);
   for (const core::KeyframeId id : *ids) {
-    if (!std::binary_search(known.begin(), known.end(), id)) continue;
-    views.world_from_camera.push_back(stored.map.pose_of(id).inverse());
+    if (!stored.map.has_keyframe(id)) continue;
+    views.world_from_camera.push_back(stored.map.camera_from_world(id).inverse());
     views.robots.push_back(id.robot);
     views.keyframes.push_back(id);
     views.frames.push_back(0);
@@ -66,7 +64,7 @@ core::Result<Views> views_of(const maps::StoreReader& reader, const maps::Stored
     if (frame >= stored.frames.size() || !stored.frames[frame].tracked) continue;
     const maps::FramePose& pose = stored.frames[frame];
     views.world_from_camera.push_back(
-        (pose.camera_from_reference * stored.map.pose_of(pose.reference)).inverse());
+        (pose.camera_from_reference * stored.map.camera_from_world(pose.reference)).inverse());
     views.robots.push_back(pose.reference.robot);
     views.keyframes.emplace_back();
     views.frames.push_back(frame);
@@ -120,9 +118,9 @@ geometry::Trajectory StoredResult::trajectory() const {
 
 std::vector<KeyframePose> StoredResult::keyframes() const {
   std::vector<KeyframePose> poses;
-  for (const core::KeyframeId id : maps::every_keyframe(map_.map)) {
-    poses.push_back(
-        {id, map_.map.stamp_of(id), map_.result.output_from_map * map_.map.pose_of(id).inverse()});
+  for (const core::KeyframeId id : map_.map.keyframe_ids()) {
+    poses.push_back({id, map_.map.keyframe(id).stamp,
+                     map_.result.output_from_map * map_.map.camera_from_world(id).inverse()});
   }
   return poses;
 }
@@ -212,13 +210,12 @@ core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& fo
   }
   const auto ids = reader_->cloud_ids();
   if (!ids) return tl::unexpected<core::Error>(ids.error());
-  const std::vector<core::KeyframeId> known = maps::every_keyframe(map_.map);
   std::size_t written = 0;
   for (const core::KeyframeId id : *ids) {
-    if (!std::binary_search(known.begin(), known.end(), id)) continue;
+    if (!map_.map.has_keyframe(id)) continue;
     const auto cloud = reader_->cloud(id);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    move_cloud(**cloud, map_.result.output_from_map * map_.map.pose_of(id).inverse());
+    move_cloud(**cloud, map_.result.output_from_map * map_.map.camera_from_world(id).inverse());
     const std::string name =
         id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
     if (auto done = cloud::write_ply(folder / name, **cloud); !done) {

@@ -22,12 +22,6 @@ constexpr double kMostLostPercent = 10.0;
 /// Numbers are for people: 4 decimals are more than any of them is good for.
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
-core::Result<void> write_text(const std::filesystem::path& file, const std::string& text) {
-  core::OutputFile out(file);
-  out.write(text);
-  return out.commit();
-}
-
 /// The 4 x 4 matrix, row by row.
 nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
   nlohmann::ordered_json matrix = nlohmann::ordered_json::array();
@@ -325,7 +319,8 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"version", core::version()},
       {"seed", s.seed}};
   // Names of files need not be UTF-8: replace what JSON cannot hold.
-  return write_text(file, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  return core::write_file(file,
+                          json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
@@ -346,7 +341,7 @@ core::Result<void> write_timing(const std::filesystem::path& file, const RunRepo
     text += known ? fmt::format(",{:.1f}", report.rss_mb[f]) : ",";
     text += '\n';
   }
-  return write_text(file, text);
+  return core::write_file(file, text);
 }
 
 std::string to_text(const RunSummary& s) {

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "plumbline/cloud/types.hpp"
-#include "plumbline/core/executor.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 
@@ -23,10 +22,8 @@ struct UpFrame {
 };
 
 /// z up; x where the first camera looks, as far as that is horizontal; the origin below (floor) or at
-/// (camera) the first camera. kFloor takes the direction that most horizontal surface shares and the lowest
-/// large surface that faces it as the floor, and falls back to kCamera when no such surface is seen. Without
-/// poses: none.
-UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory,
-                const core::Executor& executor);
+/// (camera) the first camera. kFloor takes the lowest large plane that faces up (cloud::find_floor), and
+/// falls back to kCamera when no such surface is seen. Without poses: none.
+UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory);
 
 }  // namespace plumbline::pipeline

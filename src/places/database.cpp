@@ -37,7 +37,6 @@ void Database::file(Kind kind, const features::Descriptor256& descriptor, const 
   kinds_[at(word)] = kind;
   index_[at(word)].push_back(entry);
   seen_[at(entry.slot)].mass += weights_[at(word)];
-  if (vocabulary_.fixed()) return;
   const bool before = vocabulary_.overfull(word);
   vocabulary_.count(word);
   if (!before && vocabulary_.overfull(word)) overfull_.push_back(word);
@@ -57,7 +56,6 @@ void Database::add(KeyframeId id, std::shared_ptr<const FrameFeatures> features)
   for (std::size_t i = 0; i < features->lines.size(); ++i) {
     file(Kind::kLine, features->lines[i].descriptor, {slot, static_cast<std::int32_t>(i)});
   }
-  if (vocabulary_.fixed()) return;
   divide_overfull();
   const std::int64_t features_now =
       vocabulary_.feature_count(Kind::kPoint) + vocabulary_.feature_count(Kind::kLine);

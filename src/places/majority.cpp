@@ -4,18 +4,12 @@
 #include <algorithm>
 #include <numeric>
 
+#include "plumbline/core/random.hpp"
+
 namespace plumbline::places {
 namespace {
 
 using features::Descriptor256;
-
-/// splitmix64 (Steele, Lea & Flood 2014): one number after the other from a seed.
-std::uint64_t next_random(std::uint64_t& state) {
-  std::uint64_t z = (state += 0x9e3779b97f4a7c15ULL);
-  z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27U)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31U);
-}
 
 class Distances {
  public:
@@ -37,13 +31,14 @@ class Distances {
 /// k-means++: each next centre is drawn with a chance that grows with the squared distance from those there.
 std::vector<Descriptor256> first_centres(const std::vector<Descriptor256>& descriptors, int k,
                                          std::uint64_t seed, Distances& distances) {
-  std::vector<Descriptor256> centres{descriptors[next_random(seed) % descriptors.size()]};
+  core::SplitMix random(seed);
+  std::vector<Descriptor256> centres{descriptors[random.below(descriptors.size())]};
   std::vector<int> nearest = distances.from(centres.front());
   while (static_cast<int>(centres.size()) < k) {
     std::uint64_t total = 0;
     for (const int d : nearest) total += static_cast<std::uint64_t>(d) * static_cast<std::uint64_t>(d);
     if (total == 0) break;  // all descriptors are centres
-    std::uint64_t draw = next_random(seed) % total;
+    std::uint64_t draw = random.next() % total;
     std::size_t chosen = 0;
     for (; chosen < nearest.size(); ++chosen) {
       const auto d = static_cast<std::uint64_t>(nearest[chosen]);

@@ -76,7 +76,6 @@ double Vocabulary::weight(Word word) const {
 }
 
 void Vocabulary::count(Word word) {
-  if (fixed_) throw std::logic_error("Vocabulary: a fixed vocabulary does not learn");
   Node& node = nodes_[at(word)];
   ++node.features;
   const auto root = static_cast<Word>(node.kind);
@@ -85,7 +84,7 @@ void Vocabulary::count(Word word) {
 
 bool Vocabulary::overfull(Word word) const {
   const Node& node = nodes_[at(word)];
-  return !fixed_ && node.children == 0 && node.level < options_.levels && node.features > node.divide_at;
+  return node.children == 0 && node.level < options_.levels && node.features > node.divide_at;
 }
 
 Word Vocabulary::add_children(Word parent, const std::vector<Descriptor256>& centres) {
@@ -119,40 +118,6 @@ std::vector<Word> Vocabulary::divide(Word word, const std::vector<Descriptor256>
     ++nodes_[at(words.back())].features;
   }
   return words;
-}
-
-Vocabulary Vocabulary::train(const std::vector<Descriptor256>& points,
-                             const std::vector<Descriptor256>& lines, const VocabularyOptions& options) {
-  Vocabulary vocabulary(options);
-  struct Task {
-    Word word;
-    std::vector<Descriptor256> members;
-  };
-  std::vector<Task> tasks{{0, points}, {1, lines}};
-  vocabulary.nodes_[0].features = static_cast<std::int64_t>(points.size());
-  vocabulary.nodes_[1].features = static_cast<std::int64_t>(lines.size());
-  // Trained at once, every level has seen all there is: none has to wait.
-  const auto enough = static_cast<std::size_t>(vocabulary.options_.branching);
-  while (!tasks.empty()) {
-    const Task task = std::move(tasks.back());
-    tasks.pop_back();
-    if (vocabulary.nodes_[at(task.word)].level >= options.levels || task.members.size() <= enough) continue;
-    const Clusters clusters = k_majority(task.members, vocabulary.options_.branching, options.iterations,
-                                         static_cast<std::uint64_t>(task.word));
-    if (clusters.centres.size() < 2) continue;
-    const Word first = vocabulary.add_children(task.word, clusters.centres);
-    std::vector<Task> children(clusters.centres.size());
-    for (std::size_t c = 0; c < children.size(); ++c) children[c].word = first + static_cast<Word>(c);
-    for (std::size_t i = 0; i < task.members.size(); ++i) {
-      children[static_cast<std::size_t>(clusters.member_of[i])].members.push_back(task.members[i]);
-    }
-    for (Task& child : children) {
-      vocabulary.nodes_[at(child.word)].features = static_cast<std::int64_t>(child.members.size());
-      tasks.push_back(std::move(child));
-    }
-  }
-  vocabulary.fixed_ = true;
-  return vocabulary;
 }
 
 std::size_t Vocabulary::word_count(Kind kind) const {

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "plumbline/core/config.hpp"
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::synth {
 
@@ -57,9 +58,9 @@ constexpr KindName kKinds[] = {
 };
 
 bool read_number(const std::string& text, double& value) {
-  char* end = nullptr;
-  value = std::strtod(text.c_str(), &end);
-  return !text.empty() && end == text.c_str() + text.size() && std::isfinite(value);
+  const auto number = core::to_number(text);
+  value = number.value_or(0.0);
+  return number && std::isfinite(value);
 }
 
 std::string trim(const std::string& s) {

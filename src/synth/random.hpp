@@ -2,19 +2,15 @@
 #pragma once
 
 // Counter-based random numbers: a value is a pure function of its seed and counter, so that frames come out
-// the same in any order and on any number of threads. Mixing: splitmix64 (Steele, Lea, Flood 2014), public
-// domain.
+// the same in any order and on any number of threads.
 #include <cmath>
 #include <cstdint>
 
+#include "plumbline/core/random.hpp"
+
 namespace plumbline::synth {
 
-inline std::uint64_t mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31U);
-}
+inline std::uint64_t mix(std::uint64_t x) { return core::SplitMix(x).next(); }
 inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) {
   return mix(mix(a) ^ (b * 0xd1342543de82ef95ULL));
 }

@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
+#include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
-#include "png_writer.hpp"
 #include "reference.hpp"
 
 namespace plumbline::synth {
@@ -18,15 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using core::Result;
-
-Result<void> write_text(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.flush();
-  if (!out)
-    return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
-  return {};
-}
 
 Result<void> make_folder(const fs::path& folder) {
   std::error_code error;
@@ -37,11 +28,11 @@ Result<void> make_folder(const fs::path& folder) {
 }
 
 std::string write_png(const fs::path& file, const cv::Mat& image) {
-  const std::vector<std::uint8_t> bytes = encode_png(image);
-  std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  out.flush();
-  return out ? "" : file.string() + ": cannot be written (disk full, no right?)";
+  constexpr int kQuick = 1;
+  const auto bytes = dataset::encode_png(image, kQuick);
+  if (!bytes) return bytes.error().message;
+  const auto done = core::write_file(file, {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  return done ? "" : done.error().message;
 }
 
 std::string color_name(const dataset::PairInfo& info) { return fmt::format("rgb/{:.6f}.png", info.stamp); }
@@ -76,10 +67,10 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   }
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
-  if (auto ok = write_text(folder / "rgb.txt", color); !ok) return ok;
-  if (auto ok = write_text(folder / "depth.txt", depth); !ok) return ok;
-  if (auto ok = write_text(folder / "associations.txt", pairs); !ok) return ok;
-  if (auto ok = write_text(folder / "camera.yaml", sensor::to_yaml(source.camera())); !ok) return ok;
+  if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
+  if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
+  if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
+  if (auto ok = core::write_file(folder / "camera.yaml", sensor::to_yaml(source.camera())); !ok) return ok;
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
 }
 
@@ -226,7 +217,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
                                  {"samples", summary.reference_samples},
                                  {"visible", summary.reference_visible}}},
                                {"complete", !summary.stopped}};
-  if (auto ok = write_text(output / "scene.json", json.dump(2) + "\n"); !ok) return fail(ok.error());
+  if (auto ok = core::write_file(output / "scene.json", json.dump(2) + "\n"); !ok) return fail(ok.error());
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));

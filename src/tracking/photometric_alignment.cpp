@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::tracking {
@@ -47,12 +48,6 @@ void weigh_by_depth(const Rigid3& camera_from_reference, optimize::PhotometricFa
                        static_cast<float>(sensor::depth_sigma(static_cast<double>(z))) * per_sigma;
     term.weight = 1.0F / std::sqrt(1.0F + grey * grey);
   }
-}
-
-double median_of(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
 }
 
 }  // namespace
@@ -123,14 +118,15 @@ bool settle_photometric(optimize::PhotometricFamily& family, const Rigid3& camer
     expected.push_back(std::abs(family.terms[i].value));
   }
   if (static_cast<int>(sizes.size()) < kMinPhotometric) return false;
-  family.gain =
-      std::clamp(median_of(sizes) / std::max(median_of(expected), 1e-3), 1.0 / kLargestGain, kLargestGain);
+  family.gain = std::clamp(
+      static_cast<double>(core::median(sizes)) / std::max(static_cast<double>(core::median(expected)), 1e-3),
+      1.0 / kLargestGain, kLargestGain);
   sizes.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!std::isnan(seen[i]))
       sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
   }
-  family.sigma = std::max(kMinSigma, 1.4826 * median_of(sizes));
+  family.sigma = std::max(kMinSigma, 1.4826 * static_cast<double>(core::median(sizes)));
   weigh_by_depth(camera_from_world * family.reference_from_world.inverse(), family);
   return true;
 }

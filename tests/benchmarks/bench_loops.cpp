@@ -55,8 +55,8 @@ struct PoseError {
 };
 
 PoseError error_of(const mapping::Loop& loop, const maps::Map& map, const geometry::Trajectory& truth) {
-  const auto query = geometry::pose_at(truth, map.stamp_of(loop.query));
-  const auto match = geometry::pose_at(truth, map.stamp_of(loop.match));
+  const auto query = geometry::pose_at(truth, map.keyframe(loop.query).stamp);
+  const auto match = geometry::pose_at(truth, map.keyframe(loop.match).stamp);
   if (!query || !match) return {};
   const geometry::Rigid3 truly = query->inverse() * *match;
   const geometry::Rigid3 error = loop.evidence.query_from_match * truly.inverse();
@@ -271,17 +271,6 @@ void force_wrong(const maps::StoredMap& stored, const geometry::Trajectory& trut
   }
 }
 
-/// Leaves of a map what its first frames gave.
-void cut(maps::StoredMap& stored, std::size_t frames) {
-  if (frames >= stored.frames.size()) return;
-  stored.frames.resize(frames);
-  const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
-  for (auto id = ids.rbegin(); id != ids.rend() && stored.map.stamp_of(*id) > stored.frames.back().stamp;
-       ++id) {
-    stored.map.remove_keyframe(*id);
-  }
-}
-
 /// What a drift of `rate` rad a metre, always the same way, would have made of the map.
 void bend(maps::Map& map, double rate) {
   mapping::KeyframePoses poses;
@@ -315,7 +304,6 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   if (!truth) return core::input_error(stored->header.input + ": comes without truth");
   const auto options = options_of(settings.overrides, true);
   if (!options) return tl::unexpected<core::Error>(options.error());
-  if (settings.frames > 0) cut(*stored, settings.frames);
   if (settings.bend != 0.0) bend(stored->map, settings.bend);
   maps::Map map = stored->map;
   const std::string name = short_name(file);

@@ -84,7 +84,6 @@ TEST_F(Worlds, SeveralEstimatesSideBySide) {
   EXPECT_NEAR(report["estimates"][0]["ate_m"]["rmse"], 0.001, 1e-9);
   EXPECT_NEAR(report["estimates"][1]["ate_m"]["rmse"], 0.01, 1e-9);
   for (const char* chart : {"path", "error", "poses", "error_distribution"}) {
-    EXPECT_FALSE(cv::imread(path(std::string("charts/") + chart + ".png").string()).empty()) << chart;
     EXPECT_NE(slurp(path(std::string("charts/") + chart + ".svg")).find("<svg"), std::string::npos) << chart;
   }
   const Outcome text = run("evaluate trajectory near.txt far.txt gt.txt --align none");

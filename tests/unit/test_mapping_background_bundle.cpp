@@ -159,22 +159,6 @@ TEST(BackgroundBundle, ALagChangesTheMapLittle) {
   }
 }
 
-TEST(BackgroundBundle, AKeyframeThatIsGoneAgainIsNotBegun) {
-  const core::Executor executor(1);
-  GrowingMap world;
-  world.add_keyframe();
-  BackgroundBundle bundle({}, {}, 3, kCamera, executor);
-  bundle.request(world.map, world.add_keyframe(), 1);
-  const KeyframeId waits = world.add_keyframe();
-  bundle.request(world.map, waits, 2);
-  EXPECT_FALSE(bundle.idle());
-  world.map.remove_keyframe(waits);
-  BundleReport report;
-  EXPECT_TRUE(bundle.commit(world.map, 4, report).has_value());
-  EXPECT_EQ(report.keyframe, (KeyframeId{0, 1}));
-  EXPECT_TRUE(bundle.idle());
-}
-
 TEST(BackgroundBundle, AnEndWithoutCommitWaitsForTheWork) {
   const core::Executor executor(2);
   GrowingMap world;

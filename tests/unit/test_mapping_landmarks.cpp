@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "landmark_world.hpp"
-#include "plumbline/mapping/keyframe_culling.hpp"
 #include "plumbline/mapping/landmark_culling.hpp"
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
@@ -295,66 +294,6 @@ TEST(LandmarkCuller, KeepsWhatIsSeenAndFound) {
   EXPECT_EQ(culler.judge(world.map, {0, 140}), 0) << "who passed stays";
   world.map.point(good).found = 0;
   EXPECT_EQ(culler.judge(world.map, {0, 141}), 0) << "and is not judged again";
-}
-
-/// Eight keyframes close together, all of which see all points, and a wall.
-LandmarkWorld crowded(std::uint32_t seed) {
-  LandmarkWorld world(seed, 60, 6);
-  world.add_wall(2.5);
-  std::vector<KeyframeId> k;
-  for (int i = 0; i < 12; ++i) k.push_back(world.add_keyframe(looking_from(0.02 * i)));
-  for (std::size_t i = 0; i < 60; ++i) world.add_point(i, k);
-  for (std::size_t i = 0; i < 6; ++i) world.add_line(i, k);
-  return world;
-}
-
-TEST(KeyframeCulling, RedundantOnesGoTheRestStays) {
-  LandmarkWorld world = crowded(11);
-  const auto gone = cull_keyframes(world.map, {0, 11}, {});
-  EXPECT_GE(gone.size(), 3U);
-  EXPECT_TRUE(world.map.has_keyframe({0, 0})) << "it holds the map's place";
-  for (int i = 7; i < 12; ++i) EXPECT_TRUE(world.map.has_keyframe({0, i})) << i;
-  for (core::PointId id : world.map.point_ids()) EXPECT_GE(world.map.point(id).observations.size(), 3U);
-  EXPECT_EQ(world.map.point_count(), 60U);
-  for (KeyframeId id : gone) {
-    EXPECT_LT(tests::distance(world.map.pose_of(id), looking_from(0.02 * id.index)), 1e-12);
-  }
-}
-
-TEST(KeyframeCulling, WhatOthersDoNotSeeKeepsAKeyframe) {
-  LandmarkWorld landmarks = crowded(12);
-  for (std::size_t i = 0; i < 12; ++i) {
-    for (int k = 0; k < 12; ++k) {
-      if (k != 4) landmarks.map.unobserve(core::PointId{0, static_cast<int>(i)}, {0, k});
-    }
-  }
-  EXPECT_LT(redundant_landmarks(landmarks.map, {0, 4}, 3), 0.85);
-  EXPECT_GT(redundant_landmarks(landmarks.map, {0, 5}, 3), 0.99);
-  cull_keyframes(landmarks.map, {0, 11}, {});
-  EXPECT_TRUE(landmarks.map.has_keyframe({0, 4}));
-
-  LandmarkWorld surface(13, 60, 0);
-  std::vector<KeyframeId> k;
-  for (int i = 0; i < 12; ++i) {
-    surface.surface.clear();
-    surface.add_wall(2.5);
-    if (i == 4) surface.add_wall(1.2, 0.4);  // only keyframe 4 measured what is in front
-    k.push_back(surface.add_keyframe(looking_from(0.02 * i)));
-  }
-  for (std::size_t i = 0; i < 60; ++i) surface.add_point(i, k);
-  EXPECT_LT(covered_surface(surface.map, k[4], k, 2), 0.9);
-  EXPECT_GT(covered_surface(surface.map, k[5], k, 2), 0.95);
-  const auto gone = cull_keyframes(surface.map, k.back(), {});
-  EXPECT_FALSE(gone.empty());
-  EXPECT_TRUE(surface.map.has_keyframe(k[4]));
-}
-
-TEST(KeyframeCulling, ALonelyKeyframeStays) {
-  LandmarkWorld world(14, 4, 0);
-  world.add_keyframe(looking_from(0.0));
-  for (int i = 1; i < 10; ++i) world.add_keyframe(looking_from(9.0 * i));
-  EXPECT_TRUE(cull_keyframes(world.map, {0, 9}, {}).empty());
-  EXPECT_EQ(redundant_landmarks(world.map, {0, 1}, 3), 1.0) << "nothing speaks for it";
 }
 
 }  // namespace

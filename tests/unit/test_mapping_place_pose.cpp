@@ -5,9 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "../../src/mapping/place_bound.hpp"
 #include "../../src/mapping/place_matches.hpp"
-#include "../../src/mapping/place_p3p.hpp"
 #include "../../src/mapping/place_pose.hpp"
 
 namespace plumbline::mapping {
@@ -47,45 +45,6 @@ sensor::Pinhole camera() { return {640, 480, 525.0, 520.0, 319.0, 241.0}; }
 
 double apart(const Rigid3& a, const Rigid3& b) {
   return (a.rotation - b.rotation).norm() + (a.translation - b.translation).norm();
-}
-
-TEST(PlaceP3p, FindsTheCameraAndOnlyPosesThatSeeThePoints) {
-  Random random(1);
-  int several = 0;
-  for (int trial = 0; trial < 2000; ++trial) {
-    const Rigid3 truth = random.pose();
-    std::array<Vector3d, 3> world;
-    std::array<Vector3d, 3> rays;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vector3d seen = random.in_view();
-      world[k] = truth.inverse() * seen;
-      rays[k] = seen.normalized();
-    }
-    const P3pPoses poses = poses_from_points(world, rays);
-    ASSERT_GT(poses.count, 0U) << trial;
-    double nearest = 1e9;
-    for (std::size_t i = 0; i < poses.count; ++i) {
-      const Rigid3& pose = poses.camera_from_world[i];
-      nearest = std::min(nearest, apart(pose, truth));
-      for (std::size_t k = 0; k < 3; ++k) EXPECT_LT(((pose * world[k]).normalized() - rays[k]).norm(), 1e-6);
-      EXPECT_NEAR(pose.rotation.determinant(), 1.0, 1e-6);
-    }
-    EXPECT_LT(nearest, 1e-4) << trial;
-    several += poses.count > 1 ? 1 : 0;
-  }
-  EXPECT_GT(several, 200);
-}
-
-TEST(PlaceP3p, GivesNumbersForPointsOnALineOrInOnePlaceIfAnything) {
-  const std::array<Vector3d, 3> rays{Vector3d(-0.1, 0.0, 1.0).normalized(), Vector3d(0.0, 0.0, 1.0),
-                                     Vector3d(0.1, 0.0, 1.0).normalized()};
-  for (const Vector3d& step : {Vector3d(0.1, 0.0, 0.0), Vector3d(0.0, 0.0, 0.0)}) {
-    const Vector3d first(0.0, 0.0, 1.0);
-    const P3pPoses poses = poses_from_points({first - step, first, first + step}, rays);
-    for (std::size_t i = 0; i < poses.count; ++i) {
-      EXPECT_TRUE(poses.camera_from_world[i].translation.allFinite());
-    }
-  }
 }
 
 /// Pairs of a view moved by `query_from_match`, `good` of each kind right and as many again wrong.
@@ -142,25 +101,6 @@ TEST(PlacePose, IsNoneOfWrongPairsAlone) {
   Random random(4);
   EXPECT_FALSE(ransac_pose(make_pairs({}, 0, 0, 40, random), camera(), 600, 10, 7).has_value());
   EXPECT_FALSE(ransac_pose({}, camera(), 600, 10, 7).has_value());
-}
-
-/// RANSAC passes over what the bound says cannot win: it must never be too low, nor of no use.
-TEST(PlacePose, BoundIsNeverBelowTheInliers) {
-  Random random(5);
-  for (int trial = 0; trial < 50; ++trial) {
-    const Rigid3 truth = random.pose();
-    const PosePairs pairs = make_pairs(truth, 25, 5, 25, random);
-    const auto pose = ransac_pose(pairs, camera(), 600, 10, static_cast<std::uint64_t>(trial));
-    ASSERT_TRUE(pose.has_value());
-    const std::size_t inliers = pose->points.size() + pose->lines.size();
-    const InlierBound bound(pairs, camera());
-    EXPECT_GE(bound.of(pose->query_from_match), inliers);
-    EXPECT_LE(bound.of(pose->query_from_match), inliers + 3);
-    Rigid3 near = pose->query_from_match;
-    near.translation += Vector3d(1e-4, -1e-4, 1e-4);
-    EXPECT_GE(bound.of(near), inliers);
-    EXPECT_LT(bound.of(random.pose() * truth), inliers);
-  }
 }
 
 /// The same as the words say it, one descriptor after the other.

@@ -57,8 +57,7 @@ TEST(MapStore, EveryCommitIsTheMapInEveryBit) {
     ASSERT_TRUE(same_all(stored->frames, world.frames));
     EXPECT_FALSE(stored->complete);
   }
-  ASSERT_GT(world.map.retired_ids().size(), 1U) << "the world is too simple";
-  ASSERT_GT(world.map.edges().size(), 5U);
+  ASSERT_GT(world.map.edges().size(), 5U) << "the world is too simple";
   ASSERT_FALSE(world.map.loops().empty());
 }
 
@@ -110,12 +109,12 @@ TEST(MapStore, KeepsHeaderAndAttachments) {
   camera.depth_slope = {0.0125, -0.005};
   camera.color_from_depth = tests::Random(3).pose(1.0, 1.0);
   camera.depth = sensor::Pinhole{320, 240, 262.0, 263.0, 160.0, 120.0};
-  const std::vector<std::uint8_t> vocabulary(5000, 17);
+  const std::vector<std::uint8_t> robots(5000, 17);
   {
     auto writer = StoreWriter::create(folder.file(), header_of(camera));
     ASSERT_TRUE(writer);
-    ASSERT_TRUE(writer->attach("vocabulary", {1, 2, 3}));
-    ASSERT_TRUE(writer->attach("vocabulary", vocabulary));
+    ASSERT_TRUE(writer->attach("robots", {1, 2, 3}));
+    ASSERT_TRUE(writer->attach("robots", robots));
     ASSERT_TRUE(writer->attach("empty", {}));
   }
   const auto reader = StoreReader::open(folder.file());
@@ -129,7 +128,7 @@ TEST(MapStore, KeepsHeaderAndAttachments) {
   EXPECT_EQ(header.camera.distortion, camera.distortion);
   EXPECT_TRUE(tests::same(*header.camera.color_from_depth, *camera.color_from_depth));
   EXPECT_EQ(header.camera.depth->fy, 263.0);
-  EXPECT_EQ(reader->attachment("vocabulary").value(), vocabulary);
+  EXPECT_EQ(reader->attachment("robots").value(), robots);
   EXPECT_EQ(reader->attachment("empty").value(), std::vector<std::uint8_t>{});
   EXPECT_EQ(reader->attachment("nothing").value(), std::nullopt);
   const auto empty = reader->load();

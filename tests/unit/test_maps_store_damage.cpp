@@ -181,7 +181,7 @@ TEST(MapStoreDamage, WrongBytesAreRefusedOrHarmless) {
 
 TEST(MapStoreDamage, LostRowsAreTold) {
   const StoreFolder folder;
-  for (const char* table : {"keyframe", "state", "retired", "point", "line", "edge", "frame"}) {
+  for (const char* table : {"keyframe", "state", "point", "line", "edge", "frame"}) {
     write_store(folder.file(), 6);
     run_sql(folder.file(),
             (std::string("DELETE FROM ") + table + " WHERE rowid = (SELECT max(rowid) FROM " + table + ")")

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Keyframes that leave, landmarks that turn out to be one, and the spanning tree.
+// Landmarks that turn out to be one, and the spanning tree.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <set>
 #include <stdexcept>
 
 #include "plumbline/maps/frame_pose.hpp"
@@ -89,104 +88,20 @@ TEST(MapTree, HangsOnWhoSharesMostOrOnTheLastOne) {
   expect_tree(map, 1);
 }
 
-TEST(MapTree, WhatHungOnItGoesToParentOrSister) {
-  Map map;
-  std::vector<KeyframeId> k;
-  for (int i = 0; i < 5; ++i) k.push_back(add_keyframe(map, {}));
-  map.set_parent(k[1], k[0]);
-  for (int i = 2; i < 5; ++i) map.set_parent(k[static_cast<std::size_t>(i)], k[1]);
-  share(map, {k[0], k[3]}, 8);
-  share(map, {k[3], k[4]}, 4);
-  share(map, {k[0], k[4]}, 2);
-  map.remove_keyframe(k[1]);
-  EXPECT_FALSE(map.has_keyframe(k[1]));
-  EXPECT_EQ(map.parent(k[3]), k[0]);
-  EXPECT_EQ(map.parent(k[4]), k[3]) << "shares more with the sister than with the parent";
-  EXPECT_EQ(map.parent(k[2]), k[0]) << "shares nothing: the parent";
-  expect_tree(map, 1);
-  EXPECT_EQ(map.next_keyframe_id(0), (KeyframeId{0, 5})) << "ids are not given again";
-}
-
-TEST(MapTree, ARemovedRootIsFollowedByItsFirstChild) {
-  Map map;
-  const KeyframeId a = add_keyframe(map, {});
-  EXPECT_THROW(map.remove_keyframe(a), std::invalid_argument) << "the only one";
-  EXPECT_THROW(map.remove_keyframe({0, 7}), std::out_of_range);
-  const KeyframeId b = add_keyframe(map, {});
-  const KeyframeId c = add_keyframe(map, {});
-  map.set_parent(b, a);
-  map.set_parent(c, a);
-  map.remove_keyframe(a);
-  EXPECT_FALSE(map.parent(b).valid());
-  EXPECT_EQ(map.parent(c), b);
-  EXPECT_EQ(map.retired(a).heir, b);
-  expect_tree(map, 1);
-}
-
-TEST(MapTree, WhatIsGoneMovesWithItsHeir) {
+TEST(FramePoses, MoveWithTheirKeyframes) {
   Random random(4);
   Map map;
-  std::vector<Rigid3> pose;
-  for (int i = 0; i < 4; ++i) {
-    pose.push_back(random.pose(1.0, 2.0));
-    const KeyframeId id = add_keyframe(map, pose.back());
-    if (i > 0) map.set_parent(id, {0, i - 1});
-  }
-  const Rigid3 frame_from_third = random.pose(0.3, 0.2);
-  const std::vector<FramePose> frames{{1.1, {0, 3}, frame_from_third, true}};
-  const Rigid3 before = frame_from_third * pose[3];
-  map.remove_keyframe({0, 3});
-  map.remove_keyframe({0, 2});  // itself an heir: what hung on it goes on to the next
-  EXPECT_EQ(map.retired({0, 3}).heir, (KeyframeId{0, 1}));
-  ASSERT_EQ(map.retired_ids().size(), 2U);
-  EXPECT_LT(tests::distance(map.pose_of({0, 3}), pose[3]), 1e-12);
-  EXPECT_LT(tests::distance(map.pose_of({0, 2}), pose[2]), 1e-12);
-  ASSERT_EQ(trajectory(frames, map).size(), 1U);
-  EXPECT_LT(tests::distance(trajectory(frames, map)[0].world_from_camera.inverse(), before), 1e-12);
-
+  const Rigid3 pose = random.pose(1.0, 2.0);
+  const Rigid3 frame_from_keyframe = random.pose(0.3, 0.2);
+  const KeyframeId id = add_keyframe(map, pose);
+  const std::vector<FramePose> frames{{1.1, id, frame_from_keyframe, true}, {1.2, id, {}, false}};
   const Rigid3 correction = random.pose(0.5, 1.0);  // of the world
-  map.set_pose({0, 1}, pose[1] * correction);
-  EXPECT_LT(tests::distance(map.pose_of({0, 3}), pose[3] * correction), 1e-12);
-  EXPECT_LT(tests::angle(map.pose_of({0, 3}), pose[3] * correction), 1e-7);
-  EXPECT_LT(tests::distance(trajectory(frames, map)[0].world_from_camera.inverse(), before * correction),
+  map.set_pose(id, pose * correction);
+  const geometry::Trajectory path = trajectory(frames, map);
+  ASSERT_EQ(path.size(), 1U) << "where it was lost it has no pose";
+  EXPECT_LT(tests::distance(path[0].world_from_camera.inverse(), frame_from_keyframe * pose * correction),
             1e-12);
-  const geometry::Trajectory all = keyframe_trajectory(map);
-  ASSERT_EQ(all.size(), 4U) << "clouds hang on those that are gone, too";
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(all[i].stamp, 0.5 * static_cast<double>(i));
-}
-
-TEST(MapTree, ObservationsLandmarksAndEdgesGoWithTheKeyframe) {
-  Map map;
-  const KeyframeId a = add_keyframe(map, {});
-  const KeyframeId b = add_keyframe(map, {});
-  const KeyframeId c = add_keyframe(map, {});
-  const std::vector<PointId> alone = share(map, {b}, 2);
-  const std::vector<PointId> both = share(map, {a, b}, 3);
-  const LineId line = map.add_line(0, {});
-  const LineId lonely = map.add_line(0, {});
-  map.observe(line, b, 0);
-  map.observe(line, c, 0);
-  map.observe(lonely, b, 1);
-  for (const auto& [from, to] : {std::pair{a, b}, {a, c}, {b, c}}) {
-    SurfaceEdge edge;
-    edge.a = from;
-    edge.b = to;
-    map.add_edge(edge);
-  }
-  map.remove_keyframe(b);
-  for (PointId p : alone) EXPECT_EQ(map.find_point(p), nullptr);
-  for (PointId p : both) {
-    ASSERT_NE(map.find_point(p), nullptr);
-    EXPECT_EQ(map.point(p).observations.size(), 1U);
-    EXPECT_EQ(map.point(p).angle_keyframe, a) << "a picture that is gone has no roll to count from";
-  }
-  EXPECT_NE(map.find_line(line), nullptr);
-  EXPECT_EQ(map.find_line(lonely), nullptr);
-  EXPECT_EQ(map.shared(a, c), 0);
-  EXPECT_TRUE(map.covisible(a, 1).empty());
-  ASSERT_EQ(map.edges_of(a).size(), 1U);
-  EXPECT_EQ(map.edges_of(a)[0].b, c);
-  EXPECT_EQ(map.edges_of(c).size(), 1U);
+  ASSERT_EQ(keyframe_trajectory(map).size(), 1U);
 }
 
 TEST(MapMerge, ObservationsAndCountsMove) {
@@ -228,30 +143,6 @@ TEST(MapMerge, ObservationsAndCountsMove) {
   EXPECT_EQ(map.line_of(c, 1), l);
   EXPECT_FALSE(map.line_of(a, 1).valid());
   EXPECT_THROW(map.merge_lines(l, l), std::invalid_argument);
-}
-
-TEST(MapTree, StaysATreeUnderRandomRemovals) {
-  Random random(11);
-  Map map;
-  std::set<int> alive;
-  for (int i = 0; i < 60; ++i) {
-    const KeyframeId id = add_keyframe(map, random.pose(0.5, 1.0));
-    for (int j : alive) {
-      if (random.integer(0, 3) == 0) share(map, {id, {0, j}}, 1);
-    }
-    map.attach(id);
-    alive.insert(i);
-    if (i % 2 == 1) {
-      auto victim = alive.begin();
-      std::advance(victim, random.integer(0, static_cast<int>(alive.size()) - 1));
-      map.remove_keyframe({0, *victim});
-      alive.erase(victim);
-    }
-  }
-  expect_tree(map, 1);
-  EXPECT_EQ(map.keyframe_count(), 30U);
-  EXPECT_EQ(every_keyframe(map).size(), 60U);
-  for (KeyframeId id : map.retired_ids()) EXPECT_TRUE(map.has_keyframe(map.retired(id).heir));
 }
 
 constexpr int kLines = 190;

@@ -54,7 +54,7 @@ class UpFrameTest : public testing::Test {
     return {{1.0, map_from_world_ * world_from_camera}};
   }
   [[nodiscard]] UpFrame find(Up wanted, const geometry::Trajectory& trajectory) const {
-    return find_up(wanted, cloud_, trajectory, core::Executor(2));
+    return find_up(wanted, cloud_, trajectory);
   }
   [[nodiscard]] Vector3d placed(const UpFrame& frame, const Vector3d& world) const {
     return frame.output_from_map * (map_from_world_ * world);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <set>
 
 #include "places_world.hpp"
@@ -73,36 +74,16 @@ TEST(KMajority, FewOrEqualDescriptors) {
 
 TEST(Vocabulary, PointsAndLinesNeverMix) {
   const std::vector<Descriptor256> all = many(4, 600);
-  const Vocabulary v = Vocabulary::train(all, all, {});
-  std::set<Word> points;
-  std::set<Word> lines;
-  for (const auto& d : all) {
-    points.insert(v.word(Kind::kPoint, d));
-    lines.insert(v.word(Kind::kLine, d));
+  Vocabulary v;
+  std::array<std::set<Word>, 2> words;
+  for (const Kind kind : kKinds) {
+    const Word root = v.word(kind, all[0]);
+    for (const auto& d : all) v.count(v.word(kind, d));
+    v.divide(root, all);
+    for (const auto& d : all) words[static_cast<std::size_t>(kind)].insert(v.word(kind, d));
+    EXPECT_EQ(v.feature_count(kind), 600);
   }
-  for (const Word w : points) EXPECT_EQ(lines.count(w), 0U);
-  EXPECT_EQ(v.feature_count(Kind::kPoint), 600);
-  EXPECT_EQ(v.feature_count(Kind::kLine), 600);
-}
-
-TEST(Vocabulary, TrainedWordsAreSmallAndWeighLogNOverNw) {
-  VocabularyOptions options;
-  options.branching = 4;
-  options.levels = 8;
-  const std::vector<Descriptor256> all = many(7, 400);
-  const Vocabulary v = Vocabulary::train(all, {}, options);
-  std::map<Word, int> count;
-  for (const auto& d : all) ++count[v.word(Kind::kPoint, d)];
-  for (const auto& [word, n] : count) {
-    EXPECT_TRUE(v.is_word(word));
-    EXPECT_LE(n, 30);
-  }
-  const auto& [word, n] = *count.begin();
-  EXPECT_NEAR(v.weight(word), std::log(400.0 / n), 0.7)
-      << "a member may come down another way than in training";
-  EXPECT_TRUE(v.fixed());
-  EXPECT_GT(v.depth(Kind::kPoint), 1);
-  EXPECT_EQ(v.word_count(Kind::kLine), 1U);
+  for (const Word w : words[0]) EXPECT_EQ(words[1].count(w), 0U);
 }
 
 TEST(Vocabulary, LearnsByDividing) {
@@ -117,6 +98,12 @@ TEST(Vocabulary, LearnsByDividing) {
   ASSERT_EQ(words.size(), all.size());
   EXPECT_FALSE(v.is_word(root));
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(v.word(Kind::kPoint, all[i]), words[i]) << i;
+  for (const Word w : std::set<Word>(words.begin(), words.end())) {
+    const auto n = static_cast<double>(std::count(words.begin(), words.end(), w));
+    EXPECT_NEAR(v.weight(w), std::log(201.0 / n), 1e-12);
+  }
+  EXPECT_EQ(v.depth(Kind::kPoint), 1);
+  EXPECT_EQ(v.word_count(Kind::kLine), 1U);
 }
 
 TEST(Vocabulary, EqualDescriptorsCannotBeDividedAndAreAskedLater) {
@@ -129,42 +116,6 @@ TEST(Vocabulary, EqualDescriptorsCannotBeDividedAndAreAskedLater) {
   EXPECT_TRUE(v.divide(root, equal).empty());
   EXPECT_TRUE(v.is_word(root));
   EXPECT_FALSE(v.overfull(root));
-}
-
-TEST(Vocabulary, AFixedOneDoesNotLearn) {
-  Vocabulary v = Vocabulary::train(many(1, 50), {}, {});
-  EXPECT_THROW(v.count(v.word(Kind::kPoint, many(2, 1)[0])), std::logic_error);
-}
-
-TEST(VocabularyFile, ComesBackTheSame) {
-  const auto file = std::filesystem::temp_directory_path() / "plumbline_test_vocabulary.bin";
-  const std::vector<Descriptor256> all = many(11, 500);
-  const Vocabulary v = Vocabulary::train(all, many(12, 200), {});
-  ASSERT_TRUE(v.write(file));
-  const auto back = Vocabulary::read(file);
-  ASSERT_TRUE(back) << back.error().message;
-  EXPECT_EQ(back->to_bytes(), v.to_bytes());
-  for (const auto& d : all) EXPECT_EQ(back->word(Kind::kPoint, d), v.word(Kind::kPoint, d));
-  std::filesystem::remove(file);
-  EXPECT_FALSE(Vocabulary::read(file));
-}
-
-TEST(VocabularyFile, DamageIsToldNotRead) {
-  const std::vector<std::uint8_t> good = Vocabulary::train(many(11, 300), {}, {}).to_bytes();
-  ASSERT_TRUE(Vocabulary::from_bytes(good, "good"));
-  EXPECT_FALSE(Vocabulary::from_bytes({}, "empty"));
-  for (const std::size_t cut : {std::size_t{5}, std::size_t{12}, std::size_t{30}, good.size() - 1}) {
-    EXPECT_FALSE(
-        Vocabulary::from_bytes({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(cut)}, "cut"));
-  }
-  for (std::size_t i = 0; i < good.size(); i += 97) {
-    std::vector<std::uint8_t> bad = good;
-    bad[i] ^= 0x10U;
-    EXPECT_FALSE(Vocabulary::from_bytes(bad, "bad")) << "byte " << i;
-  }
-  const auto foreign = Vocabulary::from_bytes(std::vector<std::uint8_t>(100, 'x'), "x.bin");
-  ASSERT_FALSE(foreign);
-  EXPECT_NE(foreign.error().message.find("x.bin: is not a vocabulary"), std::string::npos);
 }
 
 }  // namespace

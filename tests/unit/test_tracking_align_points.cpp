@@ -170,7 +170,7 @@ TEST_F(WallWorld, WhatWasAlignedOnceIsAlignedWithWhenItsKeyframeIsTheOldestLeft)
   const core::KeyframeId newer = add_keyframe(second, frame);
   for (const PointMatch& m : matches) map_.observe(m.point, newer, m.feature, m.aligned);
   map_.attach(newer);
-  map_.remove_keyframe(oldest);
+  for (const PointMatch& m : matches) map_.unobserve(m.point, oldest);
 
   const Rigid3 third = camera_at(0.09, 0.02, 0.05);
   const features::FrameFeatures later = features_of(third, corners_at(third));

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "../../viz/ticks.hpp"
 #include "../markup.hpp"
 #include "plumbline/viz/svg_chart.hpp"
 
@@ -113,6 +114,26 @@ TEST(SvgChart, OneScaleForBothAxesOfAPlan) {
   ASSERT_EQ(x.size(), 3U);
   EXPECT_NEAR(x[1] - x[0], y[0] - y[2], 0.2);
   EXPECT_GT(x[1] - x[0], 100.0);
+}
+
+TEST(Ticks, AreRoundAndLabelledAlike) {
+  const Ticks ticks = nice_ticks(-0.25, 1.0, 0.2);
+  EXPECT_EQ(ticks.labels, (std::vector<std::string>{"-0.2", "0.0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
+  EXPECT_TRUE(nice_ticks(1.0, 1.0, 0.1).values.empty());
+  EXPECT_TRUE(nice_ticks(0.0, kNaN, 0.1).values.empty());
+}
+
+TEST(SvgDocument, HoldsChartsSideBySideWithTitlesAndLegends) {
+  SvgChart chart = chart_of({"error <m>", "e4", {0.0, 1.0}, {1.0, 2.0}});
+  chart.title = "Over & under";
+  const std::string svg = svg_document({chart, chart, chart}, 2);
+  EXPECT_EQ(malformed_at(svg), "") << svg;
+  EXPECT_EQ(svg.rfind("<svg xmlns=", 0), 0U);
+  EXPECT_NE(svg.find("width=\"2000\""), std::string::npos);
+  EXPECT_EQ(count_of("Over &amp; under", svg), 3U);
+  EXPECT_EQ(count_of("error &lt;m&gt;", svg), 3U);
+  EXPECT_NE(svg.find(".line.e4"), std::string::npos);
+  EXPECT_EQ(malformed_at(svg_document({}, 2)), "");
 }
 
 TEST(SvgChart, StyleHasEveryKindInLightAndDark) {

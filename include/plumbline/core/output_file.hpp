@@ -45,4 +45,7 @@ class OutputFile {
   std::string problem_;
 };
 
+/// A whole file at once.
+Result<void> write_file(const std::filesystem::path& file, std::string_view bytes);
+
 }  // namespace plumbline::core

@@ -41,7 +41,7 @@ struct ConsistentSet {
 };
 
 /// Whether two pairs tell the same story: the pose of the other one's keyframes, found by way of each, is the
-/// same within the limits. Keyframes may have been retired since. The map says how A's keyframes lie to each
+/// same within the limits. The map says how A's keyframes lie to each
 /// other, and B's.
 bool agree(const maps::Map& map_a, const maps::Map& map_b, const PlacePair& one, const PlacePair& two,
            const ConsistencyOptions& options);

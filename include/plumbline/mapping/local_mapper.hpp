@@ -7,7 +7,6 @@
 
 #include "plumbline/core/options.hpp"
 #include "plumbline/features/frame_features.hpp"
-#include "plumbline/mapping/keyframe_culling.hpp"
 #include "plumbline/mapping/landmark_culling.hpp"
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/landmark_triangulation.hpp"
@@ -30,8 +29,6 @@ struct LocalMapperOptions {
   bool fuse = true;
   bool earlier_sightings = true;
   FusionOptions fusion;
-  bool cull_keyframes = false;
-  KeyframeCullingOptions keyframe_culling;
   bool bundle = true;
   int bundle_keyframes = 12;
   SightingNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
@@ -75,7 +72,7 @@ class LocalMapper {
                          const std::vector<core::KeyframeId>& neighbours);
 
   /// What a new keyframe has to say about the map around it, in this order: doubles are fused, landmarks
-  /// that did not prove themselves go, and so do keyframes that others make redundant (never the new one).
+  /// that did not prove themselves go.
   void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:

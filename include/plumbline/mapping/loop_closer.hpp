@@ -33,16 +33,12 @@ struct LoopOptions {
   bool robust = true;       ///< the pose graph may take loops for wrong
   bool bundle = true;       ///< adjust the whole map after a loop
   std::uint64_t seed = 1;
-  std::string vocabulary_file;  ///< a trained vocabulary, fixed; empty: one that learns as it goes
-  std::shared_ptr<const places::Vocabulary> trained;  ///< what load() read
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;
   VerificationOptions verify;
   FusionOptions fusion;
   LoopOptions() { verify.rounds = 200; }  ///< enough where a third agrees; asked at every keyframe
   void declare(core::OptionTable& table);
-  /// Reads vocabulary_file, if one is named.
-  core::Result<void> load();
 };
 
 struct LoopCounts {
@@ -80,7 +76,7 @@ class LoopCloser {
       : options_(options),
         camera_(camera),
         executor_(executor),
-        database_(options.trained ? *options.trained : places::Vocabulary(options.vocabulary)),
+        database_(places::Vocabulary(options.vocabulary)),
         recogniser_(options.places) {}
 
   /// Asks for the place of a new keyframe of the map and adds it to the database. Loops that are sure enough

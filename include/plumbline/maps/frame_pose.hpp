@@ -49,11 +49,7 @@ bool beyond_noise(double off_m, double off_rad, double sigma_m);
 /// World poses of the tracked frames, in the order given, as their keyframes lie in `map` now.
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map);
 
-/// Every keyframe that was ever in `map`, those that were taken out included: their frames and clouds are
-/// still there and move with their heirs. By id.
-std::vector<core::KeyframeId> every_keyframe(const Map& map);
-
-/// World poses of every_keyframe(map), in its order.
+/// World poses of the keyframes, by id.
 geometry::Trajectory keyframe_trajectory(const Map& map);
 
 }  // namespace plumbline::maps

@@ -109,13 +109,6 @@ struct LoopEdge {
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
 };
 
-/// A keyframe that was taken out of the map: its pose moves with the keyframe that took its place.
-struct RetiredKeyframe {
-  double stamp = 0.0;  ///< seconds
-  KeyframeId heir;     ///< in the map
-  geometry::Rigid3 camera_from_heir;
-};
-
 /// The ids that come next, one of each robot that has or had such things.
 struct NextIds {
   std::vector<KeyframeId> keyframes;
@@ -149,7 +142,6 @@ struct MapParts {
   std::vector<KeyframePart> keyframes;
   std::vector<MapPoint> points;  ///< with ids and observations, as all here
   std::vector<MapLine> lines;
-  std::vector<std::pair<KeyframeId, RetiredKeyframe>> retired;
   std::vector<std::pair<std::uint64_t, SurfaceEdge>> edges;  ///< by order of creation
   std::vector<LoopEdge> loops;
   NextIds next;
@@ -158,10 +150,9 @@ struct MapParts {
 /// What a map holds beyond what it held at an earlier moment: a copy that goes on living while the map
 /// changes, at the cost of what was touched.
 struct MapChanges {
-  bool whole = false;                                           ///< since before anything was there
-  std::vector<MapParts::KeyframePart> keyframes;                ///< all of them: poses move
-  std::vector<std::pair<KeyframeId, RetiredKeyframe>> retired;  ///< all
-  std::vector<LandmarkPage<MapPoint>> points;                   ///< pages that were touched
+  bool whole = false;                             ///< since before anything was there
+  std::vector<MapParts::KeyframePart> keyframes;  ///< all of them: poses move
+  std::vector<LandmarkPage<MapPoint>> points;     ///< pages that were touched
   std::vector<LandmarkPage<MapLine>> lines;
   std::vector<std::pair<std::uint64_t, std::int32_t>> edge_names;  ///< all: number and robot of a
   std::vector<std::pair<std::uint64_t, SurfaceEdge>> edges;        ///< new ones
@@ -193,18 +184,6 @@ class Map {
   void set_pose(KeyframeId id, const geometry::Rigid3& camera_from_world);
   [[nodiscard]] std::vector<KeyframeId> keyframe_ids() const { return keyframes_.ids(); }
   [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }
-
-  /// Takes a keyframe out: its observations and edges go, and landmarks that nobody else sees. What hung on
-  /// it in the spanning tree goes to its parent or to a sister, whichever shares most. Its heir is its parent
-  /// (of a root: the child that follows it as root). Throws std::invalid_argument for the only keyframe there
-  /// is.
-  void remove_keyframe(KeyframeId id);
-  /// Keyframes that were taken out, by id.
-  [[nodiscard]] std::vector<KeyframeId> retired_ids() const { return retired_.ids(); }
-  [[nodiscard]] const RetiredKeyframe& retired(KeyframeId id) const { return retired_.at(id); }
-  /// camera_from_world of any keyframe that was ever in the map, as its heir lies now.
-  [[nodiscard]] geometry::Rigid3 pose_of(KeyframeId id) const;
-  [[nodiscard]] double stamp_of(KeyframeId id) const;  ///< the same for the stamp, seconds
 
   // Spanning tree: every keyframe but a root hangs on one that shared much with it when it was made.
   /// Hangs a new keyframe on the one that shares most with it; if none does, on the robot's last one before
@@ -265,8 +244,8 @@ class Map {
   /// All edges by order of creation.
   [[nodiscard]] const std::map<std::uint64_t, SurfaceEdge>& edges() const { return edges_; }
 
-  /// Loops that were closed and are believed; those of a keyframe that is taken out go with it. Throws
-  /// std::invalid_argument when both ends are one, std::out_of_range when one is not in the map.
+  /// Loops that were closed and are believed. Throws std::invalid_argument when both ends are one,
+  /// std::out_of_range when one is not in the map.
   void set_loops(std::vector<LoopEdge> loops);
   [[nodiscard]] const std::vector<LoopEdge>& loops() const { return loops_; }
 
@@ -283,20 +262,15 @@ class Map {
     std::vector<std::uint64_t> edges;
     KeyframeId parent;
     std::vector<KeyframeId> children;  ///< by id
-    std::vector<KeyframeId> retired;   ///< whose heir this is
   };
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
   void forget_patches(KeyframeId id);
-  void forget_observations(KeyframeId id);
-  void forget_edges(KeyframeId id);
   void detach(KeyframeId child);
-  KeyframeId leave_tree(KeyframeId id);
   void restore_tree(const MapParts& parts);
 
   IdMap<KeyframeId, KeyframeEntry> keyframes_;
   IdMap<PointId, MapPoint> points_;
   IdMap<LineId, MapLine> lines_;
-  IdMap<KeyframeId, RetiredKeyframe> retired_;
   std::map<std::uint64_t, SurfaceEdge> edges_;  ///< by order of creation
   std::uint64_t next_edge_ = 0;
   std::vector<LoopEdge> loops_;

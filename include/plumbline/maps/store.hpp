@@ -18,8 +18,7 @@
 
 namespace plumbline::maps {
 
-/// Stores of this and of lower formats are read. 1: without surfaces. 2: without summaries of views. 3:
-/// without patches of corners.
+/// Stores of other formats are refused.
 constexpr int kStoreFormat = 5;
 
 /// What is written once, when a store is made.
@@ -51,9 +50,8 @@ struct StoredMap {
 /// What a store holds, without reading it all.
 struct StoreContents {
   bool complete = false;
-  std::size_t keyframes = 0;  ///< in the map
-  std::size_t retired = 0;    ///< keyframes that left it
-  std::size_t points = 0;     ///< landmarks
+  std::size_t keyframes = 0;
+  std::size_t points = 0;  ///< landmarks
   std::size_t lines = 0;
   std::size_t edges = 0;
   std::size_t loops = 0;

@@ -21,7 +21,6 @@
 #include "plumbline/maps/map.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/pipeline/stage.hpp"
-#include "plumbline/places/vocabulary.hpp"
 #include "plumbline/sensor/frame.hpp"
 
 namespace plumbline::pipeline {
@@ -67,7 +66,6 @@ struct MapResult {
   std::vector<RobotInfo> robots;  ///< by number; empty: one robot with the recording's camera
   std::string frame_columns;      ///< header of FrameRow::columns
   std::vector<FrameRow> frames;   ///< by frame
-  std::shared_ptr<const places::Vocabulary> vocabulary;  ///< of the places; null: none was needed
 };
 
 /// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame; or of such a frame what it

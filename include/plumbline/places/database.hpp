@@ -22,7 +22,7 @@ struct Hit {
   double score = 0.0;  ///< s of METHOD section 5: 0 nothing in common, 1 the same
 };
 
-/// Keyframes of any number of robots. A vocabulary that learns is divided while keyframes are added: a fixed
+/// Keyframes of any number of robots. The vocabulary is divided while keyframes are added: a fixed
 /// number of words per keyframe at most, each of a bounded number of features, so that the cost of a keyframe
 /// does not grow with their number. Vectors of earlier keyframes follow at once (their features move to the
 /// new words); the weights log(N / n_w) are taken anew whenever the dictionary has grown by a quarter. The

@@ -2,15 +2,13 @@
 #pragma once
 
 // The dictionary of what is seen (METHOD section 5): one tree of words for points, one for lines; a leaf is a
-// word. It is either trained beforehand and fixed, or grows with what it is shown: a word that has become too
-// common is divided, and nothing else changes.
+// word. It grows with what it is shown: a word that has become too common is divided, and nothing else
+// changes.
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <vector>
 
-#include "plumbline/core/error.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/features/descriptor.hpp"
 
@@ -35,19 +33,13 @@ class Vocabulary {
  public:
   /// Knows one word for all points and one for all lines.
   explicit Vocabulary(const VocabularyOptions& options = {});
-  /// Trained on all these descriptors at once, level by level; fixed from then on. Deterministic.
-  static Vocabulary train(const std::vector<features::Descriptor256>& points,
-                          const std::vector<features::Descriptor256>& lines,
-                          const VocabularyOptions& options);
 
   /// The word of a descriptor: down the tree, to the nearest child at each level.
   [[nodiscard]] Word word(Kind kind, const features::Descriptor256& descriptor) const;
   /// log(N / n_w): N features in the dictionary, n_w of them in the word; 0 for a word never seen.
   [[nodiscard]] double weight(Word word) const;
-  [[nodiscard]] bool fixed() const { return fixed_; }
   [[nodiscard]] bool is_word(Word node) const { return nodes_[static_cast<std::size_t>(node)].children == 0; }
 
-  // Learning; not for a fixed vocabulary.
   /// One more feature in `word`.
   void count(Word word);
   /// Whether the word has become so common that it should be divided. Words near the root wait for more
@@ -62,13 +54,6 @@ class Vocabulary {
   [[nodiscard]] std::int64_t feature_count(Kind kind) const;
   [[nodiscard]] int depth(Kind kind) const;  ///< of the deepest word; 0: the root is the only word
   [[nodiscard]] const VocabularyOptions& options() const { return options_; }
-
-  /// Binary, little endian, with version and checksum; from_bytes checks both and the tree's shape.
-  /// `name` is for messages. Errors (kInput).
-  [[nodiscard]] std::vector<std::uint8_t> to_bytes() const;
-  static core::Result<Vocabulary> from_bytes(const std::vector<std::uint8_t>& bytes, const std::string& name);
-  [[nodiscard]] core::Result<void> write(const std::filesystem::path& file) const;
-  static core::Result<Vocabulary> read(const std::filesystem::path& file);
 
  private:
   struct Node {
@@ -85,7 +70,6 @@ class Vocabulary {
   VocabularyOptions options_;
   std::vector<Node> nodes_;  ///< 0 and 1 are the roots; children of a node lie side by side
   std::vector<features::Descriptor256> centres_;  ///< by node
-  bool fixed_ = false;
 };
 
 }  // namespace plumbline::places

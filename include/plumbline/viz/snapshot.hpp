@@ -50,10 +50,11 @@ struct SnapshotOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Up direction of a scene in the frame of its first camera (x right, y down, z forward): the normal
-/// direction that most horizontal surface shares (floor, table tops, ceiling) among those within 45 degrees
-/// of the cameras' mean up (-y); the mean up itself when no surface supports one; -y when nothing is known.
-/// Unit length.
+/// Mean of the cameras' up directions (-y of theirs), unit; -y when nothing is known.
+Eigen::Vector3d mean_camera_up(const std::vector<geometry::Trajectory>& paths);
+
+/// Up direction of a scene: the floor's (cloud::find_floor, about the cameras' mean up), or that mean when no
+/// floor is seen. Unit length.
 Eigen::Vector3d estimate_up(const Scene& scene);
 
 /// Draws the scene and writes a PNG; same scene and options give the same bytes on the same machine. An

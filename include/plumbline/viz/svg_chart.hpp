@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Charts as part of an HTML page: SVG text that the page's style sheet colours, for light and dark ground and
-// for paper; words stay words that can be read aloud, searched and copied. Charts as files of their own:
-// figure.hpp.
+// Charts as SVG text: as part of an HTML page, whose style sheet colours them for light and dark ground and
+// for paper, or as a file of their own. Words stay words that can be read aloud, searched and copied.
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
-
-#include "plumbline/viz/figure.hpp"
 
 namespace plumbline::viz {
 
+using AxisRange = std::pair<double, double>;
+
 /// Points joined in order; a non-finite x or y breaks the line. `kind` names how it is drawn, one of those of
-/// svg_chart_style(): "k0" ... "k7" (category_color), "truth", "lost", "loop", "plain".
+/// svg_chart_style(): "k0" ... "k7" (category_color), "truth", "lost", "loop", "plain". In files also "e0"
+/// ... "e4", from little to much (sequential_color).
 struct SvgLine {
   std::string label;  ///< in the legend; empty = not listed
   std::string kind = "k0";
@@ -43,7 +44,7 @@ struct SvgBackground {
 };
 
 struct SvgChart {
-  std::string title;             ///< told to those who cannot see the chart
+  std::string title;             ///< over the chart in files; in pages told to those who cannot see it
   std::string x_label, y_label;  ///< with units: "time (s)"
   int width_px = 1000;           ///< of the drawing, which the page may scale
   int height_px = 170;           ///< equal_aspect: found from the data
@@ -62,6 +63,10 @@ std::string svg_chart(const SvgChart& chart);
 
 /// CSS rules of all charts of a page.
 std::string svg_chart_style();
+
+/// Charts with title and legend over each, `columns` side by side: what a .svg file holds. It needs no style
+/// but its own, nothing but what any viewer of SVG knows.
+std::string svg_document(const std::vector<SvgChart>& charts, std::size_t columns);
 
 /// Text as it may stand in HTML and XML, in attributes too: markup escaped, what is not UTF-8 or a control
 /// character replaced by U+FFFD.

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/floor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numeric>
+
+#include "pcl_functions.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+struct Found {
+  Floor plane;
+  std::size_t voxels = 0;
+};
+
+/// Those points that face `up`, one for each voxel.
+CloudPtr thinned(const Cloud& cloud, const Eigen::Vector3f& up, const PclFunctions& pcl) {
+  constexpr float kVoxel_m = 0.05F;
+  const float cosine = std::cos(0.25F * static_cast<float>(M_PI));
+  auto facing_up = std::make_shared<Cloud>();
+  for (const Point& p : cloud) {
+    if (p.getNormalVector3fMap().dot(up) > cosine && p.getVector3fMap().allFinite()) facing_up->push_back(p);
+  }
+  return facing_up->empty() ? facing_up : pcl.voxel_grid(facing_up, kVoxel_m, 1);
+}
+
+/// Planes by RANSAC, one after the other in what is left; the first is the largest, or nearly so.
+std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d& up,
+                             const PclFunctions& pcl) {
+  constexpr std::size_t kFewest = 50, kMost = 8;
+  constexpr double kLargeShare = 0.2;  // of the largest one
+  std::vector<Found> planes;
+  auto left = std::make_shared<pcl::Indices>(points->size());
+  std::iota(left->begin(), left->end(), 0);
+  std::size_t enough = kFewest;
+  while (planes.size() < kMost && left->size() >= enough) {
+    Eigen::Vector4d plane;
+    const pcl::Indices inliers = pcl.level_plane(points, left, up, plane);
+    if (inliers.size() < enough) break;
+    const double sign = plane.head<3>().dot(up) < 0.0 ? -1.0 : 1.0;
+    planes.push_back({{sign * plane.head<3>(), -sign * plane[3]}, inliers.size()});
+    enough = std::max(enough, static_cast<std::size_t>(kLargeShare * static_cast<double>(inliers.size())));
+    auto rest = std::make_shared<pcl::Indices>();
+    std::set_difference(left->begin(), left->end(), inliers.begin(), inliers.end(),
+                        std::back_inserter(*rest));
+    left = rest;
+  }
+  return planes;
+}
+
+}  // namespace
+
+std::optional<Floor> find_floor(const CloudConstPtr& cloud, const Eigen::Vector3d& about_up) {
+  const auto& pcl = pcl_functions();
+  if (cloud == nullptr || cloud->empty() || !pcl) return std::nullopt;
+  const CloudConstPtr points = thinned(*cloud, about_up.cast<float>(), **pcl);
+  const std::vector<Found> planes = planes_of(points, about_up, **pcl);
+  const double alongside = std::cos(5.0 * M_PI / 180.0);
+  std::optional<Floor> floor;
+  for (const Found& found : planes) {
+    if (found.plane.normal.dot(planes.front().plane.normal) < alongside) continue;
+    if (!floor || found.plane.height_m < floor->height_m) floor = found.plane;
+  }
+  return floor;
+}
+
+}  // namespace plumbline::cloud
