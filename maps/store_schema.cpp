@@ -11,7 +11,6 @@ namespace {
 constexpr const char* kTables[] = {"keyframe", "state", "retired", "point", "line",
                                    "edge",     "frame", "log",     "cloud", "frame_cloud"};
 constexpr const char* kTablesOfFormat2[] = {"surface"};
-constexpr const char* kTablesOfFormat3[] = {"summary", "frame_summary"};
 
 void create_table(Database& database, const char* name) {
   database.run((std::string("CREATE TABLE ") + name +
@@ -52,9 +51,6 @@ void raise_format(Database& database) {
   const std::int64_t format = database.number("PRAGMA user_version");
   if (format < 2) {
     for (const char* table : kTablesOfFormat2) create_table(database, table);
-  }
-  if (format < 3) {
-    for (const char* table : kTablesOfFormat3) create_table(database, table);
   }
   database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
 }

@@ -139,7 +139,6 @@ class Fusion {
   }
 
   [[nodiscard]] core::Result<ViewSummary> summary_of(std::size_t v) {
-    if (views_.summary) return views_.summary(v);
     const auto room = workshops_.take();
     if (auto got = read(v, room->points); !got) return tl::unexpected<core::Error>(got.error());
     return summarise_view(room->points, views_.cameras[v], options_);

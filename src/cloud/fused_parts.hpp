@@ -5,10 +5,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#if defined(__linux__)
-#include <sys/mman.h>
-#endif
-
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -51,19 +47,6 @@ void leave(FusedCloud& points, const Keep& keep) {
   points.robot_lead.resize(count);
 }
 
-/// Tells the system that all of this memory will be filled: it may give it in large pages.
-inline void will_fill(void* begin, std::size_t bytes) {
-#if defined(__linux__)
-  constexpr std::uintptr_t kPage = std::uintptr_t{1} << 21;
-  const auto first = (reinterpret_cast<std::uintptr_t>(begin) + kPage - 1) / kPage * kPage;
-  const auto last = (reinterpret_cast<std::uintptr_t>(begin) + bytes) / kPage * kPage;
-  if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
-#else
-  static_cast<void>(begin);
-  static_cast<void>(bytes);
-#endif
-}
-
 /// All parts one after the other: cloud, observations, confidence and robots. Columns are put together side
 /// by side, each part given back when it is copied.
 inline FusedCloud joined(std::vector<FusedCloud>&& parts, const core::Executor& executor) {
@@ -74,7 +57,6 @@ inline FusedCloud joined(std::vector<FusedCloud>&& parts, const core::Executor& 
   const auto join = [&](const auto& column_of) {
     auto& whole = column_of(all);
     whole.reserve(count);
-    will_fill(whole.data(), count * sizeof(*whole.data()));
     for (FusedCloud& part : parts) {
       auto& column = column_of(part);
       whole.insert(whole.end(), column.begin(), column.end());

@@ -14,11 +14,9 @@
 #include <vector>
 
 #include "chain_option.hpp"
-#include "idle_work.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
-#include "plumbline/cloud/rooms.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/view_points.hpp"
 #include "plumbline/dataset/frame_source.hpp"
@@ -85,49 +83,16 @@ class FuseStage : public Stage {
     } else {
       between_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
     }
-    const sensor::Pinhole camera = camera_of(keyframe->robot);
-    views_.push_back({keyframe->robot, {}, {}, {}});
-    if (keyframe->cloud != nullptr) {
-      const auto points = rooms_.take();
-      cloud::take_points(*keyframe->cloud, *points);
-      look_at(*points, camera, views_.back());
-    }
+    camera_from_depth_.push_back(
+        keyframe->cloud != nullptr ? std::optional(cloud::sensor_pose(*keyframe->cloud)) : std::nullopt);
     return clouds_->append(keyframe->compact.get(), io.frame());
-  }
-  /// What has not been looked at while it came.
-  void frames_have_ended() override {
-    std::vector<std::size_t> open;
-    for (std::size_t place = 0; place < views_.size(); ++place) {
-      if (!views_[place].summary) open.push_back(place);
-    }
-    const auto look = [this, open](std::size_t i) {
-      View& view = views_[open[i]];
-      if (auto kept = clouds_->summary(open[i], camera_of(view.robot))) {
-        view.camera_from_depth = kept->camera_from_depth;
-        view.summary = std::move(kept->summary);
-        if (!options_.free_space) view.summary->raster = {};
-        return;
-      }
-      const auto points = rooms_.take();
-      if (const auto got = clouds_->read(open[i], *points)) {
-        look_at(*points, camera_of(view.robot), view);
-      } else {
-        view.damage = got.error();
-      }
-    };
-    looking_ = std::make_unique<IdleWork>(open.size(), look, *context_->executor);
   }
 
   /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
   /// keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
-    if (looking_ != nullptr) looking_->finish();
-    looking_.reset();
-    rooms_.clear();
-    for (const View& view : views_) {
-      if (view.damage) return tl::unexpected<core::Error>(*view.damage);
-    }
+    if (auto read = read_sensor_poses(); !read) return read;
     auto fused = fuse(*map);
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
@@ -166,7 +131,6 @@ class FuseStage : public Stage {
       const auto bytes = store->cloud_bytes(id);
       if (!bytes) return fail(bytes.error());
       places_[id] = clouds_->size();
-      views_.push_back({id.robot, {}, {}, {}});
       if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     const auto frames = store->frame_cloud_ids();
@@ -177,29 +141,35 @@ class FuseStage : public Stage {
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
       between_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
-      views_.push_back({pose.reference.robot, {}, {}, {}});
       if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     return {};
   }
 
-  /// One of the clouds.
-  struct View {
-    std::int32_t robot = 0;
-    geometry::Rigid3 camera_from_depth;
-    std::optional<cloud::ViewSummary> summary;  ///< of the cloud as it was measured
-    std::optional<core::Error> damage;
-  };
+  /// Where the depth camera was, which each cloud says: of those that were not in memory when they came.
+  core::Result<void> read_sensor_poses() {
+    camera_from_depth_.resize(clouds_->size());
+    std::vector<core::Result<void>> done(clouds_->size());
+    context_->executor->parallel_for(clouds_->size(), [&](std::size_t place) {
+      if (camera_from_depth_[place]) return;
+      const auto cloud = clouds_->read(place);
+      if (cloud) {
+        camera_from_depth_[place] = cloud::sensor_pose(**cloud);
+      } else {
+        done[place] = tl::unexpected<core::Error>(cloud.error());
+      }
+    });
+    for (core::Result<void>& one : done) {
+      if (!one) return std::move(one);
+    }
+    return {};
+  }
 
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
     if (context_->stored_maps != nullptr) return context_->stored_maps->camera_of(robot);
     if (context_->recordings != nullptr)
       return context_->recordings->robots()[static_cast<std::size_t>(robot)].camera.color;
     return context_->source->camera().color;
-  }
-  void look_at(const cloud::ViewPoints& points, const sensor::Pinhole& camera, View& view) const {
-    view.camera_from_depth = points.camera_from_depth;
-    view.summary = cloud::summarise_view(points, camera, options_);
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
@@ -230,7 +200,7 @@ class FuseStage : public Stage {
       robots.push_back(between.robot);
       stamps.push_back(between.stamp);
     }
-    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * views_[places[i]].camera_from_depth;
+    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * *camera_from_depth_[places[i]];
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
     cloud::FusionReport report;
@@ -249,7 +219,6 @@ class FuseStage : public Stage {
     views.points = [&](std::size_t i, cloud::ViewPoints& points) {
       return read_corrected(places[i], robots[i], points);
     };
-    views.summary = [&](std::size_t i) { return summary_of(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
         "{} clouds{}, fused in {} tiles; {} points seen through, {} of dust; colour gains {:.2f} "
@@ -289,17 +258,6 @@ class FuseStage : public Stage {
           report.used ? fmt::format("up to {:.0f} mm at 2 m", 1e3 * report.most_at_2m) : "not used"));
     }
     return {};
-  }
-
-  /// Used up.
-  [[nodiscard]] core::Result<cloud::ViewSummary> summary_of(std::size_t place, std::int32_t robot) {
-    std::optional<cloud::ViewSummary>& summary = views_[place].summary;
-    const auto field = fields_.find(robot);
-    if (summary && (field == fields_.end() || field->second.identity())) return std::move(*summary);
-    const auto points = rooms_.take();
-    const auto got = read_corrected(place, robot, *points);
-    if (!got) return tl::unexpected<core::Error>(got.error());
-    return cloud::summarise_view(*points, camera_of(robot), options_);
   }
 
   core::Result<void> read_corrected(std::size_t place, std::int32_t robot, cloud::ViewPoints& points) const {
@@ -346,10 +304,9 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(
-          **cloud,
-          frame_.output_from_map * keyframe.world_from_camera * views_[found->second].camera_from_depth,
-          *context_->executor);
+      move_cloud(**cloud,
+                 frame_.output_from_map * keyframe.world_from_camera * *camera_from_depth_[found->second],
+                 *context_->executor);
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
@@ -365,10 +322,9 @@ class FuseStage : public Stage {
   cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<WaitingClouds> clouds_;             ///< camera frame
-  std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
-  std::vector<View> views_;                         ///< by place among the clouds
-  cloud::Rooms<cloud::ViewPoints> rooms_;
+  std::optional<WaitingClouds> clouds_;                             ///< camera frame
+  std::map<core::KeyframeId, std::size_t> places_;                  ///< among the clouds
+  std::vector<std::optional<geometry::Rigid3>> camera_from_depth_;  ///< by place among the clouds
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;
@@ -380,7 +336,6 @@ class FuseStage : public Stage {
   std::vector<RunSummary::DepthField> told_fields_;
   UpFrame frame_;
   std::size_t points_ = 0;
-  std::unique_ptr<IdleWork> looking_;  ///< goes first: it uses the others
 };
 
 }  // namespace

@@ -48,14 +48,4 @@ core::Result<void> WaitingClouds::read(std::size_t place, cloud::ViewPoints& poi
   return read;
 }
 
-std::optional<cloud::KeptSummary> WaitingClouds::summary(std::size_t place,
-                                                         const sensor::Pinhole& camera) const {
-  if (spool_) return std::nullopt;
-  const auto bytes = maps_->summary_bytes(frames_.at(place));
-  if (!bytes || bytes->empty()) return std::nullopt;
-  auto kept = cloud::decode_summary(bytes->data(), bytes->size(), camera);
-  if (!kept) return std::nullopt;  // the cloud says the same
-  return std::move(*kept);
-}
-
 }  // namespace plumbline::pipeline

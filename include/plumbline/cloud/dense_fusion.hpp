@@ -54,8 +54,7 @@ core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_f
                                     const DenseFusionOptions& options, const core::Executor& executor,
                                     FusionReport* report = nullptr);
 
-/// What of a view matters before it is laid down, wherever that will be: worked out while clouds come, or on
-/// the way.
+/// What of a view matters before it is laid down.
 struct ViewSummary {
   bool look = false;
   DepthRaster raster;            ///< empty without free space
@@ -75,9 +74,6 @@ struct FusionViews {
   /// Gives the points of view `i` in memory that is used again, instead of `read`; may be called for several
   /// views at a time. Null: they are taken from what is read.
   std::function<core::Result<void>(std::size_t, ViewPoints&)> points;
-  /// Gives the summary of view `i`, once; may be called for several views at a time. Null: it is made of what
-  /// is read.
-  std::function<core::Result<ViewSummary>(std::size_t)> summary;
 };
 
 /// The same for views of several cameras and robots; columns.robot tells who measured each point most. What
