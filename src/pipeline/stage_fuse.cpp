@@ -18,7 +18,6 @@
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
@@ -83,8 +82,6 @@ class FuseStage : public Stage {
     } else {
       between_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
     }
-    camera_from_depth_.push_back(
-        keyframe->cloud != nullptr ? std::optional(cloud::sensor_pose(*keyframe->cloud)) : std::nullopt);
     return clouds_->append(keyframe->compact.get(), io.frame());
   }
 
@@ -92,7 +89,6 @@ class FuseStage : public Stage {
   /// keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
-    if (auto read = read_sensor_poses(); !read) return read;
     auto fused = fuse(*map);
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
@@ -146,25 +142,6 @@ class FuseStage : public Stage {
     return {};
   }
 
-  /// Where the depth camera was, which each cloud says: of those that were not in memory when they came.
-  core::Result<void> read_sensor_poses() {
-    camera_from_depth_.resize(clouds_->size());
-    std::vector<core::Result<void>> done(clouds_->size());
-    context_->executor->parallel_for(clouds_->size(), [&](std::size_t place) {
-      if (camera_from_depth_[place]) return;
-      const auto cloud = clouds_->read(place);
-      if (cloud) {
-        camera_from_depth_[place] = cloud::sensor_pose(**cloud);
-      } else {
-        done[place] = tl::unexpected<core::Error>(cloud.error());
-      }
-    });
-    for (core::Result<void>& one : done) {
-      if (!one) return std::move(one);
-    }
-    return {};
-  }
-
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
     if (context_->stored_maps != nullptr) return context_->stored_maps->camera_of(robot);
     if (context_->recordings != nullptr)
@@ -200,7 +177,6 @@ class FuseStage : public Stage {
       robots.push_back(between.robot);
       stamps.push_back(between.stamp);
     }
-    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * *camera_from_depth_[places[i]];
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
     cloud::FusionReport report;
@@ -216,9 +192,7 @@ class FuseStage : public Stage {
       for (const std::int32_t robot : robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    views.points = [&](std::size_t i, cloud::ViewPoints& points) {
-      return read_corrected(places[i], robots[i], points);
-    };
+    views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
         "{} clouds{}, fused in {} tiles; {} points seen through, {} of dust; colour gains {:.2f} "
@@ -260,13 +234,6 @@ class FuseStage : public Stage {
     return {};
   }
 
-  core::Result<void> read_corrected(std::size_t place, std::int32_t robot, cloud::ViewPoints& points) const {
-    auto got = clouds_->read(place, points);
-    const auto field = fields_.find(robot);
-    if (got && field != fields_.end()) field->second.correct(points);
-    return got;
-  }
-
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
     auto cloud = clouds_->read(place);
     const auto field = fields_.find(robot);
@@ -304,8 +271,7 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(**cloud,
-                 frame_.output_from_map * keyframe.world_from_camera * *camera_from_depth_[found->second],
+      move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera * cloud::sensor_pose(**cloud),
                  *context_->executor);
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
@@ -322,9 +288,8 @@ class FuseStage : public Stage {
   cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<WaitingClouds> clouds_;                             ///< camera frame
-  std::map<core::KeyframeId, std::size_t> places_;                  ///< among the clouds
-  std::vector<std::optional<geometry::Rigid3>> camera_from_depth_;  ///< by place among the clouds
+  std::optional<WaitingClouds> clouds_;             ///< camera frame
+  std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;

@@ -24,8 +24,6 @@ class WaitingClouds {
   core::Result<void> append(const std::vector<std::uint8_t>* compact, std::size_t frame);
   /// As encode_cloud() left it. Errors (kOutput, kInput): it cannot be read back.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(std::size_t place) const;
-  /// Its points, in memory that is used again.
-  [[nodiscard]] core::Result<void> read(std::size_t place, cloud::ViewPoints& points) const;
 
   [[nodiscard]] std::size_t size() const { return spool_ ? spool_->size() : frames_.size(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }  ///< of those in the temporary file
