@@ -18,6 +18,7 @@
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/transform.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
@@ -29,18 +30,6 @@
 
 namespace plumbline::pipeline {
 namespace {
-
-void move_cloud(cloud::Cloud& cloud, const geometry::Rigid3& to_from, const core::Executor& executor) {
-  constexpr std::size_t kAtATime = 1U << 16U;
-  executor.parallel_for((cloud.size() + kAtATime - 1) / kAtATime, [&](std::size_t part) {
-    const std::size_t end = std::min(cloud.size(), (part + 1) * kAtATime);
-    for (std::size_t i = part * kAtATime; i < end; ++i) {
-      cloud::Point& p = cloud[i];
-      p.getVector3fMap() = (to_from * p.getVector3fMap().cast<double>()).cast<float>();
-      p.getNormalVector3fMap() = (to_from.rotation * p.getNormalVector3fMap().cast<double>()).cast<float>();
-    }
-  });
-}
 
 class FuseStage : public Stage {
  public:
@@ -96,7 +85,7 @@ class FuseStage : public Stage {
     frame_ = find_up(up_, fused->cloud, map->trajectory, *context_->executor);
     dense->output_from_map = frame_.output_from_map;
     dense->upright = frame_.up != "none";
-    if (dense->upright) move_cloud(*fused->cloud, frame_.output_from_map, *context_->executor);
+    if (dense->upright) cloud::transform(*fused->cloud, frame_.output_from_map);
     if (keyframe_clouds_) {
       if (auto written = write_keyframes(*map); !written) return written;
     }
@@ -271,8 +260,8 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(**cloud, frame_.output_from_map * keyframe.world_from_camera * cloud::sensor_pose(**cloud),
-                 *context_->executor);
+      cloud::transform(**cloud,
+                       frame_.output_from_map * keyframe.world_from_camera * cloud::sensor_pose(**cloud));
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
