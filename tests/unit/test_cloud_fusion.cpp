@@ -10,6 +10,7 @@
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {
@@ -257,6 +258,20 @@ TEST(DenseFusion, NothingAndErrors) {
   const auto failed = fuse_views(blind.with(gone), fine(), core::Executor(1));
   ASSERT_FALSE(failed.has_value());
   EXPECT_EQ(failed.error().message, "gone");
+}
+
+TEST(DenseFusion, CloudsLieWhereTheirSensorWas) {
+  Views views = wall_views(2.0);
+  const auto before = views.fuse(fine());
+  for (std::size_t v = 0; v < views.poses.size(); ++v) {
+    const geometry::Rigid3 camera_from_depth(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0, 0.0, 0.25));
+    set_sensor_pose(*views.clouds[v], camera_from_depth);
+    views.poses[v] = views.poses[v] * camera_from_depth.inverse();
+  }
+  const auto after = views.fuse(fine());
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(after->cloud->size(), before->cloud->size());
+  EXPECT_LT(rms_to_wall(*after->cloud, 2.0), 0.002);
 }
 
 TEST(DenseFusion, EveryPointKnowsHowWellItIsKnown) {
