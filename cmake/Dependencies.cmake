@@ -11,6 +11,7 @@ find_package(spdlog 1.10 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
 find_package(embree 3 REQUIRED)
+find_package(tsl-robin-map REQUIRED)
 
 # PCL's own package file drags VTK into every target that links pcl_io; link the libraries by name instead,
 # so that only viz/ sees VTK.

@@ -245,16 +245,6 @@ core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId ke
                       keyframe.index);
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::summary_bytes(KeyframeId keyframe) const {
-  return impl_->extra("SELECT data FROM summary WHERE robot = ? AND number = ?", keyframe.robot,
-                      keyframe.index);
-}
-
-core::Result<std::vector<std::uint8_t>> StoreReader::frame_summary_bytes(std::size_t frame) const {
-  return impl_->extra("SELECT data FROM frame_summary WHERE robot = ? AND number = ?", 0,
-                      static_cast<std::int64_t>(frame));
-}
-
 core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes) {
   try {
     return decode_surface(unpack(bytes.data(), bytes.size()));

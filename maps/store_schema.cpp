@@ -8,8 +8,8 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr const char* kTables[] = {"keyframe", "state",   "point",       "line",    "edge",         "frame", "log",
-                                   "cloud",    "surface", "frame_cloud", "summary", "frame_summary"};
+constexpr const char* kTables[] = {"keyframe", "state", "point", "line",    "edge",
+                                   "frame",    "log",   "cloud", "surface", "frame_cloud"};
 
 void create_table(Database& database, const char* name) {
   database.run((std::string("CREATE TABLE ") + name +

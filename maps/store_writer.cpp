@@ -182,10 +182,6 @@ void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
         .run();
   };
   put("REPLACE INTO cloud VALUES (?, ?, ?)", "REPLACE INTO frame_cloud VALUES (?, ?, ?)", *cloud.bytes);
-  if (cloud.summary != nullptr) {
-    put("REPLACE INTO summary VALUES (?, ?, ?)", "REPLACE INTO frame_summary VALUES (?, ?, ?)",
-        *cloud.summary);
-  }
   if (!of_keyframe || cloud.surface == nullptr) return;
   ByteWriter bytes;
   encode(*cloud.surface, bytes);

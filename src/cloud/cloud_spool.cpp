@@ -62,9 +62,9 @@ core::Result<void> CloudSpool::append(const std::vector<std::uint8_t>& compact) 
   return {};
 }
 
-core::Result<void> CloudSpool::read_bytes(std::size_t index, std::vector<std::uint8_t>& bytes) const {
+core::Result<std::vector<std::uint8_t>> CloudSpool::read_compact(std::size_t index) const {
   const Place& place = places_.at(index);
-  bytes.resize(place.size);
+  std::vector<std::uint8_t> bytes(place.size);
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t got =
@@ -76,12 +76,6 @@ core::Result<void> CloudSpool::read_bytes(std::size_t index, std::vector<std::ui
     }
     done += static_cast<std::size_t>(got);
   }
-  return {};
-}
-
-core::Result<std::vector<std::uint8_t>> CloudSpool::read_compact(std::size_t index) const {
-  std::vector<std::uint8_t> bytes;
-  if (auto got = read_bytes(index, bytes); !got) return tl::unexpected<core::Error>(got.error());
   return bytes;
 }
 
@@ -91,13 +85,6 @@ core::Result<CloudPtr> CloudSpool::read(std::size_t index) const {
   auto cloud = decode_cloud(bytes->data(), bytes->size());
   if (cloud) return cloud;
   return core::output_error(fmt::format("{}: {}", folder_.string(), cloud.error().message));
-}
-
-core::Result<void> CloudSpool::read(std::size_t index, ViewPoints& points) const {
-  if (auto got = read_bytes(index, points.compact); !got) return got;
-  const auto decoded = decode_points(points.compact.data(), points.compact.size(), points);
-  if (decoded) return {};
-  return core::output_error(fmt::format("{}: {}", folder_.string(), decoded.error().message));
 }
 
 }  // namespace plumbline::cloud

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Compact clouds read again: as the columns of their measured points, or as clouds.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 #include <zstd.h>
@@ -10,18 +9,16 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "compact_format.hpp"
+#include "octahedral.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
-#include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/view_points.hpp"
-#include "plumbline/core/clones.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
 constexpr std::uint32_t kMostPoints = 1U << 26;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 /// Hands out parts of the bytes; null (and failed from then on) past their end.
 class Reader {
@@ -46,83 +43,37 @@ class Reader {
   bool failed_ = false;
 };
 
-/// Differences of either sign out of three planes of bytes, lowest first, or four.
-PLUMBLINE_CLONES void join_planes(const std::uint8_t* bytes, std::size_t count, bool four,
-                                  std::int32_t* values) {
-  const std::uint8_t* low = bytes;
-  const std::uint8_t* middle = bytes + count;
-  const std::uint8_t* high = bytes + 2 * count;
-  const std::uint8_t* highest = four ? bytes + 3 * count : low;
-  const std::uint32_t mask = four ? 255U : 0U;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t code =
-        static_cast<std::uint32_t>(low[i]) | static_cast<std::uint32_t>(middle[i]) << 8U |
-        static_cast<std::uint32_t>(high[i]) << 16U | (static_cast<std::uint32_t>(highest[i]) & mask) << 24U;
-    values[i] = static_cast<std::int32_t>(code >> 1U) ^ -static_cast<std::int32_t>(code & 1U);
-  }
-}
-
-/// Whole numbers out of their differences.
-bool read_numbers(Reader& reader, std::size_t count, bool four, std::vector<std::int32_t>& values) {
-  const std::uint8_t* bytes = reader.take(count * (four ? 4 : 3));
-  if (bytes == nullptr) return false;
-  values.resize(count);
-  join_planes(bytes, count, four, values.data());
+/// Whole numbers out of planes of bytes, lowest first, of their differences; empty: they end too early.
+template <std::size_t kPlanes>
+std::vector<std::int32_t> read_numbers(Reader& reader, std::size_t count) {
+  const std::uint8_t* bytes = reader.take(count * kPlanes);
+  if (bytes == nullptr) return {};
+  std::vector<std::int32_t> values(count);
   std::uint32_t sum = 0;
-  for (std::int32_t& value : values) {
-    sum += static_cast<std::uint32_t>(value);
-    value = static_cast<std::int32_t>(sum);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t code = 0;
+    for (std::size_t plane = kPlanes; plane-- > 0;) code = code << 8U | bytes[plane * count + i];
+    sum += (code >> 1U) ^ (0U - (code & 1U));
+    values[i] = static_cast<std::int32_t>(sum);
   }
-  return true;
+  return values;
 }
 
-/// Bytes out of their differences modulo 256.
-bool read_bytes(Reader& reader, std::size_t count, std::uint8_t* values) {
+/// Bytes out of their differences modulo 256; empty: they end too early.
+std::vector<std::uint8_t> read_bytes(Reader& reader, std::size_t count) {
   const std::uint8_t* bytes = reader.take(count);
-  if (bytes == nullptr) return false;
+  if (bytes == nullptr) return {};
+  std::vector<std::uint8_t> values(count);
   std::uint8_t sum = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    sum = static_cast<std::uint8_t>(sum + bytes[i]);
-    values[i] = sum;
-  }
-  return true;
-}
-
-PLUMBLINE_CLONES void scale(const std::int32_t* values, std::size_t count, double step_m, float* to) {
-  for (std::size_t i = 0; i < count; ++i) to[i] = static_cast<float>(values[i] * step_m);
-}
-
-PLUMBLINE_CLONES void multiply(const float* by, std::size_t count, float* values) {
-  for (std::size_t i = 0; i < count; ++i) values[i] *= by[i];
-}
-
-/// unpack_direction() of many.
-PLUMBLINE_CLONES void unpack_directions(const std::uint8_t* first, const std::uint8_t* second,
-                                        std::size_t count, float* x, float* y, float* z) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const float a = (static_cast<float>(first[i]) - 127.0F) / 127.0F;
-    const float b = (static_cast<float>(second[i]) - 127.0F) / 127.0F;
-    const float c = 1.0F - std::abs(a) - std::abs(b);
-    const float under = -c > 0.0F ? -c : 0.0F;
-    const float u = a + (a >= 0.0F ? -under : under);
-    const float v = b + (b >= 0.0F ? -under : under);
-    const float length = std::sqrt(u * u + (v * v + c * c));
-    const bool known = (first[i] & second[i]) != 255;
-    x[i] = known ? u / length : kNan;
-    y[i] = known ? v / length : kNan;
-    z[i] = known ? c / length : kNan;
-  }
-}
-
-PLUMBLINE_CLONES void add_to_bytes(const std::uint8_t* added, std::size_t count, std::uint8_t* values) {
-  for (std::size_t i = 0; i < count; ++i) values[i] = static_cast<std::uint8_t>(values[i] + added[i]);
+  for (std::size_t i = 0; i < count; ++i) values[i] = sum = static_cast<std::uint8_t>(sum + bytes[i]);
+  return values;
 }
 
 tl::unexpected<core::Error> damaged(const char* how) {
   return core::input_error(std::string("stored cloud: ") + how + "; it cannot be used");
 }
 
-core::Result<void> unpack(const std::uint8_t* bytes, std::size_t size, std::vector<std::uint8_t>& content) {
+core::Result<std::vector<std::uint8_t>> unpack(const std::uint8_t* bytes, std::size_t size) {
   if (size < kCompactMagic.size() || !std::equal(kCompactMagic.begin(), kCompactMagic.end() - 1, bytes)) {
     return damaged("these bytes are none");
   }
@@ -138,165 +89,105 @@ core::Result<void> unpack(const std::uint8_t* bytes, std::size_t size, std::vect
   if (length == ZSTD_CONTENTSIZE_UNKNOWN || length == ZSTD_CONTENTSIZE_ERROR || length > most) {
     return damaged("its head is damaged");
   }
-  content.resize(static_cast<std::size_t>(length));
+  std::vector<std::uint8_t> content(static_cast<std::size_t>(length));
   const std::size_t got = ZSTD_decompress(content.data(), content.size(), bytes, size);
   if (ZSTD_isError(got) != 0U || got != content.size()) return damaged("its bytes are truncated or damaged");
-  return {};
+  return content;
 }
 
-/// Colour and normal of the points.
-bool read_looks(Reader& reader, ViewPoints& points) {
+/// Colour and normal of the points that are there, which `points` lists.
+void read_looks(Reader& reader, const std::vector<Point*>& points) {
   const std::size_t count = points.size();
-  if (!read_bytes(reader, count, points.g.data()) || !read_bytes(reader, count, points.r.data()) ||
-      !read_bytes(reader, count, points.b.data())) {
-    return false;
+  const std::vector<std::uint8_t> g = read_bytes(reader, count), r = read_bytes(reader, count),
+                                  b = read_bytes(reader, count), first = read_bytes(reader, count),
+                                  second = read_bytes(reader, count);
+  if (second.size() != count) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    Point& p = *points[i];
+    p.g = g[i];
+    p.r = static_cast<std::uint8_t>(g[i] + r[i]);
+    p.b = static_cast<std::uint8_t>(g[i] + b[i]);
+    p.a = 255;
+    p.getNormalVector3fMap() = unpack_direction({first[i], second[i]});
   }
-  add_to_bytes(points.g.data(), count, points.r.data());
-  add_to_bytes(points.g.data(), count, points.b.data());
-  points.directions.resize(2 * count);
-  std::uint8_t* first = points.directions.data();
-  if (!read_bytes(reader, count, first) || !read_bytes(reader, count, first + count)) return false;
-  unpack_directions(first, first + count, count, points.normal_x.data(), points.normal_y.data(),
-                    points.normal_z.data());
-  return true;
 }
 
-bool is_set(const std::uint8_t* mask, std::size_t i) { return (mask[i / 8] >> (i % 8) & 1U) != 0; }
-
-/// Where the points are in the grid, a bit each; null: it ends too early.
-const std::uint8_t* read_grid(Reader& reader, const CompactHead& head, ViewPoints& points) {
-  const auto* x = reader.take(head.width * sizeof(float));
-  const auto* y = reader.take(head.height * sizeof(float));
-  const std::size_t cells = static_cast<std::size_t>(head.width) * head.height;
-  const auto* mask = reader.take((cells + 7) / 8);
-  if (mask == nullptr) return nullptr;
-  points.x.resize(cells + 1);
-  points.y.resize(cells + 1);
-  std::size_t count = 0;
-  for (std::size_t row = 0, i = 0; row < head.height; ++row) {
-    float ray_y = 0.0F;
-    std::memcpy(&ray_y, y + row * sizeof(float), sizeof(float));
-    for (std::size_t column = 0; column < head.width; ++column, ++i) {
-      std::memcpy(&points.x[count], x + column * sizeof(float), sizeof(float));
-      points.y[count] = ray_y;
-      count += is_set(mask, i) ? 1 : 0;
-    }
+void read_grid(Reader& reader, const CompactHead& head, Cloud& cloud) {
+  const std::uint8_t* x = reader.take(head.width * sizeof(float));
+  const std::uint8_t* y = reader.take(head.height * sizeof(float));
+  const std::uint8_t* mask = reader.take((cloud.size() + 7) / 8);
+  if (mask == nullptr) return;
+  std::vector<float> ray_x(head.width), ray_y(head.height);
+  std::memcpy(ray_x.data(), x, head.width * sizeof(float));
+  std::memcpy(ray_y.data(), y, head.height * sizeof(float));
+  std::vector<Point*> points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if ((mask[i / 8] >> (i % 8) & 1U) != 0) points.push_back(&cloud[i]);
   }
-  points.resize(count);
-  if (!read_numbers(reader, count, false, points.differences)) return nullptr;
-  scale(points.differences.data(), count, head.step_m, points.z.data());
-  multiply(points.z.data(), count, points.x.data());
-  multiply(points.z.data(), count, points.y.data());
-  return read_looks(reader, points) ? mask : nullptr;
+  const std::vector<std::int32_t> depths = read_numbers<3>(reader, points.size());
+  if (depths.size() != points.size()) return;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto i = static_cast<std::size_t>(points[k] - cloud.points.data());
+    const auto z = static_cast<float>(depths[k] * head.step_m);
+    points[k]->getVector3fMap() = Eigen::Vector3f(ray_x[i % head.width] * z, ray_y[i / head.width] * z, z);
+  }
+  cloud.is_dense = points.size() == cloud.size();
+  read_looks(reader, points);
 }
 
-void read_list(Reader& reader, const CompactHead& head, ViewPoints& points) {
-  for (std::vector<float>* axis : {&points.x, &points.y, &points.z}) {
-    if (!read_numbers(reader, head.width, true, points.differences)) return;
-    axis->resize(head.width);
-    scale(points.differences.data(), head.width, head.step_m, axis->data());
+void read_list(Reader& reader, const CompactHead& head, Cloud& cloud) {
+  std::vector<Point*> points;
+  points.reserve(cloud.size());
+  for (Point& p : cloud.points) points.push_back(&p);
+  for (const auto axis : {&Point::x, &Point::y, &Point::z}) {
+    const std::vector<std::int32_t> values = read_numbers<4>(reader, cloud.size());
+    if (values.size() != cloud.size()) return;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      cloud[i].*axis = static_cast<float>(values[i] * head.step_m);
   }
-  points.resize(head.width);
   read_looks(reader, points);
 }
 
 /// Of the sensor, behind everything else; a pose that is none takes no bytes.
-constexpr std::size_t kPoseBytes = 7 * sizeof(float);
-
-struct SensorPose {
-  Eigen::Vector4f origin{0, 0, 0, 0};
-  Eigen::Quaternionf orientation = Eigen::Quaternionf::Identity();
-};
-
-SensorPose read_sensor_pose(Reader& reader) {
-  SensorPose pose;
-  if (reader.left() != kPoseBytes) return pose;
-  const std::uint8_t* bytes = reader.take(kPoseBytes);
-  std::memcpy(pose.origin.data(), bytes, 3 * sizeof(float));
-  std::memcpy(pose.orientation.coeffs().data(), bytes + 3 * sizeof(float), 4 * sizeof(float));
-  return pose;
+void read_sensor_pose(Reader& reader, Cloud& cloud) {
+  constexpr std::size_t kBytes = 7 * sizeof(float);
+  if (reader.left() != kBytes) return;
+  const std::uint8_t* bytes = reader.take(kBytes);
+  std::memcpy(cloud.sensor_origin_.data(), bytes, 3 * sizeof(float));
+  std::memcpy(cloud.sensor_orientation_.coeffs().data(), bytes + 3 * sizeof(float), 4 * sizeof(float));
 }
 
-struct Decoded {
-  CompactHead head;
-  const std::uint8_t* mask = nullptr;  ///< of a grid, see read_grid()
-  SensorPose pose;
-};
+}  // namespace
 
-core::Result<Decoded> decode(const std::uint8_t* bytes, std::size_t size, ViewPoints& points) {
-  if (auto unpacked = unpack(bytes, size, points.content); !unpacked)
-    return tl::unexpected<core::Error>(unpacked.error());
-  Reader reader(points.content.data(), points.content.size());
-  Decoded decoded;
-  CompactHead& head = decoded.head;
+core::Result<CloudPtr> decode_cloud(const std::uint8_t* bytes, std::size_t size) {
+  const auto content = unpack(bytes, size);
+  if (!content) return tl::unexpected<core::Error>(content.error());
+  Reader reader(content->data(), content->size());
+  CompactHead head;
   const std::uint8_t* first = reader.take(sizeof(head));
   if (first == nullptr) return damaged("its head is damaged");
   std::memcpy(&head, first, sizeof(head));
   const std::uint64_t cells = std::uint64_t{head.width} * std::max(head.height, 1U);
   // A cell takes a bit at least.
-  if (cells > kMostPoints || cells / 8 > points.content.size() || !(head.step_m > 0.0) ||
+  if (cells > kMostPoints || cells / 8 > content->size() || !(head.step_m > 0.0) ||
       !std::isfinite(head.step_m)) {
     return damaged("its head is damaged");
   }
-  if (head.height > 0) {
-    decoded.mask = read_grid(reader, head, points);
-  } else {
-    read_list(reader, head, points);
-  }
-  decoded.pose = read_sensor_pose(reader);
-  if (!reader.complete()) return damaged("its parts do not fit together");
-  return decoded;
-}
-
-void set_point(const ViewPoints& points, std::size_t k, Point& p) {
-  p.x = points.x[k];
-  p.y = points.y[k];
-  p.z = points.z[k];
-  p.normal_x = points.normal_x[k];
-  p.normal_y = points.normal_y[k];
-  p.normal_z = points.normal_z[k];
-  p.r = points.r[k];
-  p.g = points.g[k];
-  p.b = points.b[k];
-  p.a = 255;
-}
-
-}  // namespace
-
-core::Result<void> decode_points(const std::uint8_t* bytes, std::size_t size, ViewPoints& points) {
-  const auto decoded = decode(bytes, size, points);
-  if (!decoded) return tl::unexpected<core::Error>(decoded.error());
-  points.width = decoded->head.width;
-  points.height = std::max(1U, decoded->head.height);
-  Cloud none;
-  none.sensor_origin_ = decoded->pose.origin;
-  none.sensor_orientation_ = decoded->pose.orientation;
-  points.camera_from_depth = sensor_pose(none);
-  return {};
-}
-
-core::Result<CloudPtr> decode_cloud(const std::uint8_t* bytes, std::size_t size) {
-  ViewPoints points;
-  const auto decoded = decode(bytes, size, points);
-  if (!decoded) return tl::unexpected<core::Error>(decoded.error());
-  const CompactHead& head = decoded->head;
+  Point none;
+  none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z =
+      std::numeric_limits<float>::quiet_NaN();
   auto cloud = std::make_shared<Cloud>();
-  cloud->sensor_origin_ = decoded->pose.origin;
-  cloud->sensor_orientation_ = decoded->pose.orientation;
+  cloud->points.assign(static_cast<std::size_t>(cells), none);
   cloud->width = head.width;
   cloud->height = std::max(1U, head.height);
-  Point none;
   if (head.height > 0) {
-    none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
+    read_grid(reader, head, *cloud);
+  } else {
+    read_list(reader, head, *cloud);
   }
-  const std::size_t cells = static_cast<std::size_t>(cloud->width) * cloud->height;
-  cloud->points.reserve(cells);
-  std::size_t k = 0;
-  for (std::size_t i = 0; i < cells; ++i) {
-    cloud->points.push_back(none);
-    if (head.height == 0 || is_set(decoded->mask, i)) set_point(points, k++, cloud->points.back());
-  }
-  cloud->is_dense = k == cells;
+  read_sensor_pose(reader, *cloud);
+  if (!reader.complete()) return damaged("its parts do not fit together");
   return cloud;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::cloud {
@@ -264,23 +265,6 @@ void DepthField::correct(Cloud& camera_cloud) const {
   }
 }
 
-void DepthField::correct(ViewPoints& points) const {
-  if (identity()) return;
-  const Eigen::Matrix<float, kTerms, 1> c = coefficients_.cast<float>();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!(points.z[i] > 0.0F)) continue;
-    Eigen::Vector3f at(points.x[i], points.y[i], points.z[i]);
-    Eigen::Vector3f normal(points.normal_x[i], points.normal_y[i], points.normal_z[i]);
-    correct(c, at, normal);
-    points.x[i] = at.x();
-    points.y[i] = at.y();
-    points.z[i] = at.z();
-    points.normal_x[i] = normal.x();
-    points.normal_y[i] = normal.y();
-    points.normal_z[i] = normal.z();
-  }
-}
-
 void DepthFieldOptions::declare(core::OptionTable& table) {
   table.integer("depth_field.views", views, {kLeastViews, 10000}, "", "Views that are compared at most");
   table.integer("depth_field.partners", partners, {1, 100}, "", "Views that each is compared with");
@@ -302,13 +286,13 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
   std::vector<core::Result<void>> done(count);
   executor.parallel_for(count, [&](std::size_t i) {
     const std::size_t view = views[i * views.size() / count];
-    poses[i] = world_from_camera[view];
     const auto cloud = read(view);
     if (!cloud) {
       done[i] = tl::unexpected<core::Error>(cloud.error());
-    } else if (!is_look(**cloud, camera)) {
-      sampled_views[i] = sampled(**cloud, camera);
+      return;
     }
+    poses[i] = world_from_camera[view] * sensor_pose(**cloud);
+    if (!is_look(**cloud, camera)) sampled_views[i] = sampled(**cloud, camera);
   });
   for (const auto& result : done) {
     if (!result) return tl::unexpected<core::Error>(result.error());

@@ -8,8 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
-#include "evidence.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -17,13 +18,6 @@ namespace {
 constexpr int kSolid = 4;          // clouds that see a surface where none looks through leave no doubt
 constexpr double kAround_m = 0.1;  // no more than the margin of a tile
 constexpr int kPasses = 3;         // the side of a person is 0.3 m deep
-
-/// What of a view matters for a box: null transforms are never used.
-struct NearView {
-  const DepthRaster* raster;
-  Eigen::Matrix3f rotation;
-  Eigen::Vector3f translation;
-};
 
 enum class Verdict : std::uint8_t { kStays, kDoubtful, kHardlySeen, kGoes };
 
@@ -33,193 +27,15 @@ struct Votes {
   int hidden = 0;
 };
 
-/// Views whose furthest measurement may reach into a box.
+/// A view whose furthest measurement may reach into a box.
+struct NearView {
+  const DepthRaster* raster;
+  Eigen::Matrix3f rotation;  ///< camera from world
+  Eigen::Vector3f translation;
+};
 struct NearViews {
   std::vector<NearView> clouds;
   std::vector<NearView> looks;
-};
-
-/// The sheets of one brick, and a ball that holds their positions.
-struct Cluster {
-  Eigen::Vector3f centre{0, 0, 0};
-  float radius = 0.0F;
-  std::vector<std::uint32_t> sheets;
-  std::vector<float> x, y, z;  ///< of the sheets, metres
-
-  void set_positions(const std::vector<Eigen::Vector3f>& positions) {
-    x.clear();
-    y.clear();
-    z.clear();
-    for (const std::uint32_t s : sheets) {
-      x.push_back(positions[s].x());
-      y.push_back(positions[s].y());
-      z.push_back(positions[s].z());
-    }
-  }
-};
-
-std::vector<Cluster> clusters_of(const Sheets& sheets, const std::vector<Eigen::Vector3f>& positions) {
-  std::vector<Cluster> clusters(sheets.brick_count());
-  for (std::size_t b = 0; b < clusters.size(); ++b) {
-    Cluster& cluster = clusters[b];
-    const Eigen::Vector3i low = sheets.brick(b) * Sheets::kBrick;
-    const Eigen::Vector3i high = low + Eigen::Vector3i::Constant(Sheets::kBrick - 1);
-    Eigen::AlignedBox3f box;
-    sheets.visit_in_brick(b, low, high, [&](std::uint32_t s) {
-      cluster.sheets.push_back(s);
-      box.extend(positions[s]);
-    });
-    cluster.centre = box.center();
-    for (const std::uint32_t s : cluster.sheets) {
-      cluster.radius = std::max(cluster.radius, (positions[s] - cluster.centre).norm());
-    }
-    cluster.set_positions(positions);
-  }
-  return clusters;
-}
-
-/// Whether the view can say anything about places within `radius` of `centre` (camera frame): the picture
-/// less its outermost cells, up to what it measured.
-class Frustum {
- public:
-  explicit Frustum(const DepthRaster& raster) : furthest_(raster.furthest_m + 0.5F) {
-    constexpr auto kCell = static_cast<float>(DepthRaster::kCell_px);
-    const auto fx = static_cast<float>(raster.camera.fx), fy = static_cast<float>(raster.camera.fy);
-    const auto cx = static_cast<float>(raster.camera.cx), cy = static_cast<float>(raster.camera.cy);
-    const float right = kCell * static_cast<float>(raster.width - 1);
-    const float low = kCell * static_cast<float>(raster.height - 1);
-    sides_.row(0) << fx, 0.0F, cx - kCell;
-    sides_.row(1) << -fx, 0.0F, right - cx;
-    sides_.row(2) << 0.0F, fy, cy - kCell;
-    sides_.row(3) << 0.0F, -fy, low - cy;
-    sides_.rowwise().normalize();
-  }
-  [[nodiscard]] bool reaches(const Eigen::Vector3f& centre, float radius) const {
-    constexpr float kRounding_m = 1e-3F;
-    const float reach = radius + kRounding_m;
-    if (centre.z() < -reach || centre.z() > furthest_ + reach) return false;
-    return (sides_ * centre).minCoeff() >= -reach;
-  }
-
- private:
-  float furthest_;
-  Eigen::Matrix<float, 4, 3> sides_;  ///< normals of the planes through the camera, inwards
-};
-
-/// What the views say about each sheet of the clusters.
-void count(const std::vector<Cluster>& clusters, const std::vector<NearView>& views,
-           std::vector<Votes>& votes) {
-  std::vector<Evidence> found;
-  for (const NearView& view : views) {
-    const Frustum frustum(*view.raster);
-    const Asking asking(*view.raster, view.rotation, view.translation);
-    for (const Cluster& cluster : clusters) {
-      if (!frustum.reaches(view.rotation * cluster.centre + view.translation, cluster.radius)) continue;
-      found.resize(cluster.sheets.size());
-      asking.ask(cluster.x.data(), cluster.y.data(), cluster.z.data(), found.size(), found.data());
-      for (std::size_t i = 0; i < found.size(); ++i) {
-        Votes& of_sheet = votes[cluster.sheets[i]];
-        of_sheet.free += found[i] == Evidence::kFree ? 1 : 0;
-        of_sheet.surface += found[i] == Evidence::kSurface ? 1 : 0;
-        of_sheet.hidden += found[i] == Evidence::kHidden ? 1 : 0;
-      }
-    }
-  }
-}
-
-Verdict judge(const Votes& v) {
-  // One view against another is enough when no third one knows better.
-  if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
-  const bool rarely_seen = v.hidden >= 3 && 3 * v.surface <= v.hidden;
-  if (rarely_seen) return Verdict::kHardlySeen;
-  return v.free > 0 ? Verdict::kDoubtful : Verdict::kStays;
-}
-
-/// Of every sheet. Looks are asked only where clouds leave a doubt.
-std::vector<Verdict> judge(const Sheets& sheets, const NearViews& views) {
-  std::vector<Eigen::Vector3f> positions;
-  positions.reserve(sheets.all().size());
-  for (const Sheet& sheet : sheets.all()) positions.push_back(sheets.position(sheet).cast<float>());
-  std::vector<Cluster> clusters = clusters_of(sheets, positions);
-  std::vector<Votes> votes(positions.size());
-  count(clusters, views.clouds, votes);
-  const auto clear = [&](std::uint32_t s) {
-    return judge(votes[s]) == Verdict::kGoes || (votes[s].free == 0 && votes[s].surface >= kSolid);
-  };
-  for (Cluster& cluster : clusters) {
-    auto& open = cluster.sheets;
-    open.erase(std::remove_if(open.begin(), open.end(), clear), open.end());
-  }
-  clusters.erase(
-      std::remove_if(clusters.begin(), clusters.end(), [](const Cluster& c) { return c.sheets.empty(); }),
-      clusters.end());
-  for (Cluster& cluster : clusters) cluster.set_positions(positions);
-  count(clusters, views.looks, votes);
-  std::vector<Verdict> verdicts;
-  verdicts.reserve(votes.size());
-  for (const Votes& v : votes) verdicts.push_back(judge(v));
-  return verdicts;
-}
-
-/// What goes with what is around it.
-class Surroundings {
- public:
-  explicit Surroundings(const Sheets& sheets)
-      : sheets_(sheets), reach_(std::max(1, static_cast<int>(kAround_m / sheets.block_m()))) {}
-
-  /// Notes where something goes: nothing else can go with it far away.
-  void look(const std::vector<Verdict>& verdicts) {
-    near_.assign(sheets_.brick_count(), 0);
-    Eigen::Vector3i last(0, 0, 0);
-    bool any = false;
-    for (std::size_t s = 0; s < verdicts.size(); ++s) {
-      if (verdicts[s] != Verdict::kGoes) continue;
-      const Eigen::Vector3i& block = sheets_.all()[s].block;
-      if (any && block == last) continue;
-      any = true;
-      last = block;
-      visit_bricks(block, [&](std::uint32_t brick) { near_[brick] = 1; });
-    }
-  }
-
-  /// Whether at least half of the points around that are no matter of doubt go.
-  [[nodiscard]] bool go(std::size_t sheet, const std::vector<Verdict>& verdicts) const {
-    const Eigen::Vector3i& block = sheets_.all()[sheet].block;
-    if (near_[sheets_.brick_at(Sheets::brick_of(block))] == 0) return false;
-    const Eigen::Vector3d position = sheets_.position(sheets_.all()[sheet]);
-    const double radius = std::max(kAround_m, sheets_.block_m());
-    std::size_t going = 0;
-    std::size_t staying = 0;
-    visit_bricks(block, [&](std::uint32_t brick) {
-      const Eigen::Vector3i reach = Eigen::Vector3i::Constant(reach_);
-      sheets_.visit_in_brick(brick, block - reach, block + reach, [&](std::uint32_t s) {
-        if (verdicts[s] != Verdict::kGoes && verdicts[s] != Verdict::kStays) return;
-        if ((sheets_.position(sheets_.all()[s]) - position).norm() > radius) return;
-        (verdicts[s] == Verdict::kGoes ? going : staying) += sheets_.all()[s].points;
-      });
-    });
-    return going > 0 && going >= staying;
-  }
-
- private:
-  /// The bricks that hold something of what is around a block.
-  template <typename Visit>
-  void visit_bricks(const Eigen::Vector3i& block, const Visit& visit) const {
-    const Eigen::Vector3i reach = Eigen::Vector3i::Constant(reach_);
-    const Eigen::Vector3i low = Sheets::brick_of(block - reach), high = Sheets::brick_of(block + reach);
-    for (int x = low.x(); x <= high.x(); ++x) {
-      for (int y = low.y(); y <= high.y(); ++y) {
-        for (int z = low.z(); z <= high.z(); ++z) {
-          const std::uint32_t brick = sheets_.brick_at({x, y, z});
-          if (brick != Sheets::kNone) visit(brick);
-        }
-      }
-    }
-  }
-
-  const Sheets& sheets_;
-  int reach_;                       ///< blocks
-  std::vector<std::uint8_t> near_;  ///< by brick: something near it goes
 };
 
 NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
@@ -238,7 +54,149 @@ NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRast
   return views;
 }
 
+/// What the views say about each of the sheets `asked`.
+void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vector3f>& positions,
+           const std::vector<NearView>& views, std::vector<Votes>& votes) {
+  for (const NearView& view : views) {
+    for (const std::uint32_t s : asked) {
+      switch (evidence(*view.raster, view.rotation * positions[s] + view.translation)) {
+        case Evidence::kFree:
+          ++votes[s].free;
+          break;
+        case Evidence::kSurface:
+          ++votes[s].surface;
+          break;
+        case Evidence::kHidden:
+          ++votes[s].hidden;
+          break;
+        case Evidence::kNone:
+          break;
+      }
+    }
+  }
+}
+
+Verdict judge(const Votes& v) {
+  // One view against another is enough when no third one knows better.
+  if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
+  const bool rarely_seen = v.hidden >= 3 && 3 * v.surface <= v.hidden;
+  if (rarely_seen) return Verdict::kHardlySeen;
+  return v.free > 0 ? Verdict::kDoubtful : Verdict::kStays;
+}
+
+/// Of every sheet. Looks are asked only where clouds leave a doubt.
+std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const NearViews& views) {
+  std::vector<Votes> votes(positions.size());
+  std::vector<std::uint32_t> asked(positions.size());
+  std::iota(asked.begin(), asked.end(), 0U);
+  count(asked, positions, views.clouds, votes);
+  const auto clear = [&](std::uint32_t s) {
+    return judge(votes[s]) == Verdict::kGoes || (votes[s].free == 0 && votes[s].surface >= kSolid);
+  };
+  asked.erase(std::remove_if(asked.begin(), asked.end(), clear), asked.end());
+  count(asked, positions, views.looks, votes);
+  std::vector<Verdict> verdicts;
+  verdicts.reserve(votes.size());
+  for (const Votes& v : votes) verdicts.push_back(judge(v));
+  return verdicts;
+}
+
+/// What goes with what is around it.
+class Surroundings {
+ public:
+  Surroundings(const std::vector<Sheet>& sheets, const std::vector<Eigen::Vector3f>& positions,
+               double radius_m)
+      : sheets_(sheets), positions_(positions), radius_m_(radius_m) {
+    for (std::uint32_t s = 0; s < positions.size(); ++s) cells_[pack_cell(cell(s))].push_back(s);
+  }
+
+  /// Whether at least half of the points within the radius that are no matter of doubt go.
+  [[nodiscard]] bool go(std::uint32_t sheet, const std::vector<Verdict>& verdicts) const {
+    std::size_t going = 0;
+    std::size_t staying = 0;
+    const auto squared = static_cast<float>(radius_m_ * radius_m_);
+    for (int k = 0; k < 27; ++k) {
+      const auto found =
+          cells_.find(pack_cell(cell(sheet) + Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
+      if (found == cells_.end()) continue;
+      for (const std::uint32_t s : found->second) {
+        if (verdicts[s] != Verdict::kGoes && verdicts[s] != Verdict::kStays) continue;
+        if ((positions_[s] - positions_[sheet]).squaredNorm() > squared) continue;
+        (verdicts[s] == Verdict::kGoes ? going : staying) += sheets_[s].points;
+      }
+    }
+    return going > 0 && going >= staying;
+  }
+
+ private:
+  [[nodiscard]] Eigen::Vector3i cell(std::uint32_t s) const {
+    return cell_of(positions_[s].cast<double>() / radius_m_);
+  }
+
+  const std::vector<Sheet>& sheets_;
+  const std::vector<Eigen::Vector3f>& positions_;
+  double radius_m_;
+  CellMap<std::vector<std::uint32_t>> cells_;  ///< sheets by cells of the radius
+};
+
 }  // namespace
+
+DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
+  constexpr int kCell = DepthRaster::kCell_px;
+  DepthRaster raster;
+  raster.camera = camera;
+  raster.width = (camera.width + kCell - 1) / kCell;
+  raster.height = (camera.height + kCell - 1) / kCell;
+  raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
+  for (const Point& p : camera_cloud.points) {
+    if (!(p.z > 0.0F && p.z < 65.0F)) continue;
+    const Eigen::Vector2d pixel = camera.project(p.getVector3fMap().cast<double>());
+    if (!camera.contains(pixel, -0.49)) continue;
+    const int column = static_cast<int>(pixel.x() + 0.5) / kCell;
+    const int row = static_cast<int>(pixel.y() + 0.5) / kCell;
+    std::uint16_t& cell = raster.nearest[static_cast<std::size_t>(row * raster.width + column)];
+    const auto mm = static_cast<std::uint16_t>(std::max(1.0F, 1000.0F * p.z + 0.5F));
+    if (cell == 0 || mm < cell) cell = mm;
+    raster.furthest_m = std::max(raster.furthest_m, p.z);
+  }
+  return raster;
+}
+
+Evidence evidence(const DepthRaster& raster, const Eigen::Vector3f& point) {
+  constexpr float kCell = DepthRaster::kCell_px;
+  constexpr int kFewestCells = 7;  // of 3 x 3
+  constexpr double kSigmas = 3.0;
+  constexpr double kPose_m = 0.03;  // poses are not exact
+  const float z = point.z();
+  if (!(z > 0.05F && z <= raster.furthest_m + 0.5F)) return Evidence::kNone;
+  const sensor::Pinhole& camera = raster.camera;
+  const float column =
+      (static_cast<float>(camera.fx) * point.x() / z + static_cast<float>(camera.cx)) / kCell;
+  const float row = (static_cast<float>(camera.fy) * point.y() / z + static_cast<float>(camera.cy)) / kCell;
+  if (!(column >= 1.0F && row >= 1.0F && column < static_cast<float>(raster.width - 1) &&
+        row < static_cast<float>(raster.height - 1))) {
+    return Evidence::kNone;
+  }
+  int measured = 0;
+  std::uint16_t before_nearest = 0xFFFF;  // 0, which is none, less 1 is the largest number
+  std::uint16_t furthest = 0;
+  const std::uint16_t* depths = raster.nearest.data() +
+                                static_cast<std::ptrdiff_t>(static_cast<int>(row) - 1) * raster.width +
+                                static_cast<int>(column) - 1;
+  for (int j = 0; j < 3; ++j, depths += raster.width) {
+    for (int i = 0; i < 3; ++i) {
+      measured += depths[i] != 0 ? 1 : 0;
+      before_nearest = std::min(before_nearest, static_cast<std::uint16_t>(depths[i] - 1));
+      furthest = std::max(furthest, depths[i]);
+    }
+  }
+  if (measured < kFewestCells) return Evidence::kNone;
+  const auto margin = [](double depth) { return kSigmas * sensor::depth_sigma(depth) + kPose_m; };
+  const double near_m = 0.001 * (before_nearest + 1);
+  const double far_m = 0.001 * furthest;
+  if (static_cast<double>(z) < near_m - margin(near_m)) return Evidence::kFree;
+  return static_cast<double>(z) > far_m + margin(far_m) ? Evidence::kHidden : Evidence::kSurface;
+}
 
 CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
                     double max_depth_m) {
@@ -294,16 +252,20 @@ std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<D
                                        const std::vector<std::uint8_t>& is_look,
                                        const std::vector<geometry::Rigid3>& world_from_camera) {
   std::vector<std::uint8_t> goes(sheets.all().size(), 0);
+  if (goes.empty()) return goes;
   Eigen::AlignedBox3d box;
-  for (const Sheet& sheet : sheets.all()) box.extend(sheets.centre(sheet.block));
-  if (sheets.all().empty()) return goes;
-  const NearViews views = views_near(box, rasters, is_look, world_from_camera);
-  std::vector<Verdict> verdicts = judge(sheets, views);
-  Surroundings around(sheets);
+  std::vector<Eigen::Vector3f> positions;
+  positions.reserve(goes.size());
+  for (const Sheet& sheet : sheets.all()) {
+    const Eigen::Vector3d position = sheets.position(sheet);
+    box.extend(position);
+    positions.push_back(position.cast<float>());
+  }
+  std::vector<Verdict> verdicts = judge(positions, views_near(box, rasters, is_look, world_from_camera));
+  const Surroundings around(sheets.all(), positions, std::max(kAround_m, sheets.block_m()));
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<Verdict> before = verdicts;
-    around.look(before);
-    for (std::size_t s = 0; s < goes.size(); ++s) {
+    for (std::uint32_t s = 0; s < goes.size(); ++s) {
       // Only what is hardly seen goes with what was itself a doubt: else good surfaces would go one by one.
       const bool asked = before[s] == Verdict::kHardlySeen || (pass == 0 && before[s] == Verdict::kDoubtful);
       if (asked && around.go(s, before)) verdicts[s] = Verdict::kGoes;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "voxel_key.hpp"
+#include "plumbline/cloud/cell_map.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -66,8 +66,8 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   cut(cells.begin(), cells.end(), space, std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (FusionTile& tile : tiles) {
-      const Eigen::Vector3i two = Eigen::Vector3i::Constant(2);
-      const Eigen::AlignedBox3i with_margin(tile.cells.min() - two, tile.cells.max() + two);
+      const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),
+                                            tile.cells.max() + Eigen::Vector3i::Ones());
       const bool reaches = std::any_of(views[v].begin(), views[v].end(), [&](const ColorCell& cell) {
         return with_margin.contains(unpack_cell(cell.cell));
       });

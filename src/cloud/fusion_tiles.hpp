@@ -22,12 +22,18 @@ struct FusionTile {
     return {cells.min().cast<double>() * cell_m,
             (cells.max().cast<double>().array() + 1.0).matrix() * cell_m};
   }
+  /// The voxels of the tile and of its margin, a cell wide.
+  [[nodiscard]] Eigen::AlignedBox3i voxels(double cell_m, double voxel_m) const {
+    const Eigen::AlignedBox3d around = box(cell_m);
+    return {((around.min().array() - cell_m) / voxel_m).floor().cast<int>(),
+            ((around.max().array() + cell_m) / voxel_m).floor().cast<int>()};
+  }
 };
 
 /// k-d cuts at medians until no box holds more than `most_cells` occupied cells, and about four boxes at
 /// least where there is enough for them. Boxes take the cells around what is occupied along, as far as no
-/// other box has them. `views`: the cells of each, by cell; points may lie a cell further on. A view belongs
-/// to a tile when its points may lie in it or in one of the cells around it. In a fixed order.
+/// other box has them. `views`: the cells of each, by cell. A view belongs to a tile when it has points in it
+/// or in one of the cells around it. In a fixed order.
 std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& views, std::size_t most_cells);
 
 }  // namespace plumbline::cloud

@@ -265,7 +265,7 @@ void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {
 std::optional<Rigid3> Slam::motion_since_last(const Rigid3& camera_from_world) const {
   if (frames_.empty() || !frames_.back().tracked) return std::nullopt;
   const maps::FramePose& last = frames_.back();
-  return camera_from_world * (last.camera_from_reference * map_.pose_of(last.reference)).inverse();
+  return camera_from_world * (last.camera_from_reference * map_.camera_from_world(last.reference)).inverse();
 }
 
 void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {

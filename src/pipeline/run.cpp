@@ -191,7 +191,6 @@ class Runner {
   core::Result<void> finish(Clock::time_point start) {
     std::vector<std::vector<Value>> results(graph_.nodes.size());
     report_.map_s = ms_since(start) / 1000.0;
-    for (Node& node : graph_.nodes) node.stage->frames_have_ended();
     for (std::size_t first = 0, count = 0; first < graph_.nodes.size(); first += count) {
       count = 1;
       while (first + count < graph_.nodes.size() && may_export_beside(first, first + count)) ++count;

@@ -14,13 +14,11 @@
 #include <vector>
 
 #include "chain_option.hpp"
-#include "idle_work.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
-#include "plumbline/cloud/rooms.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/view_points.hpp"
+#include "plumbline/cloud/transform.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
@@ -32,18 +30,6 @@
 
 namespace plumbline::pipeline {
 namespace {
-
-void move_cloud(cloud::Cloud& cloud, const geometry::Rigid3& to_from, const core::Executor& executor) {
-  constexpr std::size_t kAtATime = 1U << 16U;
-  executor.parallel_for((cloud.size() + kAtATime - 1) / kAtATime, [&](std::size_t part) {
-    const std::size_t end = std::min(cloud.size(), (part + 1) * kAtATime);
-    for (std::size_t i = part * kAtATime; i < end; ++i) {
-      cloud::Point& p = cloud[i];
-      p.getVector3fMap() = (to_from * p.getVector3fMap().cast<double>()).cast<float>();
-      p.getNormalVector3fMap() = (to_from.rotation * p.getNormalVector3fMap().cast<double>()).cast<float>();
-    }
-  });
-}
 
 class FuseStage : public Stage {
  public:
@@ -85,49 +71,13 @@ class FuseStage : public Stage {
     } else {
       between_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
     }
-    const sensor::Pinhole camera = camera_of(keyframe->robot);
-    views_.push_back({keyframe->robot, {}, {}, {}});
-    if (keyframe->cloud != nullptr) {
-      const auto points = rooms_.take();
-      cloud::take_points(*keyframe->cloud, *points);
-      look_at(*points, camera, views_.back());
-    }
     return clouds_->append(keyframe->compact.get(), io.frame());
-  }
-  /// What has not been looked at while it came.
-  void frames_have_ended() override {
-    std::vector<std::size_t> open;
-    for (std::size_t place = 0; place < views_.size(); ++place) {
-      if (!views_[place].summary) open.push_back(place);
-    }
-    const auto look = [this, open](std::size_t i) {
-      View& view = views_[open[i]];
-      if (auto kept = clouds_->summary(open[i], camera_of(view.robot))) {
-        view.camera_from_depth = kept->camera_from_depth;
-        view.summary = std::move(kept->summary);
-        if (!options_.free_space) view.summary->raster = {};
-        return;
-      }
-      const auto points = rooms_.take();
-      if (const auto got = clouds_->read(open[i], *points)) {
-        look_at(*points, camera_of(view.robot), view);
-      } else {
-        view.damage = got.error();
-      }
-    };
-    looking_ = std::make_unique<IdleWork>(open.size(), look, *context_->executor);
   }
 
   /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
   /// keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
-    if (looking_ != nullptr) looking_->finish();
-    looking_.reset();
-    rooms_.clear();
-    for (const View& view : views_) {
-      if (view.damage) return tl::unexpected<core::Error>(*view.damage);
-    }
     auto fused = fuse(*map);
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
@@ -135,7 +85,7 @@ class FuseStage : public Stage {
     frame_ = find_up(up_, fused->cloud, map->trajectory);
     dense->output_from_map = frame_.output_from_map;
     dense->upright = frame_.up != "none";
-    if (dense->upright) move_cloud(*fused->cloud, frame_.output_from_map, *context_->executor);
+    if (dense->upright) cloud::transform(*fused->cloud, frame_.output_from_map);
     if (keyframe_clouds_) {
       if (auto written = write_keyframes(*map); !written) return written;
     }
@@ -166,7 +116,6 @@ class FuseStage : public Stage {
       const auto bytes = store->cloud_bytes(id);
       if (!bytes) return fail(bytes.error());
       places_[id] = clouds_->size();
-      views_.push_back({id.robot, {}, {}, {}});
       if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     const auto frames = store->frame_cloud_ids();
@@ -177,29 +126,16 @@ class FuseStage : public Stage {
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
       between_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
-      views_.push_back({pose.reference.robot, {}, {}, {}});
       if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     return {};
   }
-
-  /// One of the clouds.
-  struct View {
-    std::int32_t robot = 0;
-    geometry::Rigid3 camera_from_depth;
-    std::optional<cloud::ViewSummary> summary;  ///< of the cloud as it was measured
-    std::optional<core::Error> damage;
-  };
 
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
     if (context_->stored_maps != nullptr) return context_->stored_maps->camera_of(robot);
     if (context_->recordings != nullptr)
       return context_->recordings->robots()[static_cast<std::size_t>(robot)].camera.color;
     return context_->source->camera().color;
-  }
-  void look_at(const cloud::ViewPoints& points, const sensor::Pinhole& camera, View& view) const {
-    view.camera_from_depth = points.camera_from_depth;
-    view.summary = cloud::summarise_view(points, camera, options_);
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
@@ -230,7 +166,6 @@ class FuseStage : public Stage {
       robots.push_back(between.robot);
       stamps.push_back(between.stamp);
     }
-    for (std::size_t i = 0; i < poses.size(); ++i) poses[i] = poses[i] * views_[places[i]].camera_from_depth;
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
     cloud::FusionReport report;
@@ -246,10 +181,7 @@ class FuseStage : public Stage {
       for (const std::int32_t robot : robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    views.points = [&](std::size_t i, cloud::ViewPoints& points) {
-      return read_corrected(places[i], robots[i], points);
-    };
-    views.summary = [&](std::size_t i) { return summary_of(places[i], robots[i]); };
+    views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
         "{} clouds{}, fused in {} tiles; {} points seen through, {} of dust; colour gains {:.2f} "
@@ -291,24 +223,6 @@ class FuseStage : public Stage {
     return {};
   }
 
-  /// Used up.
-  [[nodiscard]] core::Result<cloud::ViewSummary> summary_of(std::size_t place, std::int32_t robot) {
-    std::optional<cloud::ViewSummary>& summary = views_[place].summary;
-    const auto field = fields_.find(robot);
-    if (summary && (field == fields_.end() || field->second.identity())) return std::move(*summary);
-    const auto points = rooms_.take();
-    const auto got = read_corrected(place, robot, *points);
-    if (!got) return tl::unexpected<core::Error>(got.error());
-    return cloud::summarise_view(*points, camera_of(robot), options_);
-  }
-
-  core::Result<void> read_corrected(std::size_t place, std::int32_t robot, cloud::ViewPoints& points) const {
-    auto got = clouds_->read(place, points);
-    const auto field = fields_.find(robot);
-    if (got && field != fields_.end()) field->second.correct(points);
-    return got;
-  }
-
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
     auto cloud = clouds_->read(place);
     const auto field = fields_.find(robot);
@@ -346,10 +260,8 @@ class FuseStage : public Stage {
       if (found == places_.end()) continue;
       const auto cloud = read_corrected(found->second, keyframe.id.robot);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      move_cloud(
-          **cloud,
-          frame_.output_from_map * keyframe.world_from_camera * views_[found->second].camera_from_depth,
-          *context_->executor);
+      cloud::transform(**cloud,
+                       frame_.output_from_map * keyframe.world_from_camera * cloud::sensor_pose(**cloud));
       const std::string name = keyframe.id.robot == 0
                                    ? fmt::format("{:06}.ply", keyframe.id.index)
                                    : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
@@ -367,8 +279,6 @@ class FuseStage : public Stage {
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;             ///< camera frame
   std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
-  std::vector<View> views_;                         ///< by place among the clouds
-  cloud::Rooms<cloud::ViewPoints> rooms_;
   /// A cloud of a frame between keyframes.
   struct Between {
     std::int32_t robot = 0;
@@ -380,7 +290,6 @@ class FuseStage : public Stage {
   std::vector<RunSummary::DepthField> told_fields_;
   UpFrame frame_;
   std::size_t points_ = 0;
-  std::unique_ptr<IdleWork> looking_;  ///< goes first: it uses the others
 };
 
 }  // namespace

@@ -5,8 +5,6 @@
 #include <string>
 #include <utility>
 
-#include "plumbline/cloud/summary_bytes.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/maps/store.hpp"
@@ -23,10 +21,6 @@ class StoreStage : public Stage {
         "enabled", enabled_,
         "Write map.db, the map with its clouds, as the run goes: what a run that was ended can go on "
         "from");
-    table.boolean(
-        "summaries", summaries_,
-        "Keep with each cloud what plumbline fuse wants to know of it before it is laid down: it need "
-        "not be worked out then");
   }
   [[nodiscard]] std::vector<std::string> files() const override {
     return enabled_ ? std::vector<std::string>{kStoreFile} : std::vector<std::string>{};
@@ -35,7 +29,6 @@ class StoreStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     if (!enabled_) return {};
-    camera_ = context.source->camera().color;
     if (context.resumed != nullptr) {
       frames_ = context.resumed->map.frames.size();
       return take(maps::StoreWriter::resume(context.resumed->store));
@@ -90,25 +83,13 @@ class StoreStage : public Stage {
   /// A frame between keyframes that was lost lies nowhere: its cloud is of no use.
   void keep_cloud(const TrackedFrame& track, const KeyframeCloud& cloud) {
     if (cloud.id.valid()) {
-      step_.clouds.push_back({cloud.id, 0, cloud.compact, cloud.surface, summary_of(cloud)});
+      step_.clouds.push_back({cloud.id, 0, cloud.compact, cloud.surface});
     } else if (track.pose && track.pose->tracked) {
-      step_.clouds.push_back(
-          {{}, frames_ + step_.frames.size() - 1, cloud.compact, nullptr, summary_of(cloud)});
+      step_.clouds.push_back({{}, frames_ + step_.frames.size() - 1, cloud.compact, nullptr});
     }
-  }
-  /// Of the cloud as it will be read again. Looks are read as quickly as summaries of them.
-  [[nodiscard]] std::shared_ptr<const std::vector<std::uint8_t>> summary_of(const KeyframeCloud& cloud) {
-    if (!summaries_) return nullptr;
-    if (!cloud::decode_points(cloud.compact->data(), cloud.compact->size(), points_)) return nullptr;
-    if (cloud::is_look(points_, camera_)) return nullptr;
-    return std::make_shared<std::vector<std::uint8_t>>(
-        cloud::encode_summary({cloud::summarise_view(points_, camera_, {}), points_.camera_from_depth}));
   }
 
   bool enabled_ = true;
-  bool summaries_ = false;
-  sensor::Pinhole camera_;
-  cloud::ViewPoints points_;
   std::optional<maps::StoreWriter> writer_;
   maps::StoreStep step_;    ///< since the last keyframe
   std::size_t frames_ = 0;  ///< in the store

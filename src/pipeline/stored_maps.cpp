@@ -228,14 +228,6 @@ core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t in
   return parts_[cloud.part].reader->surface_bytes(cloud.stored_id);
 }
 
-core::Result<std::vector<std::uint8_t>> StoredMaps::summary_bytes(std::size_t index) const {
-  const StoredCloud& cloud = clouds_.at(index);
-  const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
-  const maps::StoreReader& reader = *parts_[cloud.part].reader;
-  return cloud.stored_id.valid() ? reader.summary_bytes(cloud.stored_id)
-                                 : reader.frame_summary_bytes(cloud.frame);
-}
-
 sensor::Pinhole StoredMaps::camera_of(std::int32_t robot) const {
   for (const StoredPart& part : parts_) {
     const auto found = part.cameras.find(robot);

@@ -11,6 +11,8 @@
 
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/transform.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
@@ -20,13 +22,6 @@ namespace plumbline::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-void move_cloud(cloud::Cloud& cloud, const geometry::Rigid3& to_from) {
-  for (cloud::Point& p : cloud.points) {
-    p.getVector3fMap() = (to_from * p.getVector3fMap().cast<double>()).cast<float>();
-    p.getNormalVector3fMap() = (to_from.rotation * p.getNormalVector3fMap().cast<double>()).cast<float>();
-  }
-}
 
 /// The stage of type fuse in a configuration; null: none.
 const core::ConfigNode* fuse_stage_of(const core::ConfigNode& root) {
@@ -198,7 +193,7 @@ core::Result<cloud::FusedCloud> StoredResult::lay_down(const cloud::DenseFusionO
   all.cameras = *cameras;
   all.read = read;
   auto fused = cloud::fuse_views(all, options, executor);
-  if (fused && map_.result.upright) move_cloud(*fused->cloud, map_.result.output_from_map);
+  if (fused && map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
   return fused;
 }
 
@@ -215,7 +210,8 @@ core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& fo
     if (!map_.map.has_keyframe(id)) continue;
     const auto cloud = reader_->cloud(id);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    move_cloud(**cloud, map_.result.output_from_map * map_.map.camera_from_world(id).inverse());
+    cloud::transform(**cloud, map_.result.output_from_map * map_.map.camera_from_world(id).inverse() *
+                                  cloud::sensor_pose(**cloud));
     const std::string name =
         id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
     if (auto done = cloud::write_ply(folder / name, **cloud); !done) {

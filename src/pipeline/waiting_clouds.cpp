@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "plumbline/cloud/compact_cloud.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
 
 namespace plumbline::pipeline {
@@ -35,27 +34,6 @@ core::Result<cloud::CloudPtr> WaitingClouds::read(std::size_t place) const {
   auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
   if (!cloud) return tl::unexpected<core::Error>(maps_->damaged(maps_->clouds()[frame].robot, cloud.error()));
   return cloud;
-}
-
-core::Result<void> WaitingClouds::read(std::size_t place, cloud::ViewPoints& points) const {
-  if (spool_) return spool_->read(place, points);
-  const std::size_t frame = frames_.at(place);
-  auto bytes = maps_->cloud_bytes(frame);
-  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
-  points.compact = std::move(*bytes);
-  auto read = cloud::decode_points(points.compact.data(), points.compact.size(), points);
-  if (!read) return tl::unexpected<core::Error>(maps_->damaged(maps_->clouds()[frame].robot, read.error()));
-  return read;
-}
-
-std::optional<cloud::KeptSummary> WaitingClouds::summary(std::size_t place,
-                                                         const sensor::Pinhole& camera) const {
-  if (spool_) return std::nullopt;
-  const auto bytes = maps_->summary_bytes(frames_.at(place));
-  if (!bytes || bytes->empty()) return std::nullopt;
-  auto kept = cloud::decode_summary(bytes->data(), bytes->size(), camera);
-  if (!kept) return std::nullopt;  // the cloud says the same
-  return std::move(*kept);
 }
 
 }  // namespace plumbline::pipeline

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "plumbline/cloud/cloud_spool.hpp"
-#include "plumbline/cloud/summary_bytes.hpp"
 #include "plumbline/pipeline/stage.hpp"
 
 namespace plumbline::pipeline {
@@ -25,12 +24,6 @@ class WaitingClouds {
   core::Result<void> append(const std::vector<std::uint8_t>* compact, std::size_t frame);
   /// As encode_cloud() left it. Errors (kOutput, kInput): it cannot be read back.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(std::size_t place) const;
-  /// Its points, in memory that is used again.
-  [[nodiscard]] core::Result<void> read(std::size_t place, cloud::ViewPoints& points) const;
-
-  /// What was kept with the cloud; none: nothing, or nothing that can be used.
-  [[nodiscard]] std::optional<cloud::KeptSummary> summary(std::size_t place,
-                                                          const sensor::Pinhole& camera) const;
 
   [[nodiscard]] std::size_t size() const { return spool_ ? spool_->size() : frames_.size(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }  ///< of those in the temporary file

@@ -92,16 +92,6 @@ TEST_F(Fuse, TwoMapsOfOneRoomInAnyOrder) {
   for (const char* robot : {"a", "b", "c"}) {
     EXPECT_TRUE(fs::exists(path("abc/robots") / robot / "trajectory.txt")) << robot;
   }
-  // What it keeps of its clouds for that changes nothing.
-  ASSERT_EQ(run("map world/robot0 -o plain/c -p robot --from 2.5 -q --set cloud.filters=[] --set "
-                "store.summaries=off")
-                .code,
-            0);
-  EXPECT_LT(fs::file_size(path("plain/c/map.db")), fs::file_size(path("c/map.db")));
-  ASSERT_EQ(fuse("plain/c ab -o without -q --anchor c").code, 0);
-  for (const char* file : {"map.ply", "lines.ply", "robots/c/trajectory.txt"}) {
-    EXPECT_EQ(slurp(path("abc") / file), slurp(path("without") / file)) << file;
-  }
 }
 
 TEST_F(Fuse, WorldsThatDoNotConnectStayApart) {

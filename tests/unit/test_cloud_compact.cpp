@@ -14,7 +14,6 @@
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {
@@ -68,38 +67,6 @@ void expect_same(const Point& a, const Point& b, float tolerance) {
   EXPECT_EQ(std::isnan(a.normal_x), std::isnan(b.normal_x));
   if (std::isnan(a.normal_x)) return;
   EXPECT_GT(a.getNormalVector3fMap().dot(b.getNormalVector3fMap()), 0.9998F);
-}
-
-/// Bit by bit: unknown normals are no numbers that could be compared.
-std::vector<std::uint32_t> bits(const std::vector<float>& column) {
-  std::vector<std::uint32_t> all(column.size());
-  if (!column.empty()) std::memcpy(all.data(), column.data(), column.size() * sizeof(float));
-  return all;
-}
-
-TEST(CompactCloud, PointsAreThoseOfTheCloud) {
-  const CloudPtr grid = grid_cloud();
-  set_sensor_pose(*grid, geometry::Rigid3(geometry::exp_so3({0.01, -0.02, 0.005}), {0.001, 0.002, -0.003}));
-  (*grid)[grid->size() / 2].normal_x = std::numeric_limits<float>::quiet_NaN();
-  ViewPoints read;  // its memory is used again, from the largest to nothing
-  for (const Cloud& cloud : {*grid, list_cloud(1000), list_cloud(1), Cloud()}) {
-    const auto bytes = encode_cloud(cloud);
-    ASSERT_TRUE(decode_points(bytes.data(), bytes.size(), read).has_value());
-    const CloudPtr decoded = *decode_cloud(bytes.data(), bytes.size());
-    ViewPoints wanted;
-    take_points(*decoded, wanted);
-    EXPECT_EQ(read.size(), static_cast<std::size_t>(std::count_if(cloud.begin(), cloud.end(), finite)));
-    for (const auto column : {&ViewPoints::x, &ViewPoints::y, &ViewPoints::z, &ViewPoints::normal_x,
-                              &ViewPoints::normal_y, &ViewPoints::normal_z}) {
-      EXPECT_EQ(bits(read.*column), bits(wanted.*column));
-    }
-    for (const auto column : {&ViewPoints::r, &ViewPoints::g, &ViewPoints::b})
-      EXPECT_EQ(read.*column, wanted.*column);
-    EXPECT_EQ(read.width, decoded->width);
-    EXPECT_EQ(read.height, decoded->height);
-    EXPECT_EQ(read.camera_from_depth.translation, sensor_pose(*decoded).translation);
-    EXPECT_EQ(read.camera_from_depth.rotation, sensor_pose(*decoded).rotation);
-  }
 }
 
 TEST(CompactCloud, KeepsThePoseOfTheSensor) {

@@ -10,6 +10,7 @@
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {
@@ -38,11 +39,13 @@ struct Views {
   }
   [[nodiscard]] core::Result<FusedCloud> fuse(const DenseFusionOptions& options,
                                               FusionReport* report = nullptr, int threads = 1) const {
-    const core::Executor executor(threads);
-    return fuse_views(
-        poses,
-        [this](std::size_t i) -> core::Result<CloudPtr> { return std::make_shared<Cloud>(*clouds[i]); },
-        camera(), options, executor, report);
+    const auto read = [this](std::size_t i) -> core::Result<CloudPtr> {
+      return std::make_shared<Cloud>(*clouds[i]);
+    };
+    return fuse_views(with(read), options, core::Executor(threads), report);
+  }
+  [[nodiscard]] FusionViews with(const ReadView& read) const {
+    return {poses, std::vector<sensor::Pinhole>(poses.size(), camera()), {}, read};
   }
 };
 
@@ -251,12 +254,24 @@ TEST(DenseFusion, NothingAndErrors) {
   Views blind;
   blind.add(cv::Mat(480, 640, CV_32FC1, cv::Scalar(0)), 0.0);
   EXPECT_EQ(blind.fuse(fine())->cloud->size(), 0U);
-  const core::Executor executor(1);
-  const auto failed = fuse_views(
-      blind.poses, [](std::size_t) -> core::Result<CloudPtr> { return core::output_error("gone"); }, camera(),
-      fine(), executor);
+  const auto gone = [](std::size_t) -> core::Result<CloudPtr> { return core::output_error("gone"); };
+  const auto failed = fuse_views(blind.with(gone), fine(), core::Executor(1));
   ASSERT_FALSE(failed.has_value());
   EXPECT_EQ(failed.error().message, "gone");
+}
+
+TEST(DenseFusion, CloudsLieWhereTheirSensorWas) {
+  Views views = wall_views(2.0);
+  const auto before = views.fuse(fine());
+  for (std::size_t v = 0; v < views.poses.size(); ++v) {
+    const geometry::Rigid3 camera_from_depth(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0, 0.0, 0.25));
+    set_sensor_pose(*views.clouds[v], camera_from_depth);
+    views.poses[v] = views.poses[v] * camera_from_depth.inverse();
+  }
+  const auto after = views.fuse(fine());
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(after->cloud->size(), before->cloud->size());
+  EXPECT_LT(rms_to_wall(*after->cloud, 2.0), 0.002);
 }
 
 TEST(DenseFusion, EveryPointKnowsHowWellItIsKnown) {
@@ -289,11 +304,9 @@ TEST(Exposure, ViewsAgreeOnColours) {
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 2), 0.1, cv::Scalar(100, 100, 100));
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 3), 0.2, cv::Scalar(140, 120, 100));
   std::vector<std::vector<ColorCell>> cells;
-  for (std::size_t v = 0; v < 3; ++v)
-    cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
-  const auto gains = color_gains(cells, core::Executor(2));
+  for (std::size_t v = 0; v < 3; ++v) cells.push_back(color_cells(*views.clouds[v], views.poses[v], 0.1));
+  const auto gains = color_gains(cells);
   ASSERT_EQ(gains.size(), 3U);
-  EXPECT_EQ(gains, color_gains(cells, core::Executor(1)));
   EXPECT_NEAR(gains[0].z() / gains[2].z(), 1.4F, 0.03F);  // blue
   EXPECT_NEAR(gains[0].y() / gains[2].y(), 1.2F, 0.02F);
   EXPECT_NEAR(gains[0].x() / gains[2].x(), 1.0F, 0.01F);
@@ -305,11 +318,9 @@ TEST(Exposure, WithoutAnythingSharedNothingChanges) {
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 1), 0.0, cv::Scalar(50, 50, 50));
   views.add(plane_depth({0, 0, 1}, 2.0, 1.0, 2), 50.0, cv::Scalar(200, 200, 200));
   std::vector<std::vector<ColorCell>> cells;
-  for (std::size_t v = 0; v < 2; ++v)
-    cells.push_back(color_cells(color_spots(*views.clouds[v]), views.poses[v], 0.1));
-  for (const Eigen::Vector3f& gain : color_gains(cells, core::Executor(1)))
-    EXPECT_EQ(gain, Eigen::Vector3f(1, 1, 1));
-  EXPECT_TRUE(color_gains({}, core::Executor(1)).empty());
+  for (std::size_t v = 0; v < 2; ++v) cells.push_back(color_cells(*views.clouds[v], views.poses[v], 0.1));
+  for (const Eigen::Vector3f& gain : color_gains(cells)) EXPECT_EQ(gain, Eigen::Vector3f(1, 1, 1));
+  EXPECT_TRUE(color_gains({}).empty());
 }
 
 TEST(FreeSpace, EvidenceOfAView) {
@@ -328,50 +339,6 @@ TEST(FreeSpace, EvidenceOfAView) {
   EXPECT_EQ(at(162, 240, 1.5), Evidence::kSurface);  // at the box's border: not sure
   EXPECT_EQ(at(-50, 240, 1.0), Evidence::kNone);
   EXPECT_EQ(at(400, 240, -1.0), Evidence::kNone);
-}
-
-TEST(FreeSpace, LimitsSayWhatTheirCellsSay) {
-  Views views;
-  cv::Mat depth = with_box(plane_depth({0.2, 0, 0.9}, 2.0, 1.0), cv::Rect(100, 100, 200, 150), 1.0F);
-  depth(cv::Rect(300, 300, 90, 70)) = 0.0F;
-  views.add_whole(depth, 0.0);
-  const DepthRaster plain = depth_raster(*views.clouds[0], camera());
-  DepthRaster noted = plain;
-  set_limits(noted);
-  std::array<int, 4> seen{};
-  for (int v = -8; v < 490; v += 7) {
-    for (int u = -8; u < 650; u += 7) {
-      for (const double z : {0.5, 1.0, 1.9, 2.1, 3.0}) {
-        const Eigen::Vector3f place = camera().unproject(u, v, z).cast<float>();
-        EXPECT_EQ(evidence(plain, place), evidence(noted, place)) << u << ", " << v << ", " << z;
-        ++seen[static_cast<std::size_t>(evidence(noted, place))];
-      }
-    }
-  }
-  for (const int count : seen) EXPECT_GT(count, 50);
-}
-
-TEST(DenseFusion, PointsInMemoryThatIsUsedAgainAreAsGoodAsClouds) {
-  const Views views = wall_views(1.5, 14);  // more than are read at a time
-  const auto wanted = views.fuse(fine());
-  FusionViews all;
-  all.world_from_camera = views.poses;
-  all.cameras.assign(views.poses.size(), camera());
-  all.points = [&](std::size_t i, ViewPoints& points) -> core::Result<void> {
-    take_points(*views.clouds[i], points);
-    return {};
-  };
-  const core::Executor executor(2);
-  const auto fused = fuse_views(all, fine(), executor);
-  ASSERT_TRUE(wanted.has_value() && fused.has_value());
-  ASSERT_EQ(fused->cloud->size(), wanted->cloud->size());
-  ASSERT_GT(fused->cloud->size(), 1000U);
-  for (std::size_t i = 0; i < fused->cloud->size(); ++i) {
-    ASSERT_EQ((*fused->cloud)[i].getVector3fMap(), (*wanted->cloud)[i].getVector3fMap());
-    ASSERT_EQ((*fused->cloud)[i].rgba, (*wanted->cloud)[i].rgba);
-  }
-  EXPECT_EQ(fused->columns.observations, wanted->columns.observations);
-  EXPECT_EQ(fused->columns.confidence, wanted->columns.confidence);
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ TEST(VoxelMap, WeightsAreInverseVariances) {
   const double total = near + far;
   EXPECT_NEAR(fused.columns.confidence[0], total / (total + 1.0), 1e-3);
   const double spread = std::sqrt(near * far) / total * 0.04;
-  EXPECT_NEAR(fused.spread_m[0], spread, 2e-4);
+  EXPECT_NEAR(map.points()[0].spread_m, spread, 2e-4);
 }
 
 TEST(VoxelMap, AnObliqueMeasurementCountsItsCosine) {
@@ -77,8 +77,6 @@ TEST(VoxelMap, OneViewIsOneObservationHoweverManyPoints) {
   EXPECT_EQ(map.extract().columns.observations, (std::vector<std::uint32_t>{1}));
   map.insert(cloud, looking(1.0));
   EXPECT_EQ(map.extract().columns.observations, (std::vector<std::uint32_t>{2}));
-  EXPECT_TRUE(map.extract({3}).cloud->empty());
-  EXPECT_EQ(map.extract({2}).cloud->size(), 1U);
 }
 
 TEST(VoxelMap, AThinWallSeenFromBothRoomsHasTwoSides) {
@@ -122,7 +120,7 @@ TEST(VoxelMap, PassesOverWhatIsNoMeasurement) {
   EXPECT_EQ(map.size(), 0U);
   EXPECT_TRUE(map.extract().cloud->empty());
   map.insert(single(point(0, 0, 1)), Rigid3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(1e6, 0, 0)));
-  EXPECT_EQ(map.dropped(), 1U);
+  EXPECT_EQ(map.size(), 0U) << "out of reach";
 }
 
 /// Random points seen from a few places.
@@ -146,6 +144,7 @@ TEST(VoxelMap, SameInsertsGiveSameBytesInAFixedOrder) {
   ASSERT_EQ(a.cloud->size(), b.cloud->size());
   EXPECT_EQ(std::memcmp(a.cloud->points.data(), b.cloud->points.data(), a.cloud->size() * sizeof(Point)), 0);
   EXPECT_EQ(a.columns.confidence, b.columns.confidence);
+  EXPECT_TRUE(a.columns.robot.empty()) << "nobody asked";
   const auto cell = [](const Point& p) {
     return std::array<int, 3>{static_cast<int>(std::floor(p.x / 0.02F)),
                               static_cast<int>(std::floor(p.y / 0.02F)),
@@ -157,92 +156,57 @@ TEST(VoxelMap, SameInsertsGiveSameBytesInAFixedOrder) {
   EXPECT_LE(descents, a.cloud->size() / 500) << "only rounding at a cell's border may look like a descent";
 }
 
-TEST(VoxelMap, MergeOfPartsIsTheWhole) {
-  VoxelMap whole(voxels(0.05));
-  VoxelMap first(voxels(0.05));
-  VoxelMap second(voxels(0.05));
-  for (int i = 0; i < 4; ++i) {
-    const Cloud cloud = single(point(0.02F, 0.02F, 1.0F + 0.01F * static_cast<float>(i + 1), {0, 0, -1},
-                                     static_cast<std::uint8_t>(50 * i)));
-    whole.insert(cloud, looking(1.0));
-    (i < 2 ? first : second).insert(cloud, looking(1.0));
-  }
-  VoxelMap merged(voxels(0.05));
-  merged.merge(first, Rigid3());
-  merged.merge(second, Rigid3());
-  const auto a = whole.extract();
-  const auto b = merged.extract();
-  ASSERT_EQ(b.cloud->size(), 1U);
-  EXPECT_NEAR((*a.cloud)[0].z, (*b.cloud)[0].z, 1e-6F);
-  EXPECT_EQ(b.columns.observations[0], 4U);
-  EXPECT_NEAR(a.columns.confidence[0], b.columns.confidence[0], 1e-5F);
-  EXPECT_NEAR(a.spread_m[0], b.spread_m[0], 1e-5F);
-  EXPECT_NEAR((*a.cloud)[0].r, (*b.cloud)[0].r, 1);
-}
-
-TEST(VoxelMap, MergeMovesAndNeverCountsAViewTwice) {
+TEST(VoxelMap, FusedPointsGoIntoLargerVoxels) {
   VoxelMap fine(voxels(0.01));
   Cloud cloud;
   for (int i = 0; i < 10; ++i) cloud.push_back(point(0.01F * static_cast<float>(i) + 0.005F, 0.005F, 1.005F));
   fine.insert(cloud, looking(1.0));
   fine.insert(cloud, looking(1.0));
+  ASSERT_EQ(fine.size(), 10U);
   VoxelMap coarse(voxels(1.0));
-  coarse.merge(fine, looking(2.0, true));
-  const auto fused = coarse.extract();
-  ASSERT_EQ(fused.cloud->size(), 1U);
-  EXPECT_EQ(fused.columns.observations[0], 2U);
-  EXPECT_NEAR((*fused.cloud)[0].z, 1.995F, 1e-4F);
-  EXPECT_NEAR((*fused.cloud)[0].x, -0.05F, 1e-4F);
-  EXPECT_NEAR((*fused.cloud)[0].normal_z, 1.0F, 1e-4F);
+  coarse.insert(fine.points());
+  const std::vector<FusedPoint> fused = coarse.points();
+  ASSERT_EQ(fused.size(), 1U);
+  EXPECT_EQ(fused[0].observations, 2U) << "no view is counted twice";
+  EXPECT_NEAR(fused[0].point.x, 0.05F, 1e-4F);
+  EXPECT_NEAR(fused[0].point.z, 0.005F, 1e-4F);
+  float weight = 0.0F;
+  for (const FusedPoint& one : fine.points()) weight += one.weight;
+  EXPECT_NEAR(fused[0].weight, weight, 1e-4F * weight);
 }
 
 TEST(VoxelMap, TellsWhoMeasuredAPointMost) {
-  VoxelMapOptions options = voxels(0.1);
-  options.robots = true;
-  VoxelMap map(options);
+  VoxelMap map(voxels(0.1));
+  const Eigen::AlignedBox3i everywhere(Eigen::Vector3i::Constant(-100), Eigen::Vector3i::Constant(100));
   const auto seen_by = [&](std::uint8_t robot, int views) {
-    for (int i = 0; i < views; ++i) {
-      const ViewSamples view =
-          VoxelMap::sampled(single(point(0.01F, 0.01F, 1.02F, {0, 0, -1}, 40)), looking(1.0), options, robot);
-      map.begin_view();
-      map.add(view.samples.data(), view.samples.size());
-    }
+    const Cloud cloud = single(point(0.01F, 0.01F, 1.02F, {0, 0, -1}, 40));
+    for (int i = 0; i < views; ++i)
+      map.insert(VoxelMap::measured(cloud, looking(1.0), voxels(0.1), robot), everywhere);
   };
   seen_by(0, 2);
   seen_by(3, 4);
   seen_by(1, 1);
-  const auto fused = map.extract();
-  ASSERT_EQ(fused.columns.robot.size(), 1U);
-  EXPECT_EQ(fused.columns.robot[0], 3);
-  EXPECT_EQ(fused.columns.observations[0], 7U);
-  VoxelMap settled(options);
-  settled.merge(fused);
-  EXPECT_EQ(settled.extract().columns.robot, fused.columns.robot);
-  EXPECT_TRUE(random_map(1).extract().columns.robot.empty()) << "nobody asked";
+  const std::vector<FusedPoint> fused = map.points();
+  ASSERT_EQ(fused.size(), 1U);
+  EXPECT_EQ(fused[0].robot, 3U);
+  EXPECT_EQ(fused[0].observations, 7U);
+  VoxelMap settled(voxels(0.1));
+  settled.insert(fused);
+  EXPECT_EQ(settled.points()[0].robot, 3U);
+  EXPECT_EQ(settled.points()[0].observations, 7U);
 }
 
-TEST(VoxelMap, AViewIsSummedByVoxelBeforeItIsTakenUp) {
-  Cloud cloud = single(point(0.01F, 0.01F, 1.02F, {0, 0, -1}, 40));
-  cloud.push_back(point(0.02F, 0.03F, 1.06F, {0, 0, -1}, 80));
-  cloud.push_back(point(0.02F, 0.03F, 1.06F, {0, 0, 1}, 80));  // the other side
-  cloud.push_back(point(0.31F, 0.01F, 1.02F, {0, 0, -1}, 40));
-  const ViewSamples view = VoxelMap::sampled(cloud, looking(1.0), voxels(0.1));
-  ASSERT_EQ(view.samples.size(), 3U);
-  const double first = weight(1.02);
-  const double second = weight(1.06);
-  EXPECT_NEAR(view.samples[0].color.x(), (first * 40 + second * 80) / (first + second), 1.0);
-  EXPECT_EQ(view.samples[0].robot_lead, 2U);
-  EXPECT_EQ(VoxelMap::voxel_of(view.samples[2]), Eigen::Vector3i(3, 0, 0));
-}
-
-TEST(VoxelMap, ClearForgetsEverything) {
-  VoxelMap map = random_map(1);
-  EXPECT_GT(map.size(), 1000U);
-  EXPECT_GE(map.bytes(), map.size() * 40);
-  map.clear();
-  EXPECT_EQ(map.size(), 0U);
-  map.insert(single(point(0, 0, 1)), Rigid3());
-  EXPECT_EQ(map.extract().columns.observations[0], 1U);
+TEST(VoxelMap, AViewIsTakenUpAsFarAsItLiesInTheRegion) {
+  Cloud cloud = single(point(0.01F, 0.01F, 1.02F));
+  cloud.push_back(point(0.31F, 0.01F, 1.02F));
+  cloud.push_back(point(0.41F, 0.01F, 1.02F));
+  const std::vector<VoxelSample> view = VoxelMap::measured(cloud, looking(1.0), voxels(0.1));
+  ASSERT_EQ(view.size(), 3U);
+  EXPECT_EQ(view[1].voxel, Eigen::Vector3i(3, 0, 0));
+  VoxelMap map(voxels(0.1));
+  map.insert(view, Eigen::AlignedBox3i(Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(3, 0, 0)));
+  ASSERT_EQ(map.size(), 1U);
+  EXPECT_NEAR(map.points()[0].point.x, 0.31F, 1e-5F);
 }
 
 }  // namespace

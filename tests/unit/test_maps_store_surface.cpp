@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Coarse surfaces of keyframes and summaries of views in the store, and stores that were made before there
+// Coarse surfaces of keyframes in the store, and stores that were made before there
 // were any.
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -97,34 +97,6 @@ TEST(StoreSurface, DamagedOneIsRefused) {
   const auto read = unpack_surface(*bytes);
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().kind, core::ErrorKind::kInput);
-}
-
-TEST(StoreSurface, SummariesAreKeptBesideTheirClouds) {
-  using Bytes = std::vector<std::uint8_t>;
-  const StoreFolder folder;
-  StoreWorld world(6);
-  KeyframeId keyframe;
-  {
-    auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
-    ASSERT_TRUE(writer);
-    StoreStep step;
-    keyframe = world.step();
-    step.map = std::make_shared<MapChanges>(world.map.changes_since({}));
-    const auto bytes = std::make_shared<Bytes>(10, std::uint8_t{7});
-    step.clouds.push_back({keyframe, 0, bytes, nullptr, std::make_shared<Bytes>(Bytes{1, 2, 3})});
-    step.clouds.push_back({{}, 4, bytes, nullptr, std::make_shared<Bytes>(Bytes{4, 5})});
-    step.clouds.push_back({{}, 5, bytes});
-    ASSERT_TRUE(writer->add(step));
-  }
-  {
-    const auto reader = StoreReader::open(folder.file());
-    ASSERT_TRUE(reader);
-    reader->read_ahead();
-    EXPECT_EQ(*reader->summary_bytes(keyframe), (Bytes{1, 2, 3}));
-    EXPECT_EQ(*reader->frame_summary_bytes(4), (Bytes{4, 5}));
-    EXPECT_TRUE(reader->frame_summary_bytes(5)->empty());
-    EXPECT_TRUE(reader->summary_bytes({keyframe.robot, keyframe.index + 1})->empty());
-  }
 }
 
 TEST(StoreSurface, StoresOfAnOlderFormatAreRefusedWithTheRemedy) {

@@ -9,7 +9,6 @@
 
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/types.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/core/error.hpp"
 
 namespace plumbline::cloud {
@@ -31,8 +30,6 @@ class CloudSpool {
   core::Result<void> append(const std::vector<std::uint8_t>& compact);
   /// Cloud `index` as encode_cloud() left it. Errors (kOutput): the file cannot be read back.
   [[nodiscard]] core::Result<CloudPtr> read(std::size_t index) const;
-  /// Its points, in memory that is used again. Errors (kOutput).
-  [[nodiscard]] core::Result<void> read(std::size_t index, ViewPoints& points) const;
   /// The bytes of cloud `index`. Errors (kOutput).
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> read_compact(std::size_t index) const;
 
@@ -40,7 +37,6 @@ class CloudSpool {
   [[nodiscard]] std::uint64_t bytes() const { return end_; }  ///< on disk
 
  private:
-  core::Result<void> read_bytes(std::size_t index, std::vector<std::uint8_t>& bytes) const;
   struct Place {
     std::uint64_t offset = 0;
     std::size_t size = 0;

@@ -7,13 +7,10 @@
 // tile the points of flat pieces of surface come to lie on their common plane (sheets.hpp), what other views
 // look through is removed (free_space.hpp), and colours are evened out between views (exposure.hpp).
 #include <cstddef>
+#include <cstdint>
 #include <functional>
-#include <string>
 #include <vector>
 
-#include "plumbline/cloud/exposure.hpp"
-#include "plumbline/cloud/free_space.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/cloud/voxel_map.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
@@ -43,45 +40,22 @@ struct FusionReport {
   double most_gain = 1.0;
 };
 
-/// Gives the cloud of view `i`, in its camera frame; may be called for several views at a time.
+/// Gives the cloud of view `i`, in its camera frame, for the caller to change; may be called for several
+/// views at a time.
 using ReadView = std::function<core::Result<CloudPtr>(std::size_t)>;
 
-/// Fuses the views. Reads each once to plan and once for all tiles that are filled together. `camera` is the
-/// one that the clouds were taken with. Points come tile by tile, in a fixed order; the same for any number
-/// of threads. Errors are those of `read`. `report` may be null.
-core::Result<FusedCloud> fuse_views(const std::vector<geometry::Rigid3>& world_from_camera,
-                                    const ReadView& read, const sensor::Pinhole& camera,
-                                    const DenseFusionOptions& options, const core::Executor& executor,
-                                    FusionReport* report = nullptr);
-
-/// What of a view matters before it is laid down, wherever that will be: worked out while clouds come, or on
-/// the way.
-struct ViewSummary {
-  bool look = false;
-  DepthRaster raster;            ///< empty without free space
-  std::vector<ColorSpot> spots;  ///< none of a look
-};
-ViewSummary summarise_view(const Cloud& camera_cloud, const sensor::Pinhole& camera,
-                           const DenseFusionOptions& options);
-ViewSummary summarise_view(const ViewPoints& points, const sensor::Pinhole& camera,
-                           const DenseFusionOptions& options);
-
-/// The views of a whole run. All vectors: one entry a view.
+/// The views of a whole run. All vectors: one entry a view. Where a cloud's sensor was as seen from its
+/// camera, the cloud says (sensor_pose).
 struct FusionViews {
   std::vector<geometry::Rigid3> world_from_camera;
-  std::vector<sensor::Pinhole> cameras;
+  std::vector<sensor::Pinhole> cameras;  ///< that the clouds were taken with
   std::vector<std::uint8_t> robots;  ///< whose view it is, 0-254; empty: of one robot, and no columns.robot
   ReadView read;
-  /// Gives the points of view `i` in memory that is used again, instead of `read`; may be called for several
-  /// views at a time. Null: they are taken from what is read.
-  std::function<core::Result<void>(std::size_t, ViewPoints&)> points;
-  /// Gives the summary of view `i`, once; may be called for several views at a time. Null: it is made of what
-  /// is read.
-  std::function<core::Result<ViewSummary>(std::size_t)> summary;
 };
 
-/// The same for views of several cameras and robots; columns.robot tells who measured each point most. What
-/// else a FusedCloud has (spread, weight, noise, lead of robots) is given up.
+/// Fuses the views. Reads each once to plan and once for all tiles that are filled together. Points come tile
+/// by tile, in a fixed order; the same for any number of threads. Of several robots, columns.robot tells who
+/// measured each point most. Errors are those of `read`. `report` may be null.
 core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
                                     const core::Executor& executor, FusionReport* report = nullptr);
 

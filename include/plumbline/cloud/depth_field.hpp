@@ -41,7 +41,6 @@ class DepthField {
   /// Moves points along their rays and turns their normals with the surface. Camera frame. A depth changes by
   /// half at most.
   void correct(Cloud& camera_cloud) const;
-  void correct(ViewPoints& points) const;
 
  private:
   /// One point and its normal.

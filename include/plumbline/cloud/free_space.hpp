@@ -8,14 +8,13 @@
 
 #include "plumbline/cloud/sheets.hpp"
 #include "plumbline/cloud/types.hpp"
-#include "plumbline/cloud/view_points.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/frame.hpp"
 
 namespace plumbline::cloud {
 
-/// A small depth picture of a view: range of measured depth within cells of 4 x 4 pixels.
+/// A small depth picture of a view: the nearest measured depth within cells of 4 x 4 pixels.
 struct DepthRaster {
   static constexpr int kCell_px = 4;
   int width = 0;
@@ -23,21 +22,10 @@ struct DepthRaster {
   std::vector<std::uint16_t> nearest;  ///< millimetres, 0: none
   float furthest_m = 0.0F;             ///< of all cells
   sensor::Pinhole camera;              ///< that took the view
-
-  /// What evidence() asks of the 3 x 3 cells around each cell.
-  struct Limits {
-    std::uint16_t free_to = 0;      ///< millimetres: nearer is free; 0: too little was measured around
-    std::uint16_t hidden_from = 0;  ///< further is hidden
-  };
-  std::vector<Limits> limits;  ///< by cell; empty until set_limits()
 };
 
 /// From a view's cloud, camera frame.
 DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camera);
-DepthRaster depth_raster(const ViewPoints& points, const sensor::Pinhole& camera);
-
-/// Notes the limits, for views that will be asked often.
-void set_limits(DepthRaster& raster);
 
 /// A look: what a frame says of the space before it, and nothing else. The nearest depth of each cell of a
 /// raster, as an organised cloud (metres, camera frame) without normals and colours; cells without a

@@ -75,8 +75,6 @@ struct StoreCloud {
   std::size_t frame = 0;  ///< of a frame between keyframes: its place among the store's frames
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
-  /// Bytes of cloud::encode_summary; null: none are kept.
-  std::shared_ptr<const std::vector<std::uint8_t>> summary = nullptr;
 };
 
 /// What a run adds in one go.
@@ -162,10 +160,6 @@ class StoreReader {
   [[nodiscard]] core::Result<std::vector<std::size_t>> frame_cloud_ids() const;
   [[nodiscard]] core::Result<cloud::CloudPtr> frame_cloud(std::size_t frame) const;
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> frame_cloud_bytes(std::size_t frame) const;
-  /// What was kept of a cloud for who lays it down, bytes of cloud::encode_summary; empty: nothing. Errors
-  /// (kInput): damaged.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> summary_bytes(KeyframeId keyframe) const;
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> frame_summary_bytes(std::size_t frame) const;
   /// None: nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
       const std::string& name) const;

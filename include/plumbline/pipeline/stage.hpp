@@ -165,9 +165,6 @@ class Stage {
   /// threads at a time and in any order, serial ones in frame order. An error ends the run; what concerns
   /// this frame only is not an error here: log it and leave the outputs out.
   virtual core::Result<void> process(StageIo& io) = 0;
-  /// After the last frame, before any stage's finish(): what needs no more than the frames may begin here,
-  /// beside what other stages do at their end. Returns at once.
-  virtual void frames_have_ended() {}
   /// After the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that export and
   /// do not need one another finish side by side.
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }

@@ -63,9 +63,6 @@ class StoredMaps : public dataset::FrameSource {
   /// What maps::unpack_surface makes the coarse surface of a keyframe's cloud of; empty: none was kept. May
   /// be called from several threads at a time.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> surface_bytes(std::size_t index) const;
-  /// What was kept with a cloud, bytes of cloud::encode_summary; empty: nothing. May be called from several
-  /// threads at a time.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> summary_bytes(std::size_t index) const;
   /// The camera of a robot, by this run's number.
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const;
   /// What to say of a cloud that cannot be used.

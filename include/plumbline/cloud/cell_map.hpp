@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What is known of the cells of a grid, by cell.
+#include <tsl/robin_map.h>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+
+namespace plumbline::cloud {
+
+/// Cells within +-2^20 of the origin as numbers, in order of x, then y, then z.
+inline std::uint64_t pack_cell(const Eigen::Vector3i& cell) {
+  std::uint64_t key = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    key = key << 21U |
+          (static_cast<std::uint64_t>(static_cast<std::int64_t>(cell[axis]) + (1 << 20)) & 0x1FFFFFU);
+  }
+  return key;
+}
+
+inline Eigen::Vector3i unpack_cell(std::uint64_t key) {
+  Eigen::Vector3i cell;
+  for (int axis = 2; axis >= 0; --axis, key >>= 21U) {
+    cell[axis] = static_cast<int>(key & 0x1FFFFFU) - (1 << 20);
+  }
+  return cell;
+}
+
+/// The cell that a place lies in; both in the unit of cells.
+inline Eigen::Vector3i cell_of(const Eigen::Vector3d& at) { return at.array().floor().cast<int>(); }
+
+/// Spreads neighbouring cells over a table (finaliser of MurmurHash3, public domain).
+struct CellHash {
+  std::size_t operator()(std::uint64_t key) const {
+    key ^= key >> 33;
+    key *= 0xff51afd7ed558ccdULL;
+    key ^= key >> 33;
+    key *= 0xc4ceb9fe1a85ec53ULL;
+    key ^= key >> 33;
+    return static_cast<std::size_t>(key);
+  }
+};
+
+/// By pack_cell(), or numbers made of it. Its order means nothing: whoever goes over it sorts.
+template <typename T>
+using CellMap = tsl::robin_map<std::uint64_t, T, CellHash>;
+
+}  // namespace plumbline::cloud
