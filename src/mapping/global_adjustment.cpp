@@ -244,9 +244,9 @@ void put_back(const GlobalBundle& bundle, maps::Map& map) {
 }
 
 void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
-                    const GlobalAdjustmentOptions& options, KeyframeId anchor, const core::Executor* executor,
+                    const GlobalAdjustmentOptions& options, KeyframeId anchor,
                     GlobalAdjustmentSummary& summary) {
-  const MapGraphResult graph = solve_map_graph(map, extra, options.graph, anchor, executor);
+  const MapGraphResult graph = solve_map_graph(map, extra, options.graph, anchor);
   summary.message = graph.summary.message;
   if (!graph.summary.usable) return;
   summary.extra = graph.summary.edges;
@@ -257,8 +257,7 @@ void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
 }
 
 void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
-                const GlobalAdjustmentOptions& options, KeyframeId anchor, const core::Executor* executor,
-                GlobalAdjustmentSummary& summary) {
+                const GlobalAdjustmentOptions& options, KeyframeId anchor, GlobalAdjustmentSummary& summary) {
   GlobalBuilder builder(map, cameras, options, anchor);
   builder.add_points();
   builder.add_lines();
@@ -273,7 +272,7 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
   summary.lines = static_cast<int>(bundle.lines.size());
   optimize::BundleOptions bundle_options = options.bundle_options;
   if (!extra.empty()) bundle_options.first_gate = options.first_gate;
-  summary.bundle = optimize::adjust_bundle(bundle.problem, bundle_options, executor);
+  summary.bundle = optimize::adjust_map_bundle(bundle.problem, bundle_options);
   summary.message = summary.bundle.message;
   if (!summary.bundle.usable || !may_move(map, poses_of(bundle), summary)) return;
   put_back(bundle, map);
@@ -322,8 +321,7 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
 }
 
 GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
-                                   const GlobalAdjustmentOptions& options, KeyframeId anchor,
-                                   const core::Executor* executor) {
+                                   const GlobalAdjustmentOptions& options, KeyframeId anchor) {
   GlobalAdjustmentSummary summary;
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   summary.keyframes = static_cast<int>(ids.size());
@@ -334,8 +332,8 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
   if (!anchor.valid()) anchor = ids.front();
   std::vector<Rigid3> before;
   for (const KeyframeId id : ids) before.push_back(map.camera_from_world(id));
-  if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, executor, summary);
-  if (options.bundle) run_bundle(map, cameras, extra, options, anchor, executor, summary);
+  if (options.pose_graph && !extra.empty()) run_pose_graph(map, extra, options, anchor, summary);
+  if (options.bundle) run_bundle(map, cameras, extra, options, anchor, summary);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const double shift =
         (before[i].inverse().translation - map.camera_from_world(ids[i]).inverse().translation).norm();

@@ -200,7 +200,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
 
   optimize::PoseGraphOptions graph;
   graph.robust = options_.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
-  const MapGraphResult solved = solve_map_graph(map, all, graph, {}, executor_);
+  const MapGraphResult solved = solve_map_graph(map, all, graph);
   if (!solved.summary.usable) return false;
   if (const auto wrong = contradiction(map, solved.poses)) {
     ++counts_.refused;
@@ -229,8 +229,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     GlobalAdjustmentOptions adjustment;
     adjustment.graph = graph;
     adjustment.noise.orb_scale_factor = options_.verify.orb_scale_factor;
-    const KeyframeId anchor{};
-    adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment, anchor, executor_);
+    adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment);
   }
   return true;
 }

@@ -154,7 +154,7 @@ std::vector<std::size_t> connected_parts(std::size_t parts, const std::vector<Me
 }
 
 FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
-                   const MapFusionOptions& options, const core::Executor* executor) {
+                   const MapFusionOptions& options) {
   FusedMap fused;
   std::vector<const maps::Map*> maps;
   for (const auto& [part, anchor_from_part] : lay_out(merges, anchor)) {
@@ -182,9 +182,8 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
       options.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
   adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
   adjustment.bundle = false;  // before surfaces are aligned it bends a map that hangs on a narrow overlap
-  const GlobalAdjustmentSummary graph =
-      adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front(), executor);
-  if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options, executor);
+  const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
+  if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
   std::vector<PoseEdge> believed;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     if (i >= graph.extra.size() || !graph.extra[i].rejected) believed.push_back(edges[i]);

@@ -168,8 +168,7 @@ void set_loops(maps::Map& map, const std::vector<PoseEdge>& edges) {
 }
 
 MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
-                               const optimize::PoseGraphOptions& options, KeyframeId anchor,
-                               const core::Executor* executor) {
+                               const optimize::PoseGraphOptions& options, KeyframeId anchor) {
   MapGraphResult result;
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   if (ids.empty()) {
@@ -203,7 +202,7 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
   for (const PoseEdge& e : map_edges(map)) {
     graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information / factor, true});
   }
-  result.summary = optimize::solve_pose_graph(graph, options, executor);
+  result.summary = optimize::solve_pose_graph(graph, options);
   std::vector<optimize::EdgeVerdict> verdicts(extra.size());
   for (std::size_t i = 0; i < extra.size(); ++i) {
     if (place[i] >= 0 && !result.summary.edges.empty()) {

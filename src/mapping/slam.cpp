@@ -60,7 +60,7 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       mapper_(mapper_of(options), camera),
       bundle_({options.mapper.bundle_keyframes, noise_of(options)}, options.mapper.bundle_options,
               options.bundle_lag, camera, executor),
-      closer_(options.loops, camera, &executor) {
+      closer_(options.loops, camera) {
   if (!options.loops.enabled) return;
   constexpr std::size_t kLookAlikes = 12;
   tracker_.set_place_finder([this](const features::FrameFeatures& picture) {

@@ -12,15 +12,6 @@
 namespace plumbline::optimize {
 namespace {
 
-BundleState state_of(const BundleProblem& problem) {
-  BundleState state;
-  for (const BundlePose& pose : problem.poses) state.poses.push_back(pose.camera_from_world);
-  state.points = problem.points;
-  for (const geometry::PluckerLine& line : problem.lines)
-    state.lines.push_back(geometry::to_orthonormal(line));
-  return state;
-}
-
 void write_back(const BundleState& state, BundleProblem& problem) {
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     if (!problem.poses[i].fixed) problem.poses[i].camera_from_world = state.poses[i];
@@ -138,7 +129,47 @@ BundleFits mark_outliers(BundleProblem& problem, const BundleState& state, const
   return {points.fit(2), lines.fit(2), fit_of_edges(problem, state)};
 }
 
+/// Rounds, and between them what does not fit is put aside.
+template <typename SolveRound>
+BundleSummary adjust(BundleProblem& problem, const BundleOptions& options, const SolveRound& solve_round) {
+  BundleSummary summary;
+  const bool anchored =
+      std::any_of(problem.poses.begin(), problem.poses.end(), [](const BundlePose& p) { return p.fixed; });
+  if (!anchored) {
+    summary.message = "no pose is fixed: the solution would float";
+    return summary;
+  }
+  BundleState state = state_of(problem);
+  if (options.first_gate > 0.0) {
+    const double gate = options.first_gate * options.first_gate;
+    summary.before = mark_outliers(problem, state, options, gate, gate, kLeastFirstGate_px);
+  }
+  for (int round = 0; round < options.rounds; ++round) {
+    const RoundSummary done = solve_round(problem, options, state);
+    if (round == 0) summary.initial_cost = done.initial_cost;
+    summary.message = done.message;
+    if (!done.usable) return summary;
+    summary.final_cost = done.final_cost;
+    summary.iterations += done.iterations;
+    summary.after = mark_outliers(problem, state, options, options.point_gate, options.line_gate, 0.0);
+  }
+  write_back(state, problem);
+  summary.usable = true;
+  for (const auto& o : problem.point_observations) summary.point_outliers += o.outlier ? 1 : 0;
+  for (const auto& o : problem.line_observations) summary.line_outliers += o.outlier ? 1 : 0;
+  return summary;
+}
+
 }  // namespace
+
+BundleState state_of(const BundleProblem& problem) {
+  BundleState state;
+  for (const BundlePose& pose : problem.poses) state.poses.push_back(pose.camera_from_world);
+  state.points = problem.points;
+  for (const geometry::PluckerLine& line : problem.lines)
+    state.lines.push_back(geometry::to_orthonormal(line));
+  return state;
+}
 
 void BundleOptions::declare(core::OptionTable& table) {
   table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "", "Iterations of each round at most");
@@ -153,35 +184,12 @@ void BundleOptions::declare(core::OptionTable& table) {
                "Huber threshold of relative poses, standard deviations");
 }
 
-BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options,
-                            const core::Executor* executor) {
-  BundleSummary summary;
-  const bool anchored =
-      std::any_of(problem.poses.begin(), problem.poses.end(), [](const BundlePose& p) { return p.fixed; });
-  if (!anchored) {
-    summary.message = "no pose is fixed: the solution would float";
-    return summary;
-  }
-  BundleState state = state_of(problem);
-  core::Crew crew(executor);
-  if (options.first_gate > 0.0) {
-    const double gate = options.first_gate * options.first_gate;
-    summary.before = mark_outliers(problem, state, options, gate, gate, kLeastFirstGate_px);
-  }
-  for (int round = 0; round < options.rounds; ++round) {
-    const RoundSummary done = solve_bundle_round(problem, options, crew, state);
-    if (round == 0) summary.initial_cost = done.initial_cost;
-    summary.message = done.message;
-    if (!done.usable) return summary;
-    summary.final_cost = done.final_cost;
-    summary.iterations += done.iterations;
-    summary.after = mark_outliers(problem, state, options, options.point_gate, options.line_gate, 0.0);
-  }
-  write_back(state, problem);
-  summary.usable = true;
-  for (const auto& o : problem.point_observations) summary.point_outliers += o.outlier ? 1 : 0;
-  for (const auto& o : problem.line_observations) summary.line_outliers += o.outlier ? 1 : 0;
-  return summary;
+BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options) {
+  return adjust(problem, options, solve_bundle_round);
+}
+
+BundleSummary adjust_map_bundle(BundleProblem& problem, const BundleOptions& options) {
+  return adjust(problem, options, solve_map_round);
 }
 
 }  // namespace plumbline::optimize

@@ -8,22 +8,12 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-/// A point behind the camera: a constant, large error that the gate takes for an outlier.
-constexpr double kBehind = 2e6;  // squared
-
 }  // namespace
 
-double BundleRound::sum_costs() const {
-  double sum = 0.0;
-  for (const double c : costs_) sum += c;
-  for (const Edge& edge : edges_) sum += edge.cost;
-  return sum;
-}
-
 double BundleRound::cost(const BundleState& state) {
-  each(slot_pose_.size(), 1, [&](std::size_t slot) {
+  double sum = 0.0;
+  for (std::size_t slot = 0; slot < slot_pose_.size(); ++slot) {
     const Rigid3& pose = state.poses[at(slot_pose_[slot])];
-    double sum = 0.0;
     for (std::size_t i = points_.slot_begin[slot]; i < points_.slot_begin[slot + 1]; ++i) {
       point_terms_[i].world = state.points[at(points_.sightings[i].landmark)];
       Eigen::Vector3d r;
@@ -35,18 +25,16 @@ double BundleRound::cost(const BundleState& state) {
                                           state.lines[at(lines_.sightings[i].landmark)], nullptr);
       sum += line_loss_.cost(r.squaredNorm());
     }
-    costs_[slot] = sum;
-  });
-  each(edges_.size(), 64, [&](std::size_t i) {
-    Edge& edge = edges_[i];
-    const Rigid3& a = edge.a < 0 ? edge.world : state.poses[at(slot_pose_[at(edge.a)])];
+  }
+  for (const Edge& edge : edges_) {
+    const Rigid3 a = edge.a < 0 ? Rigid3() : state.poses[at(slot_pose_[at(edge.a)])];
     const double e = edge_rows(edge.view, a, state.poses[at(slot_pose_[at(edge.b)])], nullptr).squaredNorm();
-    edge.cost = edge.robust ? edge_loss_.cost(e) : 0.5 * e;
-  });
-  return sum_costs();
+    sum += edge.robust ? edge_loss_.cost(e) : 0.5 * e;
+  }
+  return sum;
 }
 
-void BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
+double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   const Rigid3& pose = state.poses[at(slot_pose_[slot])];
   Matrix6d normal = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -88,58 +76,51 @@ void BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
     lines_.square[i].noalias() = weight * (j.by_line.transpose() * j.by_line);
     lines_.gradients[i].noalias() = weight * (j.by_line.transpose() * r);
   }
-  costs_[slot] = sum;
-  if (slot >= at(free_)) return;
-  normal_[slot] = normal;
-  gradient_[slot] = gradient;
+  if (slot < at(free_)) {
+    normal_[slot] = normal;
+    gradient_[slot] = gradient;
+  }
+  return sum;
 }
 
-void BundleRound::linearise_edge(std::size_t index, const BundleState& state) {
-  Edge& edge = edges_[index];
-  const Rigid3& a = edge.a < 0 ? edge.world : state.poses[at(slot_pose_[at(edge.a)])];
+double BundleRound::linearise_edge(Edge& edge, const BundleState& state) {
+  const Rigid3 a = edge.a < 0 ? Rigid3() : state.poses[at(slot_pose_[at(edge.a)])];
   edge.r = edge_rows(edge.view, a, state.poses[at(slot_pose_[at(edge.b)])], &edge.j);
   const double squared = edge.r.squaredNorm();
-  edge.cost = edge.robust ? edge_loss_.cost(squared) : 0.5 * squared;
   const double root = edge.robust ? std::sqrt(edge_loss_.weight(squared)) : 1.0;
   edge.r *= root;
   edge.j.by_a *= root;
   edge.j.by_b *= root;
+  if (edge.a >= 0 && edge.a < free_) {
+    normal_[at(edge.a)].noalias() += edge.j.by_a.transpose() * edge.j.by_a;
+    gradient_[at(edge.a)].noalias() += edge.j.by_a.transpose() * edge.r;
+  }
+  if (edge.b < free_) {
+    normal_[at(edge.b)].noalias() += edge.j.by_b.transpose() * edge.j.by_b;
+    gradient_[at(edge.b)].noalias() += edge.j.by_b.transpose() * edge.r;
+  }
+  return edge.robust ? edge_loss_.cost(squared) : 0.5 * squared;
 }
 
 double BundleRound::linearise(const BundleState& state) {
-  each(slot_pose_.size(), 1, [&](std::size_t slot) { linearise_slot(slot, state); });
-  each(edges_.size(), 64, [&](std::size_t i) { linearise_edge(i, state); });
-  for (const Edge& edge : edges_) {
-    if (edge.a >= 0 && edge.a < free_) {
-      normal_[at(edge.a)].noalias() += edge.j.by_a.transpose() * edge.j.by_a;
-      gradient_[at(edge.a)].noalias() += edge.j.by_a.transpose() * edge.r;
-    }
-    if (edge.b < free_) {
-      normal_[at(edge.b)].noalias() += edge.j.by_b.transpose() * edge.j.by_b;
-      gradient_[at(edge.b)].noalias() += edge.j.by_b.transpose() * edge.r;
-    }
-  }
-  each(points_.hessian.size(), 512, [&](std::size_t i) { points_.sum(i); });
-  each(lines_.hessian.size(), 512, [&](std::size_t i) { lines_.sum(i); });
-  return sum_costs();
+  double sum = 0.0;
+  for (std::size_t slot = 0; slot < slot_pose_.size(); ++slot) sum += linearise_slot(slot, state);
+  for (Edge& edge : edges_) sum += linearise_edge(edge, state);
+  points_.sum();
+  lines_.sum();
+  return sum;
 }
 
 void BundleRound::set_scales() {
   for (std::size_t i = 0; i < normal_.size(); ++i) damping_[i].set_scale(normal_[i].diagonal());
-  for (std::size_t i = 0; i < points_.hessian.size(); ++i)
-    points_.damping[i].set_scale(points_.hessian[i].diagonal());
-  for (std::size_t i = 0; i < lines_.hessian.size(); ++i)
-    lines_.damping[i].set_scale(lines_.hessian[i].diagonal());
+  points_.set_scales();
+  lines_.set_scales();
 }
 
 void BundleRound::set_damping() {
   for (std::size_t i = 0; i < normal_.size(); ++i) damping_[i].set_diagonal(normal_[i].diagonal());
-  for (std::size_t i = 0; i < points_.hessian.size(); ++i) {
-    points_.damping[i].set_diagonal(points_.hessian[i].diagonal());
-  }
-  for (std::size_t i = 0; i < lines_.hessian.size(); ++i) {
-    lines_.damping[i].set_diagonal(lines_.hessian[i].diagonal());
-  }
+  points_.set_damping();
+  lines_.set_damping();
 }
 
 double BundleRound::largest_gradient() const {

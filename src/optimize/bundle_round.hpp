@@ -5,11 +5,8 @@
 // (bundle_normal.cpp), steps (bundle_solver.cpp).
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <utility>
 #include <vector>
 
-#include "block_cholesky.hpp"
 #include "bundle_solver.hpp"
 #include "bundle_terms.hpp"
 #include "landmark_family.hpp"
@@ -40,40 +37,14 @@ struct Target {
 /// Normal equations of one round, and what it steps through.
 class BundleRound {
  public:
-  BundleRound(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
-              const BundleState& state);
+  BundleRound(const BundleProblem& problem, const BundleOptions& options);
 
+  /// Poses that edges hold are held where they are as well (holding_edges).
+  void hold(const BundleState& state);
   RoundSummary run(BundleState& state);
+  [[nodiscard]] std::vector<geometry::Matrix6d> covariances(const BundleState& state);
 
  private:
-  template <typename Body>
-  void each(std::size_t count, std::size_t grain, const Body& body) const {
-    crew_.each(count, grain, body);
-  }
-
-  void choose_sightings();
-  void choose_slots();
-  void add_sightings();
-  void add_edges(const BundleState& state);
-  void pair_poses();
-  double sum_costs() const;
-  [[nodiscard]] double cost(const BundleState& state);
-  double linearise(const BundleState& state);
-  void linearise_slot(std::size_t slot, const BundleState& state);
-  void linearise_edge(std::size_t edge, const BundleState& state);
-  void set_scales();
-  void set_damping();
-  [[nodiscard]] double largest_gradient() const;
-  bool solve(double radius);
-  template <typename Family>
-  void eliminate(const Family& family, std::size_t slot, const std::vector<std::size_t>& block_of,
-                 std::vector<Target>& targets, double* rhs);
-  void assemble_row(std::size_t slot, double radius);
-  void assemble_edges();
-  [[nodiscard]] double model_decrease(double radius) const;
-  void step(const BundleState& from, BundleState& to) const;
-  [[nodiscard]] bool tiny_step(const BundleState& state) const;
-
   using Matrix6d = geometry::Matrix6d;
   using Vector6d = geometry::Vector6d;
   using Rigid3 = geometry::Rigid3;
@@ -84,26 +55,38 @@ class BundleRound {
     int b;
     EdgeView view;
     bool robust;
-    Rigid3 world;  ///< of a, if that is the world
     EdgeDerivatives j{};
     Vector6d r = Vector6d::Zero();
-    double cost = 0.0;
   };
+
+  void choose_slots();
+  void add_sightings();
+  [[nodiscard]] double cost(const BundleState& state);
+  double linearise(const BundleState& state);
+  double linearise_slot(std::size_t slot, const BundleState& state);
+  double linearise_edge(Edge& edge, const BundleState& state);
+  void set_scales();
+  void set_damping();
+  [[nodiscard]] double largest_gradient() const;
+  bool solve(double radius);
+  template <typename Family>
+  void eliminate(const Family& family, std::size_t slot);
+  void assemble(double radius);
+  [[nodiscard]] double* block(int row, int column) { return &matrix_(6 * row, 6 * column); }
+  [[nodiscard]] double model_decrease(double radius) const;
+  void step(const BundleState& from, BundleState& to) const;
+  [[nodiscard]] bool tiny_step(const BundleState& state) const;
 
   const BundleProblem& problem_;
   const BundleOptions& options_;
-  core::Crew& crew_;
   Eigen::Matrix3d projection_;
   Huber point_loss_;
   Huber line_loss_;
   Huber edge_loss_;
 
-  std::vector<int> used_points_;  ///< observations, of the problem
-  std::vector<int> used_lines_;
   std::vector<int> slot_of_;    ///< of each pose
   std::vector<int> slot_pose_;  ///< pose of each slot
   int free_ = 0;
-  std::vector<std::pair<int, int>> pairs_;  ///< of slots that share a block
   Points points_;
   Lines lines_;
   std::vector<PointTerm> point_terms_;  ///< of each sighting
@@ -113,9 +96,9 @@ class BundleRound {
   std::vector<Matrix6d> normal_;  ///< of each free slot: J^T J
   std::vector<Vector6d> gradient_;
   std::vector<Damping<6>> damping_;
-  std::vector<double> pose_steps_;
-  std::vector<double> costs_;
-  std::optional<BlockCholesky> matrix_;
+  Eigen::VectorXd pose_steps_;  ///< 6 a free slot
+  Eigen::MatrixXd matrix_;      ///< of the reduced equations: its lower triangle
+  std::vector<Target> targets_;
 };
 
 }  // namespace plumbline::optimize

@@ -5,6 +5,7 @@
 
 #include "bundle_round.hpp"
 #include "plumbline/core/clones.hpp"
+#include "plumbline/optimize/pose_covariances.hpp"
 
 namespace plumbline::optimize {
 namespace {
@@ -13,94 +14,81 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-/// y w^T is subtracted from each target, column-major 6x6; y and w are 6 x unknowns.
+/// y w^T is subtracted from each target, a 6x6 block of a matrix whose columns are `stride` long; y and w are
+/// 6 x unknowns.
 PLUMBLINE_CLONES
-void subtract_products(const double* y, int unknowns, const Target* targets, std::size_t count) {
-  for (std::size_t n = 0; n < count; ++n) {
-    double* block = targets[n].block;
-    const double* w = targets[n].w;
+void subtract_products(const double* y, int unknowns, const std::vector<Target>& targets,
+                       std::ptrdiff_t stride) {
+  for (const Target& target : targets) {
+    const double* w = target.w;
     for (int j = 0; j < 6; ++j) {
+      double* column = target.block + stride * j;
       double sum[6];
-      for (int i = 0; i < 6; ++i) sum[i] = block[6 * j + i];
+      for (int i = 0; i < 6; ++i) sum[i] = column[i];
       for (int k = 0; k < unknowns; ++k) {
         const double factor = w[6 * k + j];
         for (int i = 0; i < 6; ++i) sum[i] -= y[6 * k + i] * factor;
       }
-      for (int i = 0; i < 6; ++i) block[6 * j + i] = sum[i];
+      for (int i = 0; i < 6; ++i) column[i] = sum[i];
     }
   }
 }
 
 }  // namespace
 
+/// Takes the landmarks that a free slot sees out of its row of the equations.
 template <typename Family>
-void BundleRound::eliminate(const Family& family, std::size_t slot, const std::vector<std::size_t>& block_of,
-                            std::vector<Target>& targets, double* rhs) {
-  Eigen::Map<Vector6d> b(rhs);
+void BundleRound::eliminate(const Family& family, std::size_t slot) {
+  const int row = static_cast<int>(slot);
   for (std::size_t i = family.slot_begin[slot]; i < family.slot_begin[slot + 1]; ++i) {
     const auto landmark = at(family.sightings[i].landmark);
     const typename Family::Cross y = family.cross[i] * family.inverse[landmark];
-    b.noalias() += family.cross[i] * family.step[landmark];
-    targets.clear();
+    pose_steps_.segment<6>(6 * row).noalias() += family.cross[i] * family.step[landmark];
+    targets_.clear();
     for (std::size_t k = family.landmark_begin[landmark]; k < family.landmark_begin[landmark + 1]; ++k) {
       const auto other = at(family.by_landmark[k]);
-      const auto column = at(family.sightings[other].slot);
-      if (column > slot) break;
-      double* block =
-          column == slot ? matrix_->diagonal(static_cast<int>(slot)) : matrix_->block(block_of[column]);
-      targets.push_back({block, family.cross[other].data()});
+      const int column = family.sightings[other].slot;
+      if (column > row) break;
+      targets_.push_back({block(row, column), family.cross[other].data()});
     }
-    subtract_products(y.data(), static_cast<int>(Family::Vector::RowsAtCompileTime), targets.data(),
-                      targets.size());
+    subtract_products(y.data(), static_cast<int>(Family::Vector::RowsAtCompileTime), targets_,
+                      matrix_.rows());
   }
 }
 
-/// The row of the reduced equations that belongs to a free slot.
-void BundleRound::assemble_row(std::size_t slot, double radius) {
-  const int row = static_cast<int>(slot);
-  thread_local std::vector<std::size_t> block_of;  // of each column that the row has a block in
-  thread_local std::vector<Target> targets;
-  block_of.resize(std::max(block_of.size(), slot + 1));
-  for (const auto* entry = matrix_->row_begin(row); entry != matrix_->row_end(row); ++entry) {
-    block_of[at(entry->column)] = entry->block;
+/// The reduced equations; their right side is put where the steps will be.
+void BundleRound::assemble(double radius) {
+  matrix_.setZero();
+  for (std::size_t slot = 0; slot < at(free_); ++slot) {
+    const auto begin = static_cast<Eigen::Index>(6 * slot);
+    matrix_.block<6, 6>(begin, begin) = normal_[slot];
+    matrix_.diagonal().segment<6>(begin) += damping_[slot].diagonal / radius;
+    pose_steps_.segment<6>(begin) = -gradient_[slot];
+    eliminate(points_, slot);
+    eliminate(lines_, slot);
   }
-  Eigen::Map<Matrix6d> diagonal(matrix_->diagonal(row));
-  diagonal = normal_[slot];
-  diagonal.diagonal() += damping_[slot].diagonal / radius;
-  double* rhs = pose_steps_.data() + 6 * slot;
-  Eigen::Map<Vector6d> start(rhs);
-  start = -gradient_[slot];
-  eliminate(points_, slot, block_of, targets, rhs);
-  eliminate(lines_, slot, block_of, targets, rhs);
-}
-
-void BundleRound::assemble_edges() {
   for (const Edge& edge : edges_) {
     if (edge.a < 0 || edge.a >= free_ || edge.b >= free_ || edge.a == edge.b) continue;
+    const Matrix6d cross = edge.j.by_a.transpose() * edge.j.by_b;
     if (edge.a > edge.b) {
-      Eigen::Map<Matrix6d>(matrix_->block(edge.a, edge.b)).noalias() += edge.j.by_a.transpose() * edge.j.by_b;
+      matrix_.block<6, 6>(6 * edge.a, 6 * edge.b) += cross;
     } else {
-      Eigen::Map<Matrix6d>(matrix_->block(edge.b, edge.a)).noalias() += edge.j.by_b.transpose() * edge.j.by_a;
+      matrix_.block<6, 6>(6 * edge.b, 6 * edge.a) += cross.transpose();
     }
   }
 }
 
 /// The step of all unknowns at this radius; false when the equations cannot be solved.
 bool BundleRound::solve(double radius) {
-  each(points_.hessian.size(), 512, [&](std::size_t i) { points_.invert(i, radius); });
-  each(lines_.hessian.size(), 512, [&](std::size_t i) { lines_.invert(i, radius); });
-  matrix_->set_zero();
-  each(at(free_), 4, [&](std::size_t slot) { assemble_row(slot, radius); });
-  assemble_edges();
-  if (!matrix_->factor()) return false;
-  matrix_->solve(pose_steps_.data());
-  for (const double s : pose_steps_) {
-    if (!std::isfinite(s)) return false;
-  }
-  each(points_.hessian.size(), 512,
-       [&](std::size_t i) { points_.substitute_back(i, pose_steps_.data(), free_); });
-  each(lines_.hessian.size(), 512,
-       [&](std::size_t i) { lines_.substitute_back(i, pose_steps_.data(), free_); });
+  points_.invert(radius);
+  lines_.invert(radius);
+  assemble(radius);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
+  if (llt.info() != Eigen::Success) return false;
+  llt.solveInPlace(pose_steps_);
+  if (!pose_steps_.allFinite()) return false;
+  points_.substitute_back(pose_steps_);
+  lines_.substitute_back(pose_steps_);
   return true;
 }
 
@@ -109,7 +97,7 @@ double BundleRound::model_decrease(double radius) const {
   double gradient = 0.0;
   double damped = 0.0;
   for (std::size_t i = 0; i < normal_.size(); ++i) {
-    const Eigen::Map<const Vector6d> d(pose_steps_.data() + 6 * i);
+    const Vector6d d = pose_steps_.segment<6>(static_cast<Eigen::Index>(6 * i));
     gradient += gradient_[i].dot(d);
     damped += damping_[i].diagonal.dot(d.cwiseAbs2());
   }
@@ -125,10 +113,9 @@ double BundleRound::model_decrease(double radius) const {
 }
 
 void BundleRound::step(const BundleState& from, BundleState& to) const {
-  for (std::size_t i = 0; i < at(free_); ++i) {
-    const Eigen::Map<const Vector6d> d(pose_steps_.data() + 6 * i);
-    const auto pose = at(slot_pose_[i]);
-    to.poses[pose] = geometry::exp_se3(d) * from.poses[pose];
+  for (int i = 0; i < free_; ++i) {
+    const auto pose = at(slot_pose_[at(i)]);
+    to.poses[pose] = geometry::exp_se3(pose_steps_.segment<6>(6 * i)) * from.poses[pose];
   }
   for (std::size_t i = 0; i < points_.step.size(); ++i) {
     if (points_.landmark_begin[i] < points_.landmark_begin[i + 1])
@@ -144,14 +131,33 @@ void BundleRound::step(const BundleState& from, BundleState& to) const {
 /// Nothing moves by more than rounding does.
 bool BundleRound::tiny_step(const BundleState& state) const {
   constexpr double kShare = 1e-7;
-  double moved = 0.0;
-  for (const double s : pose_steps_) moved += s * s;
+  double moved = pose_steps_.squaredNorm();
   for (const Eigen::Vector3d& s : points_.step) moved += s.squaredNorm();
   for (const Eigen::Vector4d& s : lines_.step) moved += s.squaredNorm();
   double size = static_cast<double>(state.poses.size() + 2 * state.lines.size());
   for (const Rigid3& pose : state.poses) size += pose.translation.squaredNorm();
   for (const Eigen::Vector3d& p : state.points) size += p.squaredNorm();
   return std::sqrt(moved) <= kShare * (std::sqrt(size) + kShare);
+}
+
+/// Diagonal blocks of the reduced equations' inverse: with S = L L^T they are X^T X, L X = the pose's columns
+/// of the identity, of which only rows from the pose on are not zero.
+std::vector<Matrix6d> BundleRound::covariances(const BundleState& state) {
+  constexpr double kUndamped = std::numeric_limits<double>::infinity();
+  linearise(state);
+  points_.invert(kUndamped);
+  lines_.invert(kUndamped);
+  assemble(kUndamped);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
+  if (llt.info() != Eigen::Success) return {};
+  std::vector<Matrix6d> result(state.poses.size(), Matrix6d::Zero());
+  for (int slot = 0; slot < free_; ++slot) {
+    const Eigen::Index rows = matrix_.rows() - 6 * slot;
+    Eigen::MatrixXd x = Eigen::MatrixXd::Identity(rows, 6);
+    matrix_.bottomRightCorner(rows, rows).triangularView<Eigen::Lower>().solveInPlace(x);
+    result[at(slot_pose_[at(slot)])].noalias() = x.transpose() * x;
+  }
+  return result;
 }
 
 RoundSummary BundleRound::run(BundleState& state) {
@@ -220,9 +226,15 @@ RoundSummary BundleRound::run(BundleState& state) {
   return summary;
 }
 
-RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
+RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options,
                                 BundleState& state) {
-  return BundleRound(problem, options, crew, state).run(state);
+  BundleRound round(problem, options);
+  round.hold(state);
+  return round.run(state);
+}
+
+std::vector<Matrix6d> pose_covariances(const BundleProblem& problem, const BundleOptions& options) {
+  return BundleRound(problem, options).covariances(state_of(problem));
 }
 
 }  // namespace plumbline::optimize

@@ -3,14 +3,11 @@
 
 // One round of bundle adjustment: Levenberg-Marquardt on poses, points and lines. Landmarks are eliminated
 // first; what is left couples poses that share some (Triggs et al., Bundle Adjustment: A Modern Synthesis,
-// 2000), and is factored as a sparse matrix of blocks. Step control is Ceres's: trust region radius, damping
-// and ends of iterations mean the same. Work is cut by pose or by landmark, each sum belongs to one of them
-// and runs in one order: the same bytes for any number of threads.
-#include <memory>
+// 2000). By a solver of our own, which is the faster one while the poses are few (a window beside the
+// tracker), or by Ceres. Trust region, damping, losses and ends of iterations mean the same in both.
 #include <string>
 #include <vector>
 
-#include "plumbline/core/crew.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 
 namespace plumbline::optimize {
@@ -22,6 +19,8 @@ struct BundleState {
   std::vector<geometry::OrthonormalLine> lines;
 };
 
+BundleState state_of(const BundleProblem& problem);
+
 struct RoundSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
@@ -32,7 +31,21 @@ struct RoundSummary {
 
 /// Improves `state`; leaves out what the problem calls outliers, and landmarks that a single pose sees
 /// without depth.
-RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options, core::Crew& crew,
+RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOptions& options,
                                 BundleState& state);
+/// The same by Ceres.
+RoundSummary solve_map_round(const BundleProblem& problem, const BundleOptions& options, BundleState& state);
+
+/// Observations that take part in a round, by number.
+struct UsedSightings {
+  explicit UsedSightings(const BundleProblem& problem);
+  std::vector<int> points;
+  std::vector<int> lines;
+};
+
+/// From the world (a = -1) to each pose that edges hold, with 1 m and 1 rad: far weaker than anything
+/// measured, but directions that an edge leaves free would otherwise run off (damping scales each unknown by
+/// what is known of it, and so prefers to move along them).
+std::vector<BundleEdge> holding_edges(const BundleProblem& problem, const BundleState& state);
 
 }  // namespace plumbline::optimize

@@ -13,6 +13,9 @@
 
 namespace plumbline::optimize {
 
+/// Squared error of a point behind the camera: constant, and so large that the gate takes it for an outlier.
+constexpr double kBehind = 2e6;
+
 /// What was seen of a point; where it lies in the world is not filled in.
 PointTerm to_term(const BundlePointObservation& o);
 

@@ -78,40 +78,51 @@ struct LandmarkFamily {
     step.resize(landmarks);
   }
 
-  void sum(std::size_t landmark) {
-    Square h = Square::Zero();
-    Vector g = Vector::Zero();
-    for (std::size_t i = landmark_begin[landmark]; i < landmark_begin[landmark + 1]; ++i) {
-      h += square[static_cast<std::size_t>(by_landmark[i])];
-      g += gradients[static_cast<std::size_t>(by_landmark[i])];
+  void sum() {
+    for (std::size_t n = 0; n < hessian.size(); ++n) {
+      hessian[n].setZero();
+      gradient[n].setZero();
+      for (std::size_t i = landmark_begin[n]; i < landmark_begin[n + 1]; ++i) {
+        hessian[n] += square[static_cast<std::size_t>(by_landmark[i])];
+        gradient[n] += gradients[static_cast<std::size_t>(by_landmark[i])];
+      }
     }
-    hessian[landmark] = h;
-    gradient[landmark] = g;
+  }
+
+  void set_scales() {
+    for (std::size_t n = 0; n < hessian.size(); ++n) damping[n].set_scale(hessian[n].diagonal());
+  }
+  void set_damping() {
+    for (std::size_t n = 0; n < hessian.size(); ++n) damping[n].set_diagonal(hessian[n].diagonal());
   }
 
   /// Of a landmark that its poses do not hold in some direction the inverse is taken in the others.
-  void invert(std::size_t landmark, double radius) {
-    Square h = hessian[landmark];
-    h.diagonal() += damping[landmark].diagonal / radius;
-    const Eigen::LLT<Square> llt(h);
-    if (llt.info() == Eigen::Success) {
-      inverse[landmark] = llt.solve(Square::Identity());
-    } else {
-      inverse[landmark] = h.completeOrthogonalDecomposition().pseudoInverse();
+  void invert(double radius) {
+    for (std::size_t n = 0; n < hessian.size(); ++n) {
+      Square h = hessian[n];
+      h.diagonal() += damping[n].diagonal / radius;
+      const Eigen::LLT<Square> llt(h);
+      if (llt.info() == Eigen::Success) {
+        inverse[n] = llt.solve(Square::Identity());
+      } else {
+        inverse[n] = h.completeOrthogonalDecomposition().pseudoInverse();
+      }
+      step[n].noalias() = inverse[n] * gradient[n];
     }
-    step[landmark].noalias() = inverse[landmark] * gradient[landmark];
   }
 
-  /// The landmark's step, once those of the poses (by slot; 6 each) are known.
-  void substitute_back(std::size_t landmark, const double* pose_steps, int free_slots) {
-    Vector pull = Vector::Zero();
-    for (std::size_t i = landmark_begin[landmark]; i < landmark_begin[landmark + 1]; ++i) {
-      const auto n = static_cast<std::size_t>(by_landmark[i]);
-      if (sightings[n].slot >= free_slots) break;
-      pull.noalias() +=
-          cross[n].transpose() * Eigen::Map<const geometry::Vector6d>(pose_steps + 6 * sightings[n].slot);
+  /// The landmarks' steps, once those of the poses (by slot; 6 each) are known.
+  void substitute_back(const Eigen::VectorXd& pose_steps) {
+    const auto free_slots = static_cast<int>(pose_steps.size() / 6);
+    for (std::size_t n = 0; n < hessian.size(); ++n) {
+      Vector pull = Vector::Zero();
+      for (std::size_t i = landmark_begin[n]; i < landmark_begin[n + 1]; ++i) {
+        const auto seen = static_cast<std::size_t>(by_landmark[i]);
+        if (sightings[seen].slot >= free_slots) break;
+        pull.noalias() += cross[seen].transpose() * pose_steps.segment<6>(6 * sightings[seen].slot);
+      }
+      step[n] = -(step[n] + inverse[n] * pull);
     }
-    step[landmark] = -(step[landmark] + inverse[landmark] * pull);
   }
 };
 

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/optimize/pose_graph.hpp"
 
+#include <ceres/ceres.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 
-#include "pose_graph_solver.hpp"
+#include "ceres_terms.hpp"
 
 namespace plumbline::optimize {
 namespace {
@@ -15,6 +18,79 @@ namespace {
 constexpr double kTolerance = 1e-7;       // of a solve whose weights are decided
 constexpr double kRoughTolerance = 1e-2;  // of one on the way there
 constexpr int kRoughIterations = 3;
+
+/// Every pose that is not fixed is held to where it is by 30 m and 30 rad: nothing beside a measurement, but
+/// enough for directions that no edge holds.
+constexpr double kHoldInformation = 1e-3;
+
+/// The graph as Ceres wants it, with a weight for each edge that may change between solves. All poses in one
+/// array, so that the order of sums does not hang on where the heap puts them; the last one is the world.
+class Solver {
+ public:
+  explicit Solver(const PoseGraph& graph) : graph_(graph), numbers_(kPoseBlock * (graph.poses.size() + 1)) {
+    const std::size_t world = graph.poses.size();
+    for (std::size_t i = 0; i <= world; ++i) {
+      from_rigid(i < world ? graph.poses[i].camera_from_world : geometry::Rigid3(), block(i));
+      ceres_.AddParameterBlock(block(i), kPoseBlock, &manifold_);
+      if (i == world || graph.poses[i].fixed) ceres_.SetParameterBlockConstant(block(i));
+    }
+    for (const GraphEdge& edge : graph.edges) {
+      losses_.push_back(std::make_unique<ceres::LossFunctionWrapper>(nullptr, ceres::TAKE_OWNERSHIP));
+      add({edge.a, edge.b, edge.b_from_a, edge.information}, losses_.back().get(), block(edge.a));
+    }
+    for (std::size_t i = 0; i < world; ++i) {
+      const geometry::Matrix6d hold = kHoldInformation * geometry::Matrix6d::Identity();
+      if (!graph.poses[i].fixed)
+        add({-1, static_cast<int>(i), graph.poses[i].camera_from_world, hold}, nullptr, block(world));
+    }
+  }
+
+  void set_weight(std::size_t edge, double weight) {
+    losses_[edge]->Reset(new ceres::ScaledLoss(nullptr, weight, ceres::TAKE_OWNERSHIP),
+                         ceres::TAKE_OWNERSHIP);
+  }
+
+  /// From where the poses are. Ends where an iteration lowers the cost by a smaller share than `tolerance`.
+  ceres::Solver::Summary solve(int max_iterations, double tolerance) {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
+    options.num_threads = 1;  // sums in a fixed order
+    options.max_num_iterations = max_iterations;
+    options.initial_trust_region_radius = 1e8;  // relative poses are nearly linear: hardly damped
+    options.function_tolerance = tolerance;
+    options.parameter_tolerance = 1e-9;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &ceres_, &summary);
+    return summary;
+  }
+
+  /// Squared error of an edge as the poses are now, without its weight.
+  [[nodiscard]] double chi2(std::size_t edge) const {
+    const GraphEdge& e = graph_.edges[edge];
+    const geometry::Rigid3 b_from_a =
+        pose(static_cast<std::size_t>(e.b)) * pose(static_cast<std::size_t>(e.a)).inverse();
+    const geometry::Vector6d xi = geometry::log_se3(b_from_a * e.b_from_a.inverse());
+    return std::max(0.0, xi.dot(e.information * xi));
+  }
+  [[nodiscard]] geometry::Rigid3 pose(std::size_t i) const {
+    return to_rigid(numbers_.data() + kPoseBlock * i);
+  }
+
+ private:
+  double* block(std::size_t i) { return numbers_.data() + kPoseBlock * i; }
+  double* block(int i) { return block(static_cast<std::size_t>(i)); }
+  void add(const BundleEdge& edge, ceres::LossFunction* loss, double* a) {
+    ceres_.AddResidualBlock(new EdgeCost(edge), loss, a, block(edge.b));
+  }
+
+  const PoseGraph& graph_;
+  std::vector<double> numbers_;
+  PoseManifold manifold_;
+  std::vector<std::unique_ptr<ceres::LossFunctionWrapper>> losses_;  ///< of each edge
+  ceres::Problem ceres_{borrowing()};
+};
 
 /// Weight of a truncated quadratic that is mu away from convex (0) and from truncated (infinity); `ratio` is
 /// the squared error over the gate. Equation 14 of the paper.
@@ -27,7 +103,7 @@ double graduated_weight(double ratio, double mu) {
 /// Least squares again and again, with weights that turn into 0 and 1.
 class Graduated {
  public:
-  Graduated(const PoseGraph& graph, const PoseGraphOptions& options, PoseGraphSolver& solver,
+  Graduated(const PoseGraph& graph, const PoseGraphOptions& options, Solver& solver,
             PoseGraphSummary& summary)
       : graph_(graph), options_(options), solver_(solver), summary_(summary) {
     for (std::size_t i = 0; i < graph.edges.size(); ++i) {
@@ -45,12 +121,12 @@ class Graduated {
     double mu = worst > 1.0 ? 1.0 / (2.0 * worst - 1.0) : 1e6;
     for (int round = 0; round < options_.max_rounds; ++round) {
       const bool decided = set_weights(mu);
-      const PoseGraphSolver::Outcome solved = decided ? solver_.solve(options_.max_iterations, kTolerance)
-                                                      : solver_.solve(kRoughIterations, kRoughTolerance);
+      const ceres::Solver::Summary solved = decided ? solver_.solve(options_.max_iterations, kTolerance)
+                                                    : solver_.solve(kRoughIterations, kRoughTolerance);
       ++summary_.rounds;
-      summary_.iterations += solved.iterations;
+      summary_.iterations += static_cast<int>(solved.iterations.size());
       summary_.message = solved.message;
-      if (!solved.usable) return false;
+      if (!solved.IsSolutionUsable()) return false;
       if (decided && !set_weights(mu, true)) break;
       mu *= options_.round_factor;
     }
@@ -79,7 +155,7 @@ class Graduated {
 
   const PoseGraph& graph_;
   const PoseGraphOptions& options_;
-  PoseGraphSolver& solver_;
+  Solver& solver_;
   PoseGraphSummary& summary_;
   std::vector<double> gates_;
 };
@@ -122,15 +198,14 @@ double chi_square_gate(int dimensions, double false_alarm) {
   return false_alarm >= 0.01 ? k01[i] : k001[i];
 }
 
-PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options,
-                                  const core::Executor* executor) {
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options) {
   check(graph);
   PoseGraphSummary summary;
   if (std::none_of(graph.poses.begin(), graph.poses.end(), [](const GraphPose& p) { return p.fixed; })) {
     summary.message = "no pose is fixed: the solution would float";
     return summary;
   }
-  PoseGraphSolver solver(graph, executor);
+  Solver solver(graph);
   summary.edges.resize(graph.edges.size());
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     summary.edges[i].dimensions = rank_of(graph.edges[i].information);
@@ -139,11 +214,11 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& opti
   if (options.robust == EdgeRobustness::kGraduated) {
     if (!Graduated(graph, options, solver, summary).run()) return summary;
   } else {
-    const PoseGraphSolver::Outcome solved = solver.solve(options.max_iterations, kTolerance);
+    const ceres::Solver::Summary solved = solver.solve(options.max_iterations, kTolerance);
     summary.rounds = 1;
-    summary.iterations = solved.iterations;
+    summary.iterations = static_cast<int>(solved.iterations.size());
     summary.message = solved.message;
-    if (!solved.usable) return summary;
+    if (!solved.IsSolutionUsable()) return summary;
   }
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     EdgeVerdict& verdict = summary.edges[i];

@@ -70,7 +70,7 @@ MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapF
   if (anchor >= parts.size()) {
     anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
   }
-  mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options, &executor);
+  mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options);
   MergedRobots result;
   for (mapping::MergeEvidence& merge : evidence) {
     const std::string& a = parts[merge.a].name;

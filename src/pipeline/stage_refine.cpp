@@ -98,8 +98,7 @@ class RefineStage : public Stage {
     mapping::Cameras cameras;
     for (const core::KeyframeId id : map.keyframe_ids()) cameras[id.robot] = camera_;
     for (const RobotInfo& robot : robots) cameras[robot.number] = robot.camera.color;
-    const mapping::GlobalAdjustmentSummary summary =
-        mapping::adjust_map(map, cameras, edges, adjustment_, {}, executor_);
+    const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras, edges, adjustment_);
     for (std::size_t i = 0; i < std::min(alignments, summary.extra.size()); ++i) {
       counts_.rejected += summary.extra[i].rejected ? 1U : 0U;
     }

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/mapping/sighting_noise.hpp"
 #include "plumbline/mapping/tracked_way.hpp"
@@ -52,8 +51,7 @@ struct MapGraphResult {
 /// Pose graph of map_edges(map) and `extra`. `anchor` is held (an invalid id: the map's first keyframe). The
 /// map is not changed. Edges of `extra` between keyframes that the map does not hold throw std::out_of_range.
 MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
-                               const optimize::PoseGraphOptions& options, core::KeyframeId anchor = {},
-                               const core::Executor* executor = nullptr);
+                               const optimize::PoseGraphOptions& options, core::KeyframeId anchor = {});
 
 /// Gives keyframes new poses; points and lines follow the keyframes that see them (mean over these).
 void move_keyframes(maps::Map& map, const KeyframePoses& poses);
@@ -92,10 +90,8 @@ struct GlobalAdjustmentSummary {
 
 /// Moves all keyframes and landmarks of the map to where everything fits best, and takes observations that do
 /// not fit out of it. `anchor` stays where it is (an invalid id: the map's first keyframe). The same input
-/// gives the same bytes, for any number of threads; without an executor the caller's thread does it all.
-/// Every robot of the map must have a camera (throws std::out_of_range).
+/// gives the same bytes. Every robot of the map must have a camera (throws std::out_of_range).
 GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
-                                   const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {},
-                                   const core::Executor* executor = nullptr);
+                                   const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {});
 
 }  // namespace plumbline::mapping

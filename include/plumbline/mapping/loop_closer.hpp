@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "plumbline/core/error.hpp"
-#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/mapping/consistent_pairs.hpp"
 #include "plumbline/mapping/global_adjustment.hpp"
@@ -69,13 +68,9 @@ struct LoopTrial {
 
 class LoopCloser {
  public:
-  /// The executor shares the work of closing a loop and must outlive this; null: the caller's thread does it
-  /// all.
-  LoopCloser(const LoopOptions& options, const sensor::Pinhole& camera,
-             const core::Executor* executor = nullptr)
+  LoopCloser(const LoopOptions& options, const sensor::Pinhole& camera)
       : options_(options),
         camera_(camera),
-        executor_(executor),
         database_(places::Vocabulary(options.vocabulary)),
         recogniser_(options.places) {}
 
@@ -117,7 +112,6 @@ class LoopCloser {
 
   LoopOptions options_;
   sensor::Pinhole camera_;
-  const core::Executor* executor_;
   places::Database database_;
   places::Recogniser recogniser_;
   core::KeyframeId last_;      ///< the keyframe before

@@ -186,7 +186,7 @@ struct FusedMap {
 /// (stage refine). Merges that the pose graph finds to contradict the rest are no longer accepted, and then
 /// the fusion is done without them.
 FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
-                   const MapFusionOptions& options, const core::Executor* executor = nullptr);
+                   const MapFusionOptions& options);
 
 /// Depends on what the keyframes measured and on their poses, not on names and robots' numbers.
 std::uint64_t content_hash(const maps::Map& map);

@@ -2,14 +2,13 @@
 #pragma once
 
 // Bundle adjustment over poses, points and lines, with relative-pose edges from dense alignment (METHOD
-// sections 2 and 3). Plain structs in, plain structs out. Every sum runs in a fixed order: the same bytes for
-// any number of threads.
+// sections 2 and 3). Plain structs in, plain structs out. Every sum runs in a fixed order: the same bytes
+// each time.
 #include <Eigen/Core>
 #include <cstddef>
 #include <string>
 #include <vector>
 
-#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/geometry/plucker.hpp"
 #include "plumbline/geometry/rigid3.hpp"
@@ -109,9 +108,12 @@ struct BundleSummary {
 };
 
 /// Updates poses that are not fixed, points, lines and the outlier flags. Poses without any observation stay.
-/// At least one pose must be fixed; nothing is changed (usable = false, message says why) otherwise. Large
-/// problems are shared among the executor's threads; without one the caller's thread does it all.
-BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options,
-                            const core::Executor* executor = nullptr);
+/// At least one pose must be fixed; nothing is changed (usable = false, message says why) otherwise.
+/// For a window of keyframes: it takes a tenth of the time, but memory and time grow with the square and the
+/// cube of the poses.
+BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options);
+
+/// The same for a whole map, by Ceres.
+BundleSummary adjust_map_bundle(BundleProblem& problem, const BundleOptions& options);
 
 }  // namespace plumbline::optimize

@@ -3,12 +3,11 @@
 
 // Pose graph: poses held together by relative measurements only, some of which may be wrong. Wrong edges are
 // found by graduated non-convexity with a truncated quadratic (Yang, Antonante, Tzoumas, Carlone, RA-L 2020):
-// least squares with weights that go from nearly convex to 0 or 1. Plain structs in and out.
-// Deterministic: sums in a fixed order, whatever the number of threads.
+// least squares, by Ceres, with weights that go from nearly convex to 0 or 1. Plain structs in and out.
+// Sums run in a fixed order: the same bytes each time.
 #include <string>
 #include <vector>
 
-#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 
@@ -71,10 +70,8 @@ struct PoseGraphSummary {
 
 /// Updates the poses that are not fixed. Parts of the graph that no edges tie to a fixed pose stay near where
 /// they are. Edges that name no pose, or the same twice, throw std::invalid_argument; without a fixed pose
-/// nothing is changed (usable = false, message says why). Without an executor the caller's thread does it
-/// all.
-PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options = {},
-                                  const core::Executor* executor = nullptr);
+/// nothing is changed (usable = false, message says why).
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options = {});
 
 /// Number of eigenvalues that are not next to nothing beside the largest one (less than 1e-9 of it).
 int rank_of(const geometry::Matrix6d& information);
