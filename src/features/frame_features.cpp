@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "depth_roughness.hpp"
 #include "plumbline/features/line_border.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -90,10 +91,25 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
 /// What lies behind a border moves apart from what lies before: patches there are left empty.
 void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extractor, OrbFeatures& orb) {
   if (depth.empty()) return;
+  constexpr int kSteps = 5;  // from the corner to the end of what is asked
+  std::vector<float> roughness;
+  std::vector<std::size_t> asked;
   for (std::size_t i = 0; i < orb.points.size(); ++i) {
     const Eigen::Vector2f& pixel = orb.points[i].pixel;
     const auto reach = static_cast<float>(CornerPatch::kReach) * extractor.sigma(orb.points[i].octave);
-    if (at_border(depth, pixel, reach)) orb.patches[i].gray.fill(0);
+    if (at_border(depth, pixel, reach)) {
+      orb.patches[i].gray.fill(0);
+      continue;
+    }
+    const int x = std::clamp(cvRound(pixel.x()), 0, depth.cols - 1);
+    const int y = std::clamp(cvRound(pixel.y()), 0, depth.rows - 1);
+    if (!(depth.at<float>(y, x) > 0.0F)) continue;  // nothing is known
+    roughness.push_back(depth_roughness(depth, x, y, cvRound(reach), std::max(1, cvRound(reach) / kSteps)));
+    asked.push_back(i);
+  }
+  const float limit = roughness_limit(roughness);
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    if (roughness[k] > limit) orb.patches[asked[k]].gray.fill(0);
   }
 }
 

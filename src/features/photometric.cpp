@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "depth_roughness.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::features {
@@ -72,6 +73,16 @@ float bilinear(const cv::Mat& image, float x, float y) {
   return t + sy * (l - t);
 }
 
+/// Takes out the samples whose surroundings are rougher than most: a border is among them.
+void keep_smooth(const std::vector<float>& roughness, std::vector<PhotometricSample>& samples) {
+  const float limit = roughness_limit(roughness);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (roughness[i] <= limit) samples[kept++] = samples[i];
+  }
+  samples.resize(kept);
+}
+
 }  // namespace
 
 PhotometricImage make_photometric_image(const cv::Mat& gray) {
@@ -122,6 +133,7 @@ PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::M
     const int cell = kCell[level];
     const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
     const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+    std::vector<float> roughness;
     for (int cy = kBorder; cy + cell <= picture.rows - kBorder; cy += cell) {
       for (int cx = kBorder; cx + cell <= picture.cols - kBorder; cx += cell) {
         Spot best;
@@ -149,8 +161,11 @@ PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::M
                                  bilinear(picture, u, v),
                                  {0.5F * (bilinear(picture, u + 1.0F, v) - bilinear(picture, u - 1.0F, v)),
                                   0.5F * (bilinear(picture, u, v + 1.0F) - bilinear(picture, u, v - 1.0F))}});
+        roughness.push_back(
+            depth_roughness(depth, full_x, full_y, around.near_px, static_cast<int>(level) + 1));
       }
     }
+    keep_smooth(roughness, result[level]);
   }
   return result;
 }
