@@ -45,7 +45,14 @@ struct StoreWorld {
     for (int f = 0; f < lines; f += 2) add_line(id, f);
     map.attach(id);
     for (int i = 0; i < 3; ++i) {
-      frames.push_back({0.033 * static_cast<double>(frames.size()), id, random_.pose(0.1, 0.1), i != 1});
+      maps::FramePose frame;
+      frame.stamp = 0.033 * static_cast<double>(frames.size());
+      frame.reference = id;
+      frame.camera_from_reference = random_.pose(0.1, 0.1);
+      frame.tracked = i != 1;
+      if (i == 0) frame.camera_from_previous = random_.pose(0.1, 0.1);
+      frame.step_sigma_m = i == 0 ? 0.003 : 0.0;
+      frames.push_back(frame);
     }
     refine(id);
     if (deletes) thin_out();
@@ -75,6 +82,9 @@ struct StoreWorld {
     keyframe->frame_index = 3 * steps_;
     keyframe->stamp = 1305031102.175304 + 0.1 * steps_;
     keyframe->turn_rate = random_.uniform(0, 1);
+    if (keyframe->id.index > 0) keyframe->reference = {keyframe->id.robot, keyframe->id.index - 1};
+    keyframe->camera_from_reference = random_.pose(0.3, 0.3);
+    keyframe->reference_sigma_m = random_.uniform(0.001, 0.01);
     keyframe->features = f;
     for (int i = 0; i < 20; ++i) {
       keyframe->surface.push_back(
@@ -230,7 +240,10 @@ inline bool same(const maps::SurfaceSample& a, const maps::SurfaceSample& b) {
 }
 inline bool same(const maps::FramePose& a, const maps::FramePose& b) {
   return a.stamp == b.stamp && a.reference == b.reference &&
-         same(a.camera_from_reference, b.camera_from_reference) && a.tracked == b.tracked;
+         same(a.camera_from_reference, b.camera_from_reference) && a.tracked == b.tracked &&
+         a.camera_from_previous.has_value() == b.camera_from_previous.has_value() &&
+         (!a.camera_from_previous || same(*a.camera_from_previous, *b.camera_from_previous)) &&
+         a.step_sigma_m == b.step_sigma_m;
 }
 template <typename T>
 bool same_all(const std::vector<T>& a, const std::vector<T>& b) {
@@ -255,6 +268,8 @@ inline bool same_lookup(const features::FrameFeatures& a, const features::FrameF
 
 inline bool same(const maps::Keyframe& a, const maps::Keyframe& b) {
   if (a.id != b.id || a.frame_index != b.frame_index || a.stamp != b.stamp || a.turn_rate != b.turn_rate ||
+      a.reference != b.reference || !same(a.camera_from_reference, b.camera_from_reference) ||
+      a.reference_sigma_m != b.reference_sigma_m ||
       !same_all(a.surface, b.surface) || (a.features == nullptr) != (b.features == nullptr)) {
     return false;
   }

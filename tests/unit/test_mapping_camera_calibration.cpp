@@ -71,7 +71,7 @@ World swing(const sensor::Camera& truth, int keyframes, int corners) {
     ids.push_back(world.map.add_keyframe(keyframe, pose_at(stamp)));
     for (const double beside : {-0.03, 0.0, 0.03}) {
       world.frames.push_back(
-          {stamp + beside, ids.back(), pose_at(stamp + beside) * pose_at(stamp).inverse(), true});
+          {stamp + beside, ids.back(), pose_at(stamp + beside) * pose_at(stamp).inverse(), true, {}, 0.0});
     }
   }
   for (std::size_t i = 0; i < points.size(); ++i) {

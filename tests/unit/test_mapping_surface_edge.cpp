@@ -171,7 +171,7 @@ TEST(SurfaceEdge, AKeyframesSurfaceIsThatOfItsColourImage) {
   tracking::TrackResult track;
   track.depth_from_camera = later;
   const core::KeyframeId id =
-      mapper.insert(map, 0, frame, std::make_shared<features::FrameFeatures>(), track, {}, 0.0);
+      mapper.insert(map, 0, frame, std::make_shared<features::FrameFeatures>(), track, {}, {}, 0.0);
   int near = 0;
   for (const maps::SurfaceSample& s : map.keyframe(id).surface) {
     double least = 1.0;

@@ -103,7 +103,7 @@ TEST(StoreSurface, StoresOfAnOlderFormatAreRefusedWithTheRemedy) {
   const StoreFolder folder;
   StoreWorld world(6);
   write_store(folder.file(), world, 3);
-  run_sql(folder.file(), "PRAGMA user_version = " + std::to_string(kStoreFormat - 1));
+  run_sql(folder.file(), ("PRAGMA user_version = " + std::to_string(kStoreFormat - 1)).c_str());
   const auto reader = StoreReader::open(folder.file());
   ASSERT_FALSE(reader);
   EXPECT_NE(reader.error().message.find("map the recording again"), std::string::npos)

@@ -94,7 +94,7 @@ TEST(FramePoses, MoveWithTheirKeyframes) {
   const Rigid3 pose = random.pose(1.0, 2.0);
   const Rigid3 frame_from_keyframe = random.pose(0.3, 0.2);
   const KeyframeId id = add_keyframe(map, pose);
-  const std::vector<FramePose> frames{{1.1, id, frame_from_keyframe, true}, {1.2, id, {}, false}};
+  const std::vector<FramePose> frames{{1.1, id, frame_from_keyframe, true, {}, 0.0}, {1.2, id, {}, false, {}, 0.0}};
   const Rigid3 correction = random.pose(0.5, 1.0);  // of the world
   map.set_pose(id, pose * correction);
   const geometry::Trajectory path = trajectory(frames, map);
