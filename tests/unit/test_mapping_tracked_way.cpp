@@ -3,6 +3,8 @@
 // it is not put into the map.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
+
 #include <memory>
 #include <set>
 
