@@ -132,8 +132,6 @@ void encode(const SurfaceEdge& edge, ByteWriter& to) {
   to.put(edge.b);
   to.put(edge.b_from_a);
   to.put(edge.information);
-  to.put(edge.overlap);
-  to.put(edge.rms);
 }
 SurfaceEdge decode_edge(const Bytes& bytes) {
   ByteReader from(bytes);
@@ -142,8 +140,6 @@ SurfaceEdge decode_edge(const Bytes& bytes) {
   from.get(edge.b);
   from.get(edge.b_from_a);
   from.get(edge.information);
-  from.get(edge.overlap);
-  from.get(edge.rms);
   from.expect_end();
   return edge;
 }

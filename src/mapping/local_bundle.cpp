@@ -14,14 +14,17 @@ using geometry::Rigid3;
 
 constexpr int kMaxHeld = 20;
 
-/// How exactly the tracker knows the way from one keyframe to the next. No keyframe is freer than this,
-/// whatever it shares with others: what hangs on a handful of wrong matches would go where these pull it.
-Matrix6d tracked_information() {
-  constexpr double kSigma_m = 0.01;
-  constexpr double kSigma_rad = 0.007;
+/// What the tracker knows of the way to a keyframe from the one it followed, no better than 1 cm. No keyframe
+/// is freer than this, whatever it shares with others: what hangs on a handful of wrong matches would go
+/// where these pull it.
+Matrix6d tracked_information(const maps::Keyframe& keyframe) {
+  constexpr double kLeast_m = 0.01;
+  constexpr double kRadPerMetre = 0.7;
+  const double sigma_m = std::max(kLeast_m, keyframe.reference_sigma_m);
+  const double sigma_rad = kRadPerMetre * sigma_m;
   geometry::Vector6d diagonal;
-  diagonal << Eigen::Vector3d::Constant(1.0 / (kSigma_m * kSigma_m)),
-      Eigen::Vector3d::Constant(1.0 / (kSigma_rad * kSigma_rad));
+  diagonal << Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m)),
+      Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad));
   return diagonal.asDiagonal();
 }
 
@@ -110,7 +113,7 @@ class Builder {
       const double turning =
           unrest(keyframe.reference) * unrest(id);  // what they see holds them all the less
       add_edge(keyframe.reference, id, keyframe.camera_from_reference,
-               turning * turning * tracked_information());
+               turning * turning * tracked_information(keyframe));
     }
   }
 

@@ -102,12 +102,8 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   }
   const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());
   if (overlap < options.min_overlap) return std::nullopt;
-  return maps::SurfaceEdge{a.id,
-                           b,
-                           without_hold(pose, *problem.prior, summary.information),
-                           summary.information,
-                           overlap,
-                           summary.planes.rms};
+  return maps::SurfaceEdge{a.id, b, without_hold(pose, *problem.prior, summary.information),
+                           summary.information};
 }
 
 }  // namespace plumbline::mapping

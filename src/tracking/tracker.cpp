@@ -248,6 +248,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   }
   found->features = still;
   settle_shutter(map, frame, features, *found);
+  found->continuous = knows_motion(frame.stamp);
   found->photometric = found->features->photometric;
   found->features = without_picture(*found->features, found->points, camera_);
   remember(frame, *found->features, *found);

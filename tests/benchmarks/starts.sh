@@ -48,6 +48,8 @@ for recording in "$@"; do
     IFS='&' read -ra pairs <<<"${body#*\?}"
     for pair in "${pairs[@]}"; do options+=("--${pair%%=*}" "${pair#*=}"); done
     "$program" synth "${body%%\?*}" -o "$work/$name" "${options[@]}" --reference-spacing 0.5 -q
+    # As the files of common cameras: they do not tell their shutter.
+    [[ "$body" == *readout=* ]] && sed -i '/^readout/d' "$work/$name/robot0/camera.yaml"
     [ -d "$work/$name/robot0" ] && mv "$work/$name/robot0" "$work/$name.robot" && rm -rf "$work/$name" &&
       mv "$work/$name.robot" "$work/$name"
   fi

@@ -208,8 +208,7 @@ inline bool same(const maps::MapLine& a, const maps::MapLine& b) {
          a.visible == b.visible && a.found == b.found && same(a.observations, b.observations);
 }
 inline bool same(const maps::SurfaceEdge& a, const maps::SurfaceEdge& b) {
-  return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information &&
-         a.overlap == b.overlap && a.rms == b.rms;
+  return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information;
 }
 inline bool same(const maps::LoopEdge& a, const maps::LoopEdge& b) {
   return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information;

@@ -153,7 +153,7 @@ TEST(LocalBundle, AKeyframeTakenWhileTurningFastSaysLess) {
 TEST(LocalBundle, AnEdgeOfAKeyframeTakenWhileTurningFastSaysLess) {
   for (const double turn_rate : {0.0, 0.8}) {
     SmallMap world(turn_rate);
-    world.map.add_edge({{0, 1}, {0, 2}, {}, geometry::Matrix6d::Identity(), 1.0, 1.0});
+    world.map.add_edge({{0, 1}, {0, 2}, {}, geometry::Matrix6d::Identity()});
     const LocalBundle bundle = take_local_bundle(world.map, {0, 1}, kCamera, {});
     ASSERT_EQ(bundle.problem.edges.size(), 1U);
     EXPECT_DOUBLE_EQ(bundle.problem.edges[0].information(0, 0),

@@ -96,8 +96,6 @@ struct SurfaceEdge {
   KeyframeId b;
   geometry::Rigid3 b_from_a;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
-  double overlap = 0.0;  ///< share of a's samples in b's view that b confirms
-  double rms = 0.0;      ///< of the confirmed samples, standard deviations
 };
 
 /// A place that was seen again: how two keyframes lie to each other as their landmarks say. The information

@@ -61,8 +61,13 @@ struct TrackResult {
   /// Of the information matrix of the families that are trusted, 1/m^2, rotations scaled by the scene's
   /// depth.
   double min_eigenvalue = 0.0;
-  /// Standard deviation of the pose where it is known worst, metres; half as much in radians.
-  [[nodiscard]] double sigma_m() const { return 1.0 / std::sqrt(std::max(min_eigenvalue, 1.0)); }
+  bool continuous =
+      false;  ///< the frame before is tracked and no more than a step away: the motion model knew
+  /// Standard deviation of the motion since the frame before where it is known worst, metres; half as much in
+  /// radians. After a gap nothing bears it out: a decimetre.
+  [[nodiscard]] double sigma_m() const {
+    return continuous ? 1.0 / std::sqrt(std::max(min_eigenvalue, 1.0)) : 0.1;
+  }
   int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
   bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
   /// What these directions have of a motion (left perturbation of camera_from_world), to multiply it with;
