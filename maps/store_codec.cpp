@@ -127,14 +127,16 @@ void decode_page(const Bytes& bytes, std::vector<MapLine>& lines) {
   }
 }
 
-void encode(const SurfaceEdge& edge, ByteWriter& to) {
+void encode(const SurfaceEdge& edge, std::uint64_t number, ByteWriter& to) {
+  to.put(number);
   to.put(edge.a);
   to.put(edge.b);
   to.put(edge.b_from_a);
   to.put(edge.information);
 }
-SurfaceEdge decode_edge(const Bytes& bytes) {
+SurfaceEdge decode_edge(const Bytes& bytes, std::uint64_t number) {
   ByteReader from(bytes);
+  if (from.get<std::uint64_t>() != number) throw BadBytes("it holds what belongs to another row");
   SurfaceEdge edge;
   from.get(edge.a);
   from.get(edge.b);

@@ -40,8 +40,9 @@ void encode(const MapLine& line, ByteWriter& to);
 void decode_page(const Bytes& bytes, std::vector<MapPoint>& points);
 void decode_page(const Bytes& bytes, std::vector<MapLine>& lines);
 
-void encode(const SurfaceEdge& edge, ByteWriter& to);
-SurfaceEdge decode_edge(const Bytes& bytes);
+/// With its number, which tells a row that holds another's bytes.
+void encode(const SurfaceEdge& edge, std::uint64_t number, ByteWriter& to);
+SurfaceEdge decode_edge(const Bytes& bytes, std::uint64_t number);
 void encode(const std::vector<LoopEdge>& loops, ByteWriter& to);
 std::vector<LoopEdge> decode_loops(const Bytes& bytes);
 

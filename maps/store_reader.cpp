@@ -112,13 +112,10 @@ StoredMap read_map(Database& database, const StoreHeader& header) {
   read_landmarks(database, "point", parts.points);
   read_landmarks(database, "line", parts.lines);
   read_table(database, "edge", [&](KeyframeId, std::int64_t number, const Bytes& bytes) {
-    parts.edges.emplace_back(static_cast<std::uint64_t>(number), decode_edge(bytes));
+    parts.edges.emplace_back(static_cast<std::uint64_t>(number), decode_edge(bytes, static_cast<std::uint64_t>(number)));
   });
   std::sort(parts.edges.begin(), parts.edges.end(),  // the table is by robot first
             [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (std::size_t i = 0; i < parts.edges.size(); ++i) {
-    if (parts.edges[i].first != i) throw BadBytes("an edge has another's number");
-  }
   parts.loops = decode_loops(read_loops(database));
   read_table(database, "frame",
              [&](KeyframeId, std::int64_t, const Bytes& bytes) { decode_page(bytes, stored.frames); });

@@ -160,7 +160,7 @@ void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
     if (edges.keep(key)) continue;
     bytes.clear();
-    encode(edge, bytes);
+    encode(edge, number, bytes);
     edges.put(key, bytes.bytes());
   }
   for (const auto& [number, robot] : map.edge_names) edges.stay({robot, static_cast<std::int64_t>(number)});

@@ -149,7 +149,7 @@ struct StoreWorld {
       const core::KeyframeId other =
           all[static_cast<std::size_t>(random_.integer(0, static_cast<int>(all.size()) - 1))];
       if (other == id) continue;
-      maps::SurfaceEdge edge{i == 0 ? id : other, i == 0 ? other : id, random_.pose(1.0, 1.0), {}, 0.5, 1.25};
+      maps::SurfaceEdge edge{i == 0 ? id : other, i == 0 ? other : id, random_.pose(1.0, 1.0), {}};
       edge.information = random_.uniform(1, 1000) * geometry::Matrix6d::Identity();
       edge.information(0, 5) = random_.uniform(-1, 1);
       map.add_edge(edge);
