@@ -218,7 +218,7 @@ bool may_move(const maps::Map& map, const KeyframePoses& poses, GlobalAdjustment
   const auto wrong = contradiction(map, poses);
   if (!wrong) return true;
   ++summary.refused;
-  summary.message = wrong->text();
+  summary.refusal = wrong->text();
   return false;
 }
 

@@ -107,7 +107,7 @@ class RefineStage : public Stage {
     counts_.before = summary.bundle.before;
     counts_.after = summary.bundle.after;
     refused_ = static_cast<std::size_t>(summary.refused);
-    if (summary.refused > 0) log_->warning("refine: not put into the map: " + summary.message);
+    if (summary.refused > 0) log_->warning("refine: not put into the map: " + summary.refusal);
     if (!summary.changed) log_->warning("refine: the map stays as it is: " + summary.message);
     log_->debug(fmt::format(
         "refine: {} keyframes, {} points, {} lines, {} surface edges, {} alignments, {} loops; "

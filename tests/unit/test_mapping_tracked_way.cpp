@@ -100,7 +100,7 @@ TEST(TrackedWay, AGroupThatIsMovedAwayIsToldWithItsSeam) {
   EXPECT_FALSE(
       contradiction(way.map, way.moved(5, 8, Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.01, 0.0}))));
   EXPECT_TRUE(
-      contradiction(way.map, way.moved(5, 8, Rigid3(geometry::exp_so3({0.0, 0.05, 0.0}), {0.0, 0.0, 0.0}))));
+      contradiction(way.map, way.moved(5, 8, Rigid3(geometry::exp_so3({0.0, 0.06, 0.0}), {0.0, 0.0, 0.0}))));
 }
 
 TEST(TrackedWay, WhatTheTrackerHardlyKnewMayChange) {

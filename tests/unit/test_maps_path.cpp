@@ -66,7 +66,7 @@ TEST(Path, NoiseIsNoTear) {
   EXPECT_TRUE(check.tears.empty());
   EXPECT_NEAR(check.largest_m, 0.02, 1e-9);
   Path turned;
-  turned.move({0, 1}, Rigid3(geometry::exp_so3({0.0, 0.0, 0.05}), {0.0, 0.0, 0.0}));
+  turned.move({0, 1}, Rigid3(geometry::exp_so3({0.0, 0.0, 0.06}), {0.0, 0.0, 0.0}));
   EXPECT_EQ(check_path(turned.frames, turned.map).tears.size(), 2U) << "in front of it and behind";
   Path corridor(0.1);
   corridor.move({0, 1}, Rigid3(Eigen::Matrix3d::Identity(), {0.2, 0.0, 0.0}));

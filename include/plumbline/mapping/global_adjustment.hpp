@@ -84,7 +84,8 @@ struct GlobalAdjustmentSummary {
   double mean_shift_m = 0.0;  ///< how far keyframes moved
   double max_shift_m = 0.0;
   bool changed = false;  ///< the map was moved
-  int refused = 0;  ///< solutions that contradicted what the tracker had measured; `message` tells the last
+  int refused = 0;       ///< solutions that contradicted what the tracker had measured
+  std::string refusal;   ///< what the last of these would have torn
   std::string message;  ///< why not, or what the solver said
 };
 

@@ -35,7 +35,7 @@ struct PathStep {
 struct PathCheck {
   double largest_m = 0.0;  ///< by how much a step differs at most from the tracker's
   double largest_rad = 0.0;
-  std::vector<PathStep> tears;  ///< beyond noise: 3 cm or 2 degrees, and 4 standard deviations
+  std::vector<PathStep> tears;  ///< beyond noise: 5 cm or 3 degrees, and 4 standard deviations
 };
 
 /// Whether the map has torn: the path must lead from frame to frame as the tracker saw it. Frames hang on
