@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/surface_cloud.hpp"
+
+#include <pcl/filters/voxel_grid.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+namespace plumbline::cloud {
+namespace {
+
+/// The way a surface faces, and the block that a point lies in.
+using Part = std::array<int, 4>;
+
+Part part_of(const SurfacePoint& p, float block_m) {
+  const Eigen::Vector3f normal = p.getNormalVector3fMap();
+  Eigen::Index axis = 0;
+  normal.cwiseAbs().maxCoeff(&axis);
+  const auto block = [block_m](float x) { return static_cast<int>(std::floor(x / block_m)); };
+  return {static_cast<int>(2 * axis + (normal[axis] < 0.0F ? 1 : 0)), block(p.x), block(p.y), block(p.z)};
+}
+
+/// Of a block whose points face one way.
+void append_filtered(const SurfaceCloud::Ptr& part, float voxel_m, bool independent, SurfaceCloud& result) {
+  pcl::VoxelGrid<SurfacePoint> grid;
+  grid.setInputCloud(part);
+  grid.setLeafSize(voxel_m, voxel_m, voxel_m);
+  grid.setDownsampleAllData(true);
+  grid.setSaveLeafLayout(independent);
+  SurfaceCloud means;
+  grid.filter(means);
+  if (independent) {
+    std::vector<float> counts(means.size(), 0.0F);
+    for (const SurfacePoint& p : *part) ++counts[static_cast<std::size_t>(grid.getCentroidIndex(p))];
+    for (std::size_t i = 0; i < means.size(); ++i) means[i].curvature /= std::sqrt(counts[i]);
+  }
+  result += means;
+}
+
+}  // namespace
+
+SurfaceCloud voxel_filtered(const SurfaceCloud& cloud, float voxel_m, bool independent) {
+  constexpr float kBlock = 256.0F;  // voxels along each side: 2^24 cells
+  std::map<Part, SurfaceCloud::Ptr> parts;
+  for (const SurfacePoint& p : cloud) {
+    if (!p.getVector3fMap().allFinite() || !p.getNormalVector3fMap().allFinite()) continue;
+    SurfaceCloud::Ptr& part = parts[part_of(p, kBlock * voxel_m)];
+    if (part == nullptr) part = std::make_shared<SurfaceCloud>();
+    part->push_back(p);
+  }
+  SurfaceCloud result;
+  for (const auto& [key, part] : parts) append_filtered(part, voxel_m, independent, result);
+  return result;
+}
+
+SurfaceSearch::SurfaceSearch(SurfaceCloud::ConstPtr cloud) : cloud_(std::move(cloud)) {
+  if (cloud_->empty()) return;  // FLANN has no tree of nothing
+  tree_ = std::make_shared<Tree>();
+  tree_->setInputCloud(cloud_);
+}
+
+int nearest_facing(const SurfaceSearch::Tree& tree, const SurfacePoint& point, float distance_m,
+                   float min_cosine) {
+  constexpr int kLookedAt = 8;
+  if (!point.getVector3fMap().allFinite()) return -1;
+  thread_local pcl::Indices indices;
+  thread_local std::vector<float> squares;
+  const int found = tree.nearestKSearch(point, kLookedAt, indices, squares);
+  for (int i = 0; i < found && squares[static_cast<std::size_t>(i)] <= distance_m * distance_m; ++i) {
+    const int index = indices[static_cast<std::size_t>(i)];
+    const SurfacePoint& p = (*tree.getInputCloud())[static_cast<std::size_t>(index)];
+    if (p.getNormalVector3fMap().dot(point.getNormalVector3fMap()) >= min_cosine) return index;
+  }
+  return -1;
+}
+
+}  // namespace plumbline::cloud
