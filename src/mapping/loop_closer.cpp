@@ -229,7 +229,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
     GlobalAdjustmentOptions adjustment;
     adjustment.graph = graph;
     adjustment.noise.orb_scale_factor = options_.verify.orb_scale_factor;
-    adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment);
+    counts_.refused += adjust_map(map, {{edges.front().b.robot, camera_}}, believed, adjustment).refused;
   }
   return true;
 }

@@ -183,6 +183,8 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
   adjustment.bundle = false;  // before surfaces are aligned it bends a map that hangs on a narrow overlap
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
+  fused.refused = graph.refused;
+  fused.refusal = graph.refusal;
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
   std::vector<PoseEdge> believed;
   for (std::size_t i = 0; i < edges.size(); ++i) {

@@ -90,6 +90,8 @@ MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapF
       fmt::format("fused {} maps: {} pairs of keyframes, {} taken for wrong; {} points and {} lines were "
                   "doubles",
                   fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
+  result.refused = static_cast<std::size_t>(fused.refused);
+  if (fused.refused > 0) log.warning("merge: maps are laid into one frame, but not bent: " + fused.refusal);
   result.map = map;
   return result;
 }

@@ -25,6 +25,7 @@ struct MergedRobots {
   std::shared_ptr<const MapResult> map;
   std::vector<RunSummary::Merge> merges;
   std::string unconnected;  ///< which maps are left out and what was tried; empty: none
+  std::size_t refused = 0;  ///< adjustments that would have torn a map
 };
 
 /// mapping::learn_places of the parts: can be done beside other work.

@@ -70,6 +70,7 @@ class MapsStage : public Stage {
     summary.lines = merged_.map->lines.size();
     summary.merges = merged_.merges;
     summary.unconnected = merged_.unconnected;
+    summary.path.refused += merged_.refused;
     for (const maps::FramePose& frame : merged_.map->frame_poses) {
       ++summary.frames.read;
       ++(frame.tracked ? summary.frames.tracked : summary.frames.lost);

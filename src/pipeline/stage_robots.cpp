@@ -97,6 +97,7 @@ class RobotsStage : public Stage {
     summary.lines = merged_.map->lines.size();
     summary.merges = merged_.merges;
     summary.unconnected = merged_.unconnected;
+    summary.path.refused += merged_.refused;
     for (const RobotInfo& robot : recordings_->robots()) {
       const auto r = static_cast<std::size_t>(robot.number);
       const mapping::LoopCounts& loops = slams_[r]->loop_counts();

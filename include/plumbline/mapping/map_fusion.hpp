@@ -179,6 +179,8 @@ struct FusedMap {
   int merged_lines = 0;
   int edges = 0;     ///< pairs of keyframes given to the pose graph
   int rejected = 0;  ///< of these, taken for wrong
+  int refused = 0;   ///< 1: the pose graph would have torn a map, and parts lie as `anchor_from_part` says
+  std::string refusal;  ///< where
 };
 
 /// Lays all parts that hang together with `anchor` into its world by a pose graph and merges what is there
