@@ -1,92 +1,150 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Symmetric point-to-plane ICP of two surfaces.
+// Point-to-plane ICP of two surfaces, both ways at once, in PCL's registration loop.
 #include "plumbline/mapping/local_map_alignment.hpp"
 
 #include <fmt/format.h>
+#include <pcl/registration/icp.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
-#include "plane_matches.hpp"
+#include "plumbline/cloud/constrained_point_to_plane.hpp"
+#include "plumbline/cloud/two_way_correspondences.hpp"
 #include "surface_voxels.hpp"
 
 namespace plumbline::mapping {
 namespace {
 
+using cloud::PlaneStep;
+using cloud::SurfaceCloud;
+using cloud::SurfacePoint;
 using geometry::Matrix6d;
 using geometry::Rigid3;
-using geometry::Vector6d;
 
-/// Up to `wanted` samples, as many as possible from each of the ways a surface may face, spread over the
-/// rest.
-CoarseSurface spread(const CoarseSurface& samples, int wanted) {
-  std::array<std::vector<std::uint32_t>, 6> ways;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    ways[facing(samples[i].normal)].push_back(static_cast<std::uint32_t>(i));
-  }
-  std::array<std::vector<std::uint32_t>*, 6> order{};
+constexpr int kFewest = 100;  // correspondences
+using Icp = pcl::IterativeClosestPointWithNormals<SurfacePoint, SurfacePoint, double>;
+using Criteria = pcl::registration::DefaultConvergenceCriteria<double>;
+
+Rigid3 rigid_of(const Eigen::Matrix4d& matrix) {
+  return {Eigen::Quaterniond(Eigen::Matrix3d(matrix.topLeftCorner<3, 3>())).normalized().toRotationMatrix(),
+          matrix.topRightCorner<3, 1>()};
+}
+
+/// Up to `wanted` of these points, as many as possible from each of the ways a surface may face, spread over
+/// the rest.
+pcl::Indices spread(const SurfaceCloud& cloud, const pcl::Indices& some, int wanted) {
+  std::array<pcl::Indices, 6> ways;
+  for (const int i : some)
+    ways[facing(cloud[static_cast<std::size_t>(i)].getNormalVector3fMap())].push_back(i);
+  std::array<pcl::Indices*, 6> order{};
   for (std::size_t i = 0; i < 6; ++i) order[i] = &ways[i];
   std::stable_sort(order.begin(), order.end(), [](auto* x, auto* y) { return x->size() < y->size(); });
-  CoarseSurface result;
+  pcl::Indices result;
   auto left = static_cast<std::size_t>(wanted);
   for (std::size_t i = 0; i < order.size(); ++i) {
-    const std::vector<std::uint32_t>& way = *order[i];
+    const pcl::Indices& way = *order[i];
     const std::size_t take = std::min(way.size(), left / (order.size() - i));
-    for (std::size_t k = 0; k < take; ++k) result.push_back(samples[way[k * way.size() / take]]);
+    for (std::size_t k = 0; k < take; ++k) result.push_back(way[k * way.size() / take]);
     left -= take;
   }
   return result;
 }
 
+/// Points of a surface that have a counterpart on another one, and of how many that were asked.
+struct Overlap {
+  pcl::Indices points;
+  double share = 0.0;
+};
+Overlap overlap_of(const cloud::SurfaceSearch& surface, const cloud::SurfaceSearch& other,
+                   const Rigid3& other_from_surface, const AlignmentOptions& options) {
+  constexpr std::size_t kTried = 3000;
+  const SurfaceCloud& cloud = *surface.cloud();
+  const Eigen::Matrix3f rotation = other_from_surface.rotation.cast<float>();
+  const Eigen::Vector3f translation = other_from_surface.translation.cast<float>();
+  Overlap found;
+  std::size_t tried = 0;
+  for (std::size_t i = 0; i < cloud.size(); i += 1 + cloud.size() / kTried, ++tried) {
+    SurfacePoint p = cloud[i];
+    p.getVector3fMap() = rotation * cloud[i].getVector3fMap() + translation;
+    p.getNormalVector3fMap() = rotation * cloud[i].getNormalVector3fMap();
+    if (cloud::nearest_facing(*other.tree(), p, static_cast<float>(options.distance_m),
+                              static_cast<float>(options.min_cosine)) >= 0) {
+      found.points.push_back(static_cast<int>(i));
+    }
+  }
+  found.share =
+      static_cast<double>(found.points.size()) / static_cast<double>(std::max<std::size_t>(1, tried));
+  return found;
+}
+
 class Aligner {
  public:
-  Aligner(const SurfaceIndex& a, const SurfaceIndex& b, const AlignmentOptions& options)
-      : a_(a), b_(b), options_(options), reach_(options.distance_m) {}
+  Aligner(const cloud::SurfaceSearch& a, const cloud::SurfaceSearch& b, const AlignmentOptions& options)
+      : a_(a),
+        b_(b),
+        options_(options),
+        correspondences_(
+            std::make_shared<cloud::TwoWayCorrespondences>(a, b, static_cast<float>(options.min_cosine))),
+        estimation_(std::make_shared<cloud::ConstrainedPointToPlane>(options.min_hold)) {}
 
   SurfaceAlignment run(const Rigid3& start) {
+    constexpr double kFar = 0.3;  // of the distance between matches
     result_.b_from_a = start;
+    if (a_.tree() == nullptr || b_.tree() == nullptr) return refuse("the surfaces do not meet");
     if (!settle()) return result_;
     // Of surfaces that lay far apart few samples were in reach. Now that they meet, more are.
     if (moved_since(start) > kFar * options_.distance_m && !settle()) return result_;
-    match(0.5 * options_.distance_m);
-    if (matches_.size() < kFewest) return refuse("the surfaces do not meet");
     judge(start);
     return result_;
   }
 
  private:
-  static constexpr std::size_t kFewest = 100;
-  static constexpr std::size_t kTried = 3000;  ///< of each surface's samples, when samples are chosen
-  static constexpr double kStill_m = 1e-4;
-  static constexpr double kFar = 0.3;  ///< of the distance between matches
-
   /// ICP from where the surfaces lie now; false: refused.
   bool settle() {
     choose_samples();
-    double distance = options_.distance_m;
-    for (int round = 1; round <= options_.max_iterations; ++round) {
-      ++result_.iterations;
-      match(distance);
-      if (matches_.size() < kFewest) {
-        refuse("the surfaces do not meet");
-        return false;
-      }
-      narrow_ = distance <= 0.5 * options_.distance_m;
-      const Vector6d step = solve();
-      result_.b_from_a = geometry::exp_se3(step) * result_.b_from_a;
-      const double moved =
-          (step.head<3>() + step.tail<3>().cross(centre_)).norm() + lever_ * step.tail<3>().norm();
-      if (narrow_ && moved < kStill_m) return true;
-      if (moved < 0.02 * options_.distance_m) distance = 0.5 * options_.distance_m;
-    }
+    return align(false) && align(true);
+  }
+  bool align(bool narrow) {
+    constexpr double kStill_m = 1e-4;
+    const double distance = narrow ? 0.5 * options_.distance_m : options_.distance_m;
+    const double still = narrow ? kStill_m : 0.02 * options_.distance_m;
+    estimation_->setNarrow(narrow);
+    Icp icp;
+    icp.setInputSource(a_.cloud());
+    icp.setInputTarget(b_.cloud());
+    icp.setSearchMethodTarget(b_.tree(), true);
+    icp.setCorrespondenceEstimation(correspondences_);
+    icp.setTransformationEstimation(estimation_);
+    icp.setMaxCorrespondenceDistance(distance);
+    icp.setMaximumIterations(options_.max_iterations);
+    icp.setTransformationEpsilon(still * still);
+    icp.setTransformationRotationEpsilon(std::cos(still));
+    if (!meet(distance)) return false;
+    icp.align(moved_, result_.b_from_a.isometry().matrix());
+    result_.b_from_a = rigid_of(icp.getFinalTransformation());
+    if (!meet(distance)) return false;
+    step_ = estimation_->step(moved_, *b_.cloud(), found_);
+    if (icp.getConvergeCriteria()->getConvergenceState() != Criteria::CONVERGENCE_CRITERIA_ITERATIONS)
+      return true;
     refuse("it did not converge");
+    return false;
+  }
+  /// Correspondences where the surfaces lie now; false: refused, too few.
+  bool meet(double distance) {
+    const Rigid3& b_from_a = result_.b_from_a;
+    pcl::transformPointCloudWithNormals(*a_.cloud(), moved_,
+                                        b_from_a.isometry().matrix().cast<float>().eval());
+    correspondences_->setInputSource(std::make_shared<SurfaceCloud>(moved_));
+    correspondences_->determineCorrespondences(found_, distance);
+    if (found_.size() >= kFewest) return true;
+    refuse("the surfaces do not meet");
     return false;
   }
   /// How far the middle of the matched samples has moved.
   [[nodiscard]] double moved_since(const Rigid3& start) const {
-    return (centre_ - start * (result_.b_from_a.inverse() * centre_)).norm();
+    return (step_.centre - start * (result_.b_from_a.inverse() * step_.centre)).norm();
   }
 
   SurfaceAlignment refuse(const char* why) {
@@ -98,97 +156,21 @@ class Aligner {
 
   /// Those that have a counterpart at the start, so that all of them count where the surfaces overlap little.
   void choose_samples() {
-    const Rigid3 a_from_b = result_.b_from_a.inverse();
-    const CoarseSurface near_b = in_reach(a_.samples(), b_, result_.b_from_a);
-    const CoarseSurface near_a = in_reach(b_.samples(), a_, a_from_b);
-    shared_ = std::max(share(near_b, a_.samples()), share(near_a, b_.samples()));
-    from_a_ = spread(near_b, options_.samples);
-    from_b_ = spread(near_a, options_.samples);
-  }
-  [[nodiscard]] CoarseSurface in_reach(const CoarseSurface& samples, const SurfaceIndex& other,
-                                       const Rigid3& other_from_sample) const {
-    const Eigen::Matrix3f rotation = other_from_sample.rotation.cast<float>();
-    const Eigen::Vector3f translation = other_from_sample.translation.cast<float>();
-    CoarseSurface result;
-    const std::size_t step = 1 + samples.size() / kTried;
-    for (std::size_t i = 0; i < samples.size(); i += step) {
-      const maps::SurfaceSample& s = samples[i];
-      if (other.any(rotation * s.point + translation, rotation * s.normal, static_cast<float>(reach_),
-                    static_cast<float>(options_.min_cosine))) {
-        result.push_back(s);
-      }
-    }
-    return result;
-  }
-  static double share(const CoarseSurface& part, const CoarseSurface& whole) {
-    const std::size_t tried = (whole.size() + whole.size() / kTried) / (1 + whole.size() / kTried);
-    return whole.empty() ? 0.0 : static_cast<double>(part.size()) / static_cast<double>(tried);
-  }
-
-  /// Samples of a on the planes of b, then samples of b on the planes of a.
-  void match(double distance) {
-    matches_.clear();
-    const Rigid3& b_from_a = result_.b_from_a;
-    const Rigid3 a_from_b = b_from_a.inverse();
-    const auto reach = static_cast<float>(distance);
-    const auto cosine = static_cast<float>(options_.min_cosine);
-    for (const maps::SurfaceSample& s : from_a_) {
-      const Eigen::Vector3d p = b_from_a * s.point.cast<double>();
-      const Eigen::Vector3d n = b_from_a.rotation * s.normal.cast<double>();
-      const maps::SurfaceSample* q = b_.nearest(p.cast<float>(), n.cast<float>(), reach, cosine);
-      if (q == nullptr) continue;
-      const Eigen::Vector3d normal = q->normal.cast<double>();
-      matches_.add(p, normal, normal.dot(p - q->point.cast<double>()), variance(s, *q));
-    }
-    for (const maps::SurfaceSample& s : from_b_) {
-      const Eigen::Vector3d q = s.point.cast<double>();
-      const Eigen::Vector3d in_a = a_from_b * q;
-      const Eigen::Vector3d n = a_from_b.rotation * s.normal.cast<double>();
-      const maps::SurfaceSample* p = a_.nearest(in_a.cast<float>(), n.cast<float>(), reach, cosine);
-      if (p == nullptr) continue;
-      const Eigen::Vector3d normal = b_from_a.rotation * p->normal.cast<double>();
-      matches_.add(q, normal, normal.dot(b_from_a * p->point.cast<double>() - q), variance(s, *p));
-    }
-  }
-  static double variance(const maps::SurfaceSample& x, const maps::SurfaceSample& y) {
-    const auto of_x = static_cast<double>(x.sigma);
-    const auto of_y = static_cast<double>(y.sigma);
-    return of_x * of_x + of_y * of_y;
-  }
-
-  /// One Gauss-Newton step, in the directions that the surfaces hold. Rotations are taken about the middle of
-  /// the matches and scaled by their spread, so that all six numbers are metres.
-  Vector6d solve() {
-    centre_ = matches_.middle();
-    lever_ = std::max(0.1, matches_.spread(centre_));
-    // What most matches agree on; at least what the depth noise explains.
-    const MatchLoss loss{std::max(1.0, 1.4826 * matches_.median_error()), narrow_};
-    const MatchEquations equations = matches_.equations(centre_, lever_, loss);
-    inliers_ = equations.inliers;
-    rms_ = inliers_ > 0 ? std::sqrt(equations.squares / inliers_) : 0.0;
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(equations.h);
-    eigenvalues_ = eigen.eigenvalues();
-    directions_ = eigen.eigenvectors();
-    Vector6d step = Vector6d::Zero();
-    for (int i = 0; i < 6; ++i) {
-      held_[static_cast<std::size_t>(i)] = eigenvalues_(i) > options_.min_hold * equations.weights;
-      if (!held_[static_cast<std::size_t>(i)]) continue;
-      step -= directions_.col(i) * (directions_.col(i).dot(equations.g) / eigenvalues_(i));
-    }
-    step.tail<3>() /= lever_;
-    step.head<3>() -= step.tail<3>().cross(centre_);
-    return step;
+    const Overlap of_a = overlap_of(a_, b_, result_.b_from_a, options_);
+    const Overlap of_b = overlap_of(b_, a_, result_.b_from_a.inverse(), options_);
+    shared_ = std::max(of_a.share, of_b.share);
+    pcl::Indices from_a = spread(*a_.cloud(), of_a.points, options_.samples);
+    pcl::Indices from_b = spread(*b_.cloud(), of_b.points, options_.samples);
+    tried_ = static_cast<double>(from_a.size() + from_b.size());
+    correspondences_->setSamples(std::move(from_a), std::move(from_b));
   }
 
   void judge(const Rigid3& start) {
-    const Eigen::Vector3d before = start * (result_.b_from_a.inverse() * centre_);
-    solve();
     set_information();
-    result_.inliers = inliers_;
-    result_.rms = rms_;
-    const double tried = static_cast<double>(from_a_.size() + from_b_.size());
-    result_.overlap = shared_ * static_cast<double>(inliers_) / tried;
-    result_.shift_m = (centre_ - before).norm();
+    result_.inliers = step_.inliers;
+    result_.rms = step_.rms;
+    result_.overlap = shared_ * static_cast<double>(step_.inliers) / tried_;
+    result_.shift_m = moved_since(start);
     result_.turn_rad = geometry::rotation_angle(result_.b_from_a.rotation * start.rotation.transpose());
     if (result_.overlap < options_.min_overlap) {
       result_.refused = fmt::format("{:.2f} of the surface fits", result_.overlap);
@@ -203,42 +185,48 @@ class Aligner {
   /// In the directions that are held: what the matches say, scaled by how well they fit, no better than the
   /// floor. Nothing in the others.
   void set_information() {
-    const double fit = options_.correlation / std::max(1.0, rms_ * rms_);
+    const double fit = options_.correlation / std::max(1.0, step_.rms * step_.rms);
     Matrix6d scaled = Matrix6d::Zero();
     result_.held = 0;
     for (int i = 0; i < 6; ++i) {
-      if (!held_[static_cast<std::size_t>(i)]) continue;
-      const double variance = 1.0 / (fit * eigenvalues_(i)) + options_.floor_m * options_.floor_m;
-      scaled += directions_.col(i) * directions_.col(i).transpose() / variance;
+      if (!step_.held[static_cast<std::size_t>(i)]) continue;
+      const double variance = 1.0 / (fit * step_.eigenvalues(i)) + options_.floor_m * options_.floor_m;
+      scaled += step_.directions.col(i) * step_.directions.col(i).transpose() / variance;
       ++result_.held;
     }
     // (rho + phi x centre, lever phi) are the scaled numbers of xi = (rho, phi).
     Matrix6d scaled_from_xi = Matrix6d::Identity();
-    scaled_from_xi.topRightCorner<3, 3>() = -geometry::skew(centre_);
-    scaled_from_xi.bottomRightCorner<3, 3>() *= lever_;
+    scaled_from_xi.topRightCorner<3, 3>() = -geometry::skew(step_.centre);
+    scaled_from_xi.bottomRightCorner<3, 3>() *= step_.lever;
     result_.information = scaled_from_xi.transpose() * scaled * scaled_from_xi;
   }
 
-  const SurfaceIndex& a_;
-  const SurfaceIndex& b_;
+  const cloud::SurfaceSearch& a_;
+  const cloud::SurfaceSearch& b_;
   const AlignmentOptions& options_;
-  CoarseSurface from_a_;
-  CoarseSurface from_b_;
+  std::shared_ptr<cloud::TwoWayCorrespondences> correspondences_;
+  std::shared_ptr<cloud::ConstrainedPointToPlane> estimation_;
   SurfaceAlignment result_;
-  PlaneMatches matches_;  ///< in b's frame
-  double reach_;
+  SurfaceCloud moved_;  ///< a, in b's frame
+  pcl::Correspondences found_;
+  PlaneStep step_;
+  double tried_ = 1.0;   ///< samples that look for a partner
   double shared_ = 0.0;  ///< of the smaller surface, near the other one at the start
-  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
-  double lever_ = 1.0;
-  int inliers_ = 0;
-  double rms_ = 0.0;
-  bool narrow_ = false;
-  Vector6d eigenvalues_ = Vector6d::Zero();
-  Matrix6d directions_ = Matrix6d::Identity();
-  std::array<bool, 6> held_{};
 };
 
 }  // namespace
+
+cloud::SurfaceSearch search_of(const CoarseSurface& surface) {
+  auto cloud = std::make_shared<SurfaceCloud>();
+  for (const maps::SurfaceSample& s : surface) {
+    SurfacePoint p;
+    p.getVector3fMap() = s.point;
+    p.getNormalVector3fMap() = s.normal;
+    p.curvature = s.sigma;
+    cloud->push_back(p);
+  }
+  return cloud::SurfaceSearch(cloud);
+}
 
 void AlignmentOptions::declare(core::OptionTable& table) {
   table.integer("icp.samples", samples, {100, 100000}, "", "Samples of each local map that are matched");
@@ -260,26 +248,24 @@ void AlignmentOptions::declare(core::OptionTable& table) {
   table.number("icp.floor", floor_m, {0.0, 0.1}, "m", "What no alignment of this sensor knows better");
 }
 
-SurfaceAlignment align_surfaces(const SurfaceIndex& a, const SurfaceIndex& b, const Rigid3& b_from_a,
-                                const AlignmentOptions& options) {
+SurfaceAlignment align_surfaces(const cloud::SurfaceSearch& a, const cloud::SurfaceSearch& b,
+                                const Rigid3& b_from_a, const AlignmentOptions& options) {
   return Aligner(a, b, options).run(b_from_a);
 }
 
 std::vector<SurfaceAlignment> align_pairs(const maps::Map& map, const std::vector<LocalMap>& local_maps,
                                           const std::vector<LocalMapPair>& pairs,
                                           const AlignmentOptions& options, const core::Executor& executor) {
-  std::vector<std::unique_ptr<SurfaceIndex>> indices(local_maps.size());
-  executor.parallel_for(local_maps.size(), [&](std::size_t i) {
-    indices[i] = std::make_unique<SurfaceIndex>(local_maps[i].surface, options.distance_m);
-  });
+  std::vector<std::optional<cloud::SurfaceSearch>> searches(local_maps.size());
+  executor.parallel_for(local_maps.size(),
+                        [&](std::size_t i) { searches[i] = search_of(local_maps[i].surface); });
   std::vector<SurfaceAlignment> alignments(pairs.size());
   executor.parallel_for(pairs.size(), [&](std::size_t i) {
     const LocalMapPair& pair = pairs[i];
     const Rigid3 b_from_a = map.camera_from_world(local_maps[pair.b].anchor) *
                             map.camera_from_world(local_maps[pair.a].anchor).inverse();
-    alignments[i] = align_surfaces(*indices[pair.a], *indices[pair.b], b_from_a, options);
+    alignments[i] = align_surfaces(*searches[pair.a], *searches[pair.b], b_from_a, options);
   });
-  executor.parallel_for(indices.size(), [&](std::size_t i) { indices[i].reset(); });
   return alignments;
 }
 

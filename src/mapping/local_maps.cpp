@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/surface_cloud.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "surface_voxels.hpp"
-#include "voxel_means.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -55,17 +55,36 @@ class LocalMapCutter {
   std::vector<LocalMap> result_;
 };
 
+cloud::SurfacePoint point_of(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, float sigma) {
+  cloud::SurfacePoint p;
+  p.getVector3fMap() = point;
+  p.getNormalVector3fMap() = normal;
+  p.curvature = sigma;
+  return p;
+}
+
+CoarseSurface samples_of(const cloud::SurfaceCloud& cloud) {
+  CoarseSurface samples;
+  samples.reserve(cloud.size());
+  for (const cloud::SurfacePoint& p : cloud) {
+    samples.push_back({p.getVector3fMap(), p.getNormalVector3fMap(), p.curvature});
+  }
+  return samples;
+}
+
 /// Of the members of a local map, in its anchor's frame.
 CoarseSurface fused_surface(const maps::Map& map, const std::map<KeyframeId, CoarseSurface>& surfaces,
                             const LocalMap& local, double voxel_m) {
-  VoxelMeans means(voxel_m);
+  cloud::SurfaceCloud all;
   for (const KeyframeId id : local.members) {
     const Rigid3 anchor_from_member =
         map.camera_from_world(local.anchor) * map.camera_from_world(id).inverse();
-    means.set_frame(anchor_from_member.rotation.cast<float>(), anchor_from_member.translation.cast<float>());
-    for (const maps::SurfaceSample& s : surfaces.at(id)) means.add(s.point, s.normal, s.sigma);
+    const Eigen::Matrix3f rotation = anchor_from_member.rotation.cast<float>();
+    const Eigen::Vector3f translation = anchor_from_member.translation.cast<float>();
+    for (const maps::SurfaceSample& s : surfaces.at(id))
+      all.push_back(point_of(rotation * s.point + translation, rotation * s.normal, s.sigma));
   }
-  return means.take(true);
+  return samples_of(cloud::voxel_filtered(all, static_cast<float>(voxel_m), true));
 }
 
 /// Coarse voxels that a local map fills, world, sorted.
@@ -135,18 +154,19 @@ void PairOptions::declare(core::OptionTable& table) {
 }
 
 CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m) {
-  VoxelMeans means(voxel_m);
   const Rigid3 camera_from_depth = cloud::sensor_pose(camera_cloud);
-  means.set_frame(camera_from_depth.rotation.cast<float>(), camera_from_depth.translation.cast<float>());
+  const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
+  const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
+  cloud::SurfaceCloud points;
   for (const cloud::Point& p : camera_cloud.points) {
-    const Eigen::Vector3f point = p.getVector3fMap();
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
-    if (!point.allFinite() || !normal.allFinite() || !(p.z > 0.0F)) continue;
+    if (!p.getVector3fMap().allFinite() || !normal.allFinite() || !(p.z > 0.0F)) continue;
     // Half of the noise stays in the mean of a voxel; it acts along the ray.
     const double sigma = 0.5 * sensor::depth_sigma(static_cast<double>(p.z));
-    means.add(point, normal, static_cast<float>(sigma) * std::max(0.3F, -normal.z()));
+    points.push_back(point_of(rotation * p.getVector3fMap() + translation, rotation * normal,
+                              static_cast<float>(sigma) * std::max(0.3F, -normal.z())));
   }
-  return means.take(false);
+  return samples_of(cloud::voxel_filtered(points, static_cast<float>(voxel_m), false));
 }
 
 std::vector<LocalMap> make_local_maps(const maps::Map& map,

@@ -242,8 +242,8 @@ void align(const PlaceView& query, const PlaceView& match, const std::vector<Key
   const maps::Keyframe& q = query.map->keyframe(query.keyframe);
   if (q.surface.empty()) return;
   const AlignmentOptions options;
-  const SurfaceIndex theirs(gather_surface(*match.map, near, match.keyframe), options.distance_m);
-  const SurfaceIndex ours(q.surface, options.distance_m);
+  const cloud::SurfaceSearch theirs = search_of(gather_surface(*match.map, near, match.keyframe));
+  const cloud::SurfaceSearch ours = search_of(q.surface);
   const SurfaceAlignment aligned = align_surfaces(theirs, ours, result.query_from_match, options);
   result.surface_shift_m = aligned.shift_m;
   result.surface_rms = aligned.rms;

@@ -62,8 +62,8 @@ TEST(AlignSurfaces, FindsTheStepBetweenTwoViewsOfOneCorner) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     Random random(seed);
     const Rigid3 truth = random.pose(0.5, 1.0);
-    const SurfaceIndex a(dead_end(random), 0.1);
-    const SurfaceIndex b(moved(dead_end(random), truth), 0.1);
+    const cloud::SurfaceSearch a = search_of(dead_end(random));
+    const cloud::SurfaceSearch b = search_of(moved(dead_end(random), truth));
     const SurfaceAlignment found = align_surfaces(a, b, random.step(0.04, 0.02) * truth, {});
     EXPECT_EQ(found.refused, "") << "seed " << seed;
     EXPECT_EQ(found.held, 6);
@@ -78,8 +78,8 @@ TEST(AlignSurfaces, FindsTheStepBetweenTwoViewsOfOneCorner) {
 
 TEST(AlignSurfaces, OverlapIsThatOfTheEndHoweverFarApartItBegan) {
   Random random(7);
-  const SurfaceIndex a(dead_end(random), 0.1);
-  const SurfaceIndex b(dead_end(random), 0.1);
+  const cloud::SurfaceSearch a = search_of(dead_end(random));
+  const cloud::SurfaceSearch b = search_of(dead_end(random));
   const SurfaceAlignment found =
       align_surfaces(a, b, Rigid3(geometry::exp_so3({0.0, 0.0, 0.02}), {0.09, 0.11, 0.03}), {});
   EXPECT_EQ(found.refused, "");
@@ -89,8 +89,8 @@ TEST(AlignSurfaces, OverlapIsThatOfTheEndHoweverFarApartItBegan) {
 
 TEST(AlignSurfaces, ACorridorDoesNotSlide) {
   Random random(2);
-  const SurfaceIndex a(corridor(random), 0.1);
-  const SurfaceIndex b(corridor(random), 0.1);
+  const cloud::SurfaceSearch a = search_of(corridor(random));
+  const cloud::SurfaceSearch b = search_of(corridor(random));
   const Rigid3 start(geometry::exp_so3({0.01, 0.0, 0.01}), {0.05, 0.03, -0.02});
   const SurfaceAlignment found = align_surfaces(a, b, start, {});
   EXPECT_EQ(found.refused, "");
@@ -109,7 +109,7 @@ TEST(AlignSurfaces, OneWallHoldsThreeDirections) {
   Random random(3);
   CoarseSurface wall;
   add_wall(wall, {-1, -1, 2}, {0, 2, 0}, {2, 0, 0}, random, 3000);
-  const SurfaceIndex a(wall, 0.1);
+  const cloud::SurfaceSearch a = search_of(wall);
   const SurfaceAlignment found =
       align_surfaces(a, a, Rigid3(Eigen::Matrix3d::Identity(), {0.02, 0, 0.03}), {});
   EXPECT_EQ(found.held, 3);
@@ -119,8 +119,8 @@ TEST(AlignSurfaces, OneWallHoldsThreeDirections) {
 
 TEST(AlignSurfaces, WhatDoesNotBelongTogetherIsRefused) {
   Random random(4);
-  const SurfaceIndex a(dead_end(random), 0.1);
-  const SurfaceIndex nothing({}, 0.1);
+  const cloud::SurfaceSearch a = search_of(dead_end(random));
+  const cloud::SurfaceSearch nothing = search_of({});
   EXPECT_NE(align_surfaces(a, nothing, {}, {}).refused, "");
   EXPECT_NE(align_surfaces(nothing, nothing, {}, {}).refused, "");
   const Rigid3 far(Eigen::Matrix3d::Identity(), {9.0, 0.0, 0.0});
@@ -130,7 +130,7 @@ TEST(AlignSurfaces, WhatDoesNotBelongTogetherIsRefused) {
   add_wall(front, {-1, -1, 2}, {0, 2, 0}, {2, 0, 0}, random);
   CoarseSurface back;
   add_wall(back, {-1, -1, 2}, {2, 0, 0}, {0, 2, 0}, random);
-  EXPECT_NE(align_surfaces(SurfaceIndex(front, 0.1), SurfaceIndex(back, 0.1), {}, {}).refused, "");
+  EXPECT_NE(align_surfaces(search_of(front), search_of(back), {}, {}).refused, "");
   AlignmentOptions careful;
   careful.max_shift_m = 0.01;
   const Rigid3 off(Eigen::Matrix3d::Identity(), {0.05, 0.0, 0.0});
@@ -139,58 +139,66 @@ TEST(AlignSurfaces, WhatDoesNotBelongTogetherIsRefused) {
   EXPECT_NEAR(moved_too_far.shift_m, 0.05, 0.005);
 }
 
-TEST(SurfaceIndex, FindsWhatASearchThroughAllFinds) {
+TEST(SurfaceSearch, FindsTheNearestThatFacesTheSameWay) {
   Random random(5);
-  CoarseSurface cloud;
+  CoarseSurface surface;
   for (int i = 0; i < 3000; ++i) {
-    cloud.push_back({random.vector(1.0).cast<float>(), random.direction().cast<float>(), 0.01F});
+    const Eigen::Vector3d normal =
+        Eigen::Vector3d(0.0, 0.0, i % 2 == 0 ? 1.0 : -1.0) + 0.2 * random.direction();
+    surface.push_back({random.vector(1.0).cast<float>(), normal.normalized().cast<float>(), 0.01F});
   }
-  const SurfaceIndex index(cloud, 0.1);
-  int found = 0;
+  const cloud::SurfaceSearch search = search_of(surface);
+  int found = 0, missed = 0;
   for (int i = 0; i < 500; ++i) {
-    const Eigen::Vector3f p = random.vector(1.2).cast<float>();
-    const Eigen::Vector3f n = random.direction().cast<float>();
+    cloud::SurfacePoint p;
+    p.getVector3fMap() = random.vector(1.2).cast<float>();
+    p.getNormalVector3fMap() = Eigen::Vector3f::UnitZ();
     float best = 0.08F;
-    const maps::SurfaceSample* expected = nullptr;
-    for (const maps::SurfaceSample& s : index.samples()) {
-      const float d = (s.point - p).norm();
-      if (d < best && s.normal.dot(n) >= 0.3F) {
+    int expected = -1;
+    for (std::size_t k = 0; k < surface.size(); ++k) {
+      const float d = (surface[k].point - p.getVector3fMap()).norm();
+      if (d < best && surface[k].normal.dot(p.getNormalVector3fMap()) >= 0.3F) {
         best = d;
-        expected = &s;
+        expected = static_cast<int>(k);
       }
     }
-    EXPECT_EQ(index.nearest(p, n, 0.08F, 0.3F), expected);
-    EXPECT_EQ(index.any(p, n, 0.08F, 0.3F), expected != nullptr);
-    found += expected != nullptr ? 1 : 0;
+    EXPECT_EQ(cloud::nearest_facing(*search.tree(), p, 0.08F, 0.3F), expected);
+    ++(expected >= 0 ? found : missed);
   }
   EXPECT_GT(found, 50);
+  EXPECT_GT(missed, 50);
 }
 
-TEST(SurfaceIndex, WhatLiesFarAwayOrNowhereDoesNoHarm) {
-  const Eigen::Vector3f up(0.0F, 0.0F, 1.0F);
-  CoarseSurface surface;
-  for (const float x : {0.0F, 0.5F, 1e9F, -3e4F, 3e4F}) surface.push_back({{x, -x, x}, up, 0.01F});
-  const SurfaceIndex index(surface, 0.1);
-  for (const maps::SurfaceSample& s : index.samples()) {
-    EXPECT_EQ(index.nearest(s.point, up, 0.05F, 0.5F), &s);
-    EXPECT_EQ(index.nearest(s.point, -up, 0.05F, 0.5F), nullptr);
-  }
-  EXPECT_FALSE(index.any({1e6F, 0.0F, 0.0F}, up, 0.1F, 0.5F));
-  EXPECT_FALSE(index.any({0.25F, 0.0F, 0.0F}, up, 0.1F, 0.5F));
-  EXPECT_FALSE(index.any(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()), up, 0.1F, 0.5F));
-  EXPECT_FALSE(SurfaceIndex({}, 0.1).any({0.0F, 0.0F, 0.0F}, up, 0.1F, 0.5F));
+TEST(SurfaceSearch, WhatIsNowhereFindsNothing) {
+  const cloud::SurfaceSearch search = search_of({{{0.0F, 0.0F, 1.0F}, Eigen::Vector3f::UnitZ(), 0.01F}});
+  cloud::SurfacePoint p;
+  p.getVector3fMap().setConstant(std::numeric_limits<float>::quiet_NaN());
+  p.getNormalVector3fMap() = Eigen::Vector3f::UnitZ();
+  EXPECT_EQ(cloud::nearest_facing(*search.tree(), p, 0.1F, 0.5F), -1);
+  EXPECT_EQ(search_of({}).tree(), nullptr);
 }
 
-TEST(CoarseSurface, IsTheWeightedMeanOfEachVoxelAndFacing) {
+/// In the order of voxels and the ways they face, as far as that can be told without PCL.
+TEST(CoarseSurface, IsTheMeanOfEachVoxelAndFacing) {
   Random random(9);
   cloud::Cloud cloud;
   struct Sum {
     Eigen::Vector3d point{0, 0, 0};
     Eigen::Vector3d normal{0, 0, 0};
-    double weight = 0.0;
+    double sigma = 0.0;
+    int count = 0;
   };
   std::map<std::array<int, 4>, Sum> sums;
-  for (int i = 0; i < 1000; ++i) {  // no multiple of what is taken together
+  const auto key_of = [](const Eigen::Vector3f& at, const Eigen::Vector3f& normal) {
+    Eigen::Index axis = 0;
+    normal.cwiseAbs().maxCoeff(&axis);
+    std::array<int, 4> key{};
+    for (std::size_t k = 0; k < 3; ++k)
+      key[k] = static_cast<int>(std::floor(at[static_cast<Eigen::Index>(k)] / 0.1F));
+    key[3] = static_cast<int>(2 * axis) + (normal[axis] < 0.0F ? 1 : 0);
+    return key;
+  };
+  for (int i = 0; i < 1000; ++i) {
     const Eigen::Vector3f at = random.vector(0.3).cast<float>() + Eigen::Vector3f(0.0F, 0.0F, 1.0F);
     const Eigen::Vector3f normal = random.direction().cast<float>();
     cloud::Point p;
@@ -198,30 +206,22 @@ TEST(CoarseSurface, IsTheWeightedMeanOfEachVoxelAndFacing) {
     p.getNormalVector3fMap() = normal;
     cloud.points.push_back(p);
     const double depth_sigma = 0.0012 + 0.0019 * (at.z() - 0.4) * (at.z() - 0.4);
-    const double sigma = 0.5 * depth_sigma * std::max(0.3, -static_cast<double>(normal.z()));
-    Eigen::Index axis = 0;
-    normal.cwiseAbs().maxCoeff(&axis);
-    std::array<int, 4> key{};
-    for (std::size_t k = 0; k < 3; ++k)
-      key[k] = static_cast<int>(std::floor(at[static_cast<Eigen::Index>(k)] / 0.1F));
-    key[3] = static_cast<int>(2 * axis) + (normal[axis] < 0.0F ? 1 : 0);
-    Sum& sum = sums[key];
-    const double weight = 1.0 / (sigma * sigma);
-    sum.point += weight * at.cast<double>();
-    sum.normal += weight * normal.cast<double>();
-    sum.weight += weight;
+    Sum& sum = sums[key_of(at, normal)];
+    sum.point += at.cast<double>();
+    sum.normal += normal.cast<double>();
+    sum.sigma += 0.5 * depth_sigma * std::max(0.3, -static_cast<double>(normal.z()));
+    ++sum.count;
   }
   const CoarseSurface surface = coarse_surface(cloud, 0.1);
-  std::size_t i = 0;
-  for (const auto& [key, sum] : sums) {  // the same order
-    if (sum.normal.norm() < 0.5 * sum.weight) continue;
-    ASSERT_LT(i, surface.size());
-    EXPECT_LT((surface[i].point.cast<double>() - sum.point / sum.weight).norm(), 1e-5);
-    EXPECT_LT((surface[i].normal.cast<double>() - sum.normal.normalized()).norm(), 1e-4);
-    ++i;
+  ASSERT_EQ(surface.size(), sums.size());
+  for (const maps::SurfaceSample& s : surface) {
+    const auto found = sums.find(key_of(s.point, s.normal));
+    ASSERT_NE(found, sums.end());
+    const Sum& sum = found->second;
+    EXPECT_LT((s.point.cast<double>() - sum.point / sum.count).norm(), 1e-5);
+    EXPECT_LT((s.normal.cast<double>() - sum.normal.normalized()).norm(), 1e-4);
+    EXPECT_NEAR(static_cast<double>(s.sigma), sum.sigma / sum.count, 1e-6);
   }
-  EXPECT_EQ(i, surface.size());
-  EXPECT_GT(i, 200U);
 }
 
 TEST(CoarseSurface, MeansOfVoxelsWithoutWhatIsNotKnown) {

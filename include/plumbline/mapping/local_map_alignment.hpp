@@ -6,13 +6,13 @@
 // once, weighted with the depth noise. Directions that the surfaces do not hold (along a corridor, within a
 // wall) are neither moved nor claimed to be known.
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "plumbline/cloud/surface_cloud.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
@@ -26,8 +26,7 @@ namespace plumbline::mapping {
 using CoarseSurface = std::vector<maps::SurfaceSample>;
 
 /// Thins a keyframe's cloud (frame of the depth camera, normals towards it; points without normal are passed
-/// over) to the mean of each voxel, apart for surfaces that face different ways, in the frame that its sensor
-/// pose leads to: the colour camera's. In order of voxels.
+/// over) with cloud::voxel_filtered, in the frame that its sensor pose leads to: the colour camera's.
 CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m);
 
 struct LocalMapOptions {
@@ -50,53 +49,8 @@ std::vector<LocalMap> make_local_maps(const maps::Map& map,
                                       const std::map<core::KeyframeId, CoarseSurface>& surfaces,
                                       const LocalMapOptions& options, const core::Executor& executor);
 
-/// Nearest neighbours among the samples of a surface.
-class SurfaceIndex {
- public:
-  /// `reach_m`: the largest distance that will be asked for.
-  SurfaceIndex(CoarseSurface surface, double reach_m);
-  [[nodiscard]] const CoarseSurface& samples() const { return samples_; }
-  /// The sample nearest to `point`, within `distance_m`, that faces the same way (cosine of at least
-  /// `min_cosine`); null: none.
-  [[nodiscard]] const maps::SurfaceSample* nearest(const Eigen::Vector3f& point,
-                                                   const Eigen::Vector3f& normal, float distance_m,
-                                                   float min_cosine) const;
-
-  /// Whether there is one: told sooner than which.
-  [[nodiscard]] bool any(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, float distance_m,
-                         float min_cosine) const;
-
-  static constexpr std::size_t kLanes = 8;  ///< samples that are looked at together
-  static constexpr int kMostCells = 1
-                                    << 10;  ///< along each axis; what lies beyond is searched through as one
-
- private:
-  /// Cells above each other, along z, from the first to the last that is filled.
-  struct Column {
-    int low = 0;
-    int cells = 0;
-    std::uint32_t first = 0;  ///< into begins_: where each cell begins, and the last one ends
-  };
-  struct alignas(32) Block {
-    std::array<std::array<float, kLanes>, 3> point;  ///< x of all, y of all, z of all
-    std::array<std::array<float, kLanes>, 3> normal;
-  };
-  void place_grid(float cell_m);
-  [[nodiscard]] std::vector<Eigen::Vector3i> cells_of_samples(float cell_m) const;
-  void fill_cells();
-  [[nodiscard]] std::int32_t search(const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
-                                    float distance_m, float min_cosine, bool any) const;
-
-  float cell_m_;
-  CoarseSurface samples_;                ///< by boxes of twice the reach
-  Eigen::Vector3f first_cell_{0, 0, 0};  ///< of the grid, in cells: a whole number
-  Eigen::Vector2i corner_{0, 0};         ///< of the columns, in cells of the grid
-  Eigen::Vector2i extent_{0, 0};
-  std::vector<Column> columns_;        ///< by x, then y
-  std::vector<std::uint32_t> begins_;  ///< places
-  std::vector<Block> blocks_;          ///< samples by cell: their places
-  std::vector<std::uint32_t> places_;  ///< the sample at each place
-};
+/// As PCL's registration wants it: with its tree.
+cloud::SurfaceSearch search_of(const CoarseSurface& surface);
 
 struct AlignmentOptions {
   int samples = 900;         ///< of each surface that are matched, spread over the directions they face
@@ -127,8 +81,10 @@ struct SurfaceAlignment {
   std::string refused;  ///< why it must not be used; empty: it may
 };
 
-/// Point-to-plane ICP, symmetric, robust (Tukey, scale by the median), from `b_from_a`. Deterministic.
-SurfaceAlignment align_surfaces(const SurfaceIndex& a, const SurfaceIndex& b,
+/// pcl::IterativeClosestPointWithNormals from `b_from_a`, with correspondences both ways
+/// (cloud::TwoWayCorrespondences) and steps in the directions that the surfaces hold
+/// (cloud::ConstrainedPointToPlane); once within the distance, once within half of it. Deterministic.
+SurfaceAlignment align_surfaces(const cloud::SurfaceSearch& a, const cloud::SurfaceSearch& b,
                                 const geometry::Rigid3& b_from_a, const AlignmentOptions& options);
 
 struct PairOptions {
