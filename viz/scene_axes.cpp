@@ -13,7 +13,6 @@
 namespace plumbline::viz {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
 constexpr std::size_t kMaxNormals = 200000;
 
 /// Unit normals of an even sample of the cloud.

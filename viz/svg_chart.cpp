@@ -202,12 +202,12 @@ std::string legend(const SvgChart& chart) {
 }
 
 /// A chart without its legend; its upper left corner is at 0, 0.
-struct Drawing {
+struct SvgDrawing {
   std::string svg;
   double height = 0.0;
 };
 
-Drawing draw(const SvgChart& chart) {
+SvgDrawing draw(const SvgChart& chart) {
   Plot plot;
   const double below = kBelow + (chart.x_label.empty() ? 0.0 : kLabelBelow);
   plot.width = std::max(50.0, chart.width_px - kLeft - kRight);
@@ -243,9 +243,9 @@ std::string document_style() {
 }
 
 /// Entries side by side, in as many rows as they need.
-Drawing legend_words(const SvgChart& chart) {
+SvgDrawing legend_words(const SvgChart& chart) {
   constexpr double kRow = 18.0, kLetter = 6.5;  // px; letters are about so wide
-  Drawing words;
+  SvgDrawing words;
   double x = kLeft;
   for (const auto& [sample, label] : legend_entries(chart)) {
     const double width = 40.0 + kLetter * static_cast<double>(label.size());
@@ -264,7 +264,7 @@ Drawing legend_words(const SvgChart& chart) {
 }  // namespace
 
 std::string svg_chart(const SvgChart& chart) {
-  const Drawing drawing = draw(chart);
+  const SvgDrawing drawing = draw(chart);
   return fmt::format(
       "<figure class=\"chart\">{}<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" "
       "aria-label=\"{}\">{}</svg></figure>\n",
@@ -281,8 +281,8 @@ std::string svg_document(const std::vector<SvgChart>& charts, std::size_t column
       y += row;
       row = 0.0;
     }
-    const Drawing words = legend_words(charts[i]);
-    const Drawing drawing = draw(charts[i]);
+    const SvgDrawing words = legend_words(charts[i]);
+    const SvgDrawing drawing = draw(charts[i]);
     body += fmt::format(
         "<g transform=\"translate({:.0f},{:.0f})\"><text class=\"title\" x=\"{:.0f}\" y=\"18\">{}</text>"
         "<g transform=\"translate(0,{:.0f})\">{}</g><g transform=\"translate(0,{:.0f})\">{}</g></g>\n",

@@ -19,12 +19,12 @@ constexpr double kPitch = 35.0 * M_PI / 180.0;
 constexpr double kFieldOfView_deg = 28.0;
 
 /// The middle of what is to be seen and how far it reaches from there, a few specks left out.
-struct Extent {
+struct SceneExtent {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius_m = 1.0;
 };
 
-Extent extent_of(const Scene& scene) {
+SceneExtent extent_of(const Scene& scene) {
   constexpr std::size_t kSample = 100000;
   std::vector<Eigen::Vector3d> points;
   if (scene.cloud != nullptr) {
@@ -38,7 +38,7 @@ Extent extent_of(const Scene& scene) {
   for (const CameraPath& path : scene.paths) {
     for (const auto& pose : path.trajectory) points.push_back(pose.world_from_camera.translation);
   }
-  Extent extent;
+  SceneExtent extent;
   if (points.empty()) return extent;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
@@ -63,7 +63,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
   if (ec) return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
   SnapshotOptions view = options;
   const SceneAxes axes = scene_axes(scene, options);
-  const Extent extent = extent_of(scene);
+  const SceneExtent extent = extent_of(scene);
   view.view = View::kExplicit;
   view.up = axes.up;
   view.viewpoint.up = axes.up;

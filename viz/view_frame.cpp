@@ -9,12 +9,11 @@
 namespace plumbline::viz {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
 constexpr double kIsoPitch = 35.0 * kDegree;
 constexpr double kIsoAzimuth = 35.0 * kDegree;  // not 45: one wall direction stays the longer one
 constexpr double kHeadsRight = 0.2;             // sine of the heading from `forward`
 constexpr double kIsoFieldOfView = 28.0 * kDegree;
-constexpr double kMargin = 0.07;  // of the picture, free on each side
+constexpr double kFreeMargin = 0.07;  // of the picture, free on each side
 
 struct Interval {
   double low = 0.0;
@@ -42,7 +41,7 @@ Interval extent(const std::vector<Eigen::Vector3d>& points, const std::vector<Ei
 }
 
 void fit_orthographic(Projection& projection, const Interval& x, const Interval& y) {
-  const double room = 1.0 - 2.0 * kMargin;
+  const double room = 1.0 - 2.0 * kFreeMargin;
   const double per_metre_x = projection.width_px * room / std::max(x.high - x.low, 0.2);
   const double per_metre_y = projection.height_px * room / std::max(y.high - y.low, 0.2);
   projection.focal_px = std::min(per_metre_x, per_metre_y);
@@ -52,7 +51,7 @@ void fit_orthographic(Projection& projection, const Interval& x, const Interval&
 double fit_distance(const Projection& projection, const Eigen::Vector3d& centre,
                     const std::vector<Eigen::Vector3d>& points,
                     const std::vector<Eigen::Vector3d>& must_see) {
-  const double room = 1.0 - 2.0 * kMargin;
+  const double room = 1.0 - 2.0 * kFreeMargin;
   const double tan_x = room * 0.5 * projection.width_px / projection.focal_px;
   const double tan_y = room * 0.5 * projection.height_px / projection.focal_px;
   const auto needed = [&](const Eigen::Vector3d& p) {

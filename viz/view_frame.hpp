@@ -3,11 +3,14 @@
 
 // Directions and projection of a picture.
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 #include "plumbline/viz/snapshot.hpp"
 
 namespace plumbline::viz {
+
+constexpr double kDegree = M_PI / 180.0;
 
 /// Right-handed directions of a scene, unit length, in the scene's frame. `forward` is horizontal: the wall
 /// direction (if walls meet at right angles) nearest to where the first camera looks.

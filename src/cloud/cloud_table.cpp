@@ -8,14 +8,12 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <limits>
 
+#include "finite.hpp"
 #include "scalar.hpp"
 
 namespace plumbline::cloud {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 Point blank_point(bool color) {
   Point p;

@@ -10,13 +10,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include "finite.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
 namespace {
-
-bool finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 void check_columns(const Cloud& cloud, const CloudColumns& columns) {
   const auto fits = [&cloud](std::size_t n) { return n == 0 || n == cloud.size(); };
@@ -25,12 +24,6 @@ void check_columns(const Cloud& cloud, const CloudColumns& columns) {
                    [&](const auto& other) { return other.values.size() == cloud.size(); })) {
     throw std::invalid_argument("cloud columns have another length than the cloud");
   }
-}
-
-std::size_t count_finite(const Cloud& cloud) {
-  std::size_t count = 0;
-  for (const Point& p : cloud.points) count += finite(p) ? 1 : 0;
-  return count;
 }
 
 /// Records of points on their way into a file, many at a time.

@@ -11,20 +11,17 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "compact_format.hpp"
+#include "finite.hpp"
 #include "octahedral.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
 constexpr double kMostSteps = 1 << 30;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-bool finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 /// Small numbers of either sign as small numbers.
 std::uint32_t zigzag(std::int32_t v) {

@@ -28,10 +28,10 @@ constexpr std::size_t kLeastSamples = 5000;
 constexpr std::size_t kBlocks = 8;  // of consecutive views, dealt out to the parts
 constexpr std::size_t kParts = 4;
 constexpr std::size_t kLeastViews = 6;
-constexpr int kRounds = 8;
-constexpr double kRobust = 2.0;        // standard deviations
-constexpr double kPrior_per_m = 0.02;  // of beta: 8 cm at 2 m
-constexpr double kCorrelation = 0.01;  // samples count by this much against the prior: neighbours err alike
+constexpr int kFitRounds = 8;
+constexpr double kRobust_sigmas = 2.0;  // standard deviations
+constexpr double kPrior_per_m = 0.02;   // of beta: 8 cm at 2 m
+constexpr double kCorrelation = 0.01;   // samples count by this much against the prior: neighbours err alike
 
 struct Sample {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();  // z = 0: none
@@ -135,13 +135,13 @@ DepthField fitted(const std::vector<const Rows*>& use, const sensor::Pinhole& ca
   const DepthField::Terms rim =
       DepthField::monomials(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy);
   DepthField::Terms c = DepthField::Terms::Zero();
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     std::vector<Sum> sums(use.size());
     executor.parallel_for(use.size(), [&](std::size_t k) {
       for (const Row& row : *use[k]) {
         const DepthField::Terms j = jacobian(row);
         const double e = (row.residual + j.dot(c)) / row.sigma;
-        const double pull = 1.0 + e * e / (kRobust * kRobust);
+        const double pull = 1.0 + e * e / (kRobust_sigmas * kRobust_sigmas);
         const double weight = 1.0 / (pull * pull * row.sigma * row.sigma);
         sums[k].h.noalias() += weight * j * j.transpose();
         sums[k].g.noalias() -= weight * row.residual * j;

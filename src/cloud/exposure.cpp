@@ -13,9 +13,9 @@
 namespace plumbline::cloud {
 namespace {
 
-constexpr int kRounds = 20;
-constexpr float kRobust = 0.15F;  // residuals of the logarithm beyond this weigh less
-constexpr float kPrior = 3.0F;    // a view's gain is held at 1 by as much as this many cells
+constexpr int kExposureRounds = 20;
+constexpr float kRobustResidual = 0.15F;  // residuals of the logarithm beyond this weigh less
+constexpr float kPrior = 3.0F;            // a view's gain is held at 1 by as much as this many cells
 constexpr float kFewestPoints = 5.0F;
 constexpr float kMostLog = 0.693F;
 constexpr int kDark = 12;
@@ -48,7 +48,9 @@ std::vector<Sighting> shared_sightings(const std::vector<std::vector<ColorCell>>
   return shared;
 }
 
-Eigen::Array3f robust_weight(const Eigen::Array3f& residual) { return kRobust / residual.abs().max(kRobust); }
+Eigen::Array3f robust_weight(const Eigen::Array3f& residual) {
+  return kRobustResidual / residual.abs().max(kRobustResidual);
+}
 
 }  // namespace
 
@@ -87,7 +89,7 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
     Eigen::Array3f weight = Eigen::Array3f::Zero();
   };
   std::vector<Sum> of_views(views.size());
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kExposureRounds; ++round) {
     for (Sum& view : of_views) {
       view.wanted.setZero();
       view.weight.setConstant(kPrior);

@@ -35,12 +35,6 @@ void refuse_unknown_keys(const ConfigNode& map, const std::string& path,
   }
 }
 
-std::size_t count_finite(const Cloud& cloud) {
-  std::size_t count = 0;
-  for (const Point& p : cloud.points) count += finite(p) ? 1U : 0U;
-  return count;
-}
-
 std::filesystem::path normal(const std::string& file) {
   return std::filesystem::path(file).lexically_normal();
 }

@@ -10,6 +10,7 @@
 #include <limits>
 #include <string>
 
+#include "finite.hpp"
 #include "plumbline/cloud/filter.hpp"
 
 namespace plumbline::cloud {
@@ -37,7 +38,6 @@ FilterInfo transform_filter();
 FilterInfo uniform_sampling_filter();
 FilterInfo voxel_grid_filter();
 
-inline bool finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 inline bool has_normal(const Point& p) { return std::isfinite(p.normal_x + p.normal_y + p.normal_z); }
 inline bool organised(const Cloud& cloud) { return cloud.height > 1; }
 

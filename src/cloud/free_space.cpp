@@ -7,9 +7,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
+#include "finite.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::cloud {
@@ -201,7 +201,6 @@ Evidence evidence(const DepthRaster& raster, const Eigen::Vector3f& point) {
 CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
                     double max_depth_m) {
   constexpr int kCell = DepthRaster::kCell_px;
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   const auto least = static_cast<float>(min_depth_m), most = static_cast<float>(max_depth_m);
   const int columns = (camera.width + kCell - 1) / kCell, rows = (camera.height + kCell - 1) / kCell;
   Point none;

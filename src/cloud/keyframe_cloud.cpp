@@ -6,16 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <vector>
 
+#include "finite.hpp"
 #include "inverse_depth.hpp"
 
 namespace plumbline::cloud {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 /// Half base in cells that gives the same angular noise at every depth as `at_2m` pixels do at 2 m.
 int base_cells(float w, float sigma, float at_2m, int stride, int longest) {

@@ -12,11 +12,6 @@
 namespace plumbline::dataset {
 namespace {
 
-template <typename T>
-tl::unexpected<core::Error> pass_on(const core::Result<T>& result) {
-  return tl::unexpected<core::Error>(result.error());
-}
-
 std::string type_name(const cv::Mat& image) {
   const int bits = image.depth() == CV_8U ? 8 : image.depth() == CV_16U ? 16 : 32;
   return fmt::format("{} channel{} of {} bits", image.channels(), image.channels() == 1 ? "" : "s", bits);
@@ -36,7 +31,7 @@ core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole&
     return core::input_error(
         fmt::format("{}: the colour image has {}; 8 bits are needed", file, type_name(*image)));
   }
-  if (auto size = check_size(file, *image, camera, "colour"); !size) return pass_on(size);
+  if (auto size = check_size(file, *image, camera, "colour"); !size) return tl::unexpected(size.error());
   if (image->channels() == 1) cv::cvtColor(*image, *image, cv::COLOR_GRAY2BGR);
   if (image->channels() == 4) cv::cvtColor(*image, *image, cv::COLOR_BGRA2BGR);
   return image;
@@ -49,7 +44,7 @@ core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole&
     return core::input_error(fmt::format(
         "{}: the depth image has {}; a 16-bit PNG with one channel is needed", file, type_name(*image)));
   }
-  if (auto size = check_size(file, *image, camera, "depth"); !size) return pass_on(size);
+  if (auto size = check_size(file, *image, camera, "depth"); !size) return tl::unexpected(size.error());
   return image;
 }
 
@@ -68,9 +63,9 @@ class FolderSource final : public FrameSource {
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
     const PairInfo& pair = layout_.pairs.at(index);
     auto color = read_color(pair.color_file, camera_.color);
-    if (!color) return pass_on(color);
+    if (!color) return tl::unexpected(color.error());
     auto depth = read_depth(pair.depth_file, camera_.depth ? *camera_.depth : camera_.color);
-    if (!depth) return pass_on(depth);
+    if (!depth) return tl::unexpected(depth.error());
     sensor::RgbdFrame frame;
     frame.index = static_cast<std::int64_t>(index);
     frame.stamp = pair.stamp;

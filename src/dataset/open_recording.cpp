@@ -22,11 +22,6 @@ constexpr std::size_t kDepthSamples = 5;
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
 
-template <typename T>
-tl::unexpected<core::Error> pass_on(const core::Result<T>& result) {
-  return tl::unexpected<core::Error>(result.error());
-}
-
 core::Result<sensor::Camera> choose_camera(const fs::path& folder, const OpenOptions& options) {
   if (!options.camera.empty()) return sensor::find_camera(options.camera, options.cameras_folder);
   std::error_code ignored;
@@ -133,7 +128,7 @@ core::Result<DepthStatistics> sample_depth(const FrameSource& source, const std:
 
 core::Result<void> check_depth_scale(const FrameSource& source, const std::string& folder, core::Log& log) {
   const auto depth = sample_depth(source, folder);
-  if (!depth) return pass_on(depth);
+  if (!depth) return tl::unexpected(depth.error());
   const auto median = depth->median();
   const double scale = source.camera().depth_scale;
   const double fit = fitting_depth_scale(*median * scale);
@@ -166,14 +161,16 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   const auto camera = choose_camera(folder, options);
   const LayoutOptions layout_options{options.max_pair_gap_s, camera ? camera->fps : 30.0};
   auto layout = read_layout(folder, options.format, layout_options, log);
-  if (!layout) return pass_on(layout);
-  if (!camera) return pass_on(camera);
-  if (auto selected = select(options, folder.string(), layout->pairs); !selected) return pass_on(selected);
+  if (!layout) return tl::unexpected(layout.error());
+  if (!camera) return tl::unexpected(camera.error());
+  if (auto selected = select(options, folder.string(), layout->pairs); !selected)
+    return tl::unexpected(selected.error());
 
   fs::path place = fs::weakly_canonical(folder, ignored);  // "." and "room/" have names too
   if (place.filename().empty()) place = folder;
   auto source = make_folder_source(place.filename().string(), std::move(*layout), *camera);
-  if (auto scale = check_depth_scale(*source, folder.string(), log); !scale) return pass_on(scale);
+  if (auto scale = check_depth_scale(*source, folder.string(), log); !scale)
+    return tl::unexpected(scale.error());
   return source;
 }
 

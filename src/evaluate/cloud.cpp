@@ -27,7 +27,7 @@ constexpr std::array<double, 4> kThresholdsMm = {5.0, 10.0, 20.0, 50.0};
 constexpr double kSlackMm = 1e-3;           // for distances that lie on a threshold
 constexpr double kConsistencyReach = 0.05;  // m
 constexpr std::size_t kMostMeshSamples = 5000000;
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kPointsAtOnce = 4096;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 /// What the reference is in all its forms.
@@ -157,7 +157,7 @@ Distances measure(const Points& from, const Points& normals, const std::vector<s
   out.error_m.resize(from.size());
   out.mm.resize(from.size());
   std::vector<float> cosines(normals.empty() ? 0 : from.size(), kNone);
-  for_chunks(executor, order.size(), kChunk, [&](std::size_t first, std::size_t last) {
+  for_chunks(executor, order.size(), kPointsAtOnce, [&](std::size_t first, std::size_t last) {
     MeasuredSurface::Scratch scratch;
     for (std::size_t k = first; k < last; ++k) {
       const std::uint32_t i = order[k];

@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const Statistics& s) {
+Json distances_json(const Statistics& s) {
   return {{"mean", s.mean}, {"median", s.median}, {"rmse", s.rmse}, {"p90", s.p90}, {"max", s.max}};
 }
 
@@ -74,8 +74,8 @@ std::string row(const char* name, const Statistics& s) {
 std::string to_json(const CloudReport& r) {
   Json out;
   if (r.has_reference) {
-    out["accuracy_mm"] = json_of(r.accuracy_mm);
-    out["completeness_mm"] = json_of(r.completeness_mm);
+    out["accuracy_mm"] = distances_json(r.accuracy_mm);
+    out["completeness_mm"] = distances_json(r.completeness_mm);
     for (const ThresholdScore& s : r.at) {
       out["at"][fmt::format("{:g}mm", s.threshold_mm)] = {
           {"precision", s.precision}, {"recall", s.recall}, {"f", s.f}};

@@ -11,7 +11,7 @@
 namespace plumbline::evaluate {
 namespace {
 
-constexpr std::size_t kLeafSize = 8;
+constexpr std::size_t kPointsALeaf = 8;
 constexpr std::size_t kChunk = 4096;
 
 double squared_distance(const Eigen::Vector3f& p, const Eigen::Vector3d& q) {
@@ -21,7 +21,7 @@ double squared_distance(const Eigen::Vector3f& p, const Eigen::Vector3d& q) {
 }  // namespace
 
 PointIndex::PointIndex(const std::vector<Eigen::Vector3f>& points)
-    : points_(points), tree_(points.size(), kLeafSize, [&points](std::size_t i) {
+    : points_(points), tree_(points.size(), kPointsALeaf, [&points](std::size_t i) {
         return Box{points[i], points[i]};
       }) {
   in_order_.reserve(points.size());

@@ -6,7 +6,7 @@
 namespace plumbline::evaluate {
 namespace {
 
-constexpr std::size_t kLeafSize = 4;
+constexpr std::size_t kTrianglesALeaf = 4;
 
 Box box_of(const TriangleMesh& mesh, std::size_t triangle) {
   const auto& [a, b, c] = mesh.triangles[triangle];
@@ -46,7 +46,7 @@ Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& q, const Eigen::Vecto
 
 TriangleIndex::TriangleIndex(const TriangleMesh& mesh)
     : mesh_(mesh),
-      tree_(mesh.triangles.size(), kLeafSize, [&mesh](std::size_t i) { return box_of(mesh, i); }) {}
+      tree_(mesh.triangles.size(), kTrianglesALeaf, [&mesh](std::size_t i) { return box_of(mesh, i); }) {}
 
 MeshPoint TriangleIndex::on(std::uint32_t triangle, const Eigen::Vector3d& q) const {
   const auto& [a, b, c] = mesh_.triangles[triangle];

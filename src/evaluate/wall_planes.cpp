@@ -14,21 +14,21 @@ constexpr float kPointAlike = 0.866F;  // cosine of 30 degrees
 constexpr std::size_t kFewestPatches = 3;
 constexpr int kPasses = 10;
 
-struct Plane {
+struct SharedPlane {
   Eigen::Vector3d normal;
   double offset_m;
 };
 
 using Patches = std::vector<WallPatch>;
-using Indices = std::vector<std::size_t>;
+using PatchIndices = std::vector<std::size_t>;
 
-bool belongs(const WallPatch& patch, const Plane& plane, double slab_m) {
+bool belongs(const WallPatch& patch, const SharedPlane& plane, double slab_m) {
   return patch.normal.dot(plane.normal) > kPatchAlike &&
          std::abs(plane.normal.dot(patch.center) - plane.offset_m) <= slab_m;
 }
 
-Indices members(const Patches& patches, const Plane& plane, double slab_m) {
-  Indices own;
+PatchIndices members(const Patches& patches, const SharedPlane& plane, double slab_m) {
+  PatchIndices own;
   for (std::size_t i = 0; i < patches.size(); ++i) {
     if (belongs(patches[i], plane, slab_m)) own.push_back(i);
   }
@@ -36,11 +36,11 @@ Indices members(const Patches& patches, const Plane& plane, double slab_m) {
 }
 
 /// What most patches share of the planes they propose.
-Plane most_shared(const Patches& patches, double slab_m) {
-  Plane best{patches.front().normal, patches.front().normal.dot(patches.front().center)};
+SharedPlane most_shared(const Patches& patches, double slab_m) {
+  SharedPlane best{patches.front().normal, patches.front().normal.dot(patches.front().center)};
   std::size_t most = 0;
   for (const WallPatch& patch : patches) {
-    const Plane plane{patch.normal, patch.normal.dot(patch.center)};
+    const SharedPlane plane{patch.normal, patch.normal.dot(patch.center)};
     const auto count = static_cast<std::size_t>(std::count_if(
         patches.begin(), patches.end(), [&](const WallPatch& p) { return belongs(p, plane, slab_m); }));
     if (count <= most) continue;
@@ -50,7 +50,7 @@ Plane most_shared(const Patches& patches, double slab_m) {
   return best;
 }
 
-Plane fitted(const Patches& patches, const Indices& own, const Plane& before) {
+SharedPlane fitted(const Patches& patches, const PatchIndices& own, const SharedPlane& before) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const std::size_t i : own) mean += patches[i].center;
   mean /= static_cast<double>(own.size());
@@ -72,7 +72,7 @@ Plane fitted(const Patches& patches, const Indices& own, const Plane& before) {
   return {normal, normal.dot(mean)};
 }
 
-WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Plane& plane, double patch_m,
+WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const SharedPlane& plane, double patch_m,
                    double slab_m) {
   WallPlane result;
   result.normal = plane.normal;
@@ -110,11 +110,11 @@ std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<Wall
                                    double patch_m, const WallPlanesOptions& options) {
   std::vector<WallPlane> planes;
   while (static_cast<int>(planes.size()) < options.planes && patches.size() >= kFewestPatches) {
-    Plane plane = most_shared(patches, options.slab_m);
-    Indices own = members(patches, plane, options.slab_m);
+    SharedPlane plane = most_shared(patches, options.slab_m);
+    PatchIndices own = members(patches, plane, options.slab_m);
     for (int pass = 0; pass < kPasses && own.size() >= kFewestPatches; ++pass) {
       plane = fitted(patches, own, plane);
-      Indices again = members(patches, plane, options.slab_m);
+      PatchIndices again = members(patches, plane, options.slab_m);
       const bool settled = again == own;
       own = std::move(again);
       if (settled) break;

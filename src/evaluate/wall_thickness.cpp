@@ -21,16 +21,16 @@ namespace plumbline::evaluate {
 namespace {
 
 using Points = std::vector<Eigen::Vector3f>;
-using Indices = std::vector<std::uint32_t>;
+using PointIndices = std::vector<std::uint32_t>;
 
 constexpr std::size_t kLeastPatchPoints = 20;
 constexpr std::size_t kLeastCellPoints = 8;
 constexpr double kLeastMainShare = 0.3;  // a doubled wall's main layer may hold less than half of the points
 constexpr double kLeastCoverage = 0.75;  // of the patch's cells
-constexpr double kLeastReach = 5e-4;     // m, of the fit
+constexpr double kLeastFitReach = 5e-4;  // m, of the fit
 constexpr double kSlack = 1e-4;          // m, for layers exactly max_spacing_m apart
 
-struct Plane {
+struct LocalPlane {
   Eigen::Vector3d normal;
   Eigen::Vector3d center;
   [[nodiscard]] double height(const Eigen::Vector3f& p) const {
@@ -39,7 +39,7 @@ struct Plane {
 };
 
 /// Least squares for one layer, or for two parallel ones with a common normal; goes through the fuller one.
-Plane fitted(const Points& points, const Indices& some, const Plane& before) {
+LocalPlane fitted(const Points& points, const PointIndices& some, const LocalPlane& before) {
   std::vector<double> heights;
   for (const std::uint32_t i : some) heights.push_back(before.height(points[i]));
   const Layers layers = split_layers(heights);
@@ -62,8 +62,8 @@ Plane fitted(const Points& points, const Indices& some, const Plane& before) {
   return {normal, count[0] > count[1] ? mean[0] : mean[1]};
 }
 
-Indices within(const Points& points, const Indices& some, const Plane& plane, double reach) {
-  Indices inside;
+PointIndices within(const Points& points, const PointIndices& some, const LocalPlane& plane, double reach) {
+  PointIndices inside;
   for (const std::uint32_t i : some) {
     if (std::abs(plane.height(points[i])) <= reach) inside.push_back(i);
   }
@@ -71,14 +71,14 @@ Indices within(const Points& points, const Indices& some, const Plane& plane, do
 }
 
 /// MSAC over at most 400 of the points.
-std::optional<Plane> main_plane(const Points& points, const Indices& voxel, double flatness_m,
-                                core::SplitMix draw) {
+std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& voxel, double flatness_m,
+                                     core::SplitMix draw) {
   constexpr int kTrials = 80;
-  Indices some;
+  PointIndices some;
   const std::size_t stride = (voxel.size() + 399) / 400;
   for (std::size_t i = 0; i < voxel.size(); i += stride) some.push_back(voxel[i]);
   double best_cost = static_cast<double>(some.size()) * flatness_m * flatness_m;
-  std::optional<Plane> best;
+  std::optional<LocalPlane> best;
   for (int trial = 0; trial < kTrials; ++trial) {
     const Eigen::Vector3d a = points[some[draw.below(some.size())]].cast<double>();
     const Eigen::Vector3d b = points[some[draw.below(some.size())]].cast<double>();
@@ -86,7 +86,7 @@ std::optional<Plane> main_plane(const Points& points, const Indices& voxel, doub
     const Eigen::Vector3d normal = (b - a).cross(c - a);
     const double area = normal.norm();
     if (area < flatness_m * flatness_m) continue;  // too small a triangle to hold a plane
-    const Plane plane{normal / area, a};
+    const LocalPlane plane{normal / area, a};
     double cost = 0.0;
     for (const std::uint32_t i : some) {
       const double h = plane.height(points[i]);
@@ -112,17 +112,17 @@ class PatchMeasure {
   [[nodiscard]] std::size_t voxels() const { return buckets_.size(); }
 
   [[nodiscard]] std::optional<WallPatch> measure(std::size_t voxel) const {
-    const Indices own = buckets_.points_of(voxel);
+    const PointIndices own = buckets_.points_of(voxel);
     if (own.size() < kLeastPatchPoints) return std::nullopt;
     auto plane = main_plane(cloud_.points, own, options_.flatness_m, core::SplitMix(voxel));
     if (!plane) return std::nullopt;
-    const Indices main = within(cloud_.points, own, *plane, options_.flatness_m);
+    const PointIndices main = within(cloud_.points, own, *plane, options_.flatness_m);
     if (main.size() < kLeastPatchPoints) return std::nullopt;
     if (static_cast<double>(main.size()) < kLeastMainShare * static_cast<double>(own.size()))
       return std::nullopt;
     plane->center = mean_of(main);
     if (!cloud_.normals.empty()) turn_to_majority(main, *plane);
-    const Indices near = gather(voxel, *plane);
+    const PointIndices near = gather(voxel, *plane);
     for (int pass = 0; pass < 4; ++pass) {
       const auto refined = refine(near, *plane);
       if (!refined) return std::nullopt;
@@ -132,13 +132,13 @@ class PatchMeasure {
   }
 
  private:
-  [[nodiscard]] Eigen::Vector3d mean_of(const Indices& some) const {
+  [[nodiscard]] Eigen::Vector3d mean_of(const PointIndices& some) const {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const std::uint32_t i : some) mean += cloud_.points[i].cast<double>();
     return mean / static_cast<double>(some.size());
   }
 
-  void turn_to_majority(const Indices& main, Plane& plane) const {
+  void turn_to_majority(const PointIndices& main, LocalPlane& plane) const {
     std::size_t against = 0;
     for (const std::uint32_t i : main)
       against += cloud_.normals[i].cast<double>().dot(plane.normal) < 0.0 ? 1 : 0;
@@ -147,9 +147,9 @@ class PatchMeasure {
 
   /// Points around the patch, before and behind it; those of neighbouring voxels too, since a wall's second
   /// layer may lie just beyond the voxel's border.
-  [[nodiscard]] Indices gather(std::size_t voxel, const Plane& plane) const {
+  [[nodiscard]] PointIndices gather(std::size_t voxel, const LocalPlane& plane) const {
     constexpr double kMargin = 1.2;  // the plane still turns a little
-    Indices near;
+    PointIndices near;
     buckets_.for_neighborhood(voxel, [&](std::uint32_t i) {
       const Eigen::Vector3d d = cloud_.points[i].cast<double>() - plane.center;
       const double h = plane.normal.dot(d);
@@ -163,9 +163,9 @@ class PatchMeasure {
 
   /// Fits again to both layers if there are two; else to what lies near the plane by its own measure, so that
   /// a corner does not tilt it. Takes points all round the centre, which moves along the normal only.
-  [[nodiscard]] std::optional<Plane> refine(const Indices& near, const Plane& plane) const {
+  [[nodiscard]] std::optional<LocalPlane> refine(const PointIndices& near, const LocalPlane& plane) const {
     const double radius_sq = 0.25 * options_.patch_m * options_.patch_m;
-    Indices round;
+    PointIndices round;
     std::vector<double> heights;
     for (const std::uint32_t i : near) {
       const double h = plane.height(cloud_.points[i]);
@@ -176,7 +176,7 @@ class PatchMeasure {
     }
     if (!split_layers(heights).two) round = within(cloud_.points, round, plane, own_reach(heights));
     if (round.size() < kLeastPatchPoints) return std::nullopt;
-    Plane refined = fitted(cloud_.points, round, plane);
+    LocalPlane refined = fitted(cloud_.points, round, plane);
     refined.center = plane.center + refined.normal * refined.normal.dot(refined.center - plane.center);
     return refined;
   }
@@ -187,11 +187,11 @@ class PatchMeasure {
     for (const double h : heights) {
       if (std::abs(h) <= options_.flatness_m) off.push_back(std::abs(h));
     }
-    return std::clamp(3.0 * 1.4826 * summarize(off).median, kLeastReach, options_.flatness_m);
+    return std::clamp(3.0 * 1.4826 * summarize(off).median, kLeastFitReach, options_.flatness_m);
   }
 
-  [[nodiscard]] std::vector<std::vector<double>> heights_by_cell(const Indices& near,
-                                                                 const Plane& plane) const {
+  [[nodiscard]] std::vector<std::vector<double>> heights_by_cell(const PointIndices& near,
+                                                                 const LocalPlane& plane) const {
     const Eigen::Vector3d u = plane.normal.unitOrthogonal();
     const Eigen::Vector3d v = plane.normal.cross(u);
     const double half = 0.5 * options_.patch_m;
@@ -210,7 +210,7 @@ class PatchMeasure {
   }
 
   [[nodiscard]] std::optional<WallPatch> over_cells(std::vector<std::vector<double>> heights,
-                                                    const Plane& plane) const {
+                                                    const LocalPlane& plane) const {
     std::vector<double> thickness;
     std::size_t layered = 0;
     std::size_t covered = 0;  // by the main layer

@@ -8,7 +8,7 @@ namespace {
 
 using geometry::Rigid3;
 
-constexpr double kNear = 0.05;  // metres; nearer is behind the camera or inside it
+constexpr double kNearest_m = 0.05;  // metres; nearer is behind the camera or inside it
 
 class Delay {
  public:
@@ -21,14 +21,14 @@ class Delay {
   /// Pixel of the depth image that shows what the colour image shows at `pixel`, `z` metres away.
   [[nodiscard]] Eigen::Vector2f in_depth(const Eigen::Vector2f& pixel, double z) const {
     const Eigen::Vector3d p = depth_from_camera_ * ray(pixel, z);
-    return p.z() < kNear ? pixel : Eigen::Vector2f(camera_.project(p).cast<float>());
+    return p.z() < kNearest_m ? pixel : Eigen::Vector2f(camera_.project(p).cast<float>());
   }
   [[nodiscard]] CornerDepth point_depth(const PointFeature& point) const {
     const Eigen::Vector2f there = in_depth(point.pixel, static_cast<double>(point.depth));
     const CornerDepth found = corner_depth(depth_, there.x(), there.y());
     if (!(found.z > 0.0F)) return {};
     const double back = (camera_from_depth_ * ray(there, static_cast<double>(found.z))).z();
-    if (back < kNear) return {};
+    if (back < kNearest_m) return {};
     return {static_cast<float>(back), found.slant};
   }
   [[nodiscard]] std::optional<Line3> line_depth(const LineFeature& line,
@@ -40,7 +40,7 @@ class Delay {
     if (!fit) return fit;
     fit->start = camera_from_depth_ * fit->start;
     fit->end = camera_from_depth_ * fit->end;
-    if (fit->start.z() < kNear || fit->end.z() < kNear) return std::nullopt;
+    if (fit->start.z() < kNearest_m || fit->end.z() < kNearest_m) return std::nullopt;
     return fit;
   }
 

@@ -8,7 +8,7 @@
 namespace plumbline::features {
 namespace {
 
-constexpr int kReach = 3;             // px each side that the profile across a line covers
+constexpr int kProfileReach = 3;      // px each side that the profile across a line covers
 constexpr float kWindowSigma = 1.3F;  // px; a parallel edge 3 px away must not pull
 
 // Weighted straight-line fit offset(t) = a + b t, t in [-1, 1].
@@ -32,10 +32,10 @@ struct OffsetFit {
 
 int samples_along(float length) { return std::clamp(static_cast<int>(length / 4.0F), 6, 20); }
 
-std::array<float, 2 * kReach> window_weights() {
-  std::array<float, 2 * kReach> weights{};
-  for (int i = 0; i < 2 * kReach; ++i) {
-    const float offset = static_cast<float>(i - kReach) + 0.5F;
+std::array<float, 2 * kProfileReach> window_weights() {
+  std::array<float, 2 * kProfileReach> weights{};
+  for (int i = 0; i < 2 * kProfileReach; ++i) {
+    const float offset = static_cast<float>(i - kProfileReach) + 0.5F;
     weights[static_cast<std::size_t>(i)] = std::exp(-0.5F * offset * offset / (kWindowSigma * kWindowSigma));
   }
   return weights;
@@ -60,7 +60,7 @@ void orient(LineSegment& segment, const cv::Mat& gray) {
 }
 
 void refine(LineSegment& segment, const cv::Mat& gray) {
-  static const std::array<float, 2 * kReach> weights = window_weights();
+  static const std::array<float, 2 * kProfileReach> weights = window_weights();
   const int n = samples_along(segment.length());
   for (int pass = 0; pass < 2; ++pass) {
     const Eigen::Vector2f normal = right_of(segment.direction());
@@ -68,12 +68,12 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
     for (int k = 0; k < n; ++k) {
       const float s = (static_cast<float>(k) + 0.5F) / static_cast<float>(n);
       const Eigen::Vector2f p = segment.start + s * (segment.end - segment.start);
-      Eigen::Vector2f q = p - static_cast<float>(kReach) * normal;
+      Eigen::Vector2f q = p - static_cast<float>(kProfileReach) * normal;
       float before = bilinear(gray, q.x(), q.y());
       float total = 0.0F;
       float sum = 0.0F;
       float moment = 0.0F;
-      for (int i = 0; i < 2 * kReach; ++i) {
+      for (int i = 0; i < 2 * kProfileReach; ++i) {
         q += normal;
         const float after = bilinear(gray, q.x(), q.y());
         // Only steps from bright (left) to dark (right) belong to this line. Walls darken towards their
@@ -83,7 +83,7 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
         const float w = windowed * step;
         total += windowed;
         sum += w;
-        moment += w * (static_cast<float>(i - kReach) + 0.5F);
+        moment += w * (static_cast<float>(i - kProfileReach) + 0.5F);
         before = after;
       }
       // Saturating weight: one strong spot must not outvote the rest of the line.
@@ -91,7 +91,7 @@ void refine(LineSegment& segment, const cv::Mat& gray) {
     }
     float a = 0.0F;
     float b = 0.0F;
-    if (!fit.solve(a, b) || std::abs(a) + std::abs(b) > static_cast<float>(kReach)) return;
+    if (!fit.solve(a, b) || std::abs(a) + std::abs(b) > static_cast<float>(kProfileReach)) return;
     segment.start += (a - b) * normal;
     segment.end += (a + b) * normal;
   }

@@ -84,15 +84,15 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
 /// Whether the gradients around a pixel nearly all point the same way or its opposite (structure tensor;
 /// Harris and Stephens 1988 ask the same of one number).
 bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
-  constexpr int kReach = 3;
+  constexpr int kTensorReach = 3;
   int xx = 0;
   int xy = 0;
   int yy = 0;
-  for (int v = y - kReach; v <= y + kReach; ++v) {
+  for (int v = y - kTensorReach; v <= y + kTensorReach; ++v) {
     const unsigned char* above = level.ptr<unsigned char>(v - 1);
     const unsigned char* row = level.ptr<unsigned char>(v);
     const unsigned char* below = level.ptr<unsigned char>(v + 1);
-    for (int u = x - kReach; u <= x + kReach; ++u) {
+    for (int u = x - kTensorReach; u <= x + kTensorReach; ++u) {
       const int dx = row[u + 1] - row[u - 1];
       const int dy = below[u] - above[u];
       xx += dx * dx;

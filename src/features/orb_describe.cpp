@@ -21,7 +21,7 @@ constexpr int kHalfPatch = 15;
 constexpr std::size_t kPatchRows = 2 * kHalfPatch + 1;
 constexpr std::size_t kPatchColumns = 32;  // the last one weighs nothing
 constexpr std::size_t kTests = 256;
-constexpr int kReach = 3;  // of the smoothing, px
+constexpr int kSmoothingReach = 3;  // of the smoothing, px
 
 // ---- orientation
 
@@ -75,16 +75,17 @@ using Spans = std::array<std::optional<Span>, kTests>;
 /// `blur` from either of both pixels or between them. All places of the border side by side in one picture.
 Spans ask(int dx, int dy, int blur) {
   constexpr int kTile = 64;
-  constexpr int kSide = 10;  // tiles
+  constexpr int kTilesAcross = 10;  // tiles
   const int farthest = (dx + dy) * 18 + blur;
   Spans spans;
-  const auto orb = cv::ORB::create(kSide * kSide, 1.2F, 1, kTile / 4, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
+  const auto orb =
+      cv::ORB::create(kTilesAcross * kTilesAcross, 1.2F, 1, kTile / 4, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
   for (const bool negative : {false, true}) {
-    cv::Mat picture(kSide * kTile, kSide * kTile, CV_8UC1, cv::Scalar(0));
+    cv::Mat picture(kTilesAcross * kTile, kTilesAcross * kTile, CV_8UC1, cv::Scalar(0));
     std::vector<cv::KeyPoint> centres;
     for (int c = -farthest; c <= farthest; ++c) {
       const int tile = c + farthest;
-      const cv::Rect area(tile % kSide * kTile, tile / kSide * kTile, kTile, kTile);
+      const cv::Rect area(tile % kTilesAcross * kTile, tile / kTilesAcross * kTile, kTile, kTile);
       for (int v = 0; v < kTile; ++v) {
         for (int u = 0; u < kTile; ++u) {
           const bool behind = dx * (u - kTile / 2) + dy * (v - kTile / 2) >= c;
@@ -116,9 +117,9 @@ Spans ask(int dx, int dy, int blur) {
 /// The tests were learned by ORB's authors. OpenCV keeps them to itself, so they are read off its answers:
 /// its descriptors and ours stay the same bits, whatever its version.
 TestPlaces read_test_places() {
-  const Spans x = ask(1, 0, kReach);
-  const Spans y = ask(0, 1, kReach);
-  const Spans sum = ask(1, 1, 2 * kReach);
+  const Spans x = ask(1, 0, kSmoothingReach);
+  const Spans y = ask(0, 1, kSmoothingReach);
+  const Spans sum = ask(1, 1, 2 * kSmoothingReach);
   TestPlaces places;
   for (std::size_t i = 0; i < kTests; ++i) {
     // Where both pixels are alike in one coordinate, it comes from the other and the sum.
@@ -163,13 +164,14 @@ float orb_orientation(const cv::Mat& image, int x, int y) {
 }
 
 cv::Mat orb_smooth(const cv::Mat& image) {
-  CV_Assert(image.type() == CV_8UC1 && image.cols > kReach && image.rows > kReach);
+  CV_Assert(image.type() == CV_8UC1 && image.cols > kSmoothingReach && image.rows > kSmoothingReach);
   cv::Mat wide;
-  cv::copyMakeBorder(image, wide, kReach, kReach, kReach, kReach, cv::BORDER_REFLECT_101);
+  cv::copyMakeBorder(image, wide, kSmoothingReach, kSmoothingReach, kSmoothingReach, kSmoothingReach,
+                     cv::BORDER_REFLECT_101);
   cv::Mat result;
   // Of a part of a picture, which OpenCV smooths in floating point, as cv::ORB does.
-  cv::GaussianBlur(wide(cv::Rect(kReach, kReach, image.cols, image.rows)), result, {7, 7}, 2.0, 2.0,
-                   cv::BORDER_REFLECT_101);
+  cv::GaussianBlur(wide(cv::Rect(kSmoothingReach, kSmoothingReach, image.cols, image.rows)), result, {7, 7},
+                   2.0, 2.0, cv::BORDER_REFLECT_101);
   return result;
 }
 

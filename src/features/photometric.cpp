@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kBorder = 3;  // pixels of a level without samples along the picture's edge
 constexpr std::array<int, kPhotometricLevels> kCell{3, 2};
-constexpr float kNear = 0.25F;                  // metres
+constexpr float kNearestSample_m = 0.25F;       // metres
 constexpr int kBox = 7;                         // pixels of a level
 constexpr float kHalo = 0.5F + 2 * (kBox / 2);  // how far two such boxes reach
 
@@ -27,7 +27,7 @@ struct Surroundings {
 /// picture holds of another surface, if only in the local mean, moves with that.
 float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& around) {
   const float here = depth.at<float>(y, x);
-  if (!(here > kNear)) return 0.0F;
+  if (!(here > kNearestSample_m)) return 0.0F;
   const float tolerance = 0.02F + 6.0F * static_cast<float>(sensor::depth_sigma(here)) / here;
   const int near = around.near_px, far = around.far_px;
   float sum = 1.0F / here;
@@ -64,7 +64,7 @@ float steepness(const cv::Mat& image, int x, int y) {
   return gx * gx + gy * gy;
 }
 
-float bilinear(const cv::Mat& image, float x, float y) {
+float interpolated(const cv::Mat& image, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
   const float* top = image.ptr<float>(iy) + ix;
@@ -150,17 +150,18 @@ PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::M
         const Eigen::Vector3f in_depth =
             camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();
         const Eigen::Vector3f p = rotation * in_depth + translation;
-        if (p.z() < kNear) continue;
+        if (p.z() < kNearestSample_m) continue;
         const Eigen::Vector2f pixel = small.project(p.cast<double>()).cast<float>();
         if (pixel.x() < 1.0F || pixel.y() < 1.0F || pixel.x() > static_cast<float>(picture.cols - 3) ||
             pixel.y() > static_cast<float>(picture.rows - 3)) {
           continue;
         }
         const float u = pixel.x(), v = pixel.y();
-        result[level].push_back({p,
-                                 bilinear(picture, u, v),
-                                 {0.5F * (bilinear(picture, u + 1.0F, v) - bilinear(picture, u - 1.0F, v)),
-                                  0.5F * (bilinear(picture, u, v + 1.0F) - bilinear(picture, u, v - 1.0F))}});
+        result[level].push_back(
+            {p,
+             interpolated(picture, u, v),
+             {0.5F * (interpolated(picture, u + 1.0F, v) - interpolated(picture, u - 1.0F, v)),
+              0.5F * (interpolated(picture, u, v + 1.0F) - interpolated(picture, u, v - 1.0F))}});
         roughness.push_back(
             depth_roughness(depth, full_x, full_y, around.near_px, static_cast<int>(level) + 1));
       }

@@ -14,14 +14,14 @@ namespace {
 constexpr int kDepthIsBack = 50;     // corners with depth
 constexpr double kWellWithin = 0.8;  // of the limits: else the next frame would ask again
 
-struct View {
+struct ViewOverlap {
   double overlap = 1.0;
   double depth = 2.0;  ///< median, metres
 };
 
 /// Share of a keyframe's surface samples that the camera still sees, and their median depth.
-View view_of(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from_keyframe,
-             const sensor::Pinhole& camera) {
+ViewOverlap overlap_of(const maps::Keyframe& keyframe, const geometry::Rigid3& camera_from_keyframe,
+                       const sensor::Pinhole& camera) {
   if (keyframe.surface.empty()) return {};
   int inside = 0;
   std::vector<float> depths;
@@ -136,7 +136,7 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   if (frames_since_ == 1) features_after_keyframe_ = tracked;
   const geometry::Rigid3 camera_from_keyframe =
       track.camera_from_world * map.camera_from_world(reference).inverse();
-  const View view = view_of(map.keyframe(reference), camera_from_keyframe, camera);
+  const ViewOverlap view = overlap_of(map.keyframe(reference), camera_from_keyframe, camera);
   d.overlap = view.overlap;
   d.shared = features_after_keyframe_ > 0 ? static_cast<double>(tracked) / features_after_keyframe_ : 1.0;
   d.parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
@@ -171,7 +171,7 @@ core::KeyframeId KeyframeRule::known_ground(const maps::Map& map, core::Keyframe
     if (id == reference || landmarks <= most || landmarks < options_.min_shared * tracked) continue;
     const geometry::Rigid3 camera_from_keyframe =
         track.camera_from_world * map.camera_from_world(id).inverse();
-    const View view = view_of(map.keyframe(id), camera_from_keyframe, camera);
+    const ViewOverlap view = overlap_of(map.keyframe(id), camera_from_keyframe, camera);
     const double parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
     if (parallax > kWellWithin * options_.max_parallax ||
         geometry::rotation_angle(camera_from_keyframe.rotation) > kWellWithin * options_.max_rotation_rad ||

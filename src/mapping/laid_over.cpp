@@ -48,14 +48,14 @@ Seen seen(const cv::Mat& depth, const sensor::Pinhole& camera, const Eigen::Vect
   return point.z() > static_cast<double>(high) + tolerance ? Seen::kNot : Seen::kThere;
 }
 
-struct View {
+struct PlacedView {
   const cv::Mat* depth;
   sensor::Pinhole camera;
   Rigid3 camera_from_world;
 };
 
-std::vector<View> views_of(const MapPart& part) {
-  std::vector<View> views;
+std::vector<PlacedView> views_of(const MapPart& part) {
+  std::vector<PlacedView> views;
   for (const KeyframeId id : part.map->keyframe_ids()) {
     const auto& features = part.map->keyframe(id).features;
     if (features == nullptr || features->thumbnail_depth.empty()) continue;
@@ -125,7 +125,7 @@ void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_fro
                    std::vector<Eigen::Vector3d>* matched) const {
   constexpr double kLikeSide = 0.8;  // cosine between the directions from which a landmark was seen
   constexpr double kTimes = 1.8;     // nearer or farther: a corner does not look the same from everywhere
-  const std::vector<View> views = views_of(fixed.part);
+  const std::vector<PlacedView> views = views_of(fixed.part);
   const std::size_t step = stride(moved.landmarks.size(), kMostAsked);
   for (std::size_t i = 0; i < moved.landmarks.size(); i += step) {
     const Landmark& landmark = moved.landmarks[i];
@@ -133,7 +133,7 @@ void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_fro
     const Eigen::Vector3d direction = fixed_from_moved.rotation * landmark.view;
     bool there = false;
     bool through = false;
-    for (const View& view : views) {
+    for (const PlacedView& view : views) {
       const Eigen::Vector3d in_camera = view.camera_from_world * at;
       const double distance = in_camera.norm();
       if (in_camera.z() < kNear_m || in_camera.z() > kFar_m || distance > kTimes * landmark.distance_m ||
@@ -160,7 +160,7 @@ namespace {
 void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
                   LaidMaps::Surfaces& sum) {
   constexpr double kFacing = 0.25;  // cosine
-  const std::vector<View> views = views_of(fixed);
+  const std::vector<PlacedView> views = views_of(fixed);
   const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
   std::size_t count = 0;
   for (const KeyframeId id : ids) count += moved.map->keyframe(id).surface.size();
@@ -174,7 +174,7 @@ void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixe
       const Eigen::Vector3d normal = fixed_from_camera.rotation * samples[next].normal.cast<double>();
       bool there = false;
       bool through = false;
-      for (const View& view : views) {
+      for (const PlacedView& view : views) {
         const Eigen::Vector3d in_camera = view.camera_from_world * at;
         if (in_camera.z() < kNear_m || in_camera.z() > kFar_m) continue;
         if (-(view.camera_from_world.rotation * normal).dot(in_camera) < kFacing * in_camera.norm()) continue;

@@ -13,7 +13,7 @@ using core::LineId;
 
 // Strict: parallel edges a finger apart are two, and one wrong merger costs more than ten right ones give.
 constexpr double kEnd_px = 1.0;       // of a measured end from the landmark's image
-constexpr double kSigmas = 3.0;       // of a measured end from the landmark in space
+constexpr double kEndSigmas = 3.0;    // of a measured end from the landmark in space
 constexpr double kMaxAngle = 0.07;    // rad, between two landmarks that are one
 constexpr double kMinSigma_m = 0.01;  // ends of lines are less exact than corners
 
@@ -56,7 +56,7 @@ bool fits(const maps::MapLine& line, const features::LineFeature& f,
   if (!f.line3) return true;
   for (const Eigen::Vector3d& end : {f.line3->start, f.line3->end}) {
     const double sigma = std::max(kMinSigma_m, std::sqrt(2.0) * sensor::depth_sigma(end.z()));
-    if ((end - geometry::nearest_point(in_camera, end)).norm() > kSigmas * sigma) return false;
+    if ((end - geometry::nearest_point(in_camera, end)).norm() > kEndSigmas * sigma) return false;
   }
   return true;
 }
@@ -84,7 +84,7 @@ bool may_be_one(const maps::MapLine& a, const maps::MapLine& b, const geometry::
   for (const Eigen::Vector3d& end : {shorter.start, shorter.end}) {
     const double z = (camera_from_world * end).z();
     const double sigma = std::max(kMinSigma_m, std::sqrt(2.0) * sensor::depth_sigma(z));
-    if (distance(end, longer) > kSigmas * sigma) return false;
+    if (distance(end, longer) > kEndSigmas * sigma) return false;
   }
   return std::none_of(a.observations.begin(), a.observations.end(),
                       [&](const maps::Observation& o) { return seen_by(b, o.keyframe); });

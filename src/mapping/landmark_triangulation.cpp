@@ -15,18 +15,18 @@ using geometry::Rigid3;
 
 constexpr double kReprojectionGate = 5.99;  // chi-square, 2 degrees of freedom, 95 %
 constexpr double kEpipolarGate_px = 2.0;    // at octave 0
-constexpr double kSamePlace_px = 3.0;       // corners of several octaves at one place are one corner
+constexpr double kRival_px = 3.0;           // corners of several octaves at one place are one corner
 constexpr double kMaxScaleChange = 1.8;     // of a corner's size in space, between its two pictures
 
 /// One keyframe with what the search needs of it.
-struct View {
+struct FreeCorners {
   const features::FrameFeatures& features;
   const Rigid3& camera_from_world;
   std::vector<int> free;  ///< corners that see no landmark and have no depth
 };
 
-View view_of(const maps::Map& map, KeyframeId id, double max_measured_m) {
-  View view{*map.keyframe(id).features, map.camera_from_world(id), {}};
+FreeCorners free_corners_of(const maps::Map& map, KeyframeId id, double max_measured_m) {
+  FreeCorners view{*map.keyframe(id).features, map.camera_from_world(id), {}};
   for (std::size_t i = 0; i < view.features.points.size(); ++i) {
     const auto depth = static_cast<double>(view.features.points[i].depth);
     const bool measured = depth > 0.0 && depth <= max_measured_m;
@@ -42,7 +42,7 @@ double angle_between(double a, double b) {
 
 class PairSearch {
  public:
-  PairSearch(const View& first, const View& second, const sensor::Pinhole& camera,
+  PairSearch(const FreeCorners& first, const FreeCorners& second, const sensor::Pinhole& camera,
              const TriangulationOptions& options)
       : a_(first), b_(second), camera_(camera), options_(options) {
     b_from_a_ = b_.camera_from_world * a_.camera_from_world.inverse();
@@ -68,7 +68,7 @@ class PairSearch {
       if (off > kEpipolarGate_px * sigma(g) || !alike(f, g)) continue;
       const int distance = features::hamming_distance(a_.features.descriptors[static_cast<std::size_t>(i)],
                                                       b_.features.descriptors[static_cast<std::size_t>(j)]);
-      const bool rival = best < 0 || (g.pixel - pixel_of(best)).norm() > kSamePlace_px;
+      const bool rival = best < 0 || (g.pixel - pixel_of(best)).norm() > kRival_px;
       if (distance < best_distance) {
         if (rival) second_distance = best_distance;
         best_distance = distance;
@@ -133,8 +133,8 @@ class PairSearch {
     return (camera_.project(in_camera) - f.pixel.cast<double>()).squaredNorm() < kReprojectionGate * s * s;
   }
 
-  const View& a_;
-  const View& b_;
+  const FreeCorners& a_;
+  const FreeCorners& b_;
   const sensor::Pinhole& camera_;
   const TriangulationOptions& options_;
   Rigid3 b_from_a_;
@@ -218,8 +218,8 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
   const NewestPicture* const shown = aligns ? picture : nullptr;
   bool moved = false;
   for (KeyframeId other : neighbours) {
-    const View a = view_of(map, keyframe, max_measured_m);
-    const View b = view_of(map, other, max_measured_m);
+    const FreeCorners a = free_corners_of(map, keyframe, max_measured_m);
+    const FreeCorners b = free_corners_of(map, other, max_measured_m);
     const PairSearch search(a, b, camera, options);
     for (int i : a.free) {
       const int j = search.partner(i);

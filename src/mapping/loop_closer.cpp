@@ -12,9 +12,9 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-constexpr int kRelated = 5;         // shared landmarks: the same surroundings, not a loop
-constexpr std::size_t kAround = 8;  // keyframes on each side whose landmarks are compared
-constexpr int kPatience = 6;        // keyframes that a verified loop waits for another one
+constexpr int kRelated = 5;             // shared landmarks: the same surroundings, not a loop
+constexpr std::size_t kAroundLoop = 8;  // keyframes on each side whose landmarks are compared
+constexpr int kPatience = 6;            // keyframes that a verified loop waits for another one
 
 std::vector<KeyframeId> neighbours_of(const maps::Map& map, KeyframeId id, std::size_t count) {
   std::vector<KeyframeId> result;
@@ -140,7 +140,7 @@ std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
     if (!map.has_keyframe(id) || std::abs(now - map.keyframe(id).stamp) < options_.min_gap_s) return false;
     return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
   };
-  const auto neighbours = [&](KeyframeId id) { return neighbours_of(map, id, kAround); };
+  const auto neighbours = [&](KeyframeId id) { return neighbours_of(map, id, kAroundLoop); };
   const auto candidates = recogniser_.look(database_, keyframe, *features, last_, allowed, neighbours);
   const std::vector<Loop> verified = verify(map, keyframe, candidates);
   database_.add(keyframe, features);
@@ -167,9 +167,9 @@ void LoopCloser::restore(const maps::Map& map, KeyframeId newest) {
 }
 
 void LoopCloser::merge_doubles(maps::Map& map, const PoseEdge& edge) const {
-  std::vector<KeyframeId> old_side = neighbours_of(map, edge.a, kAround);
+  std::vector<KeyframeId> old_side = neighbours_of(map, edge.a, kAroundLoop);
   old_side.insert(old_side.begin(), edge.a);
-  std::vector<KeyframeId> new_side = neighbours_of(map, edge.b, kAround);
+  std::vector<KeyframeId> new_side = neighbours_of(map, edge.b, kAroundLoop);
   new_side.insert(new_side.begin(), edge.b);
   for (const KeyframeId id : new_side) {
     std::vector<KeyframeId> others;

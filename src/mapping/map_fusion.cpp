@@ -12,8 +12,8 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-constexpr int kRelated = 15;        // landmarks that keyframes share which see the same
-constexpr std::size_t kAround = 4;  // keyframes around each end of a pair whose landmarks are compared
+constexpr int kSeesTheSame = 15;        // landmarks that keyframes share which see the same
+constexpr std::size_t kAroundPair = 4;  // keyframes around each end of a pair whose landmarks are compared
 
 /// Where each part of the anchor's group lies: along the merges with most pairs first (a spanning tree).
 std::map<std::size_t, Rigid3> lay_out(const std::vector<MergeEvidence>& merges, std::size_t anchor) {
@@ -55,8 +55,8 @@ std::vector<PoseEdge> edges_of(const MergeEvidence& merge) {
 
 std::vector<KeyframeId> surroundings(const maps::Map& map, KeyframeId id) {
   std::vector<KeyframeId> result{id};
-  for (const auto& [other, shared] : map.covisible(id, kRelated)) {
-    if (result.size() > kAround) break;
+  for (const auto& [other, shared] : map.covisible(id, kSeesTheSame)) {
+    if (result.size() > kAroundPair) break;
     if (other.robot == id.robot) result.push_back(other);
   }
   return result;

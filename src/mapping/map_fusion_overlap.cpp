@@ -16,7 +16,7 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-constexpr std::size_t kAround = 8;  // keyframes that belong to the surroundings of one
+constexpr std::size_t kSurroundings = 8;  // keyframes that belong to the surroundings of one
 
 std::size_t part_of(const std::vector<MapPart>& parts, KeyframeId id) {
   for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -113,7 +113,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look(const places::Database
     const std::size_t where = part_of(parts, id);
     if (where == parts.size()) return around;
     for (const auto& [other, shared] : parts[where].map->covisible(id, 15)) {
-      if (around.size() >= kAround) break;
+      if (around.size() >= kSurroundings) break;
       around.push_back(other);
     }
     return around;

@@ -19,7 +19,7 @@ using geometry::Rigid3;
 constexpr std::size_t kFewPoints = 60;
 
 // When a pair of points or lines fits a pose.
-constexpr double kNear_m = 0.1;  // nothing nearer to the camera fits
+constexpr double kNearest_m = 0.1;  // nothing nearer to the camera fits
 constexpr double kPoint_px =
     4.5;                          // at octave 0: 3 standard deviations of 1.5 px, the landmark's own among it
 constexpr double kLine_px = 5.0;  // between the ends of one line and the other
@@ -45,14 +45,14 @@ class Inliers {
  private:
   [[nodiscard]] bool fits(const PointPair& pair, const Rigid3& pose) const {
     const Eigen::Vector3d p = pose * pair.match;
-    if (p.z() < kNear_m) return false;
+    if (p.z() < kNearest_m) return false;
     if ((camera_.project(p) - pair.query).norm() > kPoint_px * pair.sigma) return false;
     return !(pair.depth > 0.0) || std::abs(p.z() - pair.depth) < depth_gate_m(pair.depth);
   }
   [[nodiscard]] bool fits(const LinePair& pair, const Rigid3& pose) const {
     const Eigen::Vector3d a = pose * pair.match_start;
     const Eigen::Vector3d b = pose * pair.match_end;
-    if (a.z() < kNear_m || b.z() < kNear_m) return false;
+    if (a.z() < kNearest_m || b.z() < kNearest_m) return false;
     const Eigen::Vector2d pa = camera_.project(a);
     const Eigen::Vector2d d = (camera_.project(b) - pa).normalized();
     if (!d.allFinite()) return false;

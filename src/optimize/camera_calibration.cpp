@@ -111,9 +111,9 @@ constexpr std::size_t kStep = 6;  // turn, then shift
 using ResidualIds = std::vector<ceres::ResidualBlockId>;
 
 /// All unknowns in one buffer, for the order of Ceres' sums hangs on addresses.
-class Unknowns {
+class CameraUnknowns {
  public:
-  explicit Unknowns(const CalibrationProblem& problem) : poses_(problem.poses.size()) {
+  explicit CameraUnknowns(const CalibrationProblem& problem) : poses_(problem.poses.size()) {
     numbers_.assign(kCameraUnknowns + kStep * poses_ + 3 * problem.points.size(), 0.0);
     std::copy(problem.change.begin(), problem.change.end(), numbers_.begin());
     for (std::size_t i = 0; i < problem.points.size(); ++i)
@@ -131,7 +131,7 @@ class Unknowns {
 };
 
 /// Observations and what their residual blocks are called.
-ResidualIds add_observations(const CalibrationProblem& problem, Unknowns& unknowns,
+ResidualIds add_observations(const CalibrationProblem& problem, CameraUnknowns& unknowns,
                              ceres::LossFunction* pixel_loss, ceres::LossFunction* depth_loss,
                              ceres::Problem& to) {
   ResidualIds ids;
@@ -152,7 +152,7 @@ ResidualIds add_observations(const CalibrationProblem& problem, Unknowns& unknow
   return ids;
 }
 
-void hold(const CalibrationProblem& problem, Unknowns& unknowns, ceres::Problem& to) {
+void hold(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::Problem& to) {
   std::vector<int> held;
   for (std::size_t i = 0; i < kCameraUnknowns; ++i) {
     if (!problem.free[i]) held.push_back(static_cast<int>(i));
@@ -168,7 +168,7 @@ void hold(const CalibrationProblem& problem, Unknowns& unknowns, ceres::Problem&
   }
 }
 
-void write_back(CalibrationProblem& problem, Unknowns& unknowns) {
+void write_back(CalibrationProblem& problem, CameraUnknowns& unknowns) {
   std::copy_n(unknowns.change(), kCameraUnknowns, problem.change.begin());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     if (problem.poses[i].fixed) continue;
@@ -209,7 +209,7 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
 double adjust_with_camera(CalibrationProblem& problem, int max_iterations) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (problem.observations.empty()) return kNone;
-  Unknowns unknowns(problem);
+  CameraUnknowns unknowns(problem);
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::HuberLoss pixel_loss(1.0);

@@ -15,9 +15,9 @@ namespace {
 /// The state's numbers as Ceres wants them, and back. All in one array: within an elimination group Ceres
 /// goes by the blocks' addresses, so that with points and lines in arrays of their own the order of its sums,
 /// and with it the last digits of the result, would hang on where the heap put them.
-class Unknowns {
+class MapUnknowns {
  public:
-  explicit Unknowns(const BundleState& state) : poses_(state.poses.size()), points_(state.points.size()) {
+  explicit MapUnknowns(const BundleState& state) : poses_(state.poses.size()), points_(state.points.size()) {
     numbers_.resize(kPoseBlock * (poses_ + 1) + 3 * points_ + kLineBlock * state.lines.size());
     for (std::size_t i = 0; i < poses_; ++i) from_rigid(state.poses[i], pose(i));
     from_rigid({}, world());
@@ -118,7 +118,7 @@ class MapRound {
   const BundleProblem& problem_;
   const BundleOptions& options_;
   BundleState& state_;
-  Unknowns unknowns_;
+  MapUnknowns unknowns_;
   ceres::HuberLoss point_loss_;
   ceres::HuberLoss line_loss_;
   ceres::HuberLoss edge_loss_;

@@ -37,7 +37,7 @@ bool is_debug_folder(const fs::path& folder) {
   return !ec;
 }
 
-fs::path normal(const fs::path& path) {
+fs::path resolved(const fs::path& path) {
   std::error_code ec;
   const fs::path result = fs::weakly_canonical(fs::absolute(path), ec);
   return ec ? fs::absolute(path).lexically_normal() : result;
@@ -45,7 +45,7 @@ fs::path normal(const fs::path& path) {
 
 /// `path` as seen from `folder` when it lies in it ("." is the folder itself), else empty.
 fs::path inside(const fs::path& folder, const fs::path& path) {
-  fs::path relative = normal(path / ".").lexically_relative(normal(folder / "."));
+  fs::path relative = resolved(path / ".").lexically_relative(resolved(folder / "."));
   if (!relative.empty() && *relative.begin() == "..") relative.clear();
   return relative;
 }

@@ -29,7 +29,7 @@ std::vector<double> values_of(const CsvTable& table, std::size_t column) {
   return values;
 }
 
-double quantile(std::vector<double> values, double q) {
+double quantile_or_zero(std::vector<double> values, double q) {
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
                values.end());
   if (values.empty()) return 0.0;
@@ -49,8 +49,8 @@ std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
         name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
     if (!stage) continue;
     TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
-    column.median = quantile(column.values, 0.5);
-    if (quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
+    column.median = quantile_or_zero(column.values, 0.5);
+    if (quantile_or_zero(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
   }
   const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
   std::stable_sort(columns.begin(), columns.end(), slower);
@@ -62,7 +62,7 @@ std::string time_charts(const ReportData& data) {
   if (!data.timing_table) return {};
   const CsvTable& table = *data.timing_table;
   std::vector<double> time_s = values_of(table, table.column("stamp"));
-  const double start_s = quantile(time_s, 0.0);
+  const double start_s = quantile_or_zero(time_s, 0.0);
   for (double& t : time_s) t -= start_s;
   viz::SvgChart chart;
   chart.title = "Milliseconds of each stage per frame";
@@ -70,8 +70,8 @@ std::string time_charts(const ReportData& data) {
   chart.height_px = 180;
   double usual = 0.0, most = 0.0;
   for (TimedColumn& column : slowest_stages(table)) {
-    usual = std::max(usual, quantile(column.values, 0.98));
-    most = std::max(most, quantile(column.values, 1.0));
+    usual = std::max(usual, quantile_or_zero(column.values, 0.98));
+    most = std::max(most, quantile_or_zero(column.values, 1.0));
     chart.lines.push_back({column.name, robot_kind(chart.lines.size()), time_s, std::move(column.values)});
   }
   std::string out;
@@ -85,7 +85,7 @@ std::string time_charts(const ReportData& data) {
   memory.y_label = "memory (MB)";
   memory.lines.push_back(
       {"memory held when a frame was done", "k5", time_s, values_of(table, table.column("rss_mb"))});
-  const bool known = quantile(memory.lines[0].y, 1.0) > 0.0;
+  const bool known = quantile_or_zero(memory.lines[0].y, 1.0) > 0.0;
   return known ? out + svg_chart(memory) : out;
 }
 

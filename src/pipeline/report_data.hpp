@@ -3,6 +3,7 @@
 
 // What a result folder holds, read for its report. Anything but summary.json may be missing.
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -18,6 +19,8 @@
 #include "report_table.hpp"
 
 namespace plumbline::pipeline {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  ///< what is not known
 
 /// The way of one robot in the frame of the results.
 struct ReportPath {

@@ -10,8 +10,6 @@
 namespace plumbline::pipeline {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 std::optional<CsvTable> table_of(const char* name, ReportData& data) {
   auto table = CsvTable::read(data.folder / name);
   if (table) return std::move(*table);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "plumbline/core/numbers.hpp"
 #include "report_cloud.hpp"
@@ -12,8 +11,6 @@
 
 namespace plumbline::pipeline {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Poses are missing where stamps are further apart than five usual steps and 0.25 s.
 double longest_step(const geometry::Trajectory& poses) {

@@ -4,14 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "report_sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// The q-quantile of the numbers among them; NaN when there are none.
 double quantile(std::vector<double> values, double q) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kMaxBranching = 64;
 
-std::size_t at(Word word) { return static_cast<std::size_t>(word); }
+std::size_t index_of(Word word) { return static_cast<std::size_t>(word); }
 
 const std::array<int, kMaxBranching>& first_indices() {
   static const std::array<int, kMaxBranching> kIndices = [] {
@@ -57,10 +57,10 @@ std::int64_t Vocabulary::patience(int level) const {
 Word Vocabulary::word(Kind kind, const Descriptor256& descriptor) const {
   auto node = static_cast<Word>(kind);
   std::array<int, kMaxBranching> distances{};
-  while (nodes_[at(node)].children > 0) {
-    const Node& n = nodes_[at(node)];
+  while (nodes_[index_of(node)].children > 0) {
+    const Node& n = nodes_[index_of(node)];
     const auto count = static_cast<std::size_t>(n.children);
-    features::hamming_distances(descriptor, &centres_[at(n.first_child)], first_indices().data(), count,
+    features::hamming_distances(descriptor, &centres_[index_of(n.first_child)], first_indices().data(), count,
                                 distances.data());
     const auto nearest = std::min_element(distances.begin(), distances.begin() + n.children);
     node = n.first_child + static_cast<Word>(nearest - distances.begin());
@@ -69,21 +69,21 @@ Word Vocabulary::word(Kind kind, const Descriptor256& descriptor) const {
 }
 
 double Vocabulary::weight(Word word) const {
-  const std::int64_t in_word = nodes_[at(word)].features;
+  const std::int64_t in_word = nodes_[index_of(word)].features;
   const std::int64_t all = nodes_[0].features + nodes_[1].features;
   if (in_word <= 0 || all <= in_word) return 0.0;
   return std::log(static_cast<double>(all) / static_cast<double>(in_word));
 }
 
 void Vocabulary::count(Word word) {
-  Node& node = nodes_[at(word)];
+  Node& node = nodes_[index_of(word)];
   ++node.features;
   const auto root = static_cast<Word>(node.kind);
-  if (root != word) ++nodes_[at(root)].features;
+  if (root != word) ++nodes_[index_of(root)].features;
 }
 
 bool Vocabulary::overfull(Word word) const {
-  const Node& node = nodes_[at(word)];
+  const Node& node = nodes_[index_of(word)];
   return node.children == 0 && node.level < options_.levels && node.features > node.divide_at;
 }
 
@@ -91,14 +91,14 @@ Word Vocabulary::add_children(Word parent, const std::vector<Descriptor256>& cen
   const auto first = static_cast<Word>(nodes_.size());
   for (const Descriptor256& centre : centres) {
     Node child;
-    child.kind = nodes_[at(parent)].kind;
-    child.level = static_cast<std::int8_t>(nodes_[at(parent)].level + 1);
+    child.kind = nodes_[index_of(parent)].kind;
+    child.level = static_cast<std::int8_t>(nodes_[index_of(parent)].level + 1);
     child.divide_at = patience(child.level);
     nodes_.push_back(child);
     centres_.push_back(centre);
   }
-  nodes_[at(parent)].first_child = first;
-  nodes_[at(parent)].children = static_cast<std::int16_t>(centres.size());
+  nodes_[index_of(parent)].first_child = first;
+  nodes_[index_of(parent)].children = static_cast<std::int16_t>(centres.size());
   return first;
 }
 
@@ -107,7 +107,7 @@ std::vector<Word> Vocabulary::divide(Word word, const std::vector<Descriptor256>
   const Clusters clusters =
       k_majority(members, options_.branching, options_.iterations, static_cast<std::uint64_t>(word));
   if (clusters.centres.size() < 2) {
-    nodes_[at(word)].divide_at = 2 * nodes_[at(word)].features;
+    nodes_[index_of(word)].divide_at = 2 * nodes_[index_of(word)].features;
     return {};
   }
   const Word first = add_children(word, clusters.centres);
@@ -115,7 +115,7 @@ std::vector<Word> Vocabulary::divide(Word word, const std::vector<Descriptor256>
   words.reserve(members.size());
   for (const int c : clusters.member_of) {
     words.push_back(first + static_cast<Word>(c));
-    ++nodes_[at(words.back())].features;
+    ++nodes_[index_of(words.back())].features;
   }
   return words;
 }

@@ -12,7 +12,7 @@ namespace plumbline::synth {
 
 namespace {
 
-constexpr int kTile = 512;  // a power of two
+constexpr int kNoiseTile = 512;  // a power of two
 
 /// Sensor constants; baseline and disparity step are those of the devices.
 struct Device {
@@ -31,7 +31,7 @@ Device device(Sensor sensor) {
 }
 
 cv::Mat1f white_tile(std::uint64_t seed) {
-  cv::Mat1f tile(kTile, kTile);
+  cv::Mat1f tile(kNoiseTile, kNoiseTile);
   Rng rng(seed, 0x711e);
   for (float& v : tile) v = static_cast<float>(rng.normal());
   return tile;
@@ -42,7 +42,7 @@ void correlate(cv::Mat1f& tile, double sigma) {
   cv::Mat1f wide;
   cv::copyMakeBorder(tile, wide, 64, 64, 64, 64, cv::BORDER_WRAP);
   cv::GaussianBlur(wide, wide, {0, 0}, sigma);
-  tile = wide(cv::Rect(64, 64, kTile, kTile)).clone();
+  tile = wide(cv::Rect(64, 64, kNoiseTile, kNoiseTile)).clone();
   cv::Scalar mean, deviation;
   cv::meanStdDev(tile, mean, deviation);
   tile = (tile - mean[0]) / deviation[0];
@@ -53,8 +53,8 @@ class Field {
  public:
   Field(const cv::Mat1f& tile, std::uint64_t key)
       : tile_(tile), dx_(static_cast<int>(key & 511U)), dy_(static_cast<int>(key >> 9U & 511U)) {}
-  [[nodiscard]] const float* row(int y) const { return tile_[(y + dy_) & (kTile - 1)]; }
-  [[nodiscard]] int column(int x) const { return (x + dx_) & (kTile - 1); }
+  [[nodiscard]] const float* row(int y) const { return tile_[(y + dy_) & (kNoiseTile - 1)]; }
+  [[nodiscard]] int column(int x) const { return (x + dx_) & (kNoiseTile - 1); }
   [[nodiscard]] float at(int x, int y) const { return row(y)[column(x)]; }
 
  private:
@@ -244,7 +244,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   correlate(tiles.medium, 3.0);
   tiles.coarse = white_tile(mix(seed, 2));
   correlate(tiles.coarse, 6.0);
-  tiles.color.create(kTile, kTile);
+  tiles.color.create(kNoiseTile, kNoiseTile);
   // Neighbouring colours are interpolated from a mosaic, hence smooth; the three channels share a part.
   cv::Mat1f channel[4];
   for (std::uint64_t k = 0; k < 4; ++k) {
@@ -253,8 +253,8 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   }
   tiles.fine = 0.72 * tiles.fine + 0.58 * tiles.medium +
                0.38 * tiles.coarse;  // a sharp core with a skirt, as measured
-  for (int y = 0; y < kTile; ++y) {
-    for (int x = 0; x < kTile; ++x) {
+  for (int y = 0; y < kNoiseTile; ++y) {
+    for (int x = 0; x < kNoiseTile; ++x) {
       for (int k = 0; k < 3; ++k) {
         const float v = 16.0F * (0.75F * channel[3](y, x) + 0.66F * channel[k](y, x));
         tiles.color(y, x)[k] = static_cast<std::int8_t>(std::clamp(std::lround(v), -120L, 120L));
@@ -292,10 +292,10 @@ void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTil
   const std::uint64_t bits = frame_bits(key, 31, key.index);
   const int dx = static_cast<int>(bits & 511U), dy = static_cast<int>(bits >> 9U & 511U);
   for (int y = 0; y < image.rows; ++y) {
-    const auto* noise = tiles.color[(y + dy) & (kTile - 1)];
+    const auto* noise = tiles.color[(y + dy) & (kNoiseTile - 1)];
     auto* p = image.ptr<std::uint8_t>(y);
     for (int x = 0; x < image.cols;) {
-      const int start = (x + dx) & (kTile - 1), run = std::min(kTile - start, image.cols - x);
+      const int start = (x + dx) & (kNoiseTile - 1), run = std::min(kNoiseTile - start, image.cols - x);
       const auto* n = reinterpret_cast<const std::int8_t*>(noise + start);
       for (int i = 0; i < 3 * run; ++i) {
         const int v = p[3 * x + i] + ((n[i] * scale + 128) >> 8);

@@ -297,7 +297,7 @@ void read_furniture(const Context& c) {
       {"desk", {1.5, 0.75, 0.74}}, {"table", {1.2, 0.7, 0.72}},   {"shelf", {0.9, 0.32, 1.9}},
       {"sofa", {1.9, 0.9, 0.85}},  {"cabinet", {0.9, 0.45, 0.8}},
   };
-  static const std::map<std::string, std::string> kMaterials = {
+  static const std::map<std::string, std::string> kMaterialOfWord = {
       {"desk", "wood"}, {"table", "wood_dark"},   {"shelf", "wood"},
       {"sofa", "sofa"}, {"cabinet", "wood_dark"}, {"chair", "fabric"},
   };
@@ -305,7 +305,7 @@ void read_furniture(const Context& c) {
   double yaw = 0.0;
   bool books = true;
   int doors = 2;
-  std::string material = kMaterials.at(c.type);
+  std::string material = kMaterialOfWord.at(c.type);
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 0).angle("yaw", yaw).material("material", material);
   if (!size.empty()) r.size("size", size, 3);

@@ -37,17 +37,18 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   return camera;
 }
 
+/// Of one frame, seconds.
+struct Stamps {
+  std::int64_t number;  ///< of the frame before any were dropped; the noise's counter
+  double color, depth;
+};
+
 namespace {
 
 constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing ones
 
 /// Whole microseconds: what six decimals in a file can say.
 double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
-
-struct Stamps {
-  std::int64_t number;  ///< of the frame before any were dropped; the noise's counter
-  double color, depth;
-};
 
 std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>& events, std::size_t frames,
                                 std::uint64_t seed) {

@@ -10,7 +10,7 @@
 namespace plumbline::tracking {
 namespace {
 
-constexpr double kMinCorrelation = 0.6;
+constexpr double kMinAlike = 0.6;
 constexpr double kMinContrast = 3.0;  // grey values, standard deviation; less is a wall or a covered lens
 
 /// Half the thumbnail's size, blurred so that a shift by a pixel or two changes little.
@@ -48,7 +48,7 @@ std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core:
     const cv::Mat& thumbnail = map.keyframe(id).features->thumbnail;
     if (thumbnail.size() != features.thumbnail.size()) continue;
     const double score = correlation(current, coarse(thumbnail));
-    if (score >= kMinCorrelation) alike.push_back({id, score});
+    if (score >= kMinAlike) alike.push_back({id, score});
   }
   std::stable_sort(alike.begin(), alike.end(),
                    [](const LookAlike& a, const LookAlike& b) { return a.correlation > b.correlation; });

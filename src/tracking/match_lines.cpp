@@ -26,13 +26,13 @@ bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_f
 }
 
 /// What every landmark asks of every line of the frame.
-struct Candidate {
+struct LineCandidate {
   Eigen::Vector2f direction;
   Eigen::Vector2f middle;
 };
 
-std::vector<Candidate> candidates_of(const features::FrameFeatures& frame) {
-  std::vector<Candidate> candidates;
+std::vector<LineCandidate> candidates_of(const features::FrameFeatures& frame) {
+  std::vector<LineCandidate> candidates;
   candidates.reserve(frame.lines.size());
   for (const features::LineFeature& line : frame.lines) {
     candidates.push_back({line.segment.direction(), line.segment.middle()});
@@ -47,7 +47,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
                                    const geometry::Rigid3& camera_from_world, double radius,
                                    const AssociationOptions& options, std::vector<core::LineId>* visible) {
   const auto min_cosine = static_cast<float>(std::cos(options.max_line_angle_rad));
-  const std::vector<Candidate> candidates = candidates_of(frame);
+  const std::vector<LineCandidate> candidates = candidates_of(frame);
   std::vector<LineMatch> by_feature(frame.lines.size());
   for (core::LineId id : lines) {
     const maps::MapLine* line = map.find_line(id);

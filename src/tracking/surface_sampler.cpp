@@ -95,7 +95,7 @@ int straight_base(const HalfDepth& depth, int x, int y, int dx, int dy) {
   return 0;
 }
 
-struct Candidate {
+struct SurfaceCandidate {
   maps::SurfaceSample sample;
   int cell = 0;  ///< of the picture
   int bin = 0;   ///< of the directions
@@ -115,14 +115,14 @@ int direction_bin(const Eigen::Vector3f& n) {
   return e * kAzimuths + a;
 }
 
-std::vector<Candidate> candidates(const HalfDepth& depth, const sensor::Pinhole& camera,
-                                  const SurfaceSamplerOptions& options) {
+std::vector<SurfaceCandidate> candidates(const HalfDepth& depth, const sensor::Pinhole& camera,
+                                         const SurfaceSamplerOptions& options) {
   const auto point = [&](int x, int y) {
     const double z = depth.at(x, y);
     return camera.unproject(2.0 * x + 0.5, 2.0 * y + 0.5, z).cast<float>().eval();
   };
   const auto min_cosine = static_cast<float>(std::cos(options.max_incidence_rad));
-  std::vector<Candidate> result;
+  std::vector<SurfaceCandidate> result;
   for (int y = 3; y < depth.height - 3; y += 2) {
     for (int x = 3 + (y / 2) % 2; x < depth.width - 3; x += 2) {
       const float z = depth.at(x, y);
@@ -131,7 +131,7 @@ std::vector<Candidate> candidates(const HalfDepth& depth, const sensor::Pinhole&
       const int bx = straight_base(depth, x, y, 1, 0);
       const int by = straight_base(depth, x, y, 0, 1);
       if (bx == 0 || by == 0) continue;
-      Candidate c;
+      SurfaceCandidate c;
       c.sample.point = point(x, y);
       const Eigen::Vector3f du = point(x + bx, y) - point(x - bx, y);
       const Eigen::Vector3f dv = point(x, y + by) - point(x, y - by);
@@ -151,8 +151,8 @@ std::vector<Candidate> candidates(const HalfDepth& depth, const sensor::Pinhole&
 
 /// Takes up to `wanted` of `order`, one from each group in turn.
 template <typename GroupOf>
-void take_evenly(const std::vector<Candidate>& all, const std::vector<std::uint32_t>& order, GroupOf group_of,
-                 int groups, int wanted, std::vector<char>& taken) {
+void take_evenly(const std::vector<SurfaceCandidate>& all, const std::vector<std::uint32_t>& order,
+                 GroupOf group_of, int groups, int wanted, std::vector<char>& taken) {
   std::vector<std::vector<std::uint32_t>> by_group(static_cast<std::size_t>(groups));
   for (std::uint32_t i : order) {
     if (taken[i] == 0) by_group[static_cast<std::size_t>(group_of(all[i]))].push_back(i);
@@ -183,7 +183,7 @@ void SurfaceSamplerOptions::declare(core::OptionTable& table) {
 std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sensor::Pinhole& camera,
                                                 const SurfaceSamplerOptions& options) {
   if (depth.empty()) return {};
-  const std::vector<Candidate> all = candidates(half_depth(depth), camera, options);
+  const std::vector<SurfaceCandidate> all = candidates(half_depth(depth), camera, options);
   // A fixed scrambled order, so that "the first of a group" is not always its top-left corner.
   std::vector<std::uint32_t> order(all.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -198,9 +198,10 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
             [&](std::uint32_t a, std::uint32_t b) { return scramble(a) < scramble(b); });
   std::vector<char> taken(all.size(), 0);
   take_evenly(
-      all, order, [](const Candidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2, taken);
+      all, order, [](const SurfaceCandidate& c) { return c.cell; }, kCellsX * kCellsY, options.samples / 2,
+      taken);
   take_evenly(
-      all, order, [](const Candidate& c) { return c.bin; }, kAzimuths * kElevations,
+      all, order, [](const SurfaceCandidate& c) { return c.bin; }, kAzimuths * kElevations,
       options.samples - options.samples / 2, taken);
   std::vector<maps::SurfaceSample> result;
   result.reserve(static_cast<std::size_t>(options.samples));

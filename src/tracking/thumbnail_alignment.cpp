@@ -12,7 +12,7 @@ namespace {
 
 using geometry::Rigid3;
 
-struct Pixel {
+struct ThumbnailPixel {
   Eigen::Vector3d point;  ///< in the previous camera, metres
   float value = 0.0F;
 };
@@ -47,11 +47,11 @@ struct Step {
 };
 
 /// Residual current(project(T p)) - bias - previous(p); unknowns: pose (left perturbation) and bias.
-Step linearise(const std::vector<Pixel>& pixels, const cv::Mat& current, const sensor::Pinhole& camera,
-               const Rigid3& pose, double bias, double loss) {
+Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current,
+               const sensor::Pinhole& camera, const Rigid3& pose, double bias, double loss) {
   Step step;
   alignas(32) double h[7][8] = {};  // rows padded to whole vectors
-  for (const Pixel& pixel : pixels) {
+  for (const ThumbnailPixel& pixel : pixels) {
     const Eigen::Vector3d p = pose * pixel.point;
     if (p.z() < 0.1) continue;
     const Eigen::Vector2d uv = camera.project(p);
@@ -101,7 +101,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
   small.cx = (camera.cx + 0.5) * sx - 0.5;
   small.cy = (camera.cy + 0.5) * sy - 0.5;
 
-  std::vector<Pixel> pixels;
+  std::vector<ThumbnailPixel> pixels;
   pixels.reserve(static_cast<std::size_t>(previous.total()));
   for (int y = 1; y + 1 < previous.rows; ++y) {
     for (int x = 1; x + 1 < previous.cols; ++x) {

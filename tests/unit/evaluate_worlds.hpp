@@ -26,6 +26,10 @@ class Random {
   std::mt19937 engine_;
 };
 
+inline Eigen::Isometry3d tilt() {
+  return Eigen::Translation3d(0.3, -5.0, 2.0) * Eigen::AngleAxisd(0.7, Eigen::Vector3d(3, 1, 2).normalized());
+}
+
 /// Rectangle from `origin` along the edges u and v, points every `spacing`, in the middle of their cells.
 inline void add_rectangle(SurfaceSamples& out, const Eigen::Vector3d& origin, const Eigen::Vector3d& u,
                           const Eigen::Vector3d& v, double spacing) {

@@ -16,6 +16,14 @@
 
 namespace plumbline::features::world {
 
+inline LineSegment segment(float x0, float y0, float x1, float y1) {
+  LineSegment s;
+  s.start = {x0, y0};
+  s.end = {x1, y1};
+  s.response = 10.0F;
+  return s;
+}
+
 /// Convex, corners clockwise on the screen, pixels (centre convention).
 struct Polygon {
   std::vector<Eigen::Vector2d> corners;

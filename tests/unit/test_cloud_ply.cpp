@@ -11,7 +11,7 @@
 namespace plumbline::cloud {
 namespace {
 
-std::filesystem::path temp(const std::string& name) {
+std::filesystem::path ply_file(const std::string& name) {
   return std::filesystem::path(testing::TempDir()) / ("plumbline_ply_" + name);
 }
 
@@ -20,8 +20,8 @@ std::string slurp(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-std::filesystem::path spill(const std::string& name, const std::string& text) {
-  const auto file = temp(name);
+std::filesystem::path spill_ply(const std::string& name, const std::string& text) {
+  const auto file = ply_file(name);
   std::ofstream(file, std::ios::binary) << text;
   return file;
 }
@@ -40,7 +40,7 @@ PlyData triangle() {
 }
 
 TEST(Ply, RoundTripKeepsEverythingAndBytes) {
-  const auto file = temp("round.ply");
+  const auto file = ply_file("round.ply");
   ASSERT_TRUE(write_ply(file, triangle()));
   const std::string first = slurp(file);
   const auto data = read_ply(file);
@@ -61,12 +61,13 @@ TEST(Ply, RoundTripKeepsEverythingAndBytes) {
 }
 
 TEST(Ply, AsciiWithPolygonsUnknownElementsAndCrLf) {
-  const auto file = spill("ascii.ply",
-                          "ply\r\nformat ascii 1.0\r\nobj_info x\r\nelement vertex 4\r\nproperty double x\r\n"
-                          "property float y\r\nproperty list uchar int ring\r\nproperty float z\r\n"
-                          "element camera 1\r\nproperty float focal\r\nelement face 1\r\n"
-                          "property list uchar int vertex_index\r\nend_header\r\n"
-                          "0 0 1 7 1\r\n1 0 0 1\r\n1 +1 2 8 9 1e0\r\n0 1 0 nan\r\n525\r\n4 0 1 2 3");
+  const auto file =
+      spill_ply("ascii.ply",
+                "ply\r\nformat ascii 1.0\r\nobj_info x\r\nelement vertex 4\r\nproperty double x\r\n"
+                "property float y\r\nproperty list uchar int ring\r\nproperty float z\r\n"
+                "element camera 1\r\nproperty float focal\r\nelement face 1\r\n"
+                "property list uchar int vertex_index\r\nend_header\r\n"
+                "0 0 1 7 1\r\n1 0 0 1\r\n1 +1 2 8 9 1e0\r\n0 1 0 nan\r\n525\r\n4 0 1 2 3");
   const auto data = read_ply(file);
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ(*data->floats("x"), (std::vector<float>{0, 1, 1, 0}));
@@ -80,7 +81,7 @@ TEST(Ply, BigEndianAndIntegerProperties) {
       "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\nproperty short y\n"
       "property uint z\nproperty uchar red\nend_header\n";
   text += std::string("\x3f\xc0\x00\x00\xff\xfe\x00\x01\x00\x00\x80", 11);
-  const auto data = read_ply(spill("big.ply", text));
+  const auto data = read_ply(spill_ply("big.ply", text));
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ((*data->floats("x"))[0], 1.5F);
   EXPECT_EQ((*data->floats("y"))[0], -2.0F);
@@ -89,11 +90,11 @@ TEST(Ply, BigEndianAndIntegerProperties) {
 }
 
 TEST(Ply, EveryTruncationIsAnErrorThatNamesTheFile) {
-  const auto file = temp("whole.ply");
+  const auto file = ply_file("whole.ply");
   ASSERT_TRUE(write_ply(file, triangle()));
   const std::string whole = slurp(file);
   for (std::size_t length = 0; length < whole.size(); ++length) {
-    const auto data = read_ply(spill("cut.ply", whole.substr(0, length)));
+    const auto data = read_ply(spill_ply("cut.ply", whole.substr(0, length)));
     ASSERT_FALSE(data) << length;
     EXPECT_EQ(data.error().kind, core::ErrorKind::kInput);
     EXPECT_NE(data.error().message.find("cut.ply"), std::string::npos) << data.error().message;
@@ -103,9 +104,9 @@ TEST(Ply, EveryTruncationIsAnErrorThatNamesTheFile) {
 TEST(Ply, HeaderPromisingMoreThanTheFileHoldsIsRefusedBeforeMemoryIsTaken) {
   for (const std::string format : {"ascii", "binary_little_endian"}) {
     const auto data =
-        read_ply(spill("promise.ply", "ply\nformat " + format +
-                                          " 1.0\nelement vertex 400000000000\nproperty float x\n"
-                                          "end_header\n1 2 3\n"));
+        read_ply(spill_ply("promise.ply", "ply\nformat " + format +
+                                              " 1.0\nelement vertex 400000000000\nproperty float x\n"
+                                              "end_header\n1 2 3\n"));
     ASSERT_FALSE(data);
     EXPECT_NE(data.error().message.find("header promises 400000000000"), std::string::npos)
         << data.error().message;
@@ -133,16 +134,16 @@ TEST(Ply, BrokenFilesSayWhatIsWrong) {
       {head + "element vertex 2\nproperty list uint int l\nend_header\n4000000000 1\n", "65536"},
   };
   for (const auto& [text, words] : cases) {
-    const auto data = read_ply(spill("broken.ply", text));
+    const auto data = read_ply(spill_ply("broken.ply", text));
     ASSERT_FALSE(data) << text;
     EXPECT_NE(data.error().message.find(words), std::string::npos) << data.error().message;
   }
-  EXPECT_FALSE(read_ply(temp("not_there.ply")));
+  EXPECT_FALSE(read_ply(ply_file("not_there.ply")));
   EXPECT_FALSE(read_ply(testing::TempDir()));
 }
 
 TEST(OutputFile, LeavesTheOldFileWhenNotCommitted) {
-  const auto file = spill("kept.txt", "old");
+  const auto file = spill_ply("kept.txt", "old");
   {
     core::OutputFile out(file);
     out.write("new");
@@ -158,7 +159,7 @@ TEST(OutputFile, FullDiskFolderAndMissingFolderAreOutputErrors) {
   PlyData big;
   big.add("x", std::vector<float>(1000));
   for (const std::filesystem::path& file :
-       {std::filesystem::path("/dev/full"), temp("no_such_folder") / "a.ply",
+       {std::filesystem::path("/dev/full"), ply_file("no_such_folder") / "a.ply",
         std::filesystem::path(testing::TempDir())}) {
     const auto done = write_ply(file, big);
     ASSERT_FALSE(done) << file;

@@ -12,7 +12,7 @@ namespace {
 using geometry::Rigid3;
 using worlds::point;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 
 VoxelMapOptions voxels(double size) {
   VoxelMapOptions options;
@@ -98,7 +98,7 @@ TEST(VoxelMap, AThinWallSeenFromBothRoomsHasTwoSides) {
 
 TEST(VoxelMap, PointsWithoutNormalTakeTheSideTheyAreSeenFrom) {
   VoxelMap map(voxels(0.05));
-  const Eigen::Vector3f unknown(kNan, kNan, kNan);
+  const Eigen::Vector3f unknown(kMissing, kMissing, kMissing);
   map.insert(single(point(0.02F, 0.02F, 1.01F, unknown)), looking(1.0));
   map.insert(single(point(-0.02F, 0.02F, 0.98F, unknown)), looking(1.0, true));
   map.insert(single(point(0.02F, 0.02F, 1.01F)), looking(1.0));
@@ -111,7 +111,7 @@ TEST(VoxelMap, PointsWithoutNormalTakeTheSideTheyAreSeenFrom) {
 TEST(VoxelMap, PassesOverWhatIsNoMeasurement) {
   VoxelMap map(voxels(0.01));
   Cloud cloud;
-  cloud.push_back(point(kNan, 0, 1));
+  cloud.push_back(point(kMissing, 0, 1));
   cloud.push_back(point(0, 0, 0));
   cloud.push_back(point(0, 0, -1));
   cloud.push_back(point(0, 0, 1, {1, 0, 0}));

@@ -17,10 +17,6 @@ std::vector<WallPlane> planes_of(const SurfaceSamples& cloud, double spacing, in
   return wall_planes(cloud, wall_patches(cloud, spacing, wall, core::Executor(2)), wall.patch_m, options);
 }
 
-Eigen::Isometry3d tilt() {
-  return Eigen::Translation3d(0.3, -5.0, 2.0) * Eigen::AngleAxisd(0.7, Eigen::Vector3d(3, 1, 2).normalized());
-}
-
 TEST(WallPlanes, OfARoomAreItsSidesByArea) {
   for (const bool tilted : {false, true}) {
     SCOPED_TRACE(tilted);

@@ -16,10 +16,6 @@ WallThickness thickness(const SurfaceSamples& cloud, double spacing) {
   return wall_thickness(cloud, spacing, {}, core::Executor(2));
 }
 
-Eigen::Isometry3d tilt() {
-  return Eigen::Translation3d(0.3, -5.0, 2.0) * Eigen::AngleAxisd(0.7, Eigen::Vector3d(3, 1, 2).normalized());
-}
-
 TEST(WallThickness, OfATruePlaneIsZero) {
   const WallThickness wall = thickness(moved(plane(2.0, 0.0, 0.01), tilt()), 0.01);
   EXPECT_GE(wall.patches, 50U);

@@ -9,7 +9,7 @@ namespace {
 
 using geometry::Rigid3;
 
-const sensor::Pinhole kCamera{320, 240, 260.0, 260.0, 159.5, 119.5};
+const sensor::Pinhole kSmallCamera{320, 240, 260.0, 260.0, 159.5, 119.5};
 const Eigen::Vector3d kNormal = Eigen::Vector3d(0.6, 0.2, -1.0).normalized();  // colour camera's frame
 constexpr double kDistance = -2.0;                                             // n.p = kDistance
 
@@ -17,11 +17,11 @@ constexpr double kDistance = -2.0;                                             /
 double wall_depth(double u, double v, const Rigid3& here_from_colour) {
   const Eigen::Vector3d n = here_from_colour.rotation * kNormal;
   const double d = kDistance + n.dot(here_from_colour.translation);
-  return d / n.dot(kCamera.unproject(u, v, 1.0));
+  return d / n.dot(kSmallCamera.unproject(u, v, 1.0));
 }
 
 cv::Mat wall(const Rigid3& here_from_colour) {
-  cv::Mat depth(kCamera.height, kCamera.width, CV_32FC1);
+  cv::Mat depth(kSmallCamera.height, kSmallCamera.width, CV_32FC1);
   for (int v = 0; v < depth.rows; ++v) {
     for (int u = 0; u < depth.cols; ++u)
       depth.at<float>(v, u) = static_cast<float>(wall_depth(u, v, here_from_colour));
@@ -44,7 +44,7 @@ FrameFeatures seen_in(const cv::Mat& depth) {
     LineFeature line;
     line.segment.start = {60.0F, v};
     line.segment.end = {250.0F, v + 20.0F};
-    line.line3 = fit_line_depth(line.segment, depth, kCamera);
+    line.line3 = fit_line_depth(line.segment, depth, kSmallCamera);
     features.lines.push_back(line);
   }
   return features;
@@ -62,8 +62,8 @@ TEST(DepthDelay, DepthIsThatOfTheColourImagesMoment) {
   };
   for (const PointFeature& p : features.points) worst_before = std::max(worst_before, error(p));
   ASSERT_GT(worst_before, 0.03);
-  undo_point_depth_delay(features, depth, kCamera, kMotion);
-  undo_line_depth_delay(features, depth, kCamera, kMotion);
+  undo_point_depth_delay(features, depth, kSmallCamera, kMotion);
+  undo_line_depth_delay(features, depth, kSmallCamera, kMotion);
   // The depth camera's pixel is taken at the depth first read: its error of 5 cm leaves a tenth of a pixel,
   // and a pixel is rounded.
   for (const PointFeature& p : features.points) {
@@ -74,7 +74,7 @@ TEST(DepthDelay, DepthIsThatOfTheColourImagesMoment) {
     ASSERT_TRUE(line.line3.has_value());
     EXPECT_NEAR(kNormal.dot(line.line3->start), kDistance, 0.006);
     EXPECT_NEAR(kNormal.dot(line.line3->end), kDistance, 0.006);
-    EXPECT_LT((kCamera.project(line.line3->start) - line.segment.start.cast<double>()).norm(), 0.3)
+    EXPECT_LT((kSmallCamera.project(line.line3->start) - line.segment.start.cast<double>()).norm(), 0.3)
         << "still before its pixel";
   }
 }
@@ -83,7 +83,7 @@ TEST(DepthDelay, NoMotionChangesNothingToSpeakOf) {
   const cv::Mat depth = wall({});
   const FrameFeatures before = seen_in(depth);
   FrameFeatures after = before;
-  undo_point_depth_delay(after, depth, kCamera, {});
+  undo_point_depth_delay(after, depth, kSmallCamera, {});
   for (std::size_t i = 0; i < before.points.size(); ++i)
     EXPECT_NEAR(after.points[i].depth, before.points[i].depth, 1e-5F);
 }
@@ -93,22 +93,22 @@ TEST(DepthDelay, WithoutDepthThereIsNone) {
   FrameFeatures features = seen_in(depth);
   features.points[0].depth = 0.0F;
   features.lines[0].line3.reset();
-  undo_point_depth_delay(features, depth, kCamera, kMotion);
-  undo_line_depth_delay(features, depth, kCamera, kMotion);
+  undo_point_depth_delay(features, depth, kSmallCamera, kMotion);
+  undo_line_depth_delay(features, depth, kSmallCamera, kMotion);
   EXPECT_EQ(features.points[0].depth, 0.0F);
   EXPECT_FALSE(features.lines[0].line3.has_value());
   // Where the depth camera sees nothing what was there is gone.
-  const cv::Mat nothing(kCamera.height, kCamera.width, CV_32FC1, cv::Scalar(0));
-  undo_point_depth_delay(features, nothing, kCamera, kMotion);
-  undo_line_depth_delay(features, nothing, kCamera, kMotion);
+  const cv::Mat nothing(kSmallCamera.height, kSmallCamera.width, CV_32FC1, cv::Scalar(0));
+  undo_point_depth_delay(features, nothing, kSmallCamera, kMotion);
+  undo_line_depth_delay(features, nothing, kSmallCamera, kMotion);
   for (const PointFeature& p : features.points) EXPECT_EQ(p.depth, 0.0F);
   for (const LineFeature& l : features.lines) EXPECT_FALSE(l.line3.has_value());
   // No depth image at all, and a move that puts everything behind the depth camera.
   FrameFeatures again = seen_in(depth);
   const float kept = again.points[5].depth;
-  undo_point_depth_delay(again, cv::Mat(), kCamera, kMotion);
+  undo_point_depth_delay(again, cv::Mat(), kSmallCamera, kMotion);
   EXPECT_EQ(again.points[5].depth, kept);
-  undo_point_depth_delay(again, depth, kCamera, Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.0, -10.0}));
+  undo_point_depth_delay(again, depth, kSmallCamera, Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.0, -10.0}));
   for (const PointFeature& p : again.points) EXPECT_GE(p.depth, 0.0F);
 }
 

@@ -8,14 +8,6 @@
 namespace plumbline::features {
 namespace {
 
-LineSegment segment(float x0, float y0, float x1, float y1) {
-  LineSegment s;
-  s.start = {x0, y0};
-  s.end = {x1, y1};
-  s.response = 10.0F;
-  return s;
-}
-
 std::vector<DescribedLine> describe(const world::View& view) {
   const std::vector<LineDescriptor> descriptors = describe_lines(view.image, view.lines);
   std::vector<DescribedLine> result;
@@ -41,7 +33,7 @@ TEST(Lbd, SeesTheStepAcrossTheLineInTheMiddleBand) {
   // Bright above, dark below; the line runs to the right, so the step is across, away from the normal.
   cv::Mat image(200, 200, CV_8U, cv::Scalar(200));
   image.rowRange(100, 200).setTo(50);
-  const BandStatistics s = band_statistics(image, {segment(60.0F, 99.5F, 140.0F, 99.5F)})[0];
+  const BandStatistics s = band_statistics(image, {world::segment(60.0F, 99.5F, 140.0F, 99.5F)})[0];
   for (std::size_t band = 0; band < 9; ++band) {
     EXPECT_NEAR(s[8 * band + 0], 0.0F, 1e-6F);  // along +
     EXPECT_NEAR(s[8 * band + 1], 0.0F, 1e-6F);  // along -
@@ -84,10 +76,10 @@ TEST(Lbd, TakesDegenerateInput) {
   EXPECT_TRUE(describe_lines(cv::Mat(), {}).empty());
   // No gradient anywhere; a segment of no length; one that leaves the picture on both sides; a tiny picture.
   const LineDescriptor zero{};
-  EXPECT_EQ(describe_lines(blank, {segment(10, 10, 70, 10)})[0], zero);
-  EXPECT_EQ(describe_lines(blank, {segment(10, 10, 10, 10)})[0], zero);
-  EXPECT_EQ(describe_lines(blank, {segment(-500, 10, 900, 50)})[0], zero);
-  EXPECT_EQ(describe_lines(cv::Mat(2, 2, CV_8U, cv::Scalar(1)), {segment(0, 0, 1, 1)})[0], zero);
+  EXPECT_EQ(describe_lines(blank, {world::segment(10, 10, 70, 10)})[0], zero);
+  EXPECT_EQ(describe_lines(blank, {world::segment(10, 10, 10, 10)})[0], zero);
+  EXPECT_EQ(describe_lines(blank, {world::segment(-500, 10, 900, 50)})[0], zero);
+  EXPECT_EQ(describe_lines(cv::Mat(2, 2, CV_8U, cv::Scalar(1)), {world::segment(0, 0, 1, 1)})[0], zero);
 }
 
 TEST(Lbd, FindsTheSameEdgesInMovedPictures) {
@@ -121,26 +113,26 @@ TEST(LineMatch, PairsTheSameEdgesWithFewErrors) {
 }
 
 TEST(LineMatch, HonoursItsGates) {
-  const DescribedLine base{segment(0, 0, 100, 0), {}};
+  const DescribedLine base{world::segment(0, 0, 100, 0), {}};
   LineMatchOptions o;
   const auto matched = [&](const LineSegment& other) { return match_lines({base}, {{other, {}}}, o).size(); };
-  EXPECT_EQ(matched(segment(0, 0, 100, 0)), 1U);
-  EXPECT_EQ(matched(segment(100, 0, 0, 0)), 0U);   // opposite step
-  EXPECT_EQ(matched(segment(0, 0, 100, 50)), 0U);  // turned by 0.46 rad
-  EXPECT_EQ(matched(segment(0, 0, 30, 0)), 0U);    // too short
-  EXPECT_EQ(matched(segment(0, 40, 100, 40)), 1U);
+  EXPECT_EQ(matched(world::segment(0, 0, 100, 0)), 1U);
+  EXPECT_EQ(matched(world::segment(100, 0, 0, 0)), 0U);   // opposite step
+  EXPECT_EQ(matched(world::segment(0, 0, 100, 50)), 0U);  // turned by 0.46 rad
+  EXPECT_EQ(matched(world::segment(0, 0, 30, 0)), 0U);    // too short
+  EXPECT_EQ(matched(world::segment(0, 40, 100, 40)), 1U);
   o.max_distance_px = 20.0;
-  EXPECT_EQ(matched(segment(0, 40, 100, 40)), 0U);
-  EXPECT_EQ(matched(segment(0, 10, 100, 10)), 1U);
-  EXPECT_EQ(matched(segment(60, 10, 160, 10)), 1U);
+  EXPECT_EQ(matched(world::segment(0, 40, 100, 40)), 0U);
+  EXPECT_EQ(matched(world::segment(0, 10, 100, 10)), 1U);
+  EXPECT_EQ(matched(world::segment(60, 10, 160, 10)), 1U);
   o.min_overlap = 0.5;
-  EXPECT_EQ(matched(segment(60, 10, 160, 10)), 0U);
-  EXPECT_NEAR(overlap(base.segment, segment(60, 10, 160, 10)), 0.4, 1e-5);
-  EXPECT_EQ(overlap(base.segment, segment(200, 0, 300, 0)), 0.0);
+  EXPECT_EQ(matched(world::segment(60, 10, 160, 10)), 0U);
+  EXPECT_NEAR(overlap(base.segment, world::segment(60, 10, 160, 10)), 0.4, 1e-5);
+  EXPECT_EQ(overlap(base.segment, world::segment(200, 0, 300, 0)), 0.0);
 }
 
 TEST(LineMatch, RefusesTheAmbiguousAndTheFar) {
-  const LineSegment s = segment(0, 0, 100, 0);
+  const LineSegment s = world::segment(0, 0, 100, 0);
   const LineDescriptor zero{};
   const LineDescriptor near{0xFFULL, 0, 0, 0};
   const LineDescriptor far{~0ULL, ~0ULL, 0, 0};

@@ -12,22 +12,14 @@
 namespace plumbline::features {
 namespace {
 
-const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
-
-LineSegment segment(float x0, float y0, float x1, float y1) {
-  LineSegment s;
-  s.start = {x0, y0};
-  s.end = {x1, y1};
-  s.response = 10.0F;
-  return s;
-}
+const sensor::Pinhole kLineCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
 
 // Depth picture of the plane n . p = d.
 cv::Mat plane(const Eigen::Vector3d& n, double d) {
   cv::Mat depth(480, 640, CV_32F);
   for (int y = 0; y < depth.rows; ++y) {
     for (int x = 0; x < depth.cols; ++x) {
-      depth.at<float>(y, x) = static_cast<float>(d / n.dot(kCamera.unproject(x, y, 1.0)));
+      depth.at<float>(y, x) = static_cast<float>(d / n.dot(kLineCamera.unproject(x, y, 1.0)));
     }
   }
   return depth;
@@ -48,17 +40,17 @@ const Eigen::Vector3d kSlanted = Eigen::Vector3d(0.4, -0.3, 0.86).normalized();
 
 Eigen::Vector3d on_plane(const Eigen::Vector2f& pixel, const Eigen::Vector3d& n, double d) {
   const Eigen::Vector3d ray =
-      kCamera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), 1.0);
+      kLineCamera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), 1.0);
   return ray * (d / n.dot(ray));
 }
 
 TEST(LineDepth, IsExactOnAPlaneWithoutNoise) {
-  const LineSegment s = segment(100.0F, 80.0F, 400.0F, 300.0F);
-  const auto line = fit_line_depth(s, plane(kSlanted, 2.0), kCamera);
+  const LineSegment s = world::segment(100.0F, 80.0F, 400.0F, 300.0F);
+  const auto line = fit_line_depth(s, plane(kSlanted, 2.0), kLineCamera);
   ASSERT_TRUE(line);
   EXPECT_LT((line->start - on_plane(s.start, kSlanted, 2.0)).norm(), 2e-3);
   EXPECT_LT((line->end - on_plane(s.end, kSlanted, 2.0)).norm(), 2e-3);
-  EXPECT_LT((kCamera.project(line->start) - s.start.cast<double>()).norm(), 1e-3);
+  EXPECT_LT((kLineCamera.project(line->start) - s.start.cast<double>()).norm(), 1e-3);
   EXPECT_GT(line->inlier_share, 0.99);
   EXPECT_GT(line->coverage, 0.99);
 }
@@ -88,7 +80,7 @@ TEST(LineDepth, CovarianceFitsTheErrorsOverManyNoisyLines) {
       const Eigen::Vector2f a_seen = a + wobble;
       const Eigen::Vector2f b_seen = b + other;
       const auto line =
-          fit_line_depth(segment(a_seen.x(), a_seen.y(), b_seen.x(), b_seen.y()), depth, kCamera);
+          fit_line_depth(world::segment(a_seen.x(), a_seen.y(), b_seen.x(), b_seen.y()), depth, kLineCamera);
       ASSERT_TRUE(line);
       const Eigen::Vector3d truth = on_plane(a, kSlanted, 2.0);
       const Eigen::Vector3d error = line->start - truth;
@@ -119,8 +111,8 @@ TEST(LineDepth, CrossesHolesAndOutliers) {
     }
   }
   depth(cv::Rect(200, 0, 40, 480)).setTo(0.0F);
-  const LineSegment s = segment(120.0F, 100.0F, 360.0F, 260.0F);
-  const auto line = fit_line_depth(s, depth, kCamera);
+  const LineSegment s = world::segment(120.0F, 100.0F, 360.0F, 260.0F);
+  const auto line = fit_line_depth(s, depth, kLineCamera);
   ASSERT_TRUE(line);
   EXPECT_LT((line->start - on_plane(s.start, kSlanted, 2.0)).norm(), 0.02);
   EXPECT_LT((line->end - on_plane(s.end, kSlanted, 2.0)).norm(), 0.02);
@@ -138,33 +130,33 @@ TEST(LineDepth, TakesTheForegroundAtAJump) {
     }
   }
   for (const float x : {298.0F, 299.5F, 301.0F}) {
-    const auto line = fit_line_depth(segment(x, 60.0F, x, 400.0F), depth, kCamera);
+    const auto line = fit_line_depth(world::segment(x, 60.0F, x, 400.0F), depth, kLineCamera);
     ASSERT_TRUE(line);
     EXPECT_NEAR(line->start.z(), 1.5, 0.01);
     EXPECT_NEAR(line->end.z(), 1.5, 0.01);
   }
-  const auto behind = fit_line_depth(segment(310.0F, 60.0F, 310.0F, 400.0F), depth, kCamera);
+  const auto behind = fit_line_depth(world::segment(310.0F, 60.0F, 310.0F, 400.0F), depth, kLineCamera);
   ASSERT_TRUE(behind);
   EXPECT_NEAR(behind->start.z(), 3.0, 0.03);
 }
 
 TEST(LineDepth, RefusesWhatDepthDoesNotSupport) {
-  const LineSegment s = segment(100.0F, 200.0F, 500.0F, 200.0F);
-  EXPECT_FALSE(fit_line_depth(s, cv::Mat(), kCamera));
-  EXPECT_FALSE(fit_line_depth(s, cv::Mat(480, 640, CV_32F, cv::Scalar(0.0)), kCamera));
+  const LineSegment s = world::segment(100.0F, 200.0F, 500.0F, 200.0F);
+  EXPECT_FALSE(fit_line_depth(s, cv::Mat(), kLineCamera));
+  EXPECT_FALSE(fit_line_depth(s, cv::Mat(480, 640, CV_32F, cv::Scalar(0.0)), kLineCamera));
   EXPECT_FALSE(fit_line_depth(
-      s, cv::Mat(480, 640, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN())), kCamera));
-  EXPECT_FALSE(fit_line_depth(s, cv::Mat(480, 640, CV_32F, cv::Scalar(50.0)), kCamera));
-  EXPECT_FALSE(fit_line_depth(segment(5, 5, 5, 5), plane(kSlanted, 2.0), kCamera));
-  EXPECT_FALSE(fit_line_depth(segment(-900, -900, -800, -800), plane(kSlanted, 2.0), kCamera));
+      s, cv::Mat(480, 640, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN())), kLineCamera));
+  EXPECT_FALSE(fit_line_depth(s, cv::Mat(480, 640, CV_32F, cv::Scalar(50.0)), kLineCamera));
+  EXPECT_FALSE(fit_line_depth(world::segment(5, 5, 5, 5), plane(kSlanted, 2.0), kLineCamera));
+  EXPECT_FALSE(fit_line_depth(world::segment(-900, -900, -800, -800), plane(kSlanted, 2.0), kLineCamera));
 
   cv::Mat third = plane(kSlanted, 2.0);  // depth under a third of the line only
   third.colRange(230, 640).setTo(0.0F);
-  EXPECT_FALSE(fit_line_depth(s, third, kCamera));
+  EXPECT_FALSE(fit_line_depth(s, third, kLineCamera));
 
   cv::Mat steps(480, 640, CV_32F);  // four stairs: no one line
   for (int x = 0; x < 640; ++x) steps.col(x).setTo(1.0 + 0.5 * (x / 110 % 4));
-  EXPECT_FALSE(fit_line_depth(s, steps, kCamera));
+  EXPECT_FALSE(fit_line_depth(s, steps, kLineCamera));
 
   cv::Mat confetti(480, 640, CV_32F);
   std::mt19937 random(8);
@@ -172,7 +164,7 @@ TEST(LineDepth, RefusesWhatDepthDoesNotSupport) {
     for (int x = 0; x < 640; ++x)
       confetti.at<float>(y, x) = static_cast<float>(world::uniform(random, 0.8, 5.0));
   }
-  EXPECT_FALSE(fit_line_depth(s, confetti, kCamera));
+  EXPECT_FALSE(fit_line_depth(s, confetti, kLineCamera));
 }
 
 TEST(LineExtractor, GivesSegmentsDescriptorsAndLinesInSpace) {
@@ -183,7 +175,7 @@ TEST(LineExtractor, GivesSegmentsDescriptorsAndLinesInSpace) {
   cv::Mat depth = plane(kSlanted, 2.0);
   add_noise(depth, 1.0, 1);
   const LineExtractor extractor;
-  const std::vector<LineFeature> features = extractor.extract(image, depth, kCamera);
+  const std::vector<LineFeature> features = extractor.extract(image, depth, kLineCamera);
   ASSERT_EQ(features.size(), 4U);
   const std::vector<DescribedLine> lines = described(features);
   for (std::size_t i = 0; i < features.size(); ++i) {
@@ -192,11 +184,11 @@ TEST(LineExtractor, GivesSegmentsDescriptorsAndLinesInSpace) {
     EXPECT_NE(features[i].descriptor, LineDescriptor{});
     EXPECT_EQ(lines[i].descriptor, features[i].descriptor);
   }
-  const std::vector<LineFeature> flat = extractor.extract(image, cv::Mat(), kCamera);
+  const std::vector<LineFeature> flat = extractor.extract(image, cv::Mat(), kLineCamera);
   ASSERT_EQ(flat.size(), 4U);
   for (const LineFeature& f : flat) EXPECT_FALSE(f.line3);
-  EXPECT_TRUE(extractor.extract(cv::Mat(), cv::Mat(), kCamera).empty());
-  EXPECT_TRUE(extractor.extract(cv::Mat(480, 640, CV_8U, cv::Scalar(255)), depth, kCamera).empty());
+  EXPECT_TRUE(extractor.extract(cv::Mat(), cv::Mat(), kLineCamera).empty());
+  EXPECT_TRUE(extractor.extract(cv::Mat(480, 640, CV_8U, cv::Scalar(255)), depth, kLineCamera).empty());
 }
 
 TEST(LineOptions, AreDeclaredOnceEach) {

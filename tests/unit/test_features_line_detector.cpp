@@ -23,14 +23,6 @@ Polygon turned_square(double cx, double cy, double half, double angle, double gr
   return p;
 }
 
-LineSegment segment(float x0, float y0, float x1, float y1) {
-  LineSegment s;
-  s.start = {x0, y0};
-  s.end = {x1, y1};
-  s.response = 10.0F;
-  return s;
-}
-
 struct Case {
   LineMethod method;
   LineScale scale;
@@ -208,10 +200,10 @@ TEST(LineDetector, FindsNoLinesInNoise) {
 TEST(LineJoin, JoinsCollinearPiecesAndNothingElse) {
   const LineDetectorOptions o;
   // Two pieces 6 px apart, one of the opposite step, one parallel 5 px beside, one too far along, one turned.
-  const std::vector<LineSegment> joined =
-      join_collinear({segment(10, 10, 60, 10), segment(66, 10.4F, 120, 10.4F), segment(120, 11, 12, 11),
-                      segment(10, 15, 120, 15), segment(160, 10, 200, 10), segment(126, 10, 160, 25)},
-                     o);
+  const std::vector<LineSegment> joined = join_collinear(
+      {world::segment(10, 10, 60, 10), world::segment(66, 10.4F, 120, 10.4F), world::segment(120, 11, 12, 11),
+       world::segment(10, 15, 120, 15), world::segment(160, 10, 200, 10), world::segment(126, 10, 160, 25)},
+      o);
   ASSERT_EQ(joined.size(), 5U);
   EXPECT_NEAR(joined[0].length(), 110.0F, 0.5F);
   EXPECT_NEAR(joined[0].start.x(), 10.0F, 0.2F);
@@ -220,12 +212,14 @@ TEST(LineJoin, JoinsCollinearPiecesAndNothingElse) {
 
 TEST(LineJoin, ChainsAndDropsNearDuplicates) {
   const LineDetectorOptions o;
-  EXPECT_EQ(join_collinear({segment(0, 0, 30, 0), segment(35, 0, 70, 0), segment(75, 0, 110, 0)}, o).size(),
+  EXPECT_EQ(join_collinear(
+                {world::segment(0, 0, 30, 0), world::segment(35, 0, 70, 0), world::segment(75, 0, 110, 0)}, o)
+                .size(),
             1U);
-  EXPECT_EQ(join_collinear({segment(0, 0, 100, 0), segment(10, 0.6F, 90, 0.6F)}, o).size(), 1U);
-  EXPECT_EQ(join_collinear({segment(0, 0, 100, 0), segment(10, 1.4F, 90, 1.4F)}, o).size(), 2U);
+  EXPECT_EQ(join_collinear({world::segment(0, 0, 100, 0), world::segment(10, 0.6F, 90, 0.6F)}, o).size(), 1U);
+  EXPECT_EQ(join_collinear({world::segment(0, 0, 100, 0), world::segment(10, 1.4F, 90, 1.4F)}, o).size(), 2U);
   EXPECT_TRUE(join_collinear({}, o).empty());
-  EXPECT_TRUE(join_collinear({segment(5, 5, 5, 5)}, o).empty());
+  EXPECT_TRUE(join_collinear({world::segment(5, 5, 5, 5)}, o).empty());
 }
 
 TEST(ValidRegion, CutsFramesAndNothingElse) {

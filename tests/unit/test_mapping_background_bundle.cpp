@@ -17,7 +17,7 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+const sensor::Pinhole kBundleCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
 
 /// A camera that passes a cloud of points; keyframes come one by one, each a little askew.
 class GrowingMap {
@@ -41,7 +41,7 @@ class GrowingMap {
     for (const Eigen::Vector3d& p : points_) {
       const Eigen::Vector3d c = truth * p;
       features::PointFeature f;
-      f.pixel = kCamera.project(c).cast<float>();
+      f.pixel = kBundleCamera.project(c).cast<float>();
       f.depth = static_cast<float>(c.z());
       features->points.push_back(f);
     }
@@ -84,7 +84,7 @@ struct Outcome {
 Outcome run(int threads, int lag) {
   const core::Executor executor(threads);
   GrowingMap world;
-  BackgroundBundle bundle({}, {}, lag, kCamera, executor);
+  BackgroundBundle bundle({}, {}, lag, kBundleCamera, executor);
   world.add_keyframe();
   Outcome outcome;
   const auto commit = [&](int frame) {
@@ -163,7 +163,7 @@ TEST(BackgroundBundle, AnEndWithoutCommitWaitsForTheWork) {
   const core::Executor executor(2);
   GrowingMap world;
   world.add_keyframe();
-  BackgroundBundle bundle({}, {}, 3, kCamera, executor);
+  BackgroundBundle bundle({}, {}, 3, kBundleCamera, executor);
   bundle.request(world.map, world.add_keyframe(), 1);
   EXPECT_FALSE(bundle.due(3));
   EXPECT_TRUE(bundle.due(4));

@@ -14,7 +14,7 @@ using core::KeyframeId;
 using geometry::Rigid3;
 using tests::kTestCamera;
 
-const Rigid3 kOtherWorld(geometry::exp_so3({0.2, -0.4, 0.3}), {2.0, -1.0, 0.5});
+const Rigid3 kWorldOfOthers(geometry::exp_so3({0.2, -0.4, 0.3}), {2.0, -1.0, 0.5});
 
 maps::Map wall_map(unsigned poster, int views, double from_m, const Rigid3& world_from_truth) {
   maps::Map map;
@@ -155,7 +155,7 @@ TEST(KeyframeMessage, DamagedBytesAreRefused) {
 
 TEST(FusionEnd, TellsOnceThatTwoRobotsHaveMet) {
   const maps::Map a = wall_map(5, 8, -0.35, Rigid3{});
-  const maps::Map b = renumbered(wall_map(5, 8, -0.3, kOtherWorld), {{0, 1}});
+  const maps::Map b = renumbered(wall_map(5, 8, -0.3, kWorldOfOthers), {{0, 1}});
   const core::Executor executor(1);
   FusionEnd end({}, 2, executor);
   std::vector<MergeEvidence> merges;
@@ -168,7 +168,7 @@ TEST(FusionEnd, TellsOnceThatTwoRobotsHaveMet) {
     }
   }
   ASSERT_EQ(merges.size(), 1U);
-  EXPECT_LT(tests::distance(merges[0].a_from_b, kOtherWorld.inverse()), 0.04);
+  EXPECT_LT(tests::distance(merges[0].a_from_b, kWorldOfOthers.inverse()), 0.04);
   EXPECT_EQ(end.traffic(0).messages, 8U);
   EXPECT_GT(end.traffic(1).bytes, end.traffic(1).most);
   EXPECT_EQ(end.map(1).keyframe_count(), 8U);
@@ -181,7 +181,7 @@ TEST(FusionEnd, TellsOnceThatTwoRobotsHaveMet) {
 
 TEST(FusionEnd, RobotsInDifferentPlacesStayApart) {
   const maps::Map a = wall_map(5, 6, -0.3, Rigid3{});
-  const maps::Map b = renumbered(wall_map(99, 6, -0.3, kOtherWorld), {{0, 1}});
+  const maps::Map b = renumbered(wall_map(99, 6, -0.3, kWorldOfOthers), {{0, 1}});
   const core::Executor executor(1);
   FusionEnd end({}, 2, executor);
   for (int i = 0; i < 6; ++i) {

@@ -18,7 +18,7 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using tests::Random;
 
-const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+const sensor::Pinhole kFirstCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
 const sensor::Pinhole kOther{320, 240, 300.0, 310.0, 150.5, 121.5};
 
 const Rigid3 kSlide(Eigen::Matrix3d::Identity(), {0.1, 0.0, 0.0});
@@ -51,7 +51,7 @@ struct RingMap {
       }
       const bool second = k >= second_robot_from;
       add_keyframe(second ? KeyframeId{1, k - second_robot_from} : KeyframeId{0, k},
-                   second ? kOther : kCamera, k < slid_from ? believed : believed * kSlide);
+                   second ? kOther : kFirstCamera, k < slid_from ? believed : believed * kSlide);
     }
     add_landmarks();
   }
@@ -98,7 +98,7 @@ struct RingMap {
     if (now < slid_from_ || now > slid_from_ + 8) return false;
     for (int k = slid_from_ - 8; k < slid_from_; ++k) {
       const Eigen::Vector3d c = truth[static_cast<std::size_t>(k)] * point;
-      if (c.z() > 0.5 && kCamera.contains(kCamera.project(c))) return true;
+      if (c.z() > 0.5 && kFirstCamera.contains(kFirstCamera.project(c))) return true;
     }
     return false;
   }
@@ -132,8 +132,8 @@ struct RingMap {
   int slid_from_;
 };
 
-const Cameras kOneCamera{{0, kCamera}};
-const Cameras kTwoCameras{{0, kCamera}, {1, kOther}};
+const Cameras kOneCamera{{0, kFirstCamera}};
+const Cameras kTwoCameras{{0, kFirstCamera}, {1, kOther}};
 
 TEST(AdjustMap, ExactMeasurementsTakeTheDriftOutAndTheAnchorStays) {
   RingMap world(0.002);

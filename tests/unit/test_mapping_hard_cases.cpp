@@ -23,7 +23,7 @@ constexpr const char* kWalk =
     "nodepth@7.2+1,spin@8.8+2*0.25,cover@11+0.6";
 
 /// The walk, filmed and tracked; twelve seconds of it are enough work for one test.
-class Walk {
+class HardWalk {
  public:
   struct Step {
     double time = 0.0;  ///< seconds from the first frame
@@ -56,7 +56,7 @@ class Walk {
     return 1e9;
   }
 
-  Walk() {
+  HardWalk() {
     const core::Executor executor(2);
     const auto log = core::null_log();
     const auto source =
@@ -87,45 +87,45 @@ class Walk {
   }
 };
 
-void expect_whiteout_tracked_by_surfaces(const Walk& walk) {
+void expect_whiteout_tracked_by_surfaces(const HardWalk& walk) {
   EXPECT_GE(walk.share(1.0, 3.0).frames, 29);
   EXPECT_GE(walk.share(1.0, 3.0).value(), 0.95);
   int seen = 0;
-  for (const Walk::Step& s : walk.steps) {
+  for (const HardWalk::Step& s : walk.steps) {
     if (s.time > 1.0 && s.time < 2.9) seen += s.report.points.inliers + s.report.lines.inliers;
   }
   EXPECT_LT(seen, 20) << "a whiteout that shows the room is none";
 }
 
-void expect_darkness_survived(const Walk& walk) { EXPECT_GE(walk.share(3.6, 4.2).value(), 0.9); }
+void expect_darkness_survived(const HardWalk& walk) { EXPECT_GE(walk.share(3.6, 4.2).value(), 0.9); }
 
-void expect_blur_survived(const Walk& walk) { EXPECT_GE(walk.share(4.8, 5.4).value(), 0.9); }
+void expect_blur_survived(const HardWalk& walk) { EXPECT_GE(walk.share(4.8, 5.4).value(), 0.9); }
 
-void expect_missing_frames_survived(const Walk& walk) {
+void expect_missing_frames_survived(const HardWalk& walk) {
   EXPECT_EQ(walk.share(6.02, 6.65).frames, 0) << "frames were to be missing";
   EXPECT_LE(walk.until_tracked(6.65), 0.2);
 }
 
-void expect_blindness_tracked_by_features(const Walk& walk) {
+void expect_blindness_tracked_by_features(const HardWalk& walk) {
   EXPECT_GE(walk.share(7.2, 8.2).value(), 0.95);
-  for (const Walk::Step& s : walk.steps) {
+  for (const HardWalk::Step& s : walk.steps) {
     if (s.time > 7.25 && s.time < 8.15) {
       EXPECT_EQ(s.report.surface.inliers, 0) << s.time;
     }
   }
 }
 
-void expect_pure_rotation_tracked(const Walk& walk) { EXPECT_GE(walk.share(8.8, 10.8).value(), 0.95); }
+void expect_pure_rotation_tracked(const HardWalk& walk) { EXPECT_GE(walk.share(8.8, 10.8).value(), 0.95); }
 
-void expect_found_again_after_the_cover(const Walk& walk) {
+void expect_found_again_after_the_cover(const HardWalk& walk) {
   EXPECT_EQ(walk.share(11.05, 11.55).tracked, 0) << "nothing to be seen is nothing to be trusted";
   EXPECT_LE(walk.until_tracked(11.6), 1.0);
   EXPECT_GE(walk.share(12.0, 99.0).value(), 0.95);
 }
 
-void expect_the_trajectory_right(const Walk& walk) {
-  const Walk::Share all = walk.share(0.0, 99.0);
-  const Walk::Share covered = walk.share(11.0, 11.6);
+void expect_the_trajectory_right(const HardWalk& walk) {
+  const HardWalk::Share all = walk.share(0.0, 99.0);
+  const HardWalk::Share covered = walk.share(11.0, 11.6);
   EXPECT_GE(all.tracked, static_cast<int>(0.97 * (all.frames - covered.frames)));
   const auto report = evaluate::evaluate_trajectory(walk.trajectory, walk.truth);
   ASSERT_TRUE(report);
@@ -133,7 +133,7 @@ void expect_the_trajectory_right(const Walk& walk) {
 }
 
 TEST(HardCases, NoneEndsARun) {
-  const Walk walk;
+  const HardWalk walk;
   expect_whiteout_tracked_by_surfaces(walk);
   expect_darkness_survived(walk);
   expect_blur_survived(walk);

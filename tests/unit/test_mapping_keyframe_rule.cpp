@@ -11,7 +11,7 @@ namespace {
 
 using geometry::Rigid3;
 
-const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+const sensor::Pinhole kRuleCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
 
 /// One keyframe in front of a wall 2 m away; 100 features are tracked right after it.
 class Rule : public testing::Test {
@@ -22,7 +22,7 @@ class Rule : public testing::Test {
     for (int v = 20; v < 480; v += 20) {
       for (int u = 20; u < 640; u += 20) {
         maps::SurfaceSample s;
-        s.point = kCamera.unproject(u, v, 2.0).cast<float>();
+        s.point = kRuleCamera.unproject(u, v, 2.0).cast<float>();
         s.normal = -Eigen::Vector3f::UnitZ();
         keyframe->surface.push_back(s);
       }
@@ -43,7 +43,7 @@ class Rule : public testing::Test {
   void add_landmarks() {
     for (int i = 0; i < 300; ++i) {
       maps::MapPoint point;
-      point.position = kCamera.unproject(16 + 32 * (i % 20), 16 + 32 * ((i * 7) % 15), 2.0);
+      point.position = kRuleCamera.unproject(16 + 32 * (i % 20), 16 + 32 * ((i * 7) % 15), 2.0);
       point.normal = -Eigen::Vector3d::UnitZ();
       map_.observe(map_.add_point(0, point), {0, 0}, i);
     }
@@ -65,8 +65,8 @@ class Rule : public testing::Test {
     return track;
   }
   KeyframeDecision decide(const Rigid3& pose, std::size_t features) {
-    return rule_.decide(map_, {0, 0}, track(pose, features * 9 / 10, features - features * 9 / 10), kCamera,
-                        {});
+    return rule_.decide(map_, {0, 0}, track(pose, features * 9 / 10, features - features * 9 / 10),
+                        kRuleCamera, {});
   }
   static Rigid3 moved(double x) { return {Eigen::Matrix3d::Identity(), {-x, 0.0, 0.0}}; }
   static Rigid3 turned(double yaw) { return {geometry::exp_so3({0.0, yaw, 0.0}), Eigen::Vector3d::Zero()}; }
@@ -122,7 +122,7 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
   map_.add_keyframe(second, moved(0.5));
   for (int i = 0; i < 200; ++i) map_.observe(core::PointId{0, i}, {0, 1}, i);
   const auto known = [&](const Rigid3& pose, std::size_t points, const KeyframeRuleOptions& options = {}) {
-    return KeyframeRule(options).known_ground(map_, {0, 1}, track(pose, points, 10), kCamera);
+    return KeyframeRule(options).known_ground(map_, {0, 1}, track(pose, points, 10), kRuleCamera);
   };
   EXPECT_EQ(known(moved(0.05), 100), (core::KeyframeId{0, 0}));
   EXPECT_FALSE(known(moved(0.22), 100).valid());  // too near to its limit
@@ -135,9 +135,9 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
   }
   auto other = track(moved(0.05), 20, 0);
   for (std::int32_t i = 300; i < 360; ++i) other.points.push_back({{0, i}, i, 0});
-  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 1}, other, kCamera).valid());
+  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 1}, other, kRuleCamera).valid());
   // The reference itself is no news, and who does not want it does not get it.
-  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 0}, track(moved(0.05), 100, 10), kCamera).valid());
+  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 0}, track(moved(0.05), 100, 10), kRuleCamera).valid());
   KeyframeRuleOptions options;
   options.reuse = false;
   EXPECT_FALSE(known(moved(0.05), 100, options).valid());
@@ -175,7 +175,7 @@ TEST_F(Rule, DepthThatIsBackIsTakenAtOnce) {
   blind->surface.clear();
   map.add_keyframe(blind, {});
   const auto decide_on = [this](const maps::Map& on, int corners) {
-    return rule_.decide(on, {0, 0}, track({}, 0, 0), kCamera, {300, true, corners});
+    return rule_.decide(on, {0, 0}, track({}, 0, 0), kRuleCamera, {300, true, corners});
   };
   for (int i = 0; i < 3; ++i) EXPECT_FALSE(decide_on(map, 10).wanted) << "there is none yet";
   EXPECT_FALSE(decide_on(map_, 200).wanted) << "the last keyframe has a surface";
@@ -212,8 +212,8 @@ TEST_F(Rule, AKeyframeWithoutDepthStillHasARule) {
   auto blind = std::make_shared<maps::Keyframe>();
   blind->id = {0, 1};
   map_.add_keyframe(blind, {});
-  rule_.decide(map_, {0, 1}, track({}, 100, 0), kCamera, {});
-  const KeyframeDecision d = rule_.decide(map_, {0, 1}, track(moved(0.5), 100, 0), kCamera, {});
+  rule_.decide(map_, {0, 1}, track({}, 100, 0), kRuleCamera, {});
+  const KeyframeDecision d = rule_.decide(map_, {0, 1}, track(moved(0.5), 100, 0), kRuleCamera, {});
   EXPECT_EQ(d.overlap, 1.0);
   EXPECT_TRUE(std::isfinite(d.parallax));
   EXPECT_TRUE(d.wanted);
@@ -238,7 +238,7 @@ class ConeRule : public Rule {
     tracking::TrackResult result = track(pose, points, lines);
     result.visible_points.resize(visible);
     result.visible_lines.resize(visible / 6);
-    return rule_.decide(map_, {0, 0}, result, kCamera, {500, idle});
+    return rule_.decide(map_, {0, 0}, result, kRuleCamera, {500, idle});
   }
 };
 

@@ -17,7 +17,7 @@ namespace {
 
 using geometry::Rigid3;
 
-const sensor::Pinhole kCamera{320, 240, 260.0, 260.0, 159.5, 119.5};
+const sensor::Pinhole kSurfaceCamera{320, 240, 260.0, 260.0, 159.5, 119.5};
 
 struct Wall {
   Eigen::Vector3d normal;  ///< towards the cameras, in the first camera's frame
@@ -32,14 +32,14 @@ const std::vector<Wall> kOneWall{{Eigen::Vector3d(0.0, 0.0, -1.0), -2.0}};
 cv::Mat look(const std::vector<Wall>& walls, const Rigid3& camera_from_first, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise;
-  cv::Mat depth(kCamera.height, kCamera.width, CV_32FC1);
+  cv::Mat depth(kSurfaceCamera.height, kSurfaceCamera.width, CV_32FC1);
   for (int v = 0; v < depth.rows; ++v) {
     for (int u = 0; u < depth.cols; ++u) {
       double nearest = 1e9;
       for (const Wall& wall : walls) {
         const Eigen::Vector3d n = camera_from_first.rotation * wall.normal;
-        const double z =
-            (wall.distance + n.dot(camera_from_first.translation)) / n.dot(kCamera.unproject(u, v, 1.0));
+        const double z = (wall.distance + n.dot(camera_from_first.translation)) /
+                         n.dot(kSurfaceCamera.unproject(u, v, 1.0));
         if (z > 0.0) nearest = std::min(nearest, z);
       }
       const double z = nearest + sensor::depth_sigma(nearest) * noise(random);
@@ -64,10 +64,10 @@ cv::Mat picture(const Rigid3& camera_from_first, unsigned paint = 5) {
   }
   std::normal_distribution<double> noise;
   const Rigid3 first_from_camera = camera_from_first.inverse();
-  cv::Mat gray(kCamera.height, kCamera.width, CV_8UC1);
+  cv::Mat gray(kSurfaceCamera.height, kSurfaceCamera.width, CV_8UC1);
   for (int v = 0; v < gray.rows; ++v) {
     for (int u = 0; u < gray.cols; ++u) {
-      const Eigen::Vector3d ray = first_from_camera.rotation * kCamera.unproject(u, v, 1.0);
+      const Eigen::Vector3d ray = first_from_camera.rotation * kSurfaceCamera.unproject(u, v, 1.0);
       const Eigen::Vector3d p =
           first_from_camera.translation + ray * ((2.0 - first_from_camera.translation.z()) / ray.z());
       double value = 128.0;
@@ -81,11 +81,11 @@ cv::Mat picture(const Rigid3& camera_from_first, unsigned paint = 5) {
 maps::Keyframe first_view(const std::vector<Wall>& walls) {
   maps::Keyframe keyframe;
   keyframe.id = {0, 0};
-  keyframe.surface = tracking::sample_surface(look(walls, {}, 1), kCamera, {});
+  keyframe.surface = tracking::sample_surface(look(walls, {}, 1), kSurfaceCamera, {});
   return keyframe;
 }
 
-double apart(const Rigid3& a, const Rigid3& b) {
+double metres_apart(const Rigid3& a, const Rigid3& b) {
   return (a.inverse().translation - b.inverse().translation).norm();
 }
 
@@ -94,11 +94,11 @@ const Rigid3 kOff(geometry::exp_so3({0.004, 0.004, -0.004}), Eigen::Vector3d(0.0
 
 TEST(SurfaceEdge, ThreeWallsHoldAllDirections) {
   const auto edge = align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, kTruth, 2), kOff * kTruth,
-                                       {}, kCamera, {});
+                                       {}, kSurfaceCamera, {});
   ASSERT_TRUE(edge.has_value());
   EXPECT_EQ(edge->a, (core::KeyframeId{0, 0}));
   EXPECT_EQ(edge->b, (core::KeyframeId{0, 1}));
-  EXPECT_LT(apart(edge->b_from_a, kTruth), 0.0015) << "the hold at 1 cm does not pull it back";
+  EXPECT_LT(metres_apart(edge->b_from_a, kTruth), 0.0015) << "the hold at 1 cm does not pull it back";
   EXPECT_LT(geometry::rotation_angle(edge->b_from_a.rotation * kTruth.rotation.transpose()), 0.001);
   const geometry::Vector6d error = geometry::log_se3(kTruth * edge->b_from_a.inverse());
   EXPECT_LT(error.dot(edge->information * error), 6.0 * 9.0) << "as exact as it says";
@@ -106,8 +106,8 @@ TEST(SurfaceEdge, ThreeWallsHoldAllDirections) {
 
 TEST(SurfaceEdge, WhatTheSurfacesLeaveOpenStaysWhereItWas) {
   const Rigid3 start = kOff * kTruth;
-  const auto edge =
-      align_surface_edge(first_view(kOneWall), {0, 1}, look(kOneWall, kTruth, 2), start, {}, kCamera, {});
+  const auto edge = align_surface_edge(first_view(kOneWall), {0, 1}, look(kOneWall, kTruth, 2), start, {},
+                                       kSurfaceCamera, {});
   ASSERT_TRUE(edge.has_value());
   const Eigen::Vector3d middle(0.0, 0.0, 2.0);  // of the wall: turning the camera about it is no slide
   const Eigen::Vector3d slid = edge->b_from_a * middle - start * middle;
@@ -118,14 +118,14 @@ TEST(SurfaceEdge, WhatTheSurfacesLeaveOpenStaysWhereItWas) {
 
 TEST(SurfaceEdge, GreyValuesHoldWhatTheSurfacesLeaveOpen) {
   const auto samples = features::sample_photometric(features::make_photometric_image(picture({})),
-                                                    look(kOneWall, {}, 1), kCamera, {});
+                                                    look(kOneWall, {}, 1), kSurfaceCamera, {});
   const auto aligned = [&](const cv::Mat& second) {
     const features::PhotometricImage image = features::make_photometric_image(second);
     return align_surface_edge(first_view(kOneWall), {0, 1}, look(kOneWall, kTruth, 2), kOff * kTruth, {},
-                              kCamera, {}, {&samples, &image});
+                              kSurfaceCamera, {}, {&samples, &image});
   };
   const auto alone = align_surface_edge(first_view(kOneWall), {0, 1}, look(kOneWall, kTruth, 2),
-                                        kOff * kTruth, {}, kCamera, {});
+                                        kOff * kTruth, {}, kSurfaceCamera, {});
   const auto edge = aligned(picture(kTruth));
   const auto repainted = aligned(picture(kTruth, 6));
   ASSERT_TRUE(alone && edge && repainted);
@@ -143,28 +143,28 @@ TEST(SurfaceEdge, GreyValuesHoldWhatTheSurfacesLeaveOpen) {
 TEST(SurfaceEdge, ADepthImageTakenLaterIsAlignedWhereItWasTaken) {
   const Rigid3 later(geometry::exp_so3({0.0, 0.01, 0.0}), Eigen::Vector3d(0.004, 0.0, -0.006));
   const auto edge = align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, later * kTruth, 2), kTruth,
-                                       later, kCamera, {});
+                                       later, kSurfaceCamera, {});
   ASSERT_TRUE(edge.has_value());
-  EXPECT_LT(apart(edge->b_from_a, kTruth), 0.0015);
+  EXPECT_LT(metres_apart(edge->b_from_a, kTruth), 0.0015);
 }
 
 TEST(SurfaceEdge, WithoutOverlapThereIsNone) {
   const Rigid3 away(geometry::exp_so3({0.0, 2.5, 0.0}), Eigen::Vector3d::Zero());
   EXPECT_FALSE(
-      align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, kTruth, 2), away, {}, kCamera, {})
+      align_surface_edge(first_view(kCorner), {0, 1}, look(kCorner, kTruth, 2), away, {}, kSurfaceCamera, {})
           .has_value());
   EXPECT_FALSE(
-      align_surface_edge(first_view(kCorner), {0, 1}, cv::Mat(), kTruth, {}, kCamera, {}).has_value());
+      align_surface_edge(first_view(kCorner), {0, 1}, cv::Mat(), kTruth, {}, kSurfaceCamera, {}).has_value());
   maps::Keyframe bare;
   bare.id = {0, 0};
   EXPECT_FALSE(
-      align_surface_edge(bare, {0, 1}, look(kCorner, kTruth, 2), kTruth, {}, kCamera, {}).has_value());
+      align_surface_edge(bare, {0, 1}, look(kCorner, kTruth, 2), kTruth, {}, kSurfaceCamera, {}).has_value());
 }
 
 /// A keyframe's surface is where its colour camera was: what its depth camera measured later is carried back.
 TEST(SurfaceEdge, AKeyframesSurfaceIsThatOfItsColourImage) {
   const Rigid3 later(geometry::exp_so3({0.0, 0.02, 0.0}), Eigen::Vector3d(0.02, 0.0, -0.03));
-  LocalMapper mapper({}, kCamera);
+  LocalMapper mapper({}, kSurfaceCamera);
   maps::Map map;
   sensor::RgbdFrame frame;
   frame.depth = look(kCorner, later, 3);

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-
 #include <memory>
 #include <set>
 
@@ -19,7 +18,7 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
+const sensor::Pinhole kWayCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
 
 /// A camera that goes along x past points that are seen by four keyframes each; every keyframe knows how it
 /// lies to the one before.
@@ -71,7 +70,7 @@ class Way {
       const auto slot = static_cast<std::size_t>(k);
       features::PointFeature& f = features_[slot]->points[static_cast<std::size_t>(used_[slot])];
       const Eigen::Vector3d c = truth[slot] * point.position;
-      f.pixel = kCamera.project(c).cast<float>();
+      f.pixel = kWayCamera.project(c).cast<float>();
       f.depth = static_cast<float>(c.z());
       map.observe(id, {0, k}, used_[slot]++);
     }
@@ -137,7 +136,7 @@ TEST(TrackedWay, ALoopOfTwentyCentimetresPasses) {
 
 TEST(TrackedWay, AForcedTearIsRefusedAndTheMapStays) {
   Way way(8);
-  LocalBundle bundle = take_local_bundle(way.map, {0, 7}, kCamera, {});
+  LocalBundle bundle = take_local_bundle(way.map, {0, 7}, kWayCamera, {});
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
   for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
     auto& pose = bundle.problem.poses[i];
@@ -175,7 +174,8 @@ TEST(TrackedWay, EveryKeyframeOfAWindowIsTiedToOneThatIsHeld) {
     for (const int size : {1, 2, 5, 12}) {
       LocalBundleOptions options;
       options.keyframes = size;
-      const LocalBundle bundle = take_local_bundle(way.map, {0, around}, kCamera, options, {{0, 1}, {0, 15}});
+      const LocalBundle bundle =
+          take_local_bundle(way.map, {0, around}, kWayCamera, options, {{0, 1}, {0, 15}});
       expect_tied(bundle);
       for (const auto& edge : bundle.problem.edges) {
         EXPECT_GT(edge.information.eigenvalues().real().minCoeff(), 1000.0) << "in all six directions";

@@ -37,7 +37,7 @@ std::vector<std::uint8_t> cloud_bytes(int points) {
   return cloud::encode_cloud(cloud);
 }
 
-std::string read_file(const std::filesystem::path& file) {
+std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
@@ -202,9 +202,9 @@ TEST(MapStore, SameMapSameBytes) {
   };
   write("a.db");
   write("b.db");
-  const std::string a = read_file(folder.path / "a.db");
+  const std::string a = bytes_of(folder.path / "a.db");
   EXPECT_GT(a.size(), 10000U);
-  const std::string b = read_file(folder.path / "b.db");
+  const std::string b = bytes_of(folder.path / "b.db");
   ASSERT_EQ(a.size(), b.size());
   const auto differs = std::mismatch(a.begin(), a.end(), b.begin());
   EXPECT_TRUE(differs.first == a.end()) << "at byte " << differs.first - a.begin();

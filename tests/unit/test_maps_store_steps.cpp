@@ -25,7 +25,7 @@ using tests::same_all;
 using tests::StoreFolder;
 using tests::StoreWorld;
 
-std::shared_ptr<const std::vector<std::uint8_t>> cloud_of(int points) {
+std::shared_ptr<const std::vector<std::uint8_t>> stored_cloud(int points) {
   cloud::Cloud cloud;
   for (int i = 0; i < points; ++i) {
     cloud::Point p;
@@ -52,9 +52,9 @@ class Follower {
       log.push_back(step.log.back());
     }
     frames_ = world_.frames.size();
-    step.clouds.push_back({id, 0, cloud_of(id.index + 1)});
+    step.clouds.push_back({id, 0, stored_cloud(id.index + 1)});
     if (frames_ > 1) {
-      step.clouds.push_back({{}, frames_ - 2, cloud_of(500 + id.index)});
+      step.clouds.push_back({{}, frames_ - 2, stored_cloud(500 + id.index)});
       frame_clouds.push_back(frames_ - 2);
     }
     return step;
@@ -162,7 +162,7 @@ TEST(StoreSteps, TheEndKeepsTheRestAndTheFrameOfTheResults) {
   frame.upright = true;
   StoreStep rest;
   rest.log = {"last"};
-  rest.clouds.push_back({{}, 0, cloud_of(7)});
+  rest.clouds.push_back({{}, 0, stored_cloud(7)});
   const auto saved = writer->save_final(world.map, world.frames, frame, rest);
   ASSERT_TRUE(saved) << saved.error().message;
   const auto stored = load_map(folder.file());

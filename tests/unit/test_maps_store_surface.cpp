@@ -18,7 +18,7 @@ using tests::header_of;
 using tests::StoreFolder;
 using tests::StoreWorld;
 
-void run_sql(const std::filesystem::path& file, const char* sql) {
+void change_by_sql(const std::filesystem::path& file, const char* sql) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
   ASSERT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK);
@@ -103,7 +103,7 @@ TEST(StoreSurface, StoresOfAnOlderFormatAreRefusedWithTheRemedy) {
   const StoreFolder folder;
   StoreWorld world(6);
   write_store(folder.file(), world, 3);
-  run_sql(folder.file(), ("PRAGMA user_version = " + std::to_string(kStoreFormat - 1)).c_str());
+  change_by_sql(folder.file(), ("PRAGMA user_version = " + std::to_string(kStoreFormat - 1)).c_str());
   const auto reader = StoreReader::open(folder.file());
   ASSERT_FALSE(reader);
   EXPECT_NE(reader.error().message.find("map the recording again"), std::string::npos)

@@ -35,7 +35,7 @@ Rigid3 noisy(const Rigid3& exact, double metres, double radians, Random& random)
   return geometry::exp_se3(xi) * exact;
 }
 
-struct World {
+struct GraphWorld {
   std::vector<Rigid3> truth;
   PoseGraph graph;  ///< starts where the odometry leads
   std::vector<bool> wrong;
@@ -43,9 +43,9 @@ struct World {
 
 /// Two laps of a ring of 3 m radius; odometry between neighbours, `loops` right ones between the laps, and
 /// `wrong` that join what does not belong together.
-World make_world(int loops, int wrong, std::uint32_t seed) {
+GraphWorld make_world(int loops, int wrong, std::uint32_t seed) {
   Random random(seed);
-  World world;
+  GraphWorld world;
   constexpr int kPoses = 120;
   for (int i = 0; i < kPoses; ++i) {
     const double phi = 4.0 * M_PI * i / kPoses;
@@ -80,7 +80,7 @@ World make_world(int loops, int wrong, std::uint32_t seed) {
   return world;
 }
 
-double rmse(const World& world, const PoseGraph& graph) {
+double rmse(const GraphWorld& world, const PoseGraph& graph) {
   double sum = 0.0;
   for (std::size_t i = 0; i < world.truth.size(); ++i) {
     const double d = tests::distance(graph.poses[i].camera_from_world, world.truth[i]);
@@ -90,7 +90,7 @@ double rmse(const World& world, const PoseGraph& graph) {
 }
 
 TEST(PoseGraph, LoopsTakeTheDriftOut) {
-  World world = make_world(30, 0, 1);
+  GraphWorld world = make_world(30, 0, 1);
   const double before = rmse(world, world.graph);
   const PoseGraphSummary summary = solve_pose_graph(world.graph);
   ASSERT_TRUE(summary.usable) << summary.message;
@@ -101,9 +101,9 @@ TEST(PoseGraph, LoopsTakeTheDriftOut) {
 
 TEST(PoseGraph, ThirtyPercentWrongLoopsChangeNothing) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
-    World clean = make_world(30, 0, seed);
+    GraphWorld clean = make_world(30, 0, seed);
     ASSERT_TRUE(solve_pose_graph(clean.graph).usable);
-    World torn = make_world(30, 13, seed);  // 13 of 43
+    GraphWorld torn = make_world(30, 13, seed);  // 13 of 43
     const PoseGraphSummary summary = solve_pose_graph(torn.graph);
     ASSERT_TRUE(summary.usable) << summary.message;
     EXPECT_LT(rmse(torn, torn.graph), 1.1 * rmse(clean, clean.graph)) << "seed " << seed;
@@ -119,19 +119,19 @@ TEST(PoseGraph, ThirtyPercentWrongLoopsChangeNothing) {
 }
 
 TEST(PoseGraph, WithoutRobustnessWrongLoopsTearTheGraph) {
-  World world = make_world(30, 13, 1);
+  GraphWorld world = make_world(30, 13, 1);
   PoseGraphOptions options;
   options.robust = EdgeRobustness::kNone;
   const PoseGraphSummary summary = solve_pose_graph(world.graph, options);
   ASSERT_TRUE(summary.usable);
   EXPECT_EQ(summary.rejected, 0);
-  World clean = make_world(30, 0, 1);
+  GraphWorld clean = make_world(30, 0, 1);
   ASSERT_TRUE(solve_pose_graph(clean.graph).usable);
   EXPECT_GT(rmse(world, world.graph), 2.0 * rmse(clean, clean.graph));
 }
 
 TEST(PoseGraph, ASingleWrongLoopIsSeenThroughToo) {
-  World world = make_world(0, 1, 2);  // nothing but odometry speaks against it
+  GraphWorld world = make_world(0, 1, 2);  // nothing but odometry speaks against it
   const PoseGraphSummary summary = solve_pose_graph(world.graph);
   ASSERT_TRUE(summary.usable);
   EXPECT_TRUE(summary.edges.back().rejected);
@@ -162,7 +162,7 @@ TEST(PoseGraph, WhatAnEdgeDoesNotHoldStaysFree) {
 }
 
 TEST(PoseGraph, FixedPosesStayAndUnjoinedOnesToo) {
-  World world = make_world(10, 0, 4);
+  GraphWorld world = make_world(10, 0, 4);
   world.graph.poses[50].fixed = true;
   const Rigid3 held = world.graph.poses[50].camera_from_world;
   const Rigid3 alone(geometry::exp_so3({0.1, 0.2, 0.3}), {4.0, 5.0, 6.0});
@@ -173,8 +173,8 @@ TEST(PoseGraph, FixedPosesStayAndUnjoinedOnesToo) {
 }
 
 TEST(PoseGraph, SameBytesWhereverTheHeapPutsThings) {
-  World a = make_world(30, 13, 7);
-  World b = make_world(30, 13, 7);
+  GraphWorld a = make_world(30, 13, 7);
+  GraphWorld b = make_world(30, 13, 7);
   solve_pose_graph(a.graph);
   const tests::ShuffledHeap elsewhere(5);
   solve_pose_graph(b.graph);
@@ -188,7 +188,7 @@ TEST(PoseGraph, SameBytesWhereverTheHeapPutsThings) {
 /// The minimum itself, whatever the steps that led there: nothing pulls at any pose, a little way off costs
 /// more.
 TEST(PoseGraph, NothingPullsAtTheSolution) {
-  World world = make_world(30, 0, 3);
+  GraphWorld world = make_world(30, 0, 3);
   PoseGraphOptions options;
   options.robust = EdgeRobustness::kNone;
   const auto cost = [&](const PoseGraph& graph) {

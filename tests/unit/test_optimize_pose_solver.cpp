@@ -16,7 +16,7 @@ using tests::Random;
 
 const sensor::Pinhole kCamera{640, 480, 525.0, 525.0, 319.5, 239.5};
 
-struct World {
+struct PoseWorld {
   PoseProblem problem;
   Rigid3 truth;
 };
@@ -26,9 +26,9 @@ Eigen::Vector3d in_view(Random& random) {
 }
 
 /// Exact measurements at `truth`; every `outlier`-th term is wrong (0: none).
-World make_world(int points, int lines, int planes, std::uint32_t seed, int outlier = 0) {
+PoseWorld make_world(int points, int lines, int planes, std::uint32_t seed, int outlier = 0) {
   Random random(seed);
-  World world;
+  PoseWorld world;
   world.truth = random.pose(3.0, 3.0);
   world.problem.camera = kCamera;
   const Rigid3 world_from_camera = world.truth.inverse();
@@ -68,7 +68,7 @@ World make_world(int points, int lines, int planes, std::uint32_t seed, int outl
   return world;
 }
 
-void expect_found(const World& world, double metres, double radians, double tolerance, const char* what) {
+void expect_found(const PoseWorld& world, double metres, double radians, double tolerance, const char* what) {
   Random random(99);
   PoseSolverOptions options;
   options.max_iterations = 50;
@@ -97,7 +97,7 @@ TEST(SolvePose, FewestTermsThatHoldAPose) {
 TEST(SolvePose, ThirtyPercentOutliersMoveItLittle) {
   // Huber does not reject: what stays is a bounded pull that the gates of the tracker then remove.
   expect_found(make_world(200, 0, 0, 7, 3), 0.1, 0.1, 0.02, "points");
-  const World world = make_world(200, 60, 300, 8, 3);
+  const PoseWorld world = make_world(200, 60, 300, 8, 3);
   expect_found(world, 0.1, 0.1, 0.02, "all");
   PoseSolverOptions options;
   options.max_iterations = 50;
@@ -113,7 +113,7 @@ TEST(SolvePose, ThirtyPercentOutliersMoveItLittle) {
 
 TEST(SolvePose, NeverIncreasesTheCost) {
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
-    World world = make_world(30, 10, 30, 100 + seed, seed % 2 == 0 ? 2 : 0);
+    PoseWorld world = make_world(30, 10, 30, 100 + seed, seed % 2 == 0 ? 2 : 0);
     Random random(seed);
     const Rigid3 start = random.pose(3.0, 3.0);  // anywhere: nothing fits
     const PoseSummary summary = solve_pose(world.problem, start, {});
@@ -139,7 +139,7 @@ TEST(SolvePose, WithoutTermsStaysAtTheStart) {
 }
 
 TEST(SolvePose, PointsBehindTheCameraAreLeftOutAndCounted) {
-  World world = make_world(60, 0, 0, 11);
+  PoseWorld world = make_world(60, 0, 0, 11);
   const Rigid3 world_from_camera = world.truth.inverse();
   for (int i = 0; i < 20; ++i) {
     PointTerm term = world.problem.points[static_cast<std::size_t>(i)];
@@ -156,7 +156,7 @@ TEST(SolvePose, PointsBehindTheCameraAreLeftOutAndCounted) {
 TEST(SolvePose, HidingThePointsBehindTheCameraIsNoSolution) {
   // From a start so bad that a large step throws points behind the camera: what cannot be seen costs, too.
   for (std::uint32_t seed = 0; seed < 30; ++seed) {
-    const World world = make_world(40, 0, 0, 200 + seed);
+    const PoseWorld world = make_world(40, 0, 0, 200 + seed);
     Random random(seed);
     const Rigid3 start = random.step(1.5, 0.8) * world.truth;
     const auto in_front = [&](const Rigid3& pose) {
@@ -172,7 +172,7 @@ TEST(SolvePose, HidingThePointsBehindTheCameraIsNoSolution) {
 }
 
 TEST(SolvePose, ALineThroughTheCameraCentreIsLeftOut) {
-  World world = make_world(40, 20, 0, 12);
+  PoseWorld world = make_world(40, 20, 0, 12);
   LineTerm through;
   through.world = geometry::line_through(world.truth.inverse().translation, Eigen::Vector3d(9, 9, 9));
   through.start = {10, 10};
@@ -186,7 +186,7 @@ TEST(SolvePose, ALineThroughTheCameraCentreIsLeftOut) {
 
 TEST(SolvePose, ParallelPlanesLeaveTheWeakDirectionsAtTheStart) {
   Random random(13);
-  World world;
+  PoseWorld world;
   world.truth = Rigid3();
   world.problem.camera = kCamera;
   for (int i = 0; i < 300; ++i) {  // a wall straight ahead, at 2 m
@@ -217,7 +217,7 @@ TEST(SolvePose, ParallelPlanesLeaveTheWeakDirectionsAtTheStart) {
 }
 
 TEST(SolvePose, PriorHoldsWhatTermsDoNot) {
-  World world = make_world(0, 0, 0, 14);
+  PoseWorld world = make_world(0, 0, 0, 14);
   PosePrior prior;
   prior.camera_from_world = world.truth;
   prior.information = 1e4 * geometry::Matrix6d::Identity();
@@ -234,7 +234,7 @@ TEST(SolvePose, InformationTellsTheSpreadOfSolutions) {
   double sum = 0.0;
   constexpr int kRounds = 200;
   for (int i = 0; i < kRounds; ++i) {
-    World world = make_world(60, 0, 0, 17);
+    PoseWorld world = make_world(60, 0, 0, 17);
     for (PointTerm& term : world.problem.points) {
       term.pixel += Eigen::Vector2d(random.normal(), random.normal());
       if (term.depth > 0.0) term.depth += random.normal(term.depth_sigma);
@@ -249,7 +249,7 @@ TEST(SolvePose, InformationTellsTheSpreadOfSolutions) {
 }
 
 TEST(SolvePose, NotANumberIsNotReturned) {
-  World world = make_world(30, 0, 0, 18);
+  PoseWorld world = make_world(30, 0, 0, 18);
   world.problem.points[3].pixel.x() = std::numeric_limits<double>::quiet_NaN();
   const PoseSummary summary = solve_pose(world.problem, world.truth, {});
   EXPECT_TRUE(summary.camera_from_world.translation.allFinite());

@@ -15,7 +15,7 @@ using geometry::Vector6d;
 using tests::numeric_jacobian;
 using tests::Random;
 
-const sensor::Pinhole kCamera{640, 480, 520.0, 540.0, 318.0, 243.0};
+const sensor::Pinhole kTermCamera{640, 480, 520.0, 540.0, 318.0, 243.0};
 const Eigen::Matrix3d kProjection = geometry::line_projection(520.0, 540.0, 318.0, 243.0);
 
 /// Largest difference, as a share of the largest entry.
@@ -31,21 +31,21 @@ Eigen::Vector3d in_front(Random& random) {
 TEST(PointResidual, IsTheReprojectionAndDepthError) {
   PointTerm term;
   term.world = {0.2, -0.1, 2.0};
-  term.pixel = kCamera.project(term.world) + Eigen::Vector2d(3.0, -1.0);
+  term.pixel = kTermCamera.project(term.world) + Eigen::Vector2d(3.0, -1.0);
   term.pixel_sigma = 2.0;
   Eigen::Vector3d r;
-  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 2);
+  EXPECT_EQ(point_residual(term, {}, kTermCamera, r, nullptr), 2);
   EXPECT_NEAR(r(0), 1.5, 1e-12);
   EXPECT_NEAR(r(1), -0.5, 1e-12);
   EXPECT_EQ(r(2), 0.0);
   term.depth = 2.02;
   term.depth_sigma = 0.01;
-  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 3);
+  EXPECT_EQ(point_residual(term, {}, kTermCamera, r, nullptr), 3);
   EXPECT_NEAR(r(2), 2.0, 1e-9);
   term.world.z() = -2.0;
-  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 0) << "behind the camera";
+  EXPECT_EQ(point_residual(term, {}, kTermCamera, r, nullptr), 0) << "behind the camera";
   term.world.z() = 0.0;
-  EXPECT_EQ(point_residual(term, {}, kCamera, r, nullptr), 0) << "in the camera";
+  EXPECT_EQ(point_residual(term, {}, kTermCamera, r, nullptr), 0) << "in the camera";
 }
 
 TEST(PointResidual, Jacobian) {
@@ -60,10 +60,10 @@ TEST(PointResidual, Jacobian) {
     term.depth_sigma = 0.02;
     Eigen::Vector3d r;
     Eigen::Matrix<double, 3, 6> j;
-    ASSERT_EQ(point_residual(term, pose, kCamera, r, &j), i % 2 == 0 ? 3 : 2);
+    ASSERT_EQ(point_residual(term, pose, kTermCamera, r, &j), i % 2 == 0 ? 3 : 2);
     const auto numeric = numeric_jacobian<3, 6>([&](const Vector6d& xi) {
       Eigen::Vector3d e;
-      point_residual(term, geometry::exp_se3(xi) * pose, kCamera, e, nullptr);
+      point_residual(term, geometry::exp_se3(xi) * pose, kTermCamera, e, nullptr);
       return e;
     });
     EXPECT_LT(relative(j, numeric), 1e-6);
@@ -140,8 +140,8 @@ TEST(PlaneResidual, ValueAndJacobian) {
 
 BundleLineObservation line_observation(Random& random, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   BundleLineObservation seen;
-  seen.start = kCamera.project(a) + Eigen::Vector2d(random.normal(2.0), random.normal(2.0));
-  seen.end = kCamera.project(b) + Eigen::Vector2d(random.normal(2.0), random.normal(2.0));
+  seen.start = kTermCamera.project(a) + Eigen::Vector2d(random.normal(2.0), random.normal(2.0));
+  seen.end = kTermCamera.project(b) + Eigen::Vector2d(random.normal(2.0), random.normal(2.0));
   seen.pixel_sigma = 1.2;
   seen.has_depth = true;
   seen.start_camera = a + random.vector(0.03);
@@ -154,7 +154,7 @@ BundleLineObservation line_observation(Random& random, const Eigen::Vector3d& a,
 /// Both Jacobians of a line's residuals against central differences.
 void expect_line_jacobians(const BundleLineObservation& seen, const Rigid3& pose,
                            const geometry::OrthonormalLine& line) {
-  const LineView view(seen, kCamera);
+  const LineView view(seen, kTermCamera);
   LineDerivatives j;
   const Eigen::Vector4d r = line_rows(view, kProjection, pose, line, &j);
   EXPECT_EQ(r, line_rows(view, kProjection, pose, line, nullptr));
@@ -202,15 +202,15 @@ TEST(LineRows, DepthIsMeasuredAlongTheRayOnly) {
   const Eigen::Vector3d a(-0.5, 0.0, 2.0);
   const Eigen::Vector3d b(0.5, 0.0, 2.0);
   BundleLineObservation seen;
-  seen.start = kCamera.project(a);
-  seen.end = kCamera.project(b);
+  seen.start = kTermCamera.project(a);
+  seen.end = kTermCamera.project(b);
   seen.has_depth = true;
   seen.start_camera = a + Eigen::Vector3d(0.0, 0.01, 0.04);
   seen.end_camera = b + Eigen::Vector3d(0.2, 0.0, 0.04);  // along the line costs nothing
   seen.start_sigma = 0.02;
   seen.end_sigma = 0.04;
   const geometry::OrthonormalLine line = geometry::to_orthonormal(geometry::line_through(a, b));
-  const Eigen::Vector4d r = line_rows(LineView(seen, kCamera), kProjection, {}, line, nullptr);
+  const Eigen::Vector4d r = line_rows(LineView(seen, kTermCamera), kProjection, {}, line, nullptr);
   EXPECT_NEAR(r(0), 0.0, 1e-9);
   EXPECT_NEAR(r(1), 0.0, 1e-9);
   EXPECT_NEAR(std::abs(r(2)), 2.0, 1e-9);

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kBroken = fs::path(PLUMBLINE_SOURCE_DIR) / "tests" / "pipelines" / "broken";
-const fs::path kShipped = fs::path(PLUMBLINE_SOURCE_DIR) / "pipelines";
+const fs::path kShippedPipelines = fs::path(PLUMBLINE_SOURCE_DIR) / "pipelines";
 
 /// Refused by a schema already: shapes, keys, types, ranges. What needs the whole graph or the text itself:
 /// graph.
@@ -39,7 +39,7 @@ core::Result<void> load(const fs::path& file) {
     if (chain) return {};
     error = chain.error();
   } else {
-    const auto graph = load_graph(file, registry, kShipped);
+    const auto graph = load_graph(file, registry, kShippedPipelines);
     if (graph) return {};
     error = graph.error();
   }

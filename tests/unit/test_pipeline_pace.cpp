@@ -18,13 +18,13 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-struct Outcome {
+struct PaceOutcome {
   RunReport report;
   std::string collected;
   double seconds = 0.0;
 };
 
-Outcome run(double hz, int frames, const Progress& progress = {}, const core::StopToken& stop = {}) {
+PaceOutcome run(double hz, int frames, const Progress& progress = {}, const core::StopToken& stop = {}) {
   toys::Bench bench;
   StageRegistry registry;
   toys::register_toys(registry, bench);
@@ -50,10 +50,10 @@ Outcome run(double hz, int frames, const Progress& progress = {}, const core::St
 }
 
 TEST(Pace, FramesComeNoEarlierAndNothingElseChanges) {
-  const Outcome at_once = run(0.0, 30);
+  const PaceOutcome at_once = run(0.0, 30);
   const Clock::time_point start = Clock::now();
   std::vector<double> done;
-  const Outcome paced =
+  const PaceOutcome paced =
       run(60.0, 30, [&](std::size_t, std::size_t) { done.push_back(seconds_since(start)); });
   EXPECT_EQ(paced.collected, at_once.collected);
   EXPECT_EQ(paced.report.frames, 30U);
@@ -66,7 +66,7 @@ TEST(Pace, FramesComeNoEarlierAndNothingElseChanges) {
 }
 
 TEST(Pace, ThatCannotBeHeldIsToldByHowMuch) {
-  const Outcome outcome = run(1000.0, 40, [](std::size_t, std::size_t) {
+  const PaceOutcome outcome = run(1000.0, 40, [](std::size_t, std::size_t) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   });
   EXPECT_EQ(outcome.report.frames, 40U);
@@ -80,7 +80,7 @@ TEST(Pace, StopIsHeardWhileTheNextFrameIsWaitedFor) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     stop.request_stop();
   });
-  const Outcome outcome = run(0.01, 3, {}, stop);
+  const PaceOutcome outcome = run(0.01, 3, {}, stop);
   later.join();
   EXPECT_LT(outcome.seconds, 50.0);  // not the 100 s until the second frame
   EXPECT_EQ(outcome.report.frames, 1U);

@@ -15,7 +15,7 @@ namespace plumbline::synth {
 namespace {
 
 namespace fs = std::filesystem;
-const std::string kScenes = std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes";
+const std::string kSceneFolder = std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes";
 
 class SynthRecording : public ::testing::Test {
  protected:
@@ -31,7 +31,7 @@ class SynthRecording : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   core::Result<WriteSummary> write(int threads, const fs::path& to, const core::StopToken& stop = {}) {
-    const auto scene = load_scene("structure", kScenes);
+    const auto scene = load_scene("structure", kSceneFolder);
     if (!scene) throw std::runtime_error(scene.error().message);
     const core::Executor executor(threads);
     const auto log = core::null_log();
@@ -63,7 +63,7 @@ TEST_F(SynthRecording, WhatIsWrittenIsWhatIsRendered) {
     ASSERT_TRUE(written) << written.error().message;
     const auto rendered =
         open_synth("synth:structure?frames=6&robots=2&width=160&height=120&robot=" + std::to_string(robot),
-                   kScenes, executor, *log);
+                   kSceneFolder, executor, *log);
     ASSERT_TRUE(rendered) << rendered.error().message;
     ASSERT_EQ((*written)->size(), 6U);
     EXPECT_EQ((*written)->camera().color.fx, (*rendered)->camera().color.fx);

@@ -6,7 +6,7 @@
 namespace plumbline::synth {
 namespace {
 
-const std::string kScenes = std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes";
+const std::string kShippedScenes = std::string(PLUMBLINE_SOURCE_DIR) + "/pipelines/scenes";
 const std::string kRobots = "robots:\n  - path: [[0, 0], [1, 0]]\n";
 
 std::string problem(const std::string& yaml) {
@@ -15,10 +15,10 @@ std::string problem(const std::string& yaml) {
 }
 
 TEST(SynthScene, EveryShippedSceneLoads) {
-  const auto names = scene_names(kScenes);
+  const auto names = scene_names(kShippedScenes);
   EXPECT_EQ(names, (std::vector<std::string>{"corridor", "office", "plane", "room", "structure"}));
   for (const std::string& name : names) {
-    const auto scene = load_scene(name, kScenes);
+    const auto scene = load_scene(name, kShippedScenes);
     ASSERT_TRUE(scene) << scene.error().message;
     EXPECT_EQ(scene->name, name);
     EXPECT_GE(scene->robots.size(), 2U);
@@ -27,12 +27,12 @@ TEST(SynthScene, EveryShippedSceneLoads) {
 }
 
 TEST(SynthScene, UnknownSceneSuggestsOne) {
-  const auto scene = load_scene("rom", kScenes);
+  const auto scene = load_scene("rom", kShippedScenes);
   ASSERT_FALSE(scene);
   EXPECT_EQ(scene.error().kind, core::ErrorKind::kUsage);
   EXPECT_NE(scene.error().message.find("did you mean room"), std::string::npos) << scene.error().message;
-  EXPECT_FALSE(load_scene("", kScenes));
-  EXPECT_FALSE(load_scene("/nowhere/at/all.yaml", kScenes));
+  EXPECT_FALSE(load_scene("", kShippedScenes));
+  EXPECT_FALSE(load_scene("/nowhere/at/all.yaml", kShippedScenes));
 }
 
 TEST(SynthScene, BoxHasSixFacesThatLookOutwards) {

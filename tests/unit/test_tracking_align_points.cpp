@@ -14,7 +14,7 @@ namespace {
 using geometry::Rigid3;
 using tests::kTestCamera;
 
-constexpr double kDistance = 2.0;  // m, of the wall that all pictures show
+constexpr double kWall_m = 2.0;  // m, of the wall that all pictures show
 
 /// A wall of waves, square to the first camera unless it is slanted. The camera only moves sideways and back.
 class WallWorld : public testing::Test {
@@ -33,7 +33,7 @@ class WallWorld : public testing::Test {
   Eigen::Vector3d on_wall(const Rigid3& camera_from_world, double u, double v) const {
     const Rigid3 world_from_camera = camera_from_world.inverse();
     const Eigen::Vector3d ray = world_from_camera.rotation * kTestCamera.unproject(u, v, 1.0);
-    const Eigen::Vector3d to_wall = Eigen::Vector3d(0, 0, kDistance) - world_from_camera.translation;
+    const Eigen::Vector3d to_wall = Eigen::Vector3d(0, 0, kWall_m) - world_from_camera.translation;
     return world_from_camera.translation + ray * (normal_.dot(to_wall) / normal_.dot(ray));
   }
   /// Features with a corner at each of these whole pixels, in octave 0.

@@ -39,19 +39,19 @@ std::vector<Wave> grain(unsigned seed) {
   return waves;
 }
 
-struct Look {
+struct PlaneLook {
   cv::Mat1b gray = cv::Mat1b(480, 640);
   cv::Mat1f depth = cv::Mat1f(480, 640);
 };
 /// `amplitude`: of the grain, grey values; noise has a standard deviation of 1.
-Look look(const Rigid3& camera_from_world, double amplitude, unsigned noise_seed, double exposure = 1.0,
-          unsigned grain_seed = 7) {
+PlaneLook look(const Rigid3& camera_from_world, double amplitude, unsigned noise_seed, double exposure = 1.0,
+               unsigned grain_seed = 7) {
   static const std::vector<Wave> wall = grain(7), other = grain(8), smooth = grain(kSmooth);
   const std::vector<Wave>& waves = grain_seed == 7 ? wall : grain_seed == kSmooth ? smooth : other;
   const Rigid3 world_from_camera = camera_from_world.inverse();
   std::mt19937 random(noise_seed);
   std::normal_distribution<double> noise(0.0, 1.0);
-  Look result;
+  PlaneLook result;
   for (int y = 0; y < 480; ++y) {
     for (int x = 0; x < 640; ++x) {
       const Eigen::Vector3d ray = world_from_camera.rotation * kCamera.unproject(x, y, 1.0);
@@ -77,12 +77,12 @@ const Rigid3 kTruth = moved(0.03, -0.02, 0.01, 0.01, 0.015, -0.02);
 struct Pair {
   features::PhotometricSamples samples;
   features::PhotometricImage image;
-  Look second;
+  PlaneLook second;
   [[nodiscard]] tracking::PhotometricView view() const { return {&image, &second.depth, {}, kCamera}; }
 };
 Pair make_pair(const Rigid3& second_pose, double amplitude, double exposure = 1.0,
                unsigned second_grain = 7) {
-  const Look first = look({}, amplitude, 1, 1.0, second_grain == kSmooth ? kSmooth : 7);
+  const PlaneLook first = look({}, amplitude, 1, 1.0, second_grain == kSmooth ? kSmooth : 7);
   Pair pair;
   pair.second = look(second_pose, amplitude, 2, exposure, second_grain);
   pair.samples =
@@ -206,7 +206,7 @@ TEST(Photometric, SteepEdgesWeighLessWhereTheCameraHasMoved) {
 }
 
 TEST(Photometric, SamplesLeaveOutJumpsAndMissingDepth) {
-  Look first = look({}, 10.0, 1);
+  PlaneLook first = look({}, 10.0, 1);
   first.depth.colRange(0, 200).setTo(1.0F);
   first.depth.colRange(400, 640).setTo(0.0F);
   const auto samples =
@@ -223,7 +223,7 @@ TEST(Photometric, SamplesLeaveOutJumpsAndMissingDepth) {
 }
 
 TEST(Photometric, SamplesLeaveOutBordersTooLowForOnePixelToTell) {
-  Look first = look({}, 10.0, 1);
+  PlaneLook first = look({}, 10.0, 1);
   std::mt19937 random(5);
   std::normal_distribution<float> noise(0.0F, 1.0F);
   for (float& z : first.depth) {
