@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// robots: the SLAM of several robots side by side, and the end that fuses their maps while they go (METHOD
-// section 6, Algorithm 2). Between robots and fusion end travel messages only.
+// robots: the SLAM of several robots side by side, and the end that fuses their maps (METHOD section 6,
+// Algorithm 2).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,12 +34,14 @@ class RobotsStage : public Stage {
       return core::usage_error("a pipeline with a robots stage maps several recordings: name them all");
     }
     fusion_.verify = slam_.loops.verify;
+    std::vector<mapping::MapPart> maps;
     for (const RobotInfo& robot : recordings_->robots()) {
       slams_.push_back(std::make_unique<mapping::Slam>(slam_, robot.camera.color, robot.number,
                                                        *context.executor, *context.log));
       slams_.back()->set_shutter(robot.camera.readout_s);
+      maps.push_back({&slams_.back()->map(), {{robot.number, robot.camera.color}}});
     }
-    end_ = std::make_unique<mapping::FusionEnd>(fusion_, slams_.size(), *context.executor);
+    end_ = std::make_unique<mapping::FusionEnd>(fusion_, std::move(maps), *context.executor);
     return {};
   }
 
@@ -59,8 +61,8 @@ class RobotsStage : public Stage {
     tracked->row = rows_.back();
     if (!slam.frame_poses().empty()) tracked->pose = slam.frame_poses().back();
     io.output<TrackedFrame>("track", tracked);
-    if (!online_ || !report.keyframe.valid()) return {};
-    return send(slam.map(), report.keyframe, io.frame());
+    if (online_ && report.keyframe.valid()) look_for_overlaps(report.keyframe, io.frame());
+    return {};
   }
 
   core::Result<void> finish(StageIo& io) override {
@@ -105,25 +107,20 @@ class RobotsStage : public Stage {
       summary.loops.verified += static_cast<std::size_t>(loops.verified);
       summary.loops.accepted += static_cast<std::size_t>(loops.accepted);
       summary.path.refused += static_cast<std::size_t>(slams_[r]->refused());
-      const mapping::FusionEnd::Traffic& traffic = end_->traffic(r);
-      summary.traffic.push_back({robot.name, traffic.messages, traffic.bytes, traffic.most});
+      summary.robots.push_back({robot.name, slams_[r]->map().keyframe_count()});
     }
   }
 
  private:
-  core::Result<void> send(const maps::Map& map, core::KeyframeId id, std::size_t frame) {
-    const RobotInfo& robot = recordings_->robots()[static_cast<std::size_t>(id.robot)];
-    const auto certain = end_->receive(maps::encode_message(maps::make_message(map, id, robot.camera.color)));
-    if (!certain) return tl::unexpected<core::Error>(certain.error());
-    for (const mapping::MergeEvidence& merge : *certain) {
+  void look_for_overlaps(core::KeyframeId id, std::size_t frame) {
+    const std::vector<RobotInfo>& robots = recordings_->robots();
+    for (const mapping::MergeEvidence& merge : end_->add(id)) {
       const double time = recordings_->time_of(frame);
       times_[{merge.a, merge.b}] = time;
       context_->log->info(fmt::format("{} and {} have met after {:.1f} s: {} keyframes agree to {:.0f} mm",
-                                      recordings_->robots()[merge.a].name,
-                                      recordings_->robots()[merge.b].name, time, merge.agreeing,
+                                      robots[merge.a].name, robots[merge.b].name, time, merge.agreeing,
                                       1e3 * merge.spread_m));
     }
-    return {};
   }
 
   const RunContext* context_ = nullptr;

@@ -75,14 +75,11 @@ struct RunSummary {
     maps::PathCheck check;
     std::size_t refused = 0;  ///< adjustments of the map that would have torn it and were not used
   } path;
-  /// What a robot told the fusion end.
-  struct Traffic {
-    std::string robot;
-    std::size_t messages = 0;  ///< one a keyframe
-    std::size_t bytes = 0;
-    std::size_t most = 0;  ///< bytes of the largest message
+  struct Robot {
+    std::string name;
+    std::size_t keyframes = 0;
   };
-  std::vector<Traffic> traffic;
+  std::vector<Robot> robots;  ///< of several recordings
   std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;             ///< of the merged cloud; 0: none was to be made
