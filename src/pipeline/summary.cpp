@@ -299,7 +299,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"merges", merges_of(s)},
       {"robots", robots_of(s)},
       {"cloud", cloud_of(s)},
-      {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
+      {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
       {"depth_fields", depth_fields_of(s)},
       {"timing",
        {{"wall_s", rounded(s.wall_s)},

@@ -91,6 +91,7 @@ struct RunSummary {
   };
   std::vector<LeftOut> left_out;     ///< in the order in which it was left out
   std::string up = "none";           ///< what the output's frame stands on: floor, camera or none
+  std::string yaw = "none";          ///< where its x points: walls, camera or none
   geometry::Rigid3 output_from_map;  ///< to that frame from the one that tracking began in
   double wall_s = 0.0;               ///< the whole run
   double map_s = 0.0;                ///< first frame read to last change of the map
