@@ -38,7 +38,7 @@ std::string check_extent(const Cloud& cloud, double leaf) {
   const Eigen::Vector3d size = max - min;
   return fmt::format(
       "leaf {:g} m is too small for a cloud of {:.4g} x {:.4g} x {:.4g} m ({:.2g} cells, at most 2.1e9); "
-      "use a leaf of {:.2g} m or more, or remove far points first (crop_box, range)",
+      "use a leaf of {:.2g} m or more, or remove far points first (crop_box, pass_through)",
       leaf, size.x(), size.y(), size.z(), cells.prod(), needed);
 }
 

@@ -31,7 +31,6 @@ FilterInfo pass_through_filter();
 FilterInfo plane_filter();
 FilterInfo radius_outlier_filter();
 FilterInfo random_sampling_filter();
-FilterInfo range_filter();
 FilterInfo statistical_outlier_filter();
 FilterInfo tee_filter();
 FilterInfo transform_filter();
