@@ -86,6 +86,20 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
   return output;
 }
 
+/// Those points that a filter of PCL's kind (pcl::FilterIndices) keeps; an organised cloud keeps its shape.
+template <typename PclFilter>
+CloudPtr chosen_by(PclFilter& filter, const CloudConstPtr& input) {
+  pcl::Indices kept;  // in the order of the input, all finite
+  filter.setInputCloud(input);
+  filter.filter(kept);
+  auto next = kept.begin();
+  return select(*input, [&](std::size_t i, const Point&) {
+    const bool chosen = next != kept.end() && static_cast<std::size_t>(*next) == i;
+    if (chosen) ++next;
+    return chosen;
+  });
+}
+
 /// The finite points as a list of the caller's own: what PCL's searches and grids can be given without harm.
 inline CloudPtr finite_list(const Cloud& input) {
   auto output = like(input);
