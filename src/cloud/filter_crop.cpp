@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <pcl/filters/crop_box.h>
+#include <pcl/filters/passthrough.h>
 
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "filter_tools.hpp"
-#include "pcl_functions.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 
 namespace plumbline::cloud {
@@ -27,10 +28,11 @@ class CropBoxFilter : public Filter {
     return "";
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    const CloudPtr output = (*pcl)->crop_box(input, corner(min_m_), corner(max_m_), !inside_);
-    return select(*output, [](std::size_t, const Point&) { return true; });
+    pcl::CropBox<Point> crop;
+    crop.setMin(corner(min_m_));
+    crop.setMax(corner(max_m_));
+    crop.setNegative(!inside_);
+    return chosen_by(crop, input);
   }
 
  private:
@@ -61,11 +63,11 @@ class PassThroughFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (!column_.empty()) return by_column(*input, context);
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    const CloudPtr output =
-        (*pcl)->pass_through(input, field_, static_cast<float>(min_), static_cast<float>(max_), !inside_);
-    return select(*output, [](std::size_t, const Point&) { return true; });
+    pcl::PassThrough<Point> pass;
+    pass.setFilterFieldName(field_);
+    pass.setFilterLimits(static_cast<float>(min_), static_cast<float>(max_));
+    pass.setNegative(!inside_);
+    return chosen_by(pass, input);
   }
 
  private:

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pcl/common/centroid.h>
 #include <pcl/common/colors.h>
+#include <pcl/sample_consensus/ransac.h>
+#include <pcl/sample_consensus/sac_model_plane.h>
+#include <pcl/search/kdtree.h>
+#include <pcl/segmentation/extract_clusters.h>
+#include <pcl/segmentation/sac_segmentation.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "filter_tools.hpp"
-#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
+enum class PlaneFit { kNever, kOnce, kSpread };
 enum class Mode { kKeep, kRemove, kLabel };
 constexpr int kNoSegment = -1;
 
@@ -63,14 +68,12 @@ class PlaneFilter : public Filter {
                        "Keep the planes, remove them, or colour each (and grey the rest)");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
     auto rest = std::make_shared<pcl::Indices>(points->size());
     for (std::size_t i = 0; i < rest->size(); ++i) (*rest)[i] = static_cast<pcl::index_t>(i);
     for (int plane = 0; plane < planes_ && spans_a_plane(*points, *rest); ++plane) {
-      const pcl::Indices found = (*pcl)->plane(points, rest, distance_m_, iterations_, refine_);
+      const pcl::Indices found = largest_plane(points, rest);
       if (found.size() < static_cast<std::size_t>(min_points_)) break;
       for (const auto i : found) segments[static_cast<std::size_t>(i)] = plane;
       rest->erase(std::remove_if(rest->begin(), rest->end(),
@@ -81,6 +84,31 @@ class PlaneFilter : public Filter {
   }
 
  private:
+  /// RANSAC among some of the points; empty when there is no plane.
+  [[nodiscard]] pcl::Indices largest_plane(const CloudConstPtr& points, const pcl::IndicesPtr& among) const {
+    pcl::PointIndices inliers;
+    if (refine_ == PlaneFit::kSpread) {
+      const auto model = std::make_shared<pcl::SampleConsensusModelPlane<Point>>(points, *among);
+      pcl::RandomSampleConsensus<Point> ransac(model, distance_m_);
+      ransac.setMaxIterations(iterations_);
+      if (!ransac.computeModel()) return {};
+      ransac.refineModel(2.0, 50);
+      ransac.getInliers(inliers.indices);
+      return inliers.indices;
+    }
+    pcl::SACSegmentation<Point> segmentation;  // always the same random numbers
+    segmentation.setModelType(pcl::SACMODEL_PLANE);
+    segmentation.setMethodType(pcl::SAC_RANSAC);
+    segmentation.setDistanceThreshold(distance_m_);
+    segmentation.setMaxIterations(iterations_);
+    segmentation.setOptimizeCoefficients(refine_ == PlaneFit::kOnce);
+    segmentation.setInputCloud(points);
+    segmentation.setIndices(among);
+    pcl::ModelCoefficients coefficients;
+    segmentation.segment(inliers, coefficients);
+    return inliers.indices;
+  }
+
   double distance_m_ = 0.02;
   int planes_ = 1;
   int min_points_ = 100;
@@ -100,12 +128,10 @@ class ClustersFilter : public Filter {
                        "Keep the clusters, remove them, or colour each (and grey the rest)");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
     std::vector<pcl::PointIndices> clusters;
-    if (!points->empty()) clusters = (*pcl)->euclidean_clusters(points, distance_m_, min_points_);
+    if (!points->empty()) clusters = clusters_of(points);
     // Largest first; of equals the one that comes first in the cloud.
     std::sort(clusters.begin(), clusters.end(), [](const pcl::PointIndices& a, const pcl::PointIndices& b) {
       if (a.indices.size() != b.indices.size()) return a.indices.size() > b.indices.size();
@@ -119,6 +145,19 @@ class ClustersFilter : public Filter {
   }
 
  private:
+  [[nodiscard]] std::vector<pcl::PointIndices> clusters_of(const CloudConstPtr& points) const {
+    const auto tree = std::make_shared<pcl::search::KdTree<Point>>(false);
+    tree->setInputCloud(points);
+    pcl::EuclideanClusterExtraction<Point> extraction;
+    extraction.setClusterTolerance(distance_m_);
+    extraction.setMinClusterSize(min_points_);
+    extraction.setSearchMethod(tree);
+    extraction.setInputCloud(points);
+    std::vector<pcl::PointIndices> clusters;
+    extraction.extract(clusters);
+    return clusters;
+  }
+
   double distance_m_ = 0.05;
   int min_points_ = 100;
   int count_ = 1;

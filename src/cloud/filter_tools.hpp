@@ -89,15 +89,23 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
 /// Those points that a filter of PCL's kind (pcl::FilterIndices) keeps; an organised cloud keeps its shape.
 template <typename PclFilter>
 CloudPtr chosen_by(PclFilter& filter, const CloudConstPtr& input) {
-  pcl::Indices kept;  // in the order of the input, all finite
+  pcl::Indices kept;  // in the order of the input
   filter.setInputCloud(input);
   filter.filter(kept);
   auto next = kept.begin();
   return select(*input, [&](std::size_t i, const Point&) {
-    const bool chosen = next != kept.end() && static_cast<std::size_t>(*next) == i;
-    if (chosen) ++next;
-    return chosen;
+    while (next != kept.end() && static_cast<std::size_t>(*next) < i) ++next;
+    return next != kept.end() && static_cast<std::size_t>(*next) == i;
   });
+}
+
+/// What one of PCL's filters makes of a cloud.
+template <typename PclFilter>
+CloudPtr filtered_by(PclFilter& filter, const CloudConstPtr& input) {
+  filter.setInputCloud(input);
+  auto output = std::make_shared<Cloud>();
+  filter.filter(*output);
+  return output;
 }
 
 /// The finite points as a list of the caller's own: what PCL's searches and grids can be given without harm.
