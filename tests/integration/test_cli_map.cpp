@@ -52,6 +52,7 @@ TEST_F(MapCommand, TellsWhatFiltersLeaveOut) {
   EXPECT_EQ(cloud["left_out"][0]["points"], 0);
   EXPECT_EQ(cloud["left_out"][1]["by"], "pass_through");
   const double share = cloud["left_out"][1]["points"].get<double>() / cloud["measured"].get<double>();
+  EXPECT_EQ(cloud["left_out_of_map"][0]["by"], "clusters");
   EXPECT_GT(share, 0.5);
   EXPECT_LT(share, 0.99);
   EXPECT_NE(box.out.find("% by pass_through, of what keyframes measured"), std::string::npos) << box;
