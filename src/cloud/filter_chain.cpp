@@ -16,6 +16,9 @@ namespace {
 using core::ConfigNode;
 using core::ConfigProblems;
 
+constexpr const char* kNoRange =
+    "there is no filter 'range' any more; depth has its limits, in metres, by "
+    "{type: pass_through, field: z, min: 0.3, max: 4}";
 constexpr const char* kNameCharacters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
 
 std::string near_word(const std::string& word, const std::vector<std::string>& candidates) {
@@ -61,8 +64,10 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
   const FilterInfo* info = registry.find(type->scalar);
   if (info == nullptr || type->kind != ConfigNode::Kind::kScalar) {
     problems.push_back({type->mark, path + ".type",
-                        fmt::format("'{}' is not a filter (allowed: {}{})", type->scalar.substr(0, 40), types,
-                                    near_word(type->scalar, registry.types()))});
+                        type->scalar == "range"
+                            ? kNoRange
+                            : fmt::format("'{}' is not a filter (allowed: {}{})", type->scalar.substr(0, 40),
+                                          types, near_word(type->scalar, registry.types()))});
     return nullptr;
   }
   return info;

@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <pcl/filters/conditional_removal.h>
 #include <pcl/point_types_conversion.h>
 
 #include "filter_tools.hpp"
-#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
+
+/// Which points meet both comparisons. Not ConditionalRemoval's own run: it has no negative, and it moves an
+/// organised cloud's rejected points only.
+template <typename Compare>
+std::vector<bool> within(const Cloud& input, const std::string& name, double min, double max) {
+  pcl::ConditionAnd<Point> both;
+  both.addComparison(std::make_shared<Compare>(name, pcl::ComparisonOps::GE, min));
+  both.addComparison(std::make_shared<Compare>(name, pcl::ComparisonOps::LE, max));
+  std::vector<bool> result;
+  result.reserve(input.size());
+  for (const Point& p : input.points) result.push_back(both.evaluate(p));
+  return result;
+}
 
 class ColorFilter : public Filter {
  public:
@@ -26,10 +39,9 @@ class ColorFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
     if (is_byte()) {
-      const auto& pcl = pcl_functions();
-      if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-      const std::vector<bool> within = (*pcl)->packed_rgb_within(*input, channel_.substr(0, 1), min_, max_);
-      return select(*input, [&](std::size_t i, const Point&) { return within[i] == inside_; });
+      const std::vector<bool> met =
+          within<pcl::PackedRGBComparison<Point>>(*input, channel_.substr(0, 1), min_, max_);
+      return select(*input, [&](std::size_t i, const Point&) { return met[i] == inside_; });
     }
     // PCL's PackedHSIComparison keeps the last colour in static variables; its conversion to HSV does not.
     const auto min = static_cast<float>(min_);
@@ -63,13 +75,11 @@ class CurvatureFilter : public Filter {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
     // PCL takes NaN for equal to anything.
     const CloudConstPtr known =
         select(*input, [](std::size_t, const Point& p) { return std::isfinite(p.curvature); });
-    const std::vector<bool> within = (*pcl)->field_within(*known, "curvature", min_, max_);
-    return select(*known, [&](std::size_t i, const Point&) { return within[i]; });
+    const std::vector<bool> met = within<pcl::FieldComparison<Point>>(*known, "curvature", min_, max_);
+    return select(*known, [&](std::size_t i, const Point&) { return met[i]; });
   }
 
  private:

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <pcl/filters/crop_box.h>
+#include <pcl/filters/passthrough.h>
 
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "filter_tools.hpp"
-#include "pcl_functions.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 
 namespace plumbline::cloud {
@@ -27,10 +28,11 @@ class CropBoxFilter : public Filter {
     return "";
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    const CloudPtr output = (*pcl)->crop_box(input, corner(min_m_), corner(max_m_), !inside_);
-    return select(*output, [](std::size_t, const Point&) { return true; });
+    pcl::CropBox<Point> crop;
+    crop.setMin(corner(min_m_));
+    crop.setMax(corner(max_m_));
+    crop.setNegative(!inside_);
+    return chosen_by(crop, input);
   }
 
  private:
@@ -61,11 +63,11 @@ class PassThroughFilter : public Filter {
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (!column_.empty()) return by_column(*input, context);
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    const CloudPtr output =
-        (*pcl)->pass_through(input, field_, static_cast<float>(min_), static_cast<float>(max_), !inside_);
-    return select(*output, [](std::size_t, const Point&) { return true; });
+    pcl::PassThrough<Point> pass;
+    pass.setFilterFieldName(field_);
+    pass.setFilterLimits(static_cast<float>(min_), static_cast<float>(max_));
+    pass.setNegative(!inside_);
+    return chosen_by(pass, input);
   }
 
  private:
@@ -113,8 +115,10 @@ FilterInfo crop_box_filter() {
 FilterInfo pass_through_filter() {
   return {
       "pass_through", "Keeps points one of whose numbers lies within limits.",
-      "PCL's PassThrough. Points whose field is not a number go. `column` looks at what a file has beside "
-      "positions, normals and curvature: `column: confidence, min: 0.5` keeps what is well seen.",
+      "PCL's PassThrough. Points whose field is not a number go. In a camera's own frame `field: z` is the "
+      "depth: the noise of structured light grows with its square, so what is far away does a map more harm "
+      "than good. `column` looks at what a file has beside positions, normals and curvature: `column: "
+      "confidence, min: 0.5` keeps what is well seen.",
       "- type: pass_through\n  field: normal_y\n  min: -1\n  max: -0.9\n",
       [] { return std::make_unique<PassThroughFilter>(); }};
 }

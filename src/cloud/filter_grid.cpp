@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <pcl/filters/approximate_voxel_grid.h>
+#include <pcl/filters/uniform_sampling.h>
+#include <pcl/filters/voxel_grid.h>
 
 #include <algorithm>
 #include <array>
@@ -10,7 +13,6 @@
 #include <vector>
 
 #include "filter_tools.hpp"
-#include "pcl_functions.hpp"
 #include "plumbline/cloud/columns.hpp"
 
 namespace plumbline::cloud {
@@ -38,7 +40,7 @@ std::string check_extent(const Cloud& cloud, double leaf) {
   const Eigen::Vector3d size = max - min;
   return fmt::format(
       "leaf {:g} m is too small for a cloud of {:.4g} x {:.4g} x {:.4g} m ({:.2g} cells, at most 2.1e9); "
-      "use a leaf of {:.2g} m or more, or remove far points first (crop_box, range)",
+      "use a leaf of {:.2g} m or more, or remove far points first (crop_box, pass_through)",
       leaf, size.x(), size.y(), size.z(), cells.prod(), needed);
 }
 
@@ -137,9 +139,7 @@ class GridFilter : public Filter {
     const std::string problem = check_extent(*points, leaf_m_);
     if (!problem.empty()) return core::usage_error(problem);
     if (points->empty()) return like(*input);
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    CloudPtr output = resample(**pcl, points);
+    CloudPtr output = resample(points);
     output->sensor_origin_ = input->sensor_origin_;
     output->sensor_orientation_ = input->sensor_orientation_;
     make_list(*output);
@@ -156,7 +156,7 @@ class GridFilter : public Filter {
   }
 
   /// `points`: finite, not empty.
-  virtual CloudPtr resample(const PclFunctions& pcl, const CloudConstPtr& points) const = 0;
+  virtual CloudPtr resample(const CloudConstPtr& points) const = 0;
   [[nodiscard]] float leaf() const { return static_cast<float>(leaf_m_); }
 
  private:
@@ -169,9 +169,11 @@ class VoxelGridFilter : public GridFilter {
     GridFilter::declare(table);
     table.integer("min_points", min_points_, {1, 100000}, "", "Cells with fewer points give none");
   }
-  CloudPtr resample(const PclFunctions& pcl, const CloudConstPtr& points) const override {
-    CloudPtr output =
-        pcl.voxel_grid(without_unknown_normals(points), leaf(), static_cast<unsigned>(min_points_));
+  CloudPtr resample(const CloudConstPtr& points) const override {
+    pcl::VoxelGrid<Point> grid;
+    grid.setLeafSize(leaf(), leaf(), leaf());
+    grid.setMinimumPointsNumberPerVoxel(static_cast<unsigned>(min_points_));
+    CloudPtr output = filtered_by(grid, without_unknown_normals(points));
     restore_normals(*output);
     return output;
   }
@@ -185,8 +187,10 @@ class VoxelGridFilter : public GridFilter {
 
 class ApproximateVoxelGridFilter : public GridFilter {
  public:
-  CloudPtr resample(const PclFunctions& pcl, const CloudConstPtr& points) const override {
-    CloudPtr output = pcl.approximate_voxel_grid(without_unknown_normals(points), leaf());
+  CloudPtr resample(const CloudConstPtr& points) const override {
+    pcl::ApproximateVoxelGrid<Point> grid;
+    grid.setLeafSize(leaf(), leaf(), leaf());
+    CloudPtr output = filtered_by(grid, without_unknown_normals(points));
     restore_normals(*output);
     return output;
   }
@@ -195,11 +199,12 @@ class ApproximateVoxelGridFilter : public GridFilter {
 class UniformSamplingFilter : public GridFilter {
  public:
   /// PCL gives the points in the order of a hash table; here they stay in the order of the input.
-  CloudPtr resample(const PclFunctions& pcl, const CloudConstPtr& points) const override {
+  CloudPtr resample(const CloudConstPtr& points) const override {
+    pcl::UniformSampling<Point> sampling(true);
+    sampling.setRadiusSearch(static_cast<double>(leaf()));
+    filtered_by(sampling, points);
     std::vector<bool> removed(points->size(), false);
-    for (const auto index : pcl.uniform_sampling(points, static_cast<double>(leaf()))) {
-      removed[static_cast<std::size_t>(index)] = true;
-    }
+    for (const auto index : *sampling.getRemovedIndices()) removed[static_cast<std::size_t>(index)] = true;
     auto output = std::make_shared<Cloud>();
     for (std::size_t i = 0; i < points->size(); ++i) {
       if (!removed[i]) output->points.push_back((*points)[i]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "filter_tools.hpp"
+#include "plumbline/cloud/incidence_angle.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -12,13 +13,11 @@ class IncidenceAngleFilter : public Filter {
     table.boolean("keep_unknown", keep_unknown_, "Keep points without normal");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
-    const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
-    const auto least = static_cast<float>(std::cos(max_rad_));
-    return select(*input, [&](std::size_t, const Point& p) {
-      if (!has_normal(p)) return keep_unknown_;
-      const Eigen::Vector3f ray = viewpoint - p.getVector3fMap();
-      return std::abs(p.getNormalVector3fMap().dot(ray)) >= least * ray.norm();
-    });
+    IncidenceAngle<Point> filter;
+    filter.setViewpoint(viewpoint_of(*input, context));
+    filter.setMaxAngle(max_rad_);
+    filter.setKeepUnknown(keep_unknown_);
+    return chosen_by(filter, input);
   }
 
  private:

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
-
 #include "filter_tools.hpp"
-#include "parallel_search.hpp"
+#include "plumbline/cloud/normal_consistency.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -16,41 +14,15 @@ class NormalConsistencyFilter : public Filter {
                  "Of the neighbours with a normal, so many must agree; more than 1/2 eats edges");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
-    auto points = std::make_shared<Cloud>();
-    for (const Point& p : input->points) {
-      if (finite(p) && has_normal(p)) points->push_back(p);
-    }
-    std::vector<std::uint8_t> keep(points->size(), 0);
-    if (points->size() > 1) {
-      ParallelSearch search(context.executor, true);
-      search.setInputCloud(points);
-      search.for_each(points->size(),
-                      [&](std::size_t i) { keep[i] = consistent(search, *points, i) ? 1 : 0; });
-    }
-    std::size_t next = 0;  // select asks in the order of the input
-    return select(*input, [&](std::size_t, const Point& p) { return has_normal(p) && keep[next++] != 0; });
+    NormalConsistency<Point> filter;
+    filter.setNeighbours(neighbours_);
+    filter.setMaxAngle(max_angle_rad_);
+    filter.setMinShare(min_share_);
+    filter.setExecutor(context.executor);
+    return chosen_by(filter, input);
   }
 
  private:
-  bool consistent(const ParallelSearch& search, const Cloud& points, std::size_t i) const {
-    pcl::Indices indices;
-    std::vector<float> squared;
-    // One more: the point itself is among them.
-    const int most =
-        static_cast<int>(std::min<std::size_t>(points.size(), 1U + static_cast<unsigned>(neighbours_)));
-    search.nearestKSearch(points[i], most, indices, squared);
-    const auto least = static_cast<float>(std::cos(max_angle_rad_));
-    int agree = 0;
-    int others = 0;
-    for (const auto index : indices) {
-      const auto j = static_cast<std::size_t>(index);
-      if (j == i) continue;
-      ++others;
-      agree += points[i].getNormalVector3fMap().dot(points[j].getNormalVector3fMap()) >= least ? 1 : 0;
-    }
-    return others > 0 && agree >= min_share_ * others;
-  }
-
   int neighbours_ = 16;
   double max_angle_rad_ = 0.5236;
   double min_share_ = 0.3;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <pcl/features/normal_3d.h>
+
 #include "filter_tools.hpp"
 #include "parallel_search.hpp"
-#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -22,11 +23,15 @@ class NormalsFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudPtr points = finite_list(*input);
     if (points->empty()) return points;
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    const auto search = std::make_shared<ParallelSearch>(context.executor, true);
-    const pcl::PointCloud<pcl::Normal> normals =
-        (*pcl)->normal_estimation(points, search, neighbours_, radius_m_, viewpoint_of(*input, context));
+    const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
+    pcl::NormalEstimation<Point, pcl::Normal> estimation;
+    estimation.setSearchMethod(std::make_shared<ParallelSearch>(context.executor, true));
+    estimation.setKSearch(neighbours_);
+    estimation.setRadiusSearch(neighbours_ > 0 ? 0.0 : radius_m_);
+    estimation.setViewPoint(viewpoint.x(), viewpoint.y(), viewpoint.z());
+    estimation.setInputCloud(points);
+    pcl::PointCloud<pcl::Normal> normals;
+    estimation.compute(normals);
     for (std::size_t i = 0; i < points->size(); ++i) {
       (*points)[i].getNormalVector3fMap() = normals[i].getNormalVector3fMap();
       (*points)[i].curvature = normals[i].curvature;

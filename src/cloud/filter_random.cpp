@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <pcl/filters/random_sample.h>
+
 #include "filter_tools.hpp"
-#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -14,10 +15,10 @@ class RandomSamplingFilter : public Filter {
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);
     if (points->size() <= static_cast<std::size_t>(count_)) return finite_list(*points);
-    const auto& pcl = pcl_functions();
-    if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-    CloudPtr output = (*pcl)->random_sample(points, static_cast<unsigned>(count_),
-                                            context.seed + static_cast<unsigned>(seed_));
+    pcl::RandomSample<Point> sample;
+    sample.setSample(static_cast<unsigned>(count_));
+    sample.setSeed(context.seed + static_cast<unsigned>(seed_));
+    CloudPtr output = filtered_by(sample, points);
     make_list(*output);
     return output;
   }

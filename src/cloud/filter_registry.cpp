@@ -46,7 +46,6 @@ FilterRegistry builtin_filters() {
   registry.add(plane_filter());
   registry.add(radius_outlier_filter());
   registry.add(random_sampling_filter());
-  registry.add(range_filter());
   registry.add(statistical_outlier_filter());
   registry.add(tee_filter());
   registry.add(transform_filter());

@@ -31,7 +31,6 @@ FilterInfo pass_through_filter();
 FilterInfo plane_filter();
 FilterInfo radius_outlier_filter();
 FilterInfo random_sampling_filter();
-FilterInfo range_filter();
 FilterInfo statistical_outlier_filter();
 FilterInfo tee_filter();
 FilterInfo transform_filter();
@@ -84,6 +83,28 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
     if (finite(input[i]) && keep(i, input[i])) output->points.push_back(input[i]);
   }
   make_list(*output);
+  return output;
+}
+
+/// Those points that a filter of PCL's kind (pcl::FilterIndices) keeps; an organised cloud keeps its shape.
+template <typename PclFilter>
+CloudPtr chosen_by(PclFilter& filter, const CloudConstPtr& input) {
+  pcl::Indices kept;  // in the order of the input
+  filter.setInputCloud(input);
+  filter.filter(kept);
+  auto next = kept.begin();
+  return select(*input, [&](std::size_t i, const Point&) {
+    while (next != kept.end() && static_cast<std::size_t>(*next) < i) ++next;
+    return next != kept.end() && static_cast<std::size_t>(*next) == i;
+  });
+}
+
+/// What one of PCL's filters makes of a cloud.
+template <typename PclFilter>
+CloudPtr filtered_by(PclFilter& filter, const CloudConstPtr& input) {
+  filter.setInputCloud(input);
+  auto output = std::make_shared<Cloud>();
+  filter.filter(*output);
   return output;
 }
 

@@ -14,7 +14,7 @@ constexpr const char* kIntroduction =
     "A filter chain is a YAML file: a name and a list of filters, applied from top to bottom. Lengths and "
     "angles may\n"
     "carry a unit (`5 mm`, `75 deg`). Every problem of a file is told at once, with line and column.\n\n"
-    "```yaml\nchain: keyframe\nfilters:\n  - type: range\n    max: 3.5 m\n  - type: voxel_grid\n    leaf: 1 "
+    "```yaml\nchain: keyframe\nfilters:\n  - type: pass_through\n    max: 3.5\n  - type: voxel_grid\n    leaf: 1 "
     "cm\n```\n\n"
     "`plumbline filter CHAIN IN... OUT` runs a chain on files (several inputs are merged), `plumbline "
     "filters "

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "command_line.hpp"
+#include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -65,6 +67,13 @@ std::vector<std::string> ChainOption::files() const {
   std::vector<std::string> files;
   for (const std::string& file : chain_.writes()) files.push_back(std::filesystem::absolute(file).string());
   return files;
+}
+
+void add_left_out(const std::vector<cloud::FilterReport>& reports, RunSummary& summary) {
+  for (const cloud::FilterReport& report : reports) {
+    const std::size_t points = report.points_in - std::min(report.points_in, report.points_out);
+    summary.left_out_of_map.push_back({report.type, points});
+  }
 }
 
 }  // namespace plumbline::pipeline

@@ -31,4 +31,7 @@ class ChainOption {
   cloud::FilterChain chain_;
 };
 
+/// Adds what filters took from the merged cloud to what the run tells.
+void add_left_out(const std::vector<cloud::FilterReport>& reports, RunSummary& summary);
+
 }  // namespace plumbline::pipeline

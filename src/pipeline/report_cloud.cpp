@@ -39,6 +39,18 @@ void add_robots(const ReportData& data, Facts& facts) {
   facts.emplace_back("Points by who saw them most", text);
 }
 
+/// What filters took: from the clouds of keyframes, or from the merged one.
+void add_left_out(const ReportData& data, const char* place, const char* name, Facts& facts) {
+  std::string text;
+  for (const auto& part : list_at(data.summary, place)) {
+    const double points = number_at(part, "/points");
+    if (points > 0.0) {
+      text += fmt::format("{}{}: {}", text.empty() ? "" : ", ", text_at(part, "/by"), count_text(points));
+    }
+  }
+  if (!text.empty()) facts.emplace_back(name, text);
+}
+
 std::string box_text(const Eigen::Vector3d& size) {
   return fmt::format("{:.3f} × {:.3f} × {:.3f} m (x × y × z)", size.x(), size.y(), size.z());
 }
@@ -147,6 +159,8 @@ std::string cloud_html(const ReportData& data) {
   Facts facts{
       {"Points", count_text(number_at(data.summary, "/cloud/points"))},
       {"Voxel size", voxel_m > 0.0 ? number_text(1e3 * voxel_m, 1, "mm") : "no cloud was to be made"}};
+  add_left_out(data, "/cloud/left_out", "Left out of what keyframes measured, points", facts);
+  add_left_out(data, "/cloud/left_out_of_map", "Left out of the merged cloud, points", facts);
   std::string out;
   if (const std::optional<CloudExtent>& extent = data.extent) {
     facts.emplace_back("File", data.cloud_file);

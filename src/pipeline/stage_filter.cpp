@@ -34,13 +34,13 @@ class FilterStage : public Stage {
     const auto input = io.input<DenseCloud>("cloud");
     cloud::FilterContext context;
     context.executor = context_->executor;
+    context.spacing_m = input->voxel_m;
     auto dense = std::make_shared<DenseCloud>();
     context.columns = &input->columns;
     context.made_columns = &dense->columns;
-    std::vector<cloud::FilterReport> reports;
-    auto filtered = filters_.chain().apply(input->cloud, context, &reports);
+    auto filtered = filters_.chain().apply(input->cloud, context, &reports_);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-    if (!reports.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
+    if (!reports_.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
     dense->cloud = std::move(*filtered);
     dense->voxel_m = input->voxel_m;
     dense->output_from_map = input->output_from_map;
@@ -49,12 +49,16 @@ class FilterStage : public Stage {
     io.output<DenseCloud>("cloud", dense);
     return {};
   }
-  void summarise(RunSummary& summary) const override { summary.cloud_points = points_; }
+  void summarise(RunSummary& summary) const override {
+    add_left_out(reports_, summary);
+    summary.cloud_points = points_;
+  }
 
  private:
   ChainOption filters_{""};
   const RunContext* context_ = nullptr;
   std::size_t points_ = 0;
+  std::vector<cloud::FilterReport> reports_;
 };
 
 }  // namespace

@@ -101,6 +101,7 @@ class FuseStage : public Stage {
   }
 
   void summarise(RunSummary& summary) const override {
+    add_left_out(reports_, summary);
     summary.cloud_points = points_;
     summary.voxel_m = options_.voxels.voxel_m;
     summary.up = frame_.up;
@@ -236,20 +237,20 @@ class FuseStage : public Stage {
   }
 
   /// The largest thing in memory is not copied when there is nothing to filter.
-  core::Result<void> filter(cloud::FusedCloud fused, DenseCloud& dense) const {
+  core::Result<void> filter(cloud::FusedCloud fused, DenseCloud& dense) {
     if (filters_.chain().size() == 0) {
       dense.cloud = std::move(fused.cloud);
       dense.columns = std::move(fused.columns);
       return {};
     }
-    std::vector<cloud::FilterReport> reports;
     cloud::FilterContext context;
     context.executor = context_->executor;
+    context.spacing_m = options_.voxels.voxel_m;
     context.columns = &fused.columns;
     context.made_columns = &dense.columns;
-    auto filtered = filters_.chain().apply(fused.cloud, context, &reports);
+    auto filtered = filters_.chain().apply(std::move(fused.cloud), context, &reports_);
     if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-    context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports));
+    context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
     dense.cloud = std::move(*filtered);
     return {};
   }
@@ -294,6 +295,7 @@ class FuseStage : public Stage {
   std::vector<Between> between_;
   std::map<std::int32_t, cloud::DepthField> fields_;  ///< by robot
   std::vector<RunSummary::DepthField> told_fields_;
+  std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
   UpFrame frame_;
   std::size_t points_ = 0;
 };

@@ -64,14 +64,16 @@ nlohmann::ordered_json robots_of(const RunSummary& summary) {
 }
 
 nlohmann::ordered_json cloud_of(const RunSummary& summary) {
+  const auto list_of = [](const std::vector<RunSummary::LeftOut>& parts) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const auto& part : parts) list.push_back({{"by", part.by}, {"points", part.points}});
+    return list;
+  };
   nlohmann::ordered_json cloud = {{"points", summary.cloud_points}, {"voxel_m", summary.voxel_m}};
+  if (!summary.left_out_of_map.empty()) cloud["left_out_of_map"] = list_of(summary.left_out_of_map);
   if (summary.measured_points == 0) return cloud;
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const RunSummary::LeftOut& part : summary.left_out) {
-    list.push_back({{"by", part.by}, {"points", part.points}});
-  }
   cloud["measured"] = summary.measured_points;
-  cloud["left_out"] = list;
+  cloud["left_out"] = list_of(summary.left_out);
   return cloud;
 }
 
@@ -86,6 +88,17 @@ std::string left_out_text(const RunSummary& summary) {
     text += fmt::format("{}{:.0f} % by {}", text.empty() ? "" : ", ", percent, part.by);
   }
   return text.empty() ? text : text + ", of what keyframes measured (stage cloud)";
+}
+
+/// What the merged cloud's filters took from it, in words; empty: nothing.
+std::string left_out_of_map_text(const RunSummary& summary) {
+  std::string text;
+  for (const RunSummary::LeftOut& part : summary.left_out_of_map) {
+    if (part.points > 0) {
+      text += fmt::format("{}{} points by {}", text.empty() ? "" : ", ", part.points, part.by);
+    }
+  }
+  return text.empty() ? text : text + ", of the merged cloud";
 }
 
 nlohmann::ordered_json laid(const mapping::LaidOver& fit) {
@@ -239,7 +252,8 @@ void judge(RunSummary& summary) {
   } else if (!summary.path.check.tears.empty()) {
     summary.reason = torn_text(summary.path.check);
   } else if (all > 0 && summary.voxel_m > 0.0 && summary.cloud_points == 0) {
-    const std::string without = left_out_text(summary);
+    const std::string of_map = left_out_of_map_text(summary);
+    const std::string without = of_map.empty() ? left_out_text(summary) : of_map;
     summary.reason = "the cloud is empty: " +
                      (without.empty() ? "no keyframe had usable depth" : "left out were " + without);
   } else {
@@ -351,8 +365,8 @@ std::string to_text(const RunSummary& s) {
   text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n", s.keyframes, s.points,
                       s.lines, s.loops.accepted);
   text += fmt::format("cloud      {} points, {:g} mm voxels\n", s.cloud_points, s.voxel_m * 1000.0);
-  if (const std::string without = left_out_text(s); !without.empty()) {
-    text += fmt::format("left out   {}\n", without);
+  for (const std::string& without : {left_out_text(s), left_out_of_map_text(s)}) {
+    if (!without.empty()) text += fmt::format("left out   {}\n", without);
   }
   text +=
       fmt::format("time       {:.1f} s in all, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n",

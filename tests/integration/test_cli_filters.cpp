@@ -169,10 +169,6 @@ TEST_F(FilterTools, Clusters) {
           "cluster_extraction in.pcd pcl.pcd -min 100 -max 100000 -tolerance 0.06", "pcl0.pcd", 1e-6, true);
 }
 
-TEST_F(FilterTools, Range) {
-  compare("{type: range, min: 0 m, max: 40 cm, along: distance}", "radius_filter in.pcd pcl.pcd -radius 0.4");
-}
-
 TEST_F(FilterTools, Transform) {
   compare("{type: transform, translation: [1 m, 2 m, 3 m], rotation: [0 deg, 0 deg, 30 deg]}",
           "transform_point_cloud in.pcd pcl.pcd -trans 1,2,3 -axisangle 0,0,1,0.5235987756", "pcl.pcd", 1e-5);
@@ -183,11 +179,11 @@ class FilterRuns : public ProgramTest {};
 TEST_F(FilterRuns, SeveralInputsAreOneCloudAndTheTableSaysWhatHappened) {
   write("a.xyz", "0 0 1\n1 0 1\n");
   write("b.csv", "x,y,z\n2,0,1\n3,0,9\n");
-  write("chain.yaml", "chain: a\nfilters:\n  - {type: tee, file: all.ply}\n  - {type: range, max: 3 m}\n");
+  write("chain.yaml", "chain: a\nfilters:\n  - {type: tee, file: all.ply}\n  - {type: pass_through, max: 3}\n");
   const auto ran = run("filter chain.yaml a.xyz b.csv out.ply");
   EXPECT_EQ(ran.code, 0) << ran;
   EXPECT_NE(ran.out.find("filter"), std::string::npos);
-  EXPECT_NE(ran.out.find("range                              4           3"), std::string::npos) << ran;
+  EXPECT_NE(ran.out.find("pass_through                       4           3"), std::string::npos) << ran;
   EXPECT_EQ(cloud::read_cloud(path("all.ply"))->cloud->size(), 4U);
   EXPECT_EQ(cloud::read_cloud(path("out.ply"))->cloud->size(), 3U);
 }

@@ -41,24 +41,25 @@ TEST_F(MapCommand, WritesTheWholeResultFolder) {
 }
 
 TEST_F(MapCommand, TellsWhatFiltersLeaveOut) {
-  const auto chain = [&](const char* name, const char* range) {
-    write(name, std::string("chain: near\nfilters:\n  - type: range\n") + range);
+  const auto chain = [&](const char* name, const char* limit) {
+    write(name, std::string("chain: near\nfilters:\n  - type: pass_through\n") + limit);
     return std::string("map wall -p known_poses --set output.views= --set cloud.filters=") + name;
   };
-  const Outcome box = run(chain("box.yaml", "    max: 1.75 m\n") + " -o box");  // all but the wall
+  const Outcome box = run(chain("box.yaml", "    max: 1.75\n") + " -o box");  // all but the wall
   ASSERT_EQ(box.code, 0) << box;
   const nlohmann::json cloud = read_json(path("box/summary.json"))["cloud"];
   EXPECT_EQ(cloud["left_out"][0]["by"], "depth_limits");
   EXPECT_EQ(cloud["left_out"][0]["points"], 0);
-  EXPECT_EQ(cloud["left_out"][1]["by"], "range");
+  EXPECT_EQ(cloud["left_out"][1]["by"], "pass_through");
   const double share = cloud["left_out"][1]["points"].get<double>() / cloud["measured"].get<double>();
+  EXPECT_EQ(cloud["left_out_of_map"][0]["by"], "clusters");
   EXPECT_GT(share, 0.5);
   EXPECT_LT(share, 0.99);
-  EXPECT_NE(box.out.find("% by range, of what keyframes measured"), std::string::npos) << box;
+  EXPECT_NE(box.out.find("% by pass_through, of what keyframes measured"), std::string::npos) << box;
 
-  const Outcome none = run(chain("none.yaml", "    max: 1 m\n") + " -o none");
+  const Outcome none = run(chain("none.yaml", "    max: 1\n") + " -o none");
   EXPECT_EQ(none.code, 4) << none;
-  EXPECT_TRUE(none.told("the cloud is empty: left out were 100 % by range")) << none;
+  EXPECT_TRUE(none.told("the cloud is empty: left out were 100 % by pass_through")) << none;
 }
 
 TEST_F(MapCommand, TracksTheWall) {

@@ -111,7 +111,7 @@ TEST_F(Pipelines, TapsWriteEveryPortAndFramesAreARecordingAgain) {
   EXPECT_EQ(again.code, 0) << again;
   EXPECT_NE(slurp(path("out/config.yaml")).find("  - port: fuse.cloud\n    file: raw.ply\n"),
             std::string::npos);
-  EXPECT_NE(slurp(path("out/config.yaml")).find("    filters:\n      - {type: range, min: 0.3 m"),
+  EXPECT_NE(slurp(path("out/config.yaml")).find("    filters:\n      - {type: pass_through, field: z, "),
             std::string::npos);
 }
 

@@ -18,7 +18,7 @@ class Plugins : public ProgramTest {
   }
   void write_inputs() const {
     write("cloud.xyz", "0 0 1 200 100 50\n1 0 1 10 20 30\n");
-    write("chain.yaml", "chain: a\nfilters:\n  - {type: grey, share: 1}\n  - {type: range, max: 3 m}\n");
+    write("chain.yaml", "chain: a\nfilters:\n  - {type: grey, share: 1}\n  - {type: pass_through, max: 3}\n");
   }
 };
 
@@ -63,7 +63,7 @@ TEST_F(Plugins, WhatDoesNotFitIsRefusedWithItsReason) {
       {plugin("old"), "was built for filter interface 0, this program has"},
       {plugin("other_libraries"), "was built with plumbline 0.0.1, PCL 1.12.1, Eigen alignment 32"},
       {plugin("nothing"), "adds no filters"},
-      {plugin("twice"), "filter 'range' is registered twice"},
+      {plugin("twice"), "filter 'crop_box' is registered twice"},
       {plugin("grey") + plugin("grey"), "filter 'grey' is registered twice"},
       {plugin("none"), "none.so: no such file"},
       {" --plugin text.so", "plugin text.so: cannot be loaded"},

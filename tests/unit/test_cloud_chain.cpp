@@ -24,14 +24,14 @@ TEST(FilterChain, AllProblemsAreToldAtOnceWithTheirPlace) {
       "filtres: []\n"
       "filters:\n"
       "  - type: voxel_gird\n"
-      "  - type: range\n"
-      "    mx: 3 m\n"
+      "  - type: pass_through\n"
+      "    mx: 3\n"
       "    min: 5 kg\n"
       "  - type: voxel_grid\n"
       "    leaf: -1 m\n"
       "  - leaf: 1 cm\n"
       "  - just a word\n"
-      "  - {type: range, min: 3 m, max: 2 m}\n");
+      "  - {type: pass_through, min: 3, max: 2}\n");
   ASSERT_FALSE(chain);
   EXPECT_EQ(chain.error().kind, core::ErrorKind::kUsage);
   const std::string& m = chain.error().message;
@@ -40,7 +40,7 @@ TEST(FilterChain, AllProblemsAreToldAtOnceWithTheirPlace) {
         ":4:11: filters[0].type: 'voxel_gird'", "did you mean voxel_grid?",
         ":6:5: filters[1].mx: unknown key", "did you mean max?",
         ":7:10: filters[1].min:", ":9:11: filters[2].leaf: -1", ":10:5: filters[3]: has no type",
-        ":11:5: filters[4]: is not a filter", ":12:5: filters[5]: min (3 m) must be less than max (2 m)"}) {
+        ":11:5: filters[4]: is not a filter", ":12:5: filters[5]: min (3) must be less than max (2)"}) {
     EXPECT_NE(m.find(words), std::string::npos) << words << "\nis not in\n" << m;
   }
 }
@@ -55,18 +55,18 @@ TEST(FilterChain, NotAChain) {
 
 TEST(FilterChain, SpelledOutChainReadsBackTheSame) {
   const auto chain = load(
-      "chain: a\nfilters:\n  - {type: range, max: 250 cm}\n  - type: crop_box\n  - type: pass_through\n");
+      "chain: a\nfilters:\n  - {type: radius_outlier, radius: 250 cm}\n  - type: crop_box\n  - type: pass_through\n");
   ASSERT_TRUE(chain) << chain.error().message;
   const auto again = load(chain->to_yaml());
   ASSERT_TRUE(again) << again.error().message << "\n" << chain->to_yaml();
   EXPECT_EQ(again->to_yaml(), chain->to_yaml());
   EXPECT_EQ(again->size(), 3U);
-  EXPECT_NE(chain->to_yaml().find("max: 2.5 m"), std::string::npos) << chain->to_yaml();
+  EXPECT_NE(chain->to_yaml().find("radius: 2.5 m"), std::string::npos) << chain->to_yaml();
 }
 
 TEST(FilterChain, ReportsCountPointsThatAreThere) {
   const auto chain =
-      load("chain: a\nfilters:\n  - {type: range, max: 2 m}\n  - {type: voxel_grid, leaf: 10 m}\n");
+      load("chain: a\nfilters:\n  - {type: pass_through, max: 2}\n  - {type: voxel_grid, leaf: 10 m}\n");
   ASSERT_TRUE(chain);
   auto cloud = std::make_shared<Cloud>(2, 2, worlds::point(0, 0, 1));
   (*cloud)(0, 0).z = 5.0F;
@@ -105,8 +105,8 @@ TEST(FilterChain, ShippedChainsLoadAndRunOnAKeyframe) {
 
 TEST(FilterRegistry, RefusesTheSameTypeTwice) {
   auto registry = builtin_filters();
-  EXPECT_THROW(registry.add(FilterInfo(*registry.find("range"))), std::invalid_argument);
-  EXPECT_EQ(registry.find("rang"), nullptr);
+  EXPECT_THROW(registry.add(FilterInfo(*registry.find("crop_box"))), std::invalid_argument);
+  EXPECT_EQ(registry.find("crop"), nullptr);
   EXPECT_TRUE(std::is_sorted(registry.filters().begin(), registry.filters().end(),
                              [](const auto& a, const auto& b) { return a.type < b.type; }));
 }

@@ -77,7 +77,7 @@ TEST(Columns, KeepTheirPlaceInAnOrganisedCloudWithHoles) {
   (*row.cloud)[4].x = kNan;
   row.cloud->width = 5;
   row.cloud->height = 2;
-  const Filtered kept = filter("{type: range, max: 6.5 m, along: distance}", row);
+  const Filtered kept = filter("{type: pass_through, field: x, max: 6.5}", row);
   ASSERT_EQ(kept.cloud->size(), 10U);
   EXPECT_EQ(kept.columns.observations, row.columns.observations);
   // A list of what is left has its own.

@@ -177,14 +177,14 @@ TEST(FilterOptions, EveryExampleChainBelongsToAFilter) {
 
 TEST(FilterOptions, ProgressTellsEveryFilterAndTheEnd) {
   const auto node = core::parse_yaml(
-      "chain: test\nfilters:\n  - type: range\n  - {type: voxel_grid, leaf: 10 cm}\n", "t.yaml");
+      "chain: test\nfilters:\n  - type: crop_box\n  - {type: voxel_grid, leaf: 10 cm}\n", "t.yaml");
   core::ConfigProblems problems;
   const auto chain = FilterChain::parse(*node, "", builtin_filters(), problems);
   std::string told;
   ASSERT_TRUE(chain.apply(small_keyframe(), {}, nullptr, [&](auto done, auto total, const auto& type) {
     told += fmt::format("{}/{} {};", done, total, type);
   }));
-  EXPECT_EQ(told, "0/2 range;1/2 voxel_grid;2/2 ;");
+  EXPECT_EQ(told, "0/2 crop_box;1/2 voxel_grid;2/2 ;");
 }
 
 }  // namespace

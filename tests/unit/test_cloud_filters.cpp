@@ -23,25 +23,12 @@ using worlds::must;
 using worlds::run;
 using worlds::square;
 
-TEST(Filters, RangeByDepthAndByDistance) {
-  const auto cloud =
-      list({point(0, 0, 0.1F), point(0, 0, 1), point(3, 0, 1), point(0, 0, 5), point(kNan, 0, 1)});
-  EXPECT_EQ(must("{type: range, min: 20 cm, max: 2 m}", cloud)->size(), 2U);
-  EXPECT_EQ(must("{type: range, min: 20 cm, max: 2 m, along: distance}", cloud)->size(), 1U);
-  FilterContext context;
-  context.viewpoint = Eigen::Vector3f(3, 0, 0);
-  const auto seen = must("{type: range, min: 20 cm, max: 2 m, along: distance}", cloud, context);
-  ASSERT_EQ(seen->size(), 1U);
-  EXPECT_EQ((*seen)[0].x, 3.0F);
-}
-
 TEST(Filters, ChoosingFiltersKeepAnOrganisedCloudOrganised) {
   auto cloud = std::make_shared<Cloud>(3, 2, point(0, 0, 1));
   (*cloud)(1, 0).z = 9.0F;
   (*cloud)(2, 1).x = kNan;
   for (const std::string entry :
-       {"{type: range, max: 2 m}", "{type: crop_box, min: [-1, -1, 0], max: [1, 1, 2]}",
-        "{type: pass_through, field: z, max: 2}"}) {
+       {"{type: crop_box, min: [-1, -1, 0], max: [1, 1, 2]}", "{type: pass_through, field: z, max: 2}"}) {
     const auto output = must(entry, cloud);
     EXPECT_EQ(output->width, 3U) << entry;
     EXPECT_EQ(output->height, 2U) << entry;
@@ -92,7 +79,7 @@ TEST(Filters, FlyingPixelsLeavesANoisyObliquePlaneAlone) {
   const Eigen::Vector3d normal = Eigen::Vector3d(0.0, 0.9397, 0.342);  // 70 degrees, like a floor
   const auto cloud =
       organised_cloud(worlds::frame_of(worlds::plane_depth(normal, 0.342 * 1.5, 1.0)), worlds::camera());
-  const auto near = must("{type: range, max: 3 m}", cloud);
+  const auto near = must("{type: pass_through, max: 3}", cloud);
   const auto output = must("{type: flying_pixels}", near);
   EXPECT_GT(static_cast<double>(finite_points(*output)), 0.98 * static_cast<double>(finite_points(*near)));
 }

@@ -12,7 +12,7 @@ namespace plumbline::cloud {
 namespace {
 
 using worlds::point;
-using worlds::text_of;
+using worlds::slurp;
 
 constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
@@ -69,7 +69,7 @@ TEST(CloudIo, RoundTripKeepsPointsColumnsAndBytes) {
   for (const std::string ending : {".ply", ".pcd"}) {
     const auto file = temp("round" + ending);
     ASSERT_TRUE(write_cloud(file, cloud, columns));
-    const std::string first = text_of(file);
+    const std::string first = slurp(file);
     const auto read = read_cloud(file);
     ASSERT_TRUE(read) << read.error().message;
     expect_same(*read->cloud, cloud);
@@ -80,7 +80,7 @@ TEST(CloudIo, RoundTripKeepsPointsColumnsAndBytes) {
     EXPECT_EQ(read->columns.observations, columns.observations);
     EXPECT_EQ(read->columns.robot, columns.robot);
     ASSERT_TRUE(write_cloud(file, *read->cloud, read->columns));
-    EXPECT_EQ(text_of(file), first) << ending;
+    EXPECT_EQ(slurp(file), first) << ending;
   }
 }
 
@@ -164,7 +164,7 @@ TEST(CloudIo, EveryTruncationIsAnErrorThatNamesTheFile) {
   ASSERT_TRUE(write_pcd(temp("t.pcd"), cloud));
   ASSERT_EQ(pcl::io::savePCDFileBinaryCompressed(temp("tc.pcd").string(), some_points(40)), 0);
   for (const std::string name : {"t.ply", "t.pcd", "tc.pcd"}) {
-    const std::string whole = text_of(temp(name));
+    const std::string whole = slurp(temp(name));
     for (std::size_t length = 0; length < whole.size(); length += 7) {
       const auto read = read_cloud(spill("cut_" + name, whole.substr(0, length)));
       ASSERT_FALSE(read) << name << " cut to " << length;

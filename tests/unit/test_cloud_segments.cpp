@@ -99,6 +99,60 @@ TEST(Segments, ClustersLargestFirst) {
   EXPECT_EQ(colors(*labels, 1300, 1500), std::set<std::uint32_t>{0x808080U}) << "the rest is grey";
 }
 
+/// Two squares of 900 points, 1 m apart, and a speck of 40 between them.
+CloudPtr two_squares() {
+  auto cloud = square(30, 0.01F);
+  for (Point p : *square(30, 0.01F)) {
+    p.x -= 1.3F;  // over the border of blocks
+    cloud->push_back(p);
+  }
+  for (int i = 0; i < 40; ++i) cloud->push_back(point(-0.5F + 0.01F * static_cast<float>(i % 8), 0.2F, 1));
+  return cloud;
+}
+
+TEST(Segments, ClustersOverTheMeansOfCells) {
+  const auto cloud = two_squares();
+  const std::string entry = "{type: clusters, distance: 4 cm, leaf: 2 cm, count: 0, min_points: ";
+  const auto kept = must(entry + "41}", cloud);
+  ASSERT_EQ(kept->size(), 1800U);
+  for (std::size_t i = 0; i < kept->size(); ++i) {
+    EXPECT_EQ((*kept)[i].getVector3fMap(), (*cloud)[i].getVector3fMap()) << "points stay as they are";
+  }
+  EXPECT_EQ(must(entry + "40}", cloud)->size(), 1840U);
+  EXPECT_EQ(must(entry + "901}", cloud)->size(), 0U);
+  EXPECT_EQ(must(entry + "901, mode: remove}", cloud)->size(), 1840U);
+  const auto labels = must("{type: clusters, distance: 4 cm, leaf: 2 cm, count: 1, mode: label}", cloud);
+  EXPECT_EQ(colors(*labels, 0, 900).count(0x808080U), 0U) << "of equals the first";
+  EXPECT_EQ(colors(*labels, 900, 1840), std::set<std::uint32_t>{0x808080U});
+}
+
+TEST(Segments, ClustersOfCellsKnowNoLimitOfPclsGrids) {
+  auto cloud = two_squares();
+  for (Point p : *square(30, 0.01F)) {
+    p.getVector3fMap() += Eigen::Vector3f(300, 300, 300);  // 3e15 cells of 2 mm
+    cloud->push_back(p);
+  }
+  const std::string entry = "{type: clusters, distance: 2 cm, leaf: 2 mm, count: 0, min_points: 100}";
+  EXPECT_EQ(must(entry, cloud)->size(), 2700U);
+  cloud->push_back(point(1e8F, 0, 0));
+  const auto result = run(entry, cloud);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().kind, core::ErrorKind::kUsage);
+  EXPECT_NE(result.error().message.find("remove them first (crop_box) or use a leaf of 0.1 m or more"),
+            std::string::npos)
+      << result.error().message;
+  EXPECT_TRUE(run("{type: clusters, leaf: 101 mm}", cloud));
+}
+
+TEST(Segments, ClustersReachAsFarAsAFusedCloudIsCoarse) {
+  const auto coarse = square(30, 0.05F);
+  const std::string entry = "{type: clusters, distance: 4 cm, leaf: 2 cm, count: 0, min_points: 200}";
+  EXPECT_EQ(must(entry, coarse)->size(), 0U);
+  FilterContext context;
+  context.spacing_m = 0.05;
+  EXPECT_EQ(must(entry, coarse, context)->size(), 900U);
+}
+
 TEST(Segments, NormalConsistencyRemovesTheOddOneAndKeepsEdges) {
   auto cloud = square(20, 0.01F);
   for (int i = 0; i < 400; ++i) {

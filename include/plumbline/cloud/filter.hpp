@@ -24,6 +24,8 @@ struct CloudColumns;
 struct FilterContext {
   /// Where the sensor stood, in the cloud's frame; without it the cloud's own sensor_origin_.
   std::optional<Eigen::Vector3f> viewpoint;
+  /// How far neighbouring points are apart, metres, where that is known (the voxel of a fused cloud); 0: not.
+  double spacing_m = 0.0;
   std::uint32_t seed = 0;  ///< of random choices
   /// Threads for the filters that can use several; without it one. Results do not depend on it.
   const core::Executor* executor = nullptr;

@@ -5,8 +5,8 @@
 //
 //   chain: keyframe
 //   filters:
-//     - type: range
-//       max: 3.5 m
+//     - type: pass_through
+//       max: 3.5
 //     - type: voxel_grid
 //       leaf: 1 cm
 #include <cstddef>

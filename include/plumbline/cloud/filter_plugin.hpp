@@ -26,7 +26,7 @@
 namespace plumbline::cloud {
 
 /// Goes up when a header that plugins see changes (filter.hpp, core/options.hpp, core/error.hpp).
-constexpr std::uint32_t kFilterInterface = 1;
+constexpr std::uint32_t kFilterInterface = 2;
 constexpr std::uint32_t kFilterPluginMagic = 0x464c4250;
 /// The one symbol of a plugin, an extern "C" function: const FilterPlugin* plumbline_filter_plugin().
 constexpr const char* kFilterPluginSymbol = "plumbline_filter_plugin";

@@ -89,15 +89,16 @@ struct RunSummary {
     std::string by;  ///< a filter's type, or "depth_limits": outside min_depth and max_depth
     std::size_t points = 0;
   };
-  std::vector<LeftOut> left_out;     ///< in the order in which it was left out
-  std::string up = "none";           ///< what the output's frame stands on: floor, camera or none
-  std::string yaw = "none";          ///< where its x points: walls, camera or none
-  geometry::Rigid3 output_from_map;  ///< to that frame from the one that tracking began in
-  double wall_s = 0.0;               ///< the whole run
-  double map_s = 0.0;                ///< first frame read to last change of the map
-  double export_s = 0.0;             ///< clouds, pictures and tables
-  double pace_hz = 0.0;              ///< that recordings were played at; 0: as fast as that went
-  double behind_s = 0.0;             ///< how long after it was due the latest frame was done
+  std::vector<LeftOut> left_out;         ///< in the order in which it was left out
+  std::vector<LeftOut> left_out_of_map;  ///< points of the merged cloud that its filters left out
+  std::string up = "none";               ///< what the output's frame stands on: floor, camera or none
+  std::string yaw = "none";              ///< where its x points: walls, camera or none
+  geometry::Rigid3 output_from_map;      ///< to that frame from the one that tracking began in
+  double wall_s = 0.0;                   ///< the whole run
+  double map_s = 0.0;                    ///< first frame read to last change of the map
+  double export_s = 0.0;                 ///< clouds, pictures and tables
+  double pace_hz = 0.0;                  ///< that recordings were played at; 0: as fast as that went
+  double behind_s = 0.0;                 ///< how long after it was due the latest frame was done
   struct StageTime {
     std::string name;
     double median_ms = 0.0;

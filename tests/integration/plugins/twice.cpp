@@ -3,9 +3,9 @@
 #include "plumbline/cloud/filter_plugin.hpp"
 
 PLUMBLINE_FILTER_PLUGIN(registry) {
-  plumbline::cloud::FilterInfo info = *registry.find("range");
+  plumbline::cloud::FilterInfo info = *registry.find("crop_box");
   info.type = "fresh";
   registry.add(info);
-  info.type = "range";
+  info.type = "crop_box";
   registry.add(info);
 }
