@@ -8,19 +8,22 @@ namespace plumbline::mapping {
 
 using core::KeyframeId;
 
-FusionEnd::FusionEnd(const MapFusionOptions& options, std::vector<MapPart> parts,
+FusionEnd::FusionEnd(const MapFusionOptions& options, const std::vector<Cameras>& cameras,
                      const core::Executor& executor)
-    : options_(options),
-      executor_(&executor),
-      parts_(std::move(parts)),
-      last_(parts_.size()),
-      finder_(options) {}
+    : options_(options), executor_(&executor), last_(cameras.size()), finder_(options) {
+  for (const Cameras& own : cameras) {
+    maps_.push_back(std::make_shared<maps::Map>());
+    parts_.push_back({maps_.back().get(), own});
+  }
+}
 
-std::vector<MergeEvidence> FusionEnd::add(KeyframeId id) {
+std::vector<MergeEvidence> FusionEnd::add(std::shared_ptr<const maps::Map> map, KeyframeId id) {
   const auto robot = static_cast<std::size_t>(id.robot);
-  if (!id.valid() || robot >= parts_.size() || !parts_[robot].map->has_keyframe(id)) {
+  if (!id.valid() || robot >= parts_.size() || !map->has_keyframe(id)) {
     throw std::invalid_argument("a keyframe that no robot has");
   }
+  maps_[robot] = std::move(map);
+  parts_[robot].map = maps_[robot].get();
   const auto candidates = finder_.look(parts_, robot, id, last_[robot]);
   finder_.add(*parts_[robot].map, id);
   last_[robot] = id;

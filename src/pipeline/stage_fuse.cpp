@@ -138,10 +138,8 @@ class FuseStage : public Stage {
   }
 
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
-    if (context_->stored_maps != nullptr) return context_->stored_maps->camera_of(robot);
-    if (context_->recordings != nullptr)
-      return context_->recordings->robots()[static_cast<std::size_t>(robot)].camera.color;
-    return context_->source->camera().color;
+    return context_->stored_maps != nullptr ? context_->stored_maps->camera_of(robot)
+                                            : context_->recordings->robot(robot).camera.color;
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {

@@ -27,32 +27,34 @@ maps::Map wall_with_poster(unsigned poster, int views, double from_m, const Rigi
 }
 
 TEST(FusionEnd, TellsOnceThatTwoRobotsHaveMet) {
-  const maps::Map a = wall_with_poster(5, 8, -0.35, Rigid3{});
-  const maps::Map b = renumbered(wall_with_poster(5, 8, -0.3, kWorldOfOthers), {{0, 1}});
+  const auto a = std::make_shared<maps::Map>(wall_with_poster(5, 8, -0.35, Rigid3{}));
+  const auto b =
+      std::make_shared<maps::Map>(renumbered(wall_with_poster(5, 8, -0.3, kWorldOfOthers), {{0, 1}}));
   const core::Executor executor(1);
-  FusionEnd end({}, {{&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}}}, executor);
+  FusionEnd end({}, {{{0, kTestCamera}}, {{1, kTestCamera}}}, executor);
   std::vector<MergeEvidence> merges;
   for (int i = 0; i < 8; ++i) {
-    for (const maps::Map* map : {&a, &b}) {
+    for (const auto& map : {a, b}) {
       const KeyframeId id{map->keyframe_ids().front().robot, i};
-      const auto told = end.add(id);
+      const auto told = end.add(map, id);
       merges.insert(merges.end(), told.begin(), told.end());
     }
   }
   ASSERT_EQ(merges.size(), 1U);
   EXPECT_LT(tests::distance(merges[0].a_from_b, kWorldOfOthers.inverse()), 0.04);
-  EXPECT_THROW(end.add({5, 0}), std::invalid_argument);
+  EXPECT_THROW(end.add(a, {5, 0}), std::invalid_argument);
 }
 
 TEST(FusionEnd, RobotsInDifferentPlacesStayApart) {
-  const maps::Map a = wall_with_poster(5, 6, -0.3, Rigid3{});
-  const maps::Map b = renumbered(wall_with_poster(99, 6, -0.3, kWorldOfOthers), {{0, 1}});
+  const auto a = std::make_shared<maps::Map>(wall_with_poster(5, 6, -0.3, Rigid3{}));
+  const auto b =
+      std::make_shared<maps::Map>(renumbered(wall_with_poster(99, 6, -0.3, kWorldOfOthers), {{0, 1}}));
   const core::Executor executor(1);
-  FusionEnd end({}, {{&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}}}, executor);
+  FusionEnd end({}, {{{0, kTestCamera}}, {{1, kTestCamera}}}, executor);
   for (int i = 0; i < 6; ++i) {
-    for (const maps::Map* map : {&a, &b}) {
+    for (const auto& map : {a, b}) {
       const KeyframeId id{map->keyframe_ids().front().robot, i};
-      EXPECT_TRUE(end.add(id).empty());
+      EXPECT_TRUE(end.add(map, id).empty());
     }
   }
 }

@@ -80,7 +80,7 @@ struct RunSummary {
     std::size_t keyframes = 0;
   };
   std::vector<Robot> robots;  ///< of several recordings
-  std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
+  std::string unconnected;    ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;             ///< of the merged cloud; 0: none was to be made
   std::size_t measured_points = 0;  ///< depths on the grid of the keyframes' clouds; 0: not known
