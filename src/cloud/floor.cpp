@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/cloud/floor.hpp"
 
+#include <pcl/filters/voxel_grid.h>
+#include <pcl/sample_consensus/ransac.h>
+#include <pcl/sample_consensus/sac_model_perpendicular_plane.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <numeric>
-
-#include "pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -17,36 +19,63 @@ struct Found {
 };
 
 /// Those points that face `up`, one for each voxel.
-CloudPtr thinned(const Cloud& cloud, const Eigen::Vector3f& up, const PclFunctions& pcl) {
+CloudPtr thinned(const Cloud& cloud, const Eigen::Vector3f& up) {
   constexpr float kVoxel_m = 0.05F;
   const float cosine = std::cos(0.25F * static_cast<float>(M_PI));
   auto facing_up = std::make_shared<Cloud>();
   for (const Point& p : cloud) {
     if (p.getNormalVector3fMap().dot(up) > cosine && p.getVector3fMap().allFinite()) facing_up->push_back(p);
   }
-  return facing_up->empty() ? facing_up : pcl.voxel_grid(facing_up, kVoxel_m, 1);
+  if (facing_up->empty()) return facing_up;
+  pcl::VoxelGrid<Point> grid;
+  grid.setInputCloud(facing_up);
+  grid.setLeafSize(kVoxel_m, kVoxel_m, kVoxel_m);
+  auto result = std::make_shared<Cloud>();
+  grid.filter(*result);
+  return result;
+}
+
+/// Points within 3 cm of a plane whose normal is within 45 degrees of `up`, in order, and the plane's least
+/// squares; empty when there is no plane. What pcl::SACSegmentation does, whose library brings PCL's features
+/// along. Always the same random numbers.
+pcl::Indices level_plane(const CloudConstPtr& points, const pcl::Indices& among, const Eigen::Vector3d& up,
+                         Eigen::Vector4d& plane) {
+  constexpr double kDistance_m = 0.03;
+  const auto model = std::make_shared<pcl::SampleConsensusModelPerpendicularPlane<Point>>(points, among);
+  model->setAxis(up.cast<float>());
+  model->setEpsAngle(0.25 * M_PI);
+  pcl::RandomSampleConsensus<Point> ransac(model, kDistance_m);
+  ransac.setMaxIterations(1000);
+  pcl::Indices inliers;
+  if (!ransac.computeModel()) return inliers;
+  ransac.getInliers(inliers);
+  Eigen::VectorXf found, refined;
+  ransac.getModelCoefficients(found);
+  model->optimizeModelCoefficients(inliers, found, refined);
+  model->selectWithinDistance(refined, kDistance_m, inliers);
+  plane = refined.head<4>().cast<double>();
+  std::sort(inliers.begin(), inliers.end());
+  return inliers;
 }
 
 /// Planes by RANSAC, one after the other in what is left; the first is the largest, or nearly so.
-std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d& up,
-                             const PclFunctions& pcl) {
+std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d& up) {
   constexpr std::size_t kFewest = 50, kMost = 8;
   constexpr double kLargeShare = 0.2;  // of the largest one
   std::vector<Found> planes;
-  auto left = std::make_shared<pcl::Indices>(points->size());
-  std::iota(left->begin(), left->end(), 0);
+  pcl::Indices left(points->size());
+  std::iota(left.begin(), left.end(), 0);
   std::size_t enough = kFewest;
-  while (planes.size() < kMost && left->size() >= enough) {
+  while (planes.size() < kMost && left.size() >= enough) {
     Eigen::Vector4d plane;
-    const pcl::Indices inliers = pcl.level_plane(points, left, up, plane);
+    const pcl::Indices inliers = level_plane(points, left, up, plane);
     if (inliers.size() < enough) break;
     const double sign = plane.head<3>().dot(up) < 0.0 ? -1.0 : 1.0;
     planes.push_back({{sign * plane.head<3>(), -sign * plane[3]}, inliers.size()});
     enough = std::max(enough, static_cast<std::size_t>(kLargeShare * static_cast<double>(inliers.size())));
-    auto rest = std::make_shared<pcl::Indices>();
-    std::set_difference(left->begin(), left->end(), inliers.begin(), inliers.end(),
-                        std::back_inserter(*rest));
-    left = rest;
+    pcl::Indices rest;
+    std::set_difference(left.begin(), left.end(), inliers.begin(), inliers.end(), std::back_inserter(rest));
+    left = std::move(rest);
   }
   return planes;
 }
@@ -54,10 +83,9 @@ std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d&
 }  // namespace
 
 std::optional<Floor> find_floor(const CloudConstPtr& cloud, const Eigen::Vector3d& about_up) {
-  const auto& pcl = pcl_functions();
-  if (cloud == nullptr || cloud->empty() || !pcl) return std::nullopt;
-  const CloudConstPtr points = thinned(*cloud, about_up.cast<float>(), **pcl);
-  const std::vector<Found> planes = planes_of(points, about_up, **pcl);
+  if (cloud == nullptr || cloud->empty()) return std::nullopt;
+  const CloudConstPtr points = thinned(*cloud, about_up.cast<float>());
+  const std::vector<Found> planes = planes_of(points, about_up);
   const double alongside = std::cos(5.0 * M_PI / 180.0);
   std::optional<Floor> floor;
   for (const Found& found : planes) {

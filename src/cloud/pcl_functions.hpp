@@ -50,10 +50,6 @@ struct PclFunctions {
   /// RANSAC among some of the points; empty when there is no plane.
   pcl::Indices (*plane)(const CloudConstPtr& points, const pcl::IndicesPtr& among, double distance,
                         int max_iterations, PlaneFit fit);
-  /// RANSAC among some of the points: within 3 cm of a plane whose normal is within 45 degrees of `axis`; the
-  /// plane's least squares. In order; empty when there is no plane.
-  pcl::Indices (*level_plane)(const CloudConstPtr& points, const pcl::IndicesPtr& among,
-                              const Eigen::Vector3d& axis, Eigen::Vector4d& plane);
   std::vector<pcl::PointIndices> (*euclidean_clusters)(const CloudConstPtr& points, double tolerance,
                                                        int min_size);
   /// Those that are left are told by `indices`.

@@ -7,8 +7,6 @@
 #include <pcl/segmentation/extract_clusters.h>
 #include <pcl/segmentation/sac_segmentation.h>
 
-#include <algorithm>
-
 #include "functions.hpp"
 
 namespace plumbline::cloud {
@@ -53,27 +51,6 @@ pcl::Indices plane(const CloudConstPtr& points, const pcl::IndicesPtr& among, do
   pcl::PointIndices inliers;
   pcl::ModelCoefficients coefficients;
   segmentation.segment(inliers, coefficients);
-  return inliers.indices;
-}
-
-pcl::Indices level_plane(const CloudConstPtr& points, const pcl::IndicesPtr& among,
-                         const Eigen::Vector3d& axis, Eigen::Vector4d& plane) {
-  pcl::SACSegmentation<Point> segmentation;  // always the same random numbers
-  segmentation.setModelType(pcl::SACMODEL_PERPENDICULAR_PLANE);
-  segmentation.setMethodType(pcl::SAC_RANSAC);
-  segmentation.setAxis(axis.cast<float>());
-  segmentation.setEpsAngle(0.25 * M_PI);
-  segmentation.setDistanceThreshold(0.03);
-  segmentation.setMaxIterations(1000);
-  segmentation.setInputCloud(points);
-  segmentation.setIndices(among);
-  pcl::PointIndices inliers;
-  pcl::ModelCoefficients coefficients;
-  segmentation.segment(inliers, coefficients);
-  std::sort(inliers.indices.begin(), inliers.indices.end());
-  for (std::size_t i = 0; i < 4 && !inliers.indices.empty(); ++i) {
-    plane[static_cast<Eigen::Index>(i)] = static_cast<double>(coefficients.values[i]);
-  }
   return inliers.indices;
 }
 

@@ -21,8 +21,6 @@ pcl::PointCloud<pcl::Normal> normal_estimation(const CloudConstPtr& points,
                                                double radius, const Eigen::Vector3f& viewpoint);
 pcl::Indices plane(const CloudConstPtr& points, const pcl::IndicesPtr& among, double distance,
                    int max_iterations, PlaneFit fit);
-pcl::Indices level_plane(const CloudConstPtr& points, const pcl::IndicesPtr& among,
-                         const Eigen::Vector3d& axis, Eigen::Vector4d& plane);
 std::vector<pcl::PointIndices> euclidean_clusters(const CloudConstPtr& points, double tolerance,
                                                   int min_size);
 CloudPtr moving_least_squares(const CloudConstPtr& points, double radius, int order, pcl::Indices& indices);
