@@ -7,6 +7,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "fast.hpp"
 #include "orb_orientation.hpp"
 
 namespace plumbline::features {
@@ -15,12 +16,6 @@ namespace {
 constexpr int kFastRadius = 3;
 constexpr int kEdge = 16;        // the patch of a corner 3 px further in must lie inside the picture
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
-
-struct Corner {
-  int x = 0;  // pixels of the level
-  int y = 0;
-  int score = 0;
-};
 
 /// Which cell of a grid over a width x height area a corner lies in.
 class Cells {
@@ -118,12 +113,7 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
 /// one.
 std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int high, int low,
                            double min_corner) {
-  std::vector<cv::KeyPoint> found;
-  cv::FAST(level(region), found, low, true, cv::FastFeatureDetector::TYPE_9_16);
-  std::vector<Corner> corners;
-  corners.reserve(found.size());
-  for (const cv::KeyPoint& k : found)
-    corners.push_back({cvRound(k.pt.x), cvRound(k.pt.y), cvRound(k.response)});
+  std::vector<Corner> corners = fast_corners(level(region), low);
   const auto edge = [&](const Corner& c) {
     return on_edge(level, c.x + region.x, c.y + region.y, min_corner);
   };
