@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # plumbline_module(NAME [DEPENDS module...] [LINK library...] [PRIVATE_LINK library...] [EXCEPT source...]
 #                  [PCH header... | PCH_FROM module])
-# One folder = one static library = one layer. Sources are all *.cpp of the folder, except those of a part. A module
+# One folder = one static library = one layer. Sources are all *.cpp of the folder and its subfolders, except those of a
+# part. A module
 # may take the precompiled header of another whose macros are no more than its own.
 function(plumbline_module name)
   cmake_parse_arguments(ARG "" "PCH_FROM" "DEPENDS;LINK;PRIVATE_LINK;EXCEPT;PCH" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp ${CMAKE_CURRENT_SOURCE_DIR}/*/*.cpp)
   list(TRANSFORM ARG_EXCEPT PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
   list(REMOVE_ITEM sources ${ARG_EXCEPT})
   list(TRANSFORM ARG_DEPENDS PREPEND plumbline::)
@@ -59,6 +60,7 @@ function(plumbline_test name)
     set(ARG_LABEL unit)
   endif()
   add_executable(${name} ${ARG_SOURCES} ${PROJECT_SOURCE_DIR}/tests/scratch_folder.cpp)
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/unit)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest_main plumbline_warnings)
   if(name STREQUAL test_core) # the fewest macros
     target_precompile_headers(${name} PRIVATE ${PROJECT_SOURCE_DIR}/cmake/test_pch.hpp)

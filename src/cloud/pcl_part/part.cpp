@@ -4,7 +4,7 @@
 #include <pcl/surface/mls.h>
 #include <pcl/surface/poisson.h>
 
-#include "pcl_functions.hpp"
+#include "filters/pcl_functions.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <pcl/filters/crop_box.h>
+#include <pcl/filters/passthrough.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "filters/filter_tools.hpp"
+#include "plumbline/cloud/cloud_io.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+class CropBoxFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.numbers("min", min_m_, 3, {-1e6, 1e6}, "m", "Corner with the smallest x, y, z");
+    table.numbers("max", max_m_, 3, {-1e6, 1e6}, "m", "Corner with the largest x, y, z");
+    table.boolean("inside", inside_, "Keep what is inside (on) or outside (off)");
+  }
+  std::string check() const override {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (min_m_[i] >= max_m_[i]) return fmt::format("min must be less than max in {}", "xyz"[i]);
+    }
+    return "";
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+    pcl::CropBox<Point> crop;
+    crop.setMin(corner(min_m_));
+    crop.setMax(corner(max_m_));
+    crop.setNegative(!inside_);
+    return chosen_by(crop, input);
+  }
+
+ private:
+  static Eigen::Vector4f corner(const std::vector<double>& v) {
+    return Eigen::Vector4d(v[0], v[1], v[2], 1.0).cast<float>();
+  }
+  std::vector<double> min_m_{-1.0, -1.0, -1.0};
+  std::vector<double> max_m_{1.0, 1.0, 1.0};
+  bool inside_ = true;
+};
+
+class PassThroughFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.choice("field", field_, {"x", "y", "z", "normal_x", "normal_y", "normal_z", "curvature"},
+                 "The number of a point that is looked at");
+    table.text(
+        "column", column_,
+        "Instead of field: a further column of the file by its name, such as confidence, observations, robot "
+        "or intensity; empty: field");
+    table.number("min", min_, {-1e9, 1e9}, "",
+                 "Smallest value that passes, in the field's own unit (metres for x, y, z)");
+    table.number("max", max_, {-1e9, 1e9}, "", "Largest value that passes");
+    table.boolean("inside", inside_, "Keep what is within the limits (on) or beyond them (off)");
+  }
+  std::string check() const override {
+    return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
+    if (!column_.empty()) return by_column(*input, context);
+    pcl::PassThrough<Point> pass;
+    pass.setFilterFieldName(field_);
+    pass.setFilterLimits(static_cast<float>(min_), static_cast<float>(max_));
+    pass.setNegative(!inside_);
+    return chosen_by(pass, input);
+  }
+
+ private:
+  [[nodiscard]] core::Result<CloudPtr> by_column(const Cloud& input, const FilterContext& context) const {
+    const CloudColumns none;
+    const CloudColumns& columns = context.columns != nullptr ? *context.columns : none;
+    std::vector<std::string> names;
+    std::function<double(std::size_t)> value;
+    const auto offer = [&](const std::string& name, const auto& values) {
+      if (values.empty()) return;
+      names.push_back(name);
+      if (name == column_) value = [&values](std::size_t i) { return static_cast<double>(values[i]); };
+    };
+    offer("confidence", columns.confidence);
+    offer("observations", columns.observations);
+    offer("robot", columns.robot);
+    for (const auto& other : columns.others) offer(other.name, other.values);
+    if (!value && !input.empty()) {
+      return core::usage_error(
+          fmt::format("column: the cloud has no '{}' (it has: {})", column_,
+                      names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+    }
+    return select(input, [&](std::size_t i, const Point&) {
+      const double v = value(i);
+      return std::isfinite(v) && (v >= min_ && v <= max_) == inside_;
+    });
+  }
+
+  std::string field_ = "z";
+  std::string column_;
+  double min_ = -1e9;
+  double max_ = 1e9;
+  bool inside_ = true;
+};
+
+}  // namespace
+
+FilterInfo crop_box_filter() {
+  return {"crop_box", "Keeps points inside (or outside) a box.",
+          "PCL's CropBox, axes along the cloud's frame.",
+          "- type: crop_box\n  min: [-2 m, -1 m, 0 m]\n  max: [2 m, 1 m, 3 m]\n",
+          [] { return std::make_unique<CropBoxFilter>(); }};
+}
+
+FilterInfo pass_through_filter() {
+  return {
+      "pass_through", "Keeps points one of whose numbers lies within limits.",
+      "PCL's PassThrough. Points whose field is not a number go. In a camera's own frame `field: z` is the "
+      "depth: the noise of structured light grows with its square, so what is far away does a map more harm "
+      "than good. `column` looks at what a file has beside positions, normals and curvature: `column: "
+      "confidence, min: 0.5` keeps what is well seen.",
+      "- type: pass_through\n  field: normal_y\n  min: -1\n  max: -0.9\n",
+      [] { return std::make_unique<PassThroughFilter>(); }};
+}
+
+}  // namespace plumbline::cloud

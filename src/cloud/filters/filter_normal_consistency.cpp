@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "filters/filter_tools.hpp"
+#include "plumbline/cloud/normal_consistency.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+class NormalConsistencyFilter : public Filter {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.integer("neighbours", neighbours_, {1, 1000}, "", "Nearest neighbours looked at");
+    table.number("max_angle", max_angle_rad_, {0.0, 3.1416}, "rad", "Between normals that agree");
+    table.number("min_share", min_share_, {0.0, 1.0}, "ratio",
+                 "Of the neighbours with a normal, so many must agree; more than 1/2 eats edges");
+  }
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
+    NormalConsistency<Point> filter;
+    filter.setNeighbours(neighbours_);
+    filter.setMaxAngle(max_angle_rad_);
+    filter.setMinShare(min_share_);
+    filter.setExecutor(context.executor);
+    return chosen_by(filter, input);
+  }
+
+ private:
+  int neighbours_ = 16;
+  double max_angle_rad_ = 0.5236;
+  double min_share_ = 0.3;
+};
+
+}  // namespace
+
+FilterInfo normal_consistency_filter() {
+  return {
+      "normal_consistency", "Removes points whose normal disagrees with those around it.",
+      "Where depth is noisy, at borders and on shiny things, normals point anywhere; a point stays when "
+      "enough of its nearest neighbours have a normal within `max_angle` of its own. Points without normal "
+      "go: put the filter normals before it.",
+      "- type: normal_consistency\n  neighbours: 16\n  max_angle: 30 deg\n  min_share: 30 %\n",
+      [] { return std::make_unique<NormalConsistencyFilter>(); }};
+}
+
+}  // namespace plumbline::cloud

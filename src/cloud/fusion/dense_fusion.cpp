@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/dense_fusion.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "fusion/fusion_tiles.hpp"
+#include "plumbline/cloud/exposure.hpp"
+#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/sheets.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr double kCell_m = 0.1;  ///< of plans and colours; also the margin of tiles
+
+/// Edge of the blocks of sheets: wide enough for a plane through noise, narrow enough for furniture.
+double block_m(double voxel_m) { return std::max(0.02, 2.0 * voxel_m); }
+
+/// Occupied cells that `megabytes` hold at so many bytes for one side of a voxel.
+std::size_t cells_within(double megabytes, double bytes_per_side, const DenseFusionOptions& options) {
+  constexpr double kLayers = 1.2;  // occupied voxels per voxel of a cell's side
+  const double per_axis = std::max(1.0, kCell_m / options.voxels.voxel_m);
+  return static_cast<std::size_t>(
+      std::max(64.0, megabytes * 1e6 / (kLayers * per_axis * per_axis * bytes_per_side)));
+}
+
+/// Of a tile that is being finished: in the voxel map, as points, and in sheets.
+std::size_t cells_per_tile(const DenseFusionOptions& options) {
+  return cells_within(options.tile_mb, 240.0, options);
+}
+
+/// Of the tiles that are filled together, in the voxel maps.
+std::size_t cells_at_a_time(const DenseFusionOptions& options) {
+  return cells_within(6.0 * options.tile_mb, 110.0, options);
+}
+
+/// The first error in the order of the items, if any.
+core::Result<void> first_error(const std::vector<core::Result<void>>& results) {
+  for (const auto& result : results) {
+    if (!result) return result;
+  }
+  return {};
+}
+
+class Fusion {
+ public:
+  Fusion(const FusionViews& views, const DenseFusionOptions& options, const core::Executor& executor)
+      : views_(views), world_from_cloud_(views.world_from_camera), options_(options), executor_(executor) {}
+
+  core::Result<FusedCloud> run(FusionReport& report) {
+    if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
+    FusedCloud all{std::make_shared<Cloud>(), {}};
+    append({}, several_robots(), all);
+    const std::size_t most_cells = cells_at_a_time(options_);
+    for (std::size_t first = 0, count = 0; first < tiles_.size(); first += count) {
+      std::size_t cells = 0;
+      for (count = 0; first + count < tiles_.size(); ++count) {
+        cells += tiles_[first + count].occupied;
+        if (count > 0 && cells > most_cells) break;
+      }
+      std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
+      if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
+      std::vector<std::vector<FusedPoint>> parts(count);
+      std::vector<FusionReport> reports(count);
+      executor_.parallel_for(count, [&](std::size_t k) {
+        parts[k] = finished(tiles_[first + k], std::move(voxels[k]), reports[k]);
+      });
+      for (std::size_t k = 0; k < count; ++k) {
+        append(parts[k], several_robots(), all);
+        parts[k] = {};
+        report.dust += reports[k].dust;
+        report.seen_through += reports[k].seen_through;
+      }
+    }
+    return all;
+  }
+
+ private:
+  [[nodiscard]] bool several_robots() const { return !views_.robots.empty(); }
+
+  /// Asks every view: where it reaches, what it looks through, its colours.
+  core::Result<void> look(FusionReport& report) {
+    const std::size_t count = views_.world_from_camera.size();
+    std::vector<std::vector<ColorCell>> cells(count);
+    std::vector<core::Result<void>> done(count);
+    rasters_.resize(count);
+    is_look_.assign(count, 0);
+    executor_.parallel_for(count, [&](std::size_t v) {
+      const auto cloud = views_.read(v);
+      if (!cloud) {
+        done[v] = tl::unexpected<core::Error>(cloud.error());
+        return;
+      }
+      world_from_cloud_[v] = views_.world_from_camera[v] * sensor_pose(**cloud);
+      is_look_[v] = is_look(**cloud, views_.cameras[v]) ? 1 : 0;
+      if (is_look_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
+      if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
+    });
+    if (auto failed = first_error(done); !failed) return failed;
+    tiles_ = plan_tiles(cells, cells_per_tile(options_));
+    report.tiles = tiles_.size();
+    if (!options_.exposure) return {};
+    gains_ = color_gains(cells);
+    for (const Eigen::Vector3f& gain : gains_) {
+      report.least_gain = std::min(report.least_gain, static_cast<double>(gain.minCoeff()));
+      report.most_gain = std::max(report.most_gain, static_cast<double>(gain.maxCoeff()));
+    }
+    return {};
+  }
+
+  /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
+  /// for all of these tiles, and every tile takes the views in their order.
+  core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) {
+    constexpr std::size_t kViewsAtATime = 4;
+    std::vector<std::uint32_t> views;
+    for (std::size_t k = 0; k < voxels.size(); ++k) {
+      views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
+    }
+    std::sort(views.begin(), views.end());
+    views.erase(std::unique(views.begin(), views.end()), views.end());
+    for (std::size_t at = 0; at < views.size(); at += kViewsAtATime) {
+      const std::size_t count = std::min(kViewsAtATime, views.size() - at);
+      std::vector<std::vector<VoxelSample>> samples(count);
+      std::vector<core::Result<void>> done(count);
+      executor_.parallel_for(count, [&](std::size_t i) { done[i] = measure(views[at + i], samples[i]); });
+      if (auto failed = first_error(done); !failed) return failed;
+      executor_.parallel_for(voxels.size(), [&](std::size_t k) {
+        const FusionTile& tile = tiles_[first + k];
+        const Eigen::AlignedBox3i region = tile.voxels(kCell_m, options_.voxels.voxel_m);
+        for (std::size_t i = 0; i < count; ++i) {
+          const bool reaches = std::binary_search(tile.views.begin(), tile.views.end(), views[at + i]);
+          if (reaches) voxels[k].insert(samples[i], region);
+        }
+      });
+    }
+    return {};
+  }
+
+  core::Result<void> measure(std::size_t v, std::vector<VoxelSample>& samples) const {
+    const auto cloud = views_.read(v);
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    if (!gains_.empty()) apply_gain(**cloud, gains_[v]);
+    const std::uint8_t robot = several_robots() ? views_.robots[v] : std::uint8_t{0};
+    samples = VoxelMap::measured(**cloud, world_from_cloud_[v], options_.voxels, robot);
+    return {};
+  }
+
+  /// The points of a tile.
+  [[nodiscard]] std::vector<FusedPoint> finished(const FusionTile& tile, VoxelMap voxels,
+                                                 FusionReport& report) const {
+    std::vector<FusedPoint> points = voxels.points();
+    voxels = VoxelMap(options_.voxels);
+    clean(points, report);
+    if (options_.settle) points = VoxelMap::merged(points, options_.voxels);
+    const Eigen::AlignedBox3d box = tile.box(kCell_m);
+    const auto least = static_cast<std::uint32_t>(options_.min_observations);
+    const auto stays = [&](const FusedPoint& fused) {
+      const Eigen::Array3d p = fused.point.getVector3fMap().cast<double>();
+      return fused.observations >= least && (p >= box.min().array()).all() && (p < box.max().array()).all();
+    };
+    points.erase(std::remove_if(points.begin(), points.end(), [&](const auto& p) { return !stays(p); }),
+                 points.end());
+    return points;
+  }
+
+  /// Without what is seen through and without dust; settled.
+  void clean(std::vector<FusedPoint>& points, FusionReport& report) const {
+    Sheets sheets(points, block_m(options_.voxels.voxel_m));
+    std::vector<std::uint8_t> goes(sheets.all().size(), 0);
+    if (options_.free_space) goes = seen_through(sheets, rasters_, is_look_, world_from_cloud_);
+    sheets.fit_planes();
+    if (options_.settle) sheets.settle(points);
+    const auto least = static_cast<std::uint32_t>(options_.min_support);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::uint32_t s = sheets.of(i);
+      if (s != Sheets::kNone && goes[s] != 0) {
+        ++report.seen_through;
+      } else if (s != Sheets::kNone && sheets.all()[s].support < least) {
+        ++report.dust;
+      } else {
+        points[kept++] = points[i];
+      }
+    }
+    points.resize(kept);
+  }
+
+  const FusionViews& views_;
+  std::vector<geometry::Rigid3> world_from_cloud_;  ///< by view
+  DenseFusionOptions options_;
+  const core::Executor& executor_;
+  std::vector<FusionTile> tiles_;
+  std::vector<DepthRaster> rasters_;    ///< by view; empty ones without free space
+  std::vector<std::uint8_t> is_look_;   ///< by view
+  std::vector<Eigen::Vector3f> gains_;  ///< by view; empty: colours as they are
+};
+
+}  // namespace
+
+void DenseFusionOptions::declare(core::OptionTable& table) {
+  voxels.declare(table);
+  table.integer("min_observations", min_observations, {1, 1000}, "",
+                "Keyframes that must have seen a voxel for it to stay");
+  table.boolean("settle", settle,
+                "Lay the points of flat pieces of surface on their common plane: thin walls");
+  table.boolean("free_space", free_space, "Remove what other keyframes look through: people, flying pixels");
+  table.boolean("exposure", exposure, "Even out colours between keyframes");
+  table.integer("min_support", min_support, {0, 1000}, "",
+                "Points with fewer others around that face the same way are dust and go; 0: none");
+  table.number(
+      "tile_mb", tile_mb, {16.0, 100000.0}, "",
+      "Memory that one tile of the map may take, MB; as many as may take six times that are filled together");
+}
+
+core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
+                                    const core::Executor& executor, FusionReport* report) {
+  FusionReport unused;
+  return Fusion(views, options, executor).run(report == nullptr ? unused : *report);
+}
+
+FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel_m) {
+  constexpr float kMost = 0.9999F;
+  std::vector<FusedPoint> points(cloud.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float confidence =
+        i < columns.confidence.size() ? std::clamp(columns.confidence[i], 1e-4F, kMost) : 0.5F;
+    points[i].point = cloud[i];
+    points[i].weight = confidence / (1.0F - confidence);
+    points[i].observations = i < columns.observations.size() ? columns.observations[i] : 1;
+  }
+  VoxelMapOptions options;
+  options.voxel_m = voxel_m;
+  FusedCloud result{std::make_shared<Cloud>(), {}};
+  append(VoxelMap::merged(points, options), false, result);
+  return result;
+}
+
+}  // namespace plumbline::cloud

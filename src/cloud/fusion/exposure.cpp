@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/exposure.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "plumbline/cloud/cell_map.hpp"
+#include "io/scalar.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr int kExposureRounds = 20;
+constexpr float kRobustResidual = 0.15F;  // residuals of the logarithm beyond this weigh less
+constexpr float kPrior = 3.0F;            // a view's gain is held at 1 by as much as this many cells
+constexpr float kFewestPoints = 5.0F;
+constexpr float kMostLog = 0.693F;
+constexpr int kDark = 12;
+constexpr int kBright = 245;
+
+/// What a view saw of a cell.
+struct Sighting {
+  std::uint64_t cell = 0;
+  std::size_t view = 0;
+  Eigen::Array3f log_color;
+  Eigen::Array3f weight = Eigen::Array3f::Ones();
+};
+
+/// Cell by cell, those that two views or more saw in colour.
+std::vector<Sighting> shared_sightings(const std::vector<std::vector<ColorCell>>& views) {
+  std::vector<Sighting> all;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (const ColorCell& cell : views[v]) {
+      if (cell.points >= kFewestPoints) all.push_back({cell.cell, v, cell.color.array().log(), {1, 1, 1}});
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Sighting& a, const Sighting& b) { return a.cell < b.cell; });
+  std::vector<Sighting> shared;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool as_before = i > 0 && all[i - 1].cell == all[i].cell;
+    const bool as_after = i + 1 < all.size() && all[i + 1].cell == all[i].cell;
+    if (as_before || as_after) shared.push_back(all[i]);
+  }
+  return shared;
+}
+
+Eigen::Array3f robust_weight(const Eigen::Array3f& residual) {
+  return kRobustResidual / residual.abs().max(kRobustResidual);
+}
+
+}  // namespace
+
+std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Rigid3& world_from_camera,
+                                   double cell_m) {
+  CellMap<ColorCell> sums;
+  const Eigen::Matrix3f turn = (world_from_camera.rotation / cell_m).cast<float>();
+  const Eigen::Vector3f shift = (world_from_camera.translation / cell_m).cast<float>();
+  ColorCell* last = nullptr;
+  for (const Point& p : camera_cloud.points) {
+    const Eigen::Vector3f at = turn * p.getVector3fMap() + shift;
+    if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
+    // Neighbours in a picture mostly share their cell.
+    const std::uint64_t key = pack_cell(at.array().floor().cast<int>());
+    if (last == nullptr || last->cell != key) last = &sums[key];
+    last->cell = key;
+    const auto [least, most] = std::minmax({p.r, p.g, p.b});
+    if (least < kDark || most > kBright) continue;
+    last->color += Eigen::Vector3f(p.r, p.g, p.b);
+    last->points += 1.0F;
+  }
+  std::vector<ColorCell> cells;
+  cells.reserve(sums.size());
+  for (const auto& [key, sum] : sums)
+    cells.push_back({key, sum.color / std::max(1.0F, sum.points), sum.points});
+  std::sort(cells.begin(), cells.end(),
+            [](const ColorCell& a, const ColorCell& b) { return a.cell < b.cell; });
+  return cells;
+}
+
+std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views) {
+  std::vector<Sighting> sightings = shared_sightings(views);
+  struct Sum {
+    Eigen::Array3f log_gain = Eigen::Array3f::Zero();
+    Eigen::Array3f wanted = Eigen::Array3f::Zero();
+    Eigen::Array3f weight = Eigen::Array3f::Zero();
+  };
+  std::vector<Sum> of_views(views.size());
+  for (int round = 0; round < kExposureRounds; ++round) {
+    for (Sum& view : of_views) {
+      view.wanted.setZero();
+      view.weight.setConstant(kPrior);
+    }
+    for (std::size_t first = 0, end = 0; first < sightings.size(); first = end) {
+      Eigen::Array3f sum = Eigen::Array3f::Zero();
+      Eigen::Array3f weight = Eigen::Array3f::Zero();
+      for (end = first; end < sightings.size() && sightings[end].cell == sightings[first].cell; ++end) {
+        const Sighting& s = sightings[end];
+        sum += s.weight * (s.log_color + of_views[s.view].log_gain);
+        weight += s.weight;
+      }
+      const Eigen::Array3f mean = sum / weight;
+      for (std::size_t i = first; i < end; ++i) {
+        Sighting& s = sightings[i];
+        Sum& view = of_views[s.view];
+        const Eigen::Array3f wanted = mean - s.log_color;
+        s.weight = robust_weight(wanted - view.log_gain);
+        view.wanted += s.weight * wanted;
+        view.weight += s.weight;
+      }
+    }
+    Eigen::Array3f drift = Eigen::Array3f::Zero();
+    for (Sum& view : of_views) {
+      view.log_gain = (view.wanted / view.weight).max(-kMostLog).min(kMostLog);
+      drift += view.log_gain;
+    }
+    if (!views.empty()) drift /= static_cast<float>(views.size());
+    for (Sum& view : of_views) view.log_gain -= drift;
+  }
+  std::vector<Eigen::Vector3f> factors(views.size(), Eigen::Vector3f::Ones());
+  for (const Sighting& s : sightings)
+    factors[s.view] = of_views[s.view].log_gain.max(-kMostLog).min(kMostLog).exp();
+  return factors;
+}
+
+void apply_gain(Cloud& cloud, const Eigen::Vector3f& gain) {
+  for (Point& p : cloud.points) {
+    p.r = to_byte(static_cast<double>(gain[0] * static_cast<float>(p.r)));
+    p.g = to_byte(static_cast<double>(gain[1] * static_cast<float>(p.g)));
+    p.b = to_byte(static_cast<double>(gain[2] * static_cast<float>(p.b)));
+  }
+}
+
+}  // namespace plumbline::cloud

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+
+#include "io/cloud_table.hpp"
+#include "plumbline/cloud/ply.hpp"
+
+namespace plumbline::cloud {
+
+core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file) {
+  auto ply = read_ply(file);
+  if (!ply) return tl::unexpected<core::Error>(ply.error());
+  std::vector<Meaning> meanings;
+  std::vector<std::string> names;
+  for (const auto& column : ply->columns) {
+    meanings.push_back(meaning_of(column.name));
+    names.push_back(column.name);
+  }
+  CloudBuilder builder(meanings, names, ply->vertex_count);
+  if (!builder.has_position())
+    return core::input_error(file.string() + ": has no x, y and z; it is not a point cloud");
+  for (std::size_t c = 0; c < meanings.size(); ++c) {
+    if (meanings[c] == Meaning::kNone || meanings[c] == Meaning::kPackedColor) continue;
+    const bool color =
+        meanings[c] == Meaning::kRed || meanings[c] == Meaning::kGreen || meanings[c] == Meaning::kBlue;
+    auto& values = ply->columns[c].values;
+    if (auto* bytes = std::get_if<std::vector<std::uint8_t>>(&values)) {
+      for (std::size_t i = 0; i < bytes->size(); ++i) builder.set(i, meanings[c], c, (*bytes)[i]);
+    } else if (auto* floats = std::get_if<std::vector<float>>(&values)) {
+      // Colours written as floats go from 0 to 1 in most programs.
+      const bool share =
+          color && std::all_of(floats->begin(), floats->end(), [](float v) { return !(v > 1.0F); });
+      for (std::size_t i = 0; i < floats->size(); ++i) {
+        builder.set(i, meanings[c], c, static_cast<double>((*floats)[i]) * (share ? 255.0 : 1.0));
+      }
+    }
+    values = std::vector<float>();  // the column is in the cloud now
+  }
+  return builder.finish();
+}
+
+core::Result<CloudFile> read_cloud(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return core::input_error(file.string() + ": does not exist");
+  if (std::filesystem::is_directory(file, error)) {
+    return core::input_error(file.string() + ": is a folder, a cloud file is needed");
+  }
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".ply") return read_ply_cloud(file);
+  if (ending == ".pcd") return read_pcd_cloud(file);
+  if (ending == ".xyz" || ending == ".txt" || ending == ".csv" || ending == ".asc" || ending == ".pts") {
+    return read_text_cloud(file);
+  }
+  return core::input_error(fmt::format(
+      "{}: ending '{}' is not one that clouds are read from; use .ply, .pcd, .xyz, .txt, .csv, .asc or .pts",
+      file.string(), ending));
+}
+
+}  // namespace plumbline::cloud

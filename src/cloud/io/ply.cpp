@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/cloud/ply.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "plumbline/core/output_file.hpp"
+#include "io/ply_header.hpp"
+
+namespace plumbline::cloud {
+namespace {
+
+constexpr std::size_t kLargestPolygon = 1024;
+constexpr double kLongestList = 65536.0;
+
+/// Reads the records of one file after its header.
+class Body {
+ public:
+  Body(ByteReader& reader, PlyFormat format)
+      : reader_(reader), ascii_(format == PlyFormat::kAscii), swap_(format == PlyFormat::kBigEndian) {}
+
+  /// False: the file ended or a word was no number (see problem()).
+  bool scalar(ScalarType type, double& value) {
+    if (ascii_) return text_scalar(value);
+    const std::uint8_t* bytes = reader_.take(size_of(type));
+    if (bytes == nullptr) return false;
+    value = load(type, bytes, swap_);
+    return true;
+  }
+
+  bool list(const PlyProperty& property, std::vector<double>& items) {
+    double count = 0.0;
+    if (!scalar(property.count_type, count)) return false;
+    if (!(count >= 0.0) || count != std::floor(count)) return refuse("list length is not a natural number");
+    if (count > kLongestList) return refuse("list with more than 65536 items");
+    items.resize(static_cast<std::size_t>(count));
+    for (double& item : items) {
+      if (!scalar(property.type, item)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool ascii() const { return ascii_; }
+  [[nodiscard]] bool swap() const { return swap_; }
+  [[nodiscard]] ByteReader& reader() { return reader_; }
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+  bool refuse(std::string problem) {
+    problem_ = std::move(problem);
+    return false;
+  }
+
+ private:
+  bool text_scalar(double& value) {
+    if (!reader_.word(word_)) {
+      return word_.empty() ? false : refuse("'" + word_ + "...' is not a number");
+    }
+    const auto number = parse_number(word_);
+    if (!number) return refuse("'" + word_ + "' is not a number");
+    value = *number;
+    return true;
+  }
+
+  ByteReader& reader_;
+  bool ascii_;
+  bool swap_;
+  std::string word_;
+  std::string problem_;
+};
+
+/// Where one fixed-size scalar of a vertex goes.
+struct Sink {
+  ScalarType type = ScalarType::kFloat32;
+  std::size_t offset = 0;
+  float* floats = nullptr;
+  std::uint8_t* bytes = nullptr;
+};
+
+void store(const Sink& sink, std::size_t row, double value) {
+  if (sink.floats != nullptr) sink.floats[row] = static_cast<float>(value);
+  if (sink.bytes != nullptr) sink.bytes[row] = to_byte(value);
+}
+
+std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
+  const auto count = static_cast<std::size_t>(element.count);
+  data.vertex_count = count;
+  std::vector<Sink> sinks;
+  std::size_t offset = 0;
+  for (const auto& property : element.properties) {
+    if (property.list) continue;
+    if (property.type == ScalarType::kUint8) {
+      data.columns.push_back({property.name, std::vector<std::uint8_t>(count)});
+    } else {
+      data.columns.push_back({property.name, std::vector<float>(count)});
+    }
+    sinks.push_back({property.type, offset, nullptr, nullptr});
+    offset += size_of(property.type);
+  }
+  for (std::size_t i = 0; i < sinks.size(); ++i) {
+    auto& values = data.columns[i].values;
+    if (auto* floats = std::get_if<std::vector<float>>(&values)) sinks[i].floats = floats->data();
+    if (auto* bytes = std::get_if<std::vector<std::uint8_t>>(&values)) sinks[i].bytes = bytes->data();
+  }
+  return sinks;
+}
+
+bool has_lists(const PlyElement& element) {
+  return std::any_of(element.properties.begin(), element.properties.end(),
+                     [](const auto& p) { return p.list; });
+}
+
+/// Returns how many vertices were read.
+std::uint64_t read_vertices(Body& body, const PlyElement& element, PlyData& data) {
+  const std::vector<Sink> sinks = make_columns(element, data);
+  if (!body.ascii() && !has_lists(element)) {
+    const std::size_t size = element.least_size(false);
+    for (std::size_t row = 0; row < data.vertex_count; ++row) {
+      const std::uint8_t* record = body.reader().take(size);
+      if (record == nullptr) return row;
+      for (const Sink& sink : sinks) {
+        if (sink.type == ScalarType::kFloat32 && !body.swap()) {
+          std::memcpy(sink.floats + row, record + sink.offset, 4);
+        } else if (sink.type == ScalarType::kUint8) {
+          sink.bytes[row] = record[sink.offset];
+        } else {
+          store(sink, row, load(sink.type, record + sink.offset, body.swap()));
+        }
+      }
+    }
+    return data.vertex_count;
+  }
+  std::vector<double> items;
+  for (std::size_t row = 0; row < data.vertex_count; ++row) {
+    std::size_t column = 0;
+    for (const auto& property : element.properties) {
+      double value = 0.0;
+      if (property.list) {
+        if (!body.list(property, items)) return row;
+      } else if (body.scalar(property.type, value)) {
+        store(sinks[column++], row, value);
+      } else {
+        return row;
+      }
+    }
+  }
+  return data.vertex_count;
+}
+
+bool to_index(double value, std::size_t vertices, std::uint32_t& index) {
+  if (!(value >= 0.0) || value >= static_cast<double>(vertices) || value != std::floor(value)) return false;
+  index = static_cast<std::uint32_t>(value);
+  return true;
+}
+
+bool add_polygon(Body& body, const std::vector<double>& corners, PlyData& data) {
+  if (corners.size() > kLargestPolygon) return body.refuse("face with more than 1024 corners");
+  std::vector<std::uint32_t> indices(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (!to_index(corners[i], data.vertex_count, indices[i])) {
+      return body.refuse(fmt::format("vertex index {} is not below {}", corners[i], data.vertex_count));
+    }
+  }
+  for (std::size_t i = 2; i < indices.size(); ++i)
+    data.triangles.push_back({indices[0], indices[i - 1], indices[i]});
+  return true;
+}
+
+std::uint64_t read_faces(Body& body, const PlyElement& element, PlyData& data) {
+  std::vector<double> items;
+  for (std::uint64_t row = 0; row < element.count; ++row) {
+    for (const auto& property : element.properties) {
+      double ignored = 0.0;
+      if (!property.list) {
+        if (!body.scalar(property.type, ignored)) return row;
+        continue;
+      }
+      if (!body.list(property, items)) return row;
+      const bool corners = property.name == "vertex_indices" || property.name == "vertex_index";
+      if (corners && !add_polygon(body, items, data)) return row;
+    }
+  }
+  return element.count;
+}
+
+std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
+  std::vector<double> items;
+  bool colored = false;
+  for (std::uint64_t row = 0; row < element.count; ++row) {
+    std::array<std::uint32_t, 2> edge{};
+    std::array<std::uint8_t, 3> color{};
+    for (const auto& property : element.properties) {
+      double value = 0.0;
+      if (property.list ? !body.list(property, items) : !body.scalar(property.type, value)) return row;
+      const bool first = property.name == "vertex1";
+      if (first || property.name == "vertex2") {
+        if (!to_index(value, data.vertex_count, edge[first ? 0 : 1])) {
+          body.refuse(fmt::format("vertex index {} is not below {}", value, data.vertex_count));
+          return row;
+        }
+      }
+      if (property.name == "red") color[0] = to_byte(value);
+      if (property.name == "green") color[1] = to_byte(value);
+      if (property.name == "blue") color[2] = to_byte(value);
+      colored = colored || property.name == "red";
+    }
+    data.edges.push_back(edge);
+    if (colored) data.edge_colors.push_back(color);
+  }
+  return element.count;
+}
+
+std::uint64_t skip(Body& body, const PlyElement& element) {
+  std::vector<double> items;
+  for (std::uint64_t row = 0; row < element.count; ++row) {
+    for (const auto& property : element.properties) {
+      double ignored = 0.0;
+      if (property.list ? !body.list(property, items) : !body.scalar(property.type, ignored)) return row;
+    }
+  }
+  return element.count;
+}
+
+/// "" or what is wrong with the records of one element.
+std::string read_element(Body& body, const PlyElement& element, PlyData& data) {
+  const std::size_t least = element.least_size(body.ascii());
+  // The last word of an ascii file needs no blank after it.
+  const std::uint64_t room = body.reader().remaining() + (body.ascii() ? 1 : 0);
+  if (element.count > 0 && least == 0) return fmt::format("element '{}' has no properties", element.name);
+  if (element.count > 0 && element.count > room / least) {
+    return fmt::format(
+        "header promises {} of '{}' (at least {} bytes each) but {} bytes are left; the file is truncated",
+        element.count, element.name, least, body.reader().remaining());
+  }
+  std::uint64_t rows = 0;
+  if (element.name == "vertex") {
+    rows = read_vertices(body, element, data);
+  } else if (element.name == "face") {
+    rows = read_faces(body, element, data);
+  } else if (element.name == "edge") {
+    rows = read_edges(body, element, data);
+  } else {
+    rows = skip(body, element);
+  }
+  if (rows == element.count) return "";
+  const std::string place = fmt::format("'{}' {} of {}: ", element.name, rows + 1, element.count);
+  return place + (body.problem().empty() ? "the file ends here; it is truncated" : body.problem());
+}
+
+}  // namespace
+
+const std::vector<float>* PlyData::floats(std::string_view name) const {
+  for (const auto& column : columns) {
+    if (column.name == name) return std::get_if<std::vector<float>>(&column.values);
+  }
+  return nullptr;
+}
+
+const std::vector<std::uint8_t>* PlyData::bytes(std::string_view name) const {
+  for (const auto& column : columns) {
+    if (column.name == name) return std::get_if<std::vector<std::uint8_t>>(&column.values);
+  }
+  return nullptr;
+}
+
+void PlyData::add(std::string name, std::vector<float> values) {
+  if (columns.empty()) vertex_count = values.size();
+  columns.push_back({std::move(name), std::move(values)});
+}
+
+void PlyData::add(std::string name, std::vector<std::uint8_t> values) {
+  if (columns.empty()) vertex_count = values.size();
+  columns.push_back({std::move(name), std::move(values)});
+}
+
+core::Result<PlyData> read_ply(const std::filesystem::path& file) {
+  ByteReader reader(file);
+  if (!reader.open()) return core::input_error(file.string() + ": cannot be read");
+  auto header = read_ply_header(reader);
+  if (!header) return core::input_error(file.string() + ": " + header.error().message);
+  PlyData data;
+  data.comments = header->comments;
+  Body body(reader, header->format);
+  for (const auto& element : header->elements) {
+    const std::string problem = read_element(body, element, data);
+    if (!problem.empty()) return core::input_error(file.string() + ": " + problem);
+  }
+  return data;
+}
+
+core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& data) {
+  for (const auto& column : data.columns) {
+    const std::size_t length = std::visit([](const auto& v) { return v.size(); }, column.values);
+    if (length != data.vertex_count)
+      throw std::invalid_argument("PLY column '" + column.name + "' has another length");
+  }
+  const bool colored = !data.edge_colors.empty();
+  if (colored && data.edge_colors.size() != data.edges.size())
+    throw std::invalid_argument("PLY edge colours");
+
+  core::OutputFile out(file);
+  out.write("ply\nformat binary_little_endian 1.0\n");
+  for (const auto& comment : data.comments) out.write("comment " + comment + "\n");
+  out.write(fmt::format("element vertex {}\n", data.vertex_count));
+  for (const auto& column : data.columns) {
+    const bool floats = std::holds_alternative<std::vector<float>>(column.values);
+    out.write(fmt::format("property {} {}\n", floats ? "float" : "uchar", column.name));
+  }
+  if (!data.triangles.empty()) {
+    out.write(
+        fmt::format("element face {}\nproperty list uchar int vertex_indices\n", data.triangles.size()));
+  }
+  if (!data.edges.empty()) {
+    out.write(
+        fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size()));
+    if (colored) out.write("property uchar red\nproperty uchar green\nproperty uchar blue\n");
+  }
+  out.write("end_header\n");
+  for (std::size_t row = 0; row < data.vertex_count; ++row) {
+    for (const auto& column : data.columns) {
+      std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
+    }
+  }
+  for (const auto& triangle : data.triangles) {
+    out.put(std::uint8_t{3});
+    out.put(triangle);
+  }
+  for (std::size_t i = 0; i < data.edges.size(); ++i) {
+    out.put(data.edges[i]);
+    if (colored) out.put(data.edge_colors[i]);
+  }
+  return out.commit();
+}
+
+}  // namespace plumbline::cloud

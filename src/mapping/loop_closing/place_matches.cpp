@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loop_closing/place_matches.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+
+#include "plumbline/core/clones.hpp"
+#include "plumbline/features/descriptor.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using features::Descriptor256;
+using features::FrameFeatures;
+
+constexpr std::uint32_t kMaxHamming = 72;
+constexpr double kRatio = 0.95;
+constexpr unsigned kIndexBits =
+    20;  // distance and index in one number: the least is the nearest, the first of them
+
+/// Distances of one descriptor to all others.
+#if defined(__x86_64__)
+__attribute__((target_clones("popcnt", "default")))
+#endif
+void distances_to(const Descriptor256& one, const Descriptor256* others, std::size_t count, std::uint32_t* to) {
+  for (std::size_t j = 0; j < count; ++j) {
+    std::uint32_t sum = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      sum += static_cast<std::uint32_t>(__builtin_popcountll(one[k] ^ others[j][k]));
+    }
+    to[j] = sum;
+  }
+}
+
+/// The nearest of a row, and of each column what is nearest so far.
+PLUMBLINE_CLONES std::uint32_t take_nearest(const std::uint32_t* distances, std::uint32_t count,
+                                            std::uint32_t row, std::uint32_t* nearest) {
+  std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
+  for (std::uint32_t j = 0; j < count; ++j) {
+    const std::uint32_t shifted = distances[j] << kIndexBits;
+    least = std::min(least, shifted | j);
+    nearest[j] = std::min(nearest[j], shifted | row);
+  }
+  return least;
+}
+
+std::size_t index_of(std::uint32_t key) { return key & ((1U << kIndexBits) - 1U); }
+
+/// Whether nothing at another place of the picture is nearly as near as `best`.
+bool clearly_nearest(const FrameFeatures& picture, const std::uint32_t* distances, std::size_t step,
+                     std::size_t best) {
+  const double limit = distances[best * step] / kRatio;
+  for (std::size_t j = 0; j < picture.descriptors.size(); ++j) {
+    if (distances[j * step] < limit && (picture.points[j].pixel - picture.points[best].pixel).norm() > 5.0F) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeatures& a,
+                                                                 const FrameFeatures& b) {
+  const std::size_t rows = a.descriptors.size();
+  const std::size_t columns = b.descriptors.size();
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  if (rows == 0 || columns == 0) return pairs;
+  if (std::max(rows, columns) >> kIndexBits != 0) throw std::length_error("alike_both_ways: too many points");
+  std::vector<std::uint32_t> table(rows * columns);
+  std::vector<std::uint32_t> nearest_in_b(rows);
+  std::vector<std::uint32_t> nearest_in_a(columns, std::numeric_limits<std::uint32_t>::max());
+  for (std::size_t i = 0; i < rows; ++i) {
+    std::uint32_t* row = table.data() + i * columns;
+    distances_to(a.descriptors[i], b.descriptors.data(), columns, row);
+    nearest_in_b[i] = take_nearest(row, static_cast<std::uint32_t>(columns), static_cast<std::uint32_t>(i),
+                                   nearest_in_a.data());
+  }
+  for (std::size_t i = 0; i < rows; ++i) {
+    const std::size_t j = index_of(nearest_in_b[i]);
+    if (index_of(nearest_in_a[j]) != i || nearest_in_b[i] >> kIndexBits > kMaxHamming) continue;
+    if (clearly_nearest(b, table.data() + i * columns, 1, j) &&
+        clearly_nearest(a, table.data() + j, columns, i)) {
+      pairs.emplace_back(i, j);
+    }
+  }
+  return pairs;
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/graph.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+#include <system_error>
+
+#include "graph/graph_parts.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+using core::ConfigNode;
+using core::ConfigProblems;
+using Kind = ConfigNode::Kind;
+
+/// A stage's own checks know the stage's place only; a problem of one of its keys is told where that stands.
+void check_stage(Draft& draft, const CheckContext& context, ConfigProblems& problems) {
+  ConfigProblems told;
+  draft.node.stage->check(context, draft.mark, draft.path, told);
+  for (core::ConfigProblem& problem : told) {
+    const std::string prefix = draft.path + ".";
+    if (problem.path.compare(0, prefix.size(), prefix) == 0) {
+      const std::string key = problem.path.substr(prefix.size());
+      const ConfigNode* value = draft.body->find(key);
+      if (std::find(draft.set.begin(), draft.set.end(), key) != draft.set.end()) {
+        problem.mark = {"--set", 0, 0};
+        problem.path = draft.node.name + "." + key;
+      } else if (value != nullptr) {
+        problem.mark = value->mark;
+      }
+    }
+    problems.push_back(std::move(problem));
+  }
+}
+
+void read_description(const ConfigNode& root, Graph& graph, ConfigProblems& problems) {
+  const ConfigNode* text = root.find("description");
+  if (text == nullptr) return;
+  if (text->kind != Kind::kScalar) problems.push_back({text->mark, "description", "must be a text"});
+  graph.description = text->scalar;
+}
+
+void assemble(const std::vector<std::size_t>& order, Drafts& drafts, Graph& graph) {
+  std::map<std::size_t, std::size_t> place;  // draft -> node
+  for (const std::size_t d : order) {
+    place[d] = graph.nodes.size();
+    graph.nodes.push_back(std::move(drafts[d].node));
+    for (auto& input : graph.nodes.back().inputs) {
+      if (input) input->node = place.at(input->node);
+    }
+  }
+}
+
+core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesystem::path& file,
+                                const StageRegistry& registry, const std::filesystem::path& pipelines_folder,
+                                const std::vector<std::string>& overrides, ConfigProblems problems) {
+  const auto refuse = [&] { return tl::unexpected<core::Error>(core::to_error(problems)); };
+  if (!own) return refuse();
+  const auto root = with_includes(std::move(*own), file, pipelines_folder, problems);
+  if (!root) return refuse();
+  Graph graph;
+  read_description(*root, graph, problems);
+  Drafts drafts = read_stages(*root, registry, problems);
+  connect(drafts, problems);
+  add_taps(*root, registry, drafts, problems);
+  apply_overrides(overrides, drafts, problems, graph.warnings);
+  const CheckContext context{file.parent_path(), pipelines_folder, &registry.filters()};
+  for (Draft& draft : drafts) {
+    if (draft.node.stage) check_stage(draft, context, problems);
+  }
+  const std::vector<std::size_t> order = checked_order(drafts, problems);
+  check_files(drafts, problems);
+  if (!problems.empty()) return refuse();
+  assemble(order, drafts, graph);
+  return graph;
+}
+
+/// "stage.port" that an input reads from.
+std::string port_name(const Graph& graph, const OutputRef& from) {
+  const Node& giver = graph.nodes[from.node];
+  return giver.name + "." + giver.type->outputs[from.port].name;
+}
+
+/// "key: value", lists of maps with a line for each.
+std::string option_as_yaml(const Node& node, const std::string& key) {
+  const std::string value = node.options.value(key);
+  const auto tree = core::parse_yaml(value, key);
+  if (!tree || tree->kind != Kind::kSequence || tree->items.empty() || tree->items[0].kind != Kind::kMap) {
+    return fmt::format("    {}: {}\n", key, value);
+  }
+  std::string text = fmt::format("    {}:\n", key);
+  for (const ConfigNode& item : tree->items) text += fmt::format("      - {}\n", core::to_flow_yaml(item));
+  return text;
+}
+
+std::string stage_as_yaml(const Graph& graph, const Node& node) {
+  std::string text = fmt::format("  {}:\n    type: {}\n", node.name, node.type->name);
+  std::vector<std::string> inputs;
+  for (std::size_t i = 0; i < node.inputs.size(); ++i) {
+    if (!node.inputs[i]) continue;
+    inputs.push_back(fmt::format("{}: {}", node.type->inputs[i].name, port_name(graph, *node.inputs[i])));
+  }
+  if (!inputs.empty()) text += fmt::format("    inputs: {{{}}}\n", fmt::join(inputs, ", "));
+  for (const core::OptionSpec& spec : node.options.specs()) {
+    text += option_as_yaml(node, spec.key);
+  }
+  return text;
+}
+
+std::string tap_as_yaml(const Graph& graph, const Node& node) {
+  std::string text = fmt::format("  - port: {}\n", port_name(graph, *node.inputs[0]));
+  for (const core::OptionSpec& spec : node.options.specs()) {
+    text += option_as_yaml(node, spec.key);
+  }
+  return text;
+}
+
+}  // namespace
+
+const Node& Graph::source() const {
+  for (const Node& node : nodes) {
+    if (node.type->is_source()) return node;
+  }
+  throw std::logic_error("a checked graph has a source");
+}
+
+std::size_t Graph::stage_count() const {
+  return static_cast<std::size_t>(
+      std::count_if(nodes.begin(), nodes.end(), [](const Node& node) { return !node.tap; }));
+}
+
+core::Result<Graph> load_graph(const std::filesystem::path& file, const StageRegistry& registry,
+                               const std::filesystem::path& pipelines_folder,
+                               const std::vector<std::string>& overrides) {
+  ConfigProblems problems;
+  auto root = core::read_yaml(file, problems);
+  return build_graph(std::move(root), file, registry, pipelines_folder, overrides, std::move(problems));
+}
+
+core::Result<Graph> parse_graph(const std::string& yaml, const std::filesystem::path& file,
+                                const StageRegistry& registry, const std::filesystem::path& pipelines_folder,
+                                const std::vector<std::string>& overrides) {
+  ConfigProblems problems;
+  auto root = core::parse_yaml(yaml, file.string(), problems);
+  return build_graph(std::move(root), file, registry, pipelines_folder, overrides, std::move(problems));
+}
+
+std::string to_yaml(const Graph& graph) {
+  std::string text;
+  if (!graph.description.empty()) {
+    ConfigNode description;
+    description.kind = Kind::kScalar;
+    description.quoted = true;
+    description.scalar = graph.description;
+    std::replace(description.scalar.begin(), description.scalar.end(), '\n', ' ');
+    text += fmt::format("description: {}\n", core::to_flow_yaml(description));
+  }
+  text += "stages:\n";
+  std::string taps;
+  for (const Node& node : graph.nodes) {
+    (node.tap ? taps : text) += node.tap ? tap_as_yaml(graph, node) : stage_as_yaml(graph, node);
+  }
+  return taps.empty() ? text : text + "taps:\n" + taps;
+}
+
+std::vector<std::string> pipeline_names(const std::filesystem::path& pipelines_folder) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(pipelines_folder, ignored)) {
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+core::Result<std::filesystem::path> find_pipeline(const std::string& name_or_file,
+                                                  const std::filesystem::path& pipelines_folder) {
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(name_or_file, ignored)) return std::filesystem::path(name_or_file);
+  for (const char* ending : {"", ".yaml"}) {
+    const std::filesystem::path shipped = pipelines_folder / (name_or_file + ending);
+    if (std::filesystem::is_regular_file(shipped, ignored)) return shipped;
+  }
+  return core::usage_error(fmt::format("{}: no such pipeline file, and no shipped pipeline has that name{}",
+                                       name_or_file,
+                                       core::hint(name_or_file, pipeline_names(pipelines_folder))));
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// "--set stage.key=value".
+#include <fmt/format.h>
+
+#include <array>
+#include <string>
+#include <utility>
+
+#include "graph/command_line.hpp"
+#include "graph/graph_parts.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+using core::ConfigMark;
+using core::ConfigNode;
+using core::ConfigProblems;
+
+const ConfigMark kCommandLine{kCommandLineFile, 0, 0};
+
+void place_on_command_line(ConfigNode& node) {
+  node.mark = kCommandLine;
+  for (ConfigNode& item : node.items) place_on_command_line(item);
+  for (auto& [key, value] : node.entries) place_on_command_line(value);
+  for (ConfigMark& mark : node.key_marks) mark = kCommandLine;
+}
+
+/// What an option of a stage that went is called now; else as it is.
+std::string renamed(const std::string& text, std::vector<std::string>& warnings) {
+  constexpr std::array<std::pair<const char*, const char*>, 5> kRenamed{{{"robots.merge.", "merge."},
+                                                                         {"robots.online", "merge.online"},
+                                                                         {"robots.", "track."},
+                                                                         {"maps.", "merge."},
+                                                                         {"keep.", "store."}}};
+  for (const auto& [before, now] : kRenamed) {
+    if (text.rfind(before, 0) != 0) continue;
+    std::string result = now + text.substr(std::string(before).size());
+    warnings.push_back(fmt::format("--set {}: is called {} now", text.substr(0, text.find('=')),
+                                   result.substr(0, result.find('='))));
+    return result;
+  }
+  return text;
+}
+
+void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
+  const auto refuse = [&](const std::string& path, std::string what) {
+    problems.push_back({kCommandLine, path, std::move(what)});
+  };
+  const std::size_t equals = text.find('=');
+  const std::size_t dot = text.find('.');
+  if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals) {
+    return refuse(text, "write it as stage.key=value, e.g. --set track.points=off");
+  }
+  const std::string path = text.substr(0, equals);
+  const std::string stage = text.substr(0, dot);
+  const std::string key = text.substr(dot + 1, equals - dot - 1);
+  auto value = core::parse_yaml(text.substr(equals + 1), path);
+  if (!value) return refuse(path, "the value is not valid YAML");
+  if (equals + 1 == text.size()) value->kind = ConfigNode::Kind::kScalar;  // "stage.key=" is the empty text
+  place_on_command_line(*value);
+  const std::size_t target = find_draft(drafts, stage);
+  if (target == drafts.size()) {
+    return refuse(path, fmt::format("there is no stage '{}'{}", stage, core::hint(stage, names_of(drafts))));
+  }
+  if (key == "type" || key == "inputs") {
+    return refuse(path, "only options can be set; change the graph in a pipeline file");
+  }
+  if (drafts[target].node.type == nullptr) return;  // told already
+  drafts[target].node.options.set(key, *value, stage, problems);
+  drafts[target].set.push_back(key);
+}
+
+}  // namespace
+
+void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, ConfigProblems& problems,
+                     std::vector<std::string>& warnings) {
+  for (const std::string& text : texts) apply(renamed(text, warnings), drafts, problems);
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Taps: "taps: [{port: fuse.cloud, file: raw.ply}]" become stages that only write.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "graph/graph_parts.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+using core::ConfigNode;
+using core::ConfigProblems;
+using Kind = ConfigNode::Kind;
+
+/// The port that "stage" or "stage.port" means; none: told.
+std::optional<OutputRef> find_port(const Drafts& drafts, const ConfigNode& port, const std::string& path,
+                                   ConfigProblems& problems) {
+  const auto refuse = [&](std::string what) {
+    problems.push_back({port.mark, path + ".port", std::move(what)});
+    return std::nullopt;
+  };
+  const std::size_t dot = port.scalar.find('.');
+  const std::string name = port.scalar.substr(0, dot);
+  const std::size_t giver = find_draft(drafts, name);
+  if (giver == drafts.size()) {
+    return refuse(
+        fmt::format("there is no stage '{}'{}", name.substr(0, 40), core::hint(name, names_of(drafts))));
+  }
+  const StageType* type = drafts[giver].node.type;
+  if (type == nullptr) return std::nullopt;  // told already
+  std::vector<std::string> ports;
+  for (const Port& p : type->outputs) ports.push_back(p.name);
+  if (ports.empty()) return refuse(fmt::format("'{}' gives nothing that could be written", name));
+  if (dot == std::string::npos && ports.size() == 1) return OutputRef{giver, 0};
+  const std::string wanted = dot == std::string::npos ? "" : port.scalar.substr(dot + 1);
+  const auto found = std::find(ports.begin(), ports.end(), wanted);
+  if (found != ports.end()) return OutputRef{giver, static_cast<std::size_t>(found - ports.begin())};
+  if (dot == std::string::npos) {
+    return refuse(fmt::format("'{}' has several ports; write one of {}.{}", name, name,
+                              fmt::join(ports, fmt::format(", {}.", name))));
+  }
+  return refuse(fmt::format("'{}' has no port '{}'{}", name, wanted, core::hint(wanted, ports)));
+}
+
+}  // namespace
+
+void add_taps(const ConfigNode& root, const StageRegistry& registry, Drafts& drafts,
+              ConfigProblems& problems) {
+  const ConfigNode* taps = root.find("taps");
+  if (taps == nullptr || taps->kind != Kind::kSequence) return;
+  for (std::size_t i = 0; i < taps->items.size(); ++i) {
+    const ConfigNode& entry = taps->items[i];
+    const std::string path = fmt::format("taps[{}]", i);
+    const ConfigNode* port = entry.find("port");
+    if (entry.kind != Kind::kMap || port == nullptr || port->kind != Kind::kScalar) {
+      problems.push_back({port != nullptr ? port->mark : entry.mark, path,
+                          "must name a port, e.g. {port: fuse.cloud, file: cloud.ply}"});
+      continue;
+    }
+    const auto from = find_port(drafts, *port, path, problems);
+    if (!from) continue;
+    const StageType& giver = *drafts[from->node].node.type;
+    Draft draft;
+    draft.node.name = fmt::format("tap:{}.{}", drafts[from->node].node.name, giver.outputs[from->port].name);
+    draft.node.tap = true;
+    draft.node.type = registry.find_tap(giver.outputs[from->port].type);
+    draft.node.inputs = {from};
+    draft.mark = entry.mark;
+    draft.path = path;
+    draft.body = &entry;
+    draft.reads_from = {from->node};
+    if (draft.node.type == nullptr) {
+      problems.push_back({port->mark, path + ".port",
+                          fmt::format("a {} cannot be written", giver.outputs[from->port].type.name)});
+      continue;
+    }
+    draft.node.stage = draft.node.type->make();
+    draft.node.stage->declare(draft.node.options);
+    draft.node.options.set_all(entry, path, problems, {"port"});
+    drafts.push_back(std::move(draft));
+  }
+}
+
+}  // namespace plumbline::pipeline

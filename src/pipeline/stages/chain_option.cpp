@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stages/chain_option.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "graph/command_line.hpp"
+#include "plumbline/pipeline/summary.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+using core::ConfigNode;
+using Kind = ConfigNode::Kind;
+
+/// The list as the tree that a chain's file would hold; the stage's name is the chain's.
+ConfigNode as_chain(const ConfigNode& list, const std::string& path) {
+  ConfigNode name;
+  name.kind = Kind::kScalar;
+  name.mark = list.mark;
+  name.scalar = path.substr(path.rfind('.') + 1);
+  ConfigNode chain;
+  chain.kind = Kind::kMap;
+  chain.mark = list.mark;
+  chain.entries = {{"chain", std::move(name)}, {"filters", list}};
+  chain.key_marks = {list.mark, list.mark};
+  return chain;
+}
+
+}  // namespace
+
+ChainOption::ChainOption(const std::string& file) {
+  value_.kind = file.empty() ? Kind::kSequence : Kind::kScalar;
+  value_.scalar = file;
+}
+
+void ChainOption::check(const CheckContext& context, const std::string& path,
+                        core::ConfigProblems& problems) {
+  const std::size_t before = problems.size();
+  if (value_.kind == Kind::kSequence) {
+    chain_ = cloud::FilterChain::parse(as_chain(value_, path), path, *context.filters, problems);
+  } else if (!value_.scalar.empty()) {
+    const std::filesystem::path file = context.find(value_.scalar, value_.mark);
+    if (file.empty()) {
+      problems.push_back({value_.mark, path + ".filters",
+                          fmt::format("{}: no such file {} or among the shipped ones", value_.scalar,
+                                      value_.mark.file == kCommandLineFile ? "here, beside the pipeline"
+                                                                           : "beside the pipeline")});
+      return;
+    }
+    const auto tree = core::read_yaml(file, problems);
+    if (tree) chain_ = cloud::FilterChain::parse(*tree, "", *context.filters, problems);
+  }
+  if (problems.size() != before) return;
+  if (auto fit = chain_.ready(); !fit)
+    problems.push_back({value_.mark, path + ".filters", fit.error().message});
+  const core::ConfigMark mark = value_.mark;
+  auto spelt_out = core::parse_yaml(chain_.to_yaml(), "");
+  const ConfigNode* list = spelt_out ? spelt_out->find("filters") : nullptr;
+  if (list != nullptr) value_ = *list;
+  value_.mark = mark;
+}
+
+std::vector<std::string> ChainOption::files() const {
+  std::vector<std::string> files;
+  for (const std::string& file : chain_.writes()) files.push_back(std::filesystem::absolute(file).string());
+  return files;
+}
+
+void add_left_out(const std::vector<cloud::FilterReport>& reports, RunSummary& summary) {
+  for (const cloud::FilterReport& report : reports) {
+    const std::size_t points = report.points_in - std::min(report.points_in, report.points_out);
+    summary.left_out_of_map.push_back({report.type, points});
+  }
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stages/debug_video.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/dataset/image_io.hpp"
+#include "plumbline/tracking/overlay.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string picture_name(std::size_t number) { return fmt::format("{:06}.png", number); }
+
+bool is_picture_name(const std::string& name) {
+  const std::size_t dot = name.find('.');
+  return dot != std::string::npos && dot >= 6 && name.substr(dot) == ".png" &&
+         std::all_of(name.begin(), name.begin() + static_cast<std::ptrdiff_t>(dot),
+                     [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// Whether a folder holds debug pictures and nothing else.
+bool is_debug_folder(const fs::path& folder) {
+  std::error_code ec;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ec)) {
+    if (!entry.is_regular_file(ec) || !is_picture_name(entry.path().filename().string())) return false;
+  }
+  return !ec;
+}
+
+fs::path resolved(const fs::path& path) {
+  std::error_code ec;
+  const fs::path result = fs::weakly_canonical(fs::absolute(path), ec);
+  return ec ? fs::absolute(path).lexically_normal() : result;
+}
+
+/// `path` as seen from `folder` when it lies in it ("." is the folder itself), else empty.
+fs::path inside(const fs::path& folder, const fs::path& path) {
+  fs::path relative = resolved(path / ".").lexically_relative(resolved(folder / "."));
+  if (!relative.empty() && *relative.begin() == "..") relative.clear();
+  return relative;
+}
+
+}  // namespace
+
+core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs::path& out,
+                                               const fs::path& out_path, bool replace) {
+  DebugFolder result;
+  if (!inside(folder, out).empty()) {
+    return core::usage_error(
+        fmt::format("{}: holds the result folder {}; debug pictures need a folder of their own",
+                    folder.string(), out.string()));
+  }
+  const fs::path relative = inside(out, folder);
+  if (relative.empty()) {
+    auto own = OutputFolder::prepare(folder, replace, is_debug_folder);
+    if (!own) return tl::unexpected<core::Error>(own.error());
+    result.path_ = own->path();
+    result.own_.emplace(std::move(*own));
+    return result;
+  }
+  result.path_ = out_path / relative;
+  std::error_code ec;
+  fs::create_directories(result.path_, ec);
+  if (ec) return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  return result;
+}
+
+core::Result<void> write_debug_picture(const fs::path& folder, std::size_t number,
+                                       const sensor::RgbdFrame& frame,
+                                       const features::FrameFeatures& features, const mapping::Slam& slam,
+                                       const mapping::FrameReport& report, const sensor::Pinhole& camera) {
+  sensor::RgbdFrame shown = frame;
+  shown.index = static_cast<std::int64_t>(number);  // as in frames.csv
+  tracking::TrackResult track = slam.last_track();
+  // A keyframe has moved with the landmarks when the map was adjusted to it.
+  if (report.keyframe.valid()) track.camera_from_world = slam.map().camera_from_world(report.keyframe);
+  const cv::Mat picture = tracking::draw_overlay(shown, features, track, slam.map(), camera);
+  constexpr int kQuick = 1;
+  const auto png = dataset::encode_png(picture, kQuick);
+  if (!png) return tl::unexpected<core::Error>(png.error());
+  core::OutputFile file(folder / picture_name(number));
+  file.write(png->data(), png->size());
+  return file.commit();
+}
+
+}  // namespace plumbline::pipeline

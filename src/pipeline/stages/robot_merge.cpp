@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stages/robot_merge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace plumbline::pipeline {
+namespace {
+
+std::vector<mapping::MapPart> maps_of(const std::vector<RobotMap>& parts) {
+  std::vector<mapping::MapPart> maps;
+  for (const RobotMap& part : parts) {
+    mapping::MapPart& map = maps.emplace_back();
+    map.map = part.map.get();
+    for (const RobotInfo& robot : part.robots) map.cameras[robot.number] = robot.camera.color;
+  }
+  return maps;
+}
+
+/// The first part of the group that has most keyframes.
+std::size_t largest_group(const std::vector<RobotMap>& parts, const std::vector<std::size_t>& group) {
+  std::vector<std::size_t> keyframes(parts.size(), 0);
+  for (std::size_t p = 0; p < parts.size(); ++p) keyframes[group[p]] += parts[p].map->keyframe_count();
+  return static_cast<std::size_t>(std::max_element(keyframes.begin(), keyframes.end()) - keyframes.begin());
+}
+
+void tell(const RunSummary::Merge& merge, core::Log& log) {
+  const mapping::MergeEvidence& e = merge.evidence;
+  const std::string tried =
+      fmt::format("{} pairs of keyframes look alike, {} were tried, {} show the same place", e.candidates,
+                  e.tried, e.verified);
+  if (e.accepted) {
+    log.info(fmt::format("{} and {} overlap: {}; {} keyframes agree to {:.0f} mm ({} points and lines)",
+                         merge.a, merge.b, tried, e.agreeing, 1e3 * e.spread_m, e.inliers));
+  } else {
+    log.info(fmt::format("{} and {} are not merged: {}: {}", merge.a, merge.b, e.refused, tried));
+  }
+}
+
+std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::size_t>& used,
+                     const std::vector<RunSummary::Merge>& merges) {
+  std::string names;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (std::binary_search(used.begin(), used.end(), p)) continue;
+    names += (names.empty() ? "" : ", ") + parts[p].name;
+  }
+  if (names.empty()) return {};
+  std::string text = fmt::format("{} of {} maps do not connect and are left out: {}",
+                                 parts.size() - used.size(), parts.size(), names);
+  for (const RunSummary::Merge& merge : merges) {
+    const mapping::MergeEvidence& e = merge.evidence;
+    if (e.accepted) continue;
+    text += fmt::format("; {} with {}: {} ({} look-alikes, {} tried, {} verified)", merge.b, merge.a,
+                        e.refused, e.candidates, e.tried, e.verified);
+  }
+  return text;
+}
+
+}  // namespace
+
+MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
+                          const mapping::MapFusionOptions& options, const core::Executor& executor,
+                          core::Log& log) {
+  const std::vector<mapping::MapPart> maps = maps_of(parts);
+  mapping::OverlapFinder places = mapping::learn_places(maps, options);
+  std::vector<mapping::MergeEvidence> evidence =
+      mapping::find_overlaps(maps, places.look_at_all(maps, executor), options, executor);
+  if (anchor >= parts.size()) {
+    anchor = largest_group(parts, mapping::connected_parts(parts.size(), evidence));
+  }
+  mapping::FusedMap fused = mapping::fuse_maps(maps, evidence, anchor, options);
+  MergedRobots result;
+  for (mapping::MergeEvidence& merge : evidence) {
+    const std::string& a = parts[merge.a].name;
+    const std::string& b = parts[merge.b].name;
+    result.merges.push_back({a, b, -1.0, std::move(merge)});
+    tell(result.merges.back(), log);
+  }
+  result.unconnected = left_out(parts, fused.parts, result.merges);
+  auto map = std::make_shared<MapResult>();
+  map->map = std::make_shared<maps::Map>(std::move(fused.map));
+  for (const std::size_t p : fused.parts) {
+    map->robots.insert(map->robots.end(), parts[p].robots.begin(), parts[p].robots.end());
+    map->frame_poses.insert(map->frame_poses.end(), parts[p].frame_poses.begin(), parts[p].frame_poses.end());
+  }
+  take_poses_from_map(*map);
+  log.debug(
+      fmt::format("fused {} maps: {} pairs of keyframes, {} taken for wrong; {} points and {} lines were "
+                  "doubles",
+                  fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
+  result.refused = static_cast<std::size_t>(fused.refused);
+  if (fused.refused > 0) log.warning("merge: maps are laid into one frame, but not bent: " + fused.refusal);
+  result.map = map;
+  return result;
+}
+
+}  // namespace plumbline::pipeline

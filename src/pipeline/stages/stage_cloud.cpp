@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cloud: the filtered cloud of every keyframe.
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <utility>
+#include <vector>
+
+#include "stages/chain_option.hpp"
+#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/cloud/free_space.hpp"
+#include "plumbline/cloud/keyframe_cloud.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "stages/stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+/// Points that were measured, and those that each step left out; frames may be counted side by side.
+class LeftOut {
+ public:
+  void start(std::size_t filters) { by_filter_ = std::vector<std::atomic<std::size_t>>(filters); }
+  void count_measured(const cv::Mat& depth, const cloud::KeyframeCloudOptions& options) {
+    const auto least = static_cast<float>(options.min_depth_m);
+    const auto most = static_cast<float>(options.max_depth_m);
+    std::size_t measured = 0;
+    std::size_t within = 0;
+    for (int v = 0; v < depth.rows; v += options.stride_px) {
+      const float* row = depth.ptr<float>(v);
+      for (int u = 0; u < depth.cols; u += options.stride_px) {
+        measured += row[u] > 0.0F ? 1U : 0U;
+        within += row[u] >= least && row[u] <= most ? 1U : 0U;
+      }
+    }
+    measured_ += measured;
+    by_depth_ += measured - within;
+  }
+  void count_filtered(const std::vector<cloud::FilterReport>& reports) {
+    for (std::size_t i = 0; i < std::min(reports.size(), by_filter_.size()); ++i) {
+      const cloud::FilterReport& report = reports[i];
+      by_filter_[i] += report.points_in - std::min(report.points_in, report.points_out);
+    }
+  }
+  void tell(const cloud::FilterChain& chain, RunSummary& summary) const {
+    summary.measured_points = measured_;
+    summary.left_out = {{"depth_limits", by_depth_}};
+    const std::vector<std::string> types = chain.types();
+    for (std::size_t i = 0; i < by_filter_.size(); ++i) summary.left_out.push_back({types[i], by_filter_[i]});
+  }
+
+ private:
+  std::atomic<std::size_t> measured_{0};
+  std::atomic<std::size_t> by_depth_{0};
+  std::vector<std::atomic<std::size_t>> by_filter_;
+};
+
+class CloudStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    options_.declare(table);
+    table.integer(
+        "between", between_, {0, 100000}, "",
+        "Every so many frames, and at the end, one that is no keyframe gives a cloud as well; 0: none");
+    table.integer("looks", looks_, {0, 100000}, "",
+                  "Every so many frames one that gives no cloud is kept as what it sees through; 0: none");
+    filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
+  }
+  void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
+             core::ConfigProblems& problems) override {
+    filters_.check(context, path, problems);
+  }
+  [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
+  core::Result<void> start(const RunContext& context) override {
+    recordings_ = context.recordings;
+    left_out_.start(filters_.chain().size());
+    return {};
+  }
+
+  core::Result<void> process(StageIo& io) override {
+    const auto track = io.input<TrackedFrame>("track");
+    const std::int32_t robot = recordings_->robot_of(io.frame());
+    const std::size_t number = recordings_->frame_of(io.frame());
+    const std::size_t frames = recordings_->frames_of(robot);
+    // The last frame shows what no other does when the camera was on its way somewhere.
+    const bool between =
+        between_ > 0 && (number % static_cast<std::size_t>(between_) == 0 || number + 1 == frames);
+    const bool gives_cloud = track->keyframe.valid() || between;
+    const bool looks = looks_ > 0 && number % static_cast<std::size_t>(looks_) == 0;
+    if (!gives_cloud && !looks) return {};
+    const auto frame = io.input<sensor::RgbdFrame>("frame");
+    const sensor::Pinhole& camera = recordings_->robot(robot).camera.color;
+    core::Result<cloud::CloudPtr> made =
+        gives_cloud ? filtered(*frame, camera, track->keyframe)
+                    : cloud::depth_look(*frame, camera, options_.min_depth_m, options_.max_depth_m);
+    if (!made) return tl::unexpected<core::Error>(made.error());
+    cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
+    auto result = std::make_shared<KeyframeCloud>();
+    result->id = track->keyframe;
+    result->stamp = track->stamp;
+    result->robot = robot;
+    result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**made));
+    if (result->id.valid()) {
+      result->surface = std::make_shared<maps::StoredSurface>(
+          maps::StoredSurface{kSurfaceVoxel_m, mapping::coarse_surface(**made, kSurfaceVoxel_m)});
+    }
+    result->cloud = std::move(*made);
+    io.output<KeyframeCloud>("cloud", result);
+    return {};
+  }
+  void summarise(RunSummary& summary) const override { left_out_.tell(filters_.chain(), summary); }
+
+ private:
+  core::Result<cloud::CloudPtr> filtered(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,
+                                         core::KeyframeId keyframe) {
+    cloud::FilterContext context;
+    context.viewpoint = Eigen::Vector3f::Zero();
+    context.run = std::to_string(keyframe.index);
+    std::vector<cloud::FilterReport> reports;
+    auto cloud = filters_.chain().apply(cloud::organised_cloud(frame, camera, options_), context, &reports);
+    left_out_.count_measured(frame.depth, options_);
+    left_out_.count_filtered(reports);
+    return cloud;
+  }
+
+  cloud::KeyframeCloudOptions options_;
+  int between_ = 10;
+  int looks_ = 3;
+  ChainOption filters_{"filters/keyframe.yaml"};
+  LeftOut left_out_;
+  const RobotRecordings* recordings_ = nullptr;
+};
+
+}  // namespace
+
+StageType cloud_stage() {
+  return {"cloud",
+          "Turns a keyframe's depth into a filtered cloud with colour and normals",
+          Mode::kStateless,
+          {{"frame", frame_port()}, {"track", track_port()}},
+          {{"cloud", keyframe_cloud_port()}},
+          [] { return std::make_unique<CloudStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// filter: a chain of filters on the merged cloud.
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "stages/chain_option.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "stages/stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class FilterStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    filters_.declare(table, "Filter chain: a file, or the filters themselves");
+  }
+  void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,
+             core::ConfigProblems& problems) override {
+    filters_.check(context, path, problems);
+  }
+  [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
+  core::Result<void> start(const RunContext& context) override {
+    context_ = &context;
+    return {};
+  }
+  core::Result<void> process(StageIo& /*io*/) override { return {}; }  // its input comes at the end
+
+  core::Result<void> finish(StageIo& io) override {
+    const auto input = io.input<DenseCloud>("cloud");
+    cloud::FilterContext context;
+    context.executor = context_->executor;
+    context.spacing_m = input->voxel_m;
+    auto dense = std::make_shared<DenseCloud>();
+    context.columns = &input->columns;
+    context.made_columns = &dense->columns;
+    auto filtered = filters_.chain().apply(input->cloud, context, &reports_);
+    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!reports_.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
+    dense->cloud = std::move(*filtered);
+    dense->voxel_m = input->voxel_m;
+    dense->output_from_map = input->output_from_map;
+    dense->upright = input->upright;
+    points_ = dense->cloud->size();
+    io.output<DenseCloud>("cloud", dense);
+    return {};
+  }
+  void summarise(RunSummary& summary) const override {
+    add_left_out(reports_, summary);
+    summary.cloud_points = points_;
+  }
+
+ private:
+  ChainOption filters_{""};
+  const RunContext* context_ = nullptr;
+  std::size_t points_ = 0;
+  std::vector<cloud::FilterReport> reports_;
+};
+
+}  // namespace
+
+StageType filter_stage() {
+  return {"filter",
+          "Runs a filter chain on the merged cloud",
+          Mode::kSerial,
+          {{"cloud", cloud_port()}},
+          {{"cloud", cloud_port()}},
+          [] { return std::make_unique<FilterStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// maps: finished maps of robots; their clouds come one after another.
+#include <memory>
+#include <utility>
+
+#include "plumbline/pipeline/stored_maps.hpp"
+#include "stages/stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class MapsStage : public Stage {
+ public:
+  core::Result<void> start(const RunContext& context) override {
+    maps_ = context.stored_maps;
+    if (maps_ == nullptr) {
+      return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
+    }
+    return {};
+  }
+  [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
+
+  /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
+  core::Result<void> process(StageIo& io) override {
+    const StoredCloud& stored = maps_->clouds()[io.frame()];
+    auto result = std::make_shared<KeyframeCloud>();
+    result->id = stored.id;
+    result->stamp = stored.stamp;
+    result->robot = stored.robot;
+    result->stored = [maps = maps_, index = io.frame()] { return maps->cloud_bytes(index); };
+    if (stored.id.valid()) {
+      if (auto read = read_surface(io.frame(), *result); !read) {
+        return tl::unexpected<core::Error>(maps_->damaged(stored.robot, read.error()));
+      }
+    }
+    io.output<KeyframeCloud>("cloud", result);
+    return {};
+  }
+
+  core::Result<void> finish(StageIo& io) override {
+    auto result = std::make_shared<RobotMaps>();
+    for (const StoredPart& part : maps_->parts()) {
+      result->maps.push_back({part.name, part.robots, std::make_shared<maps::Map>(part.map), part.frames});
+    }
+    io.output<RobotMaps>("maps", result);
+    return {};
+  }
+
+ private:
+  /// As it was kept with the map, if it was.
+  core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
+    const auto kept = maps_->surface_bytes(index);
+    if (!kept) return tl::unexpected<core::Error>(kept.error());
+    if (kept->empty()) return {};
+    auto surface = maps::unpack_surface(*kept);
+    if (!surface) return tl::unexpected<core::Error>(surface.error());
+    result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
+    return {};
+  }
+
+  const StoredMaps* maps_ = nullptr;
+};
+
+}  // namespace
+
+StageType maps_stage() {
+  return {"maps",
+          "Reads finished maps of robots, with the clouds that are stored with them",
+          Mode::kStateless,
+          {},
+          {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}},
+          [] { return std::make_unique<MapsStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// output: the files of the result folder.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <system_error>
+#include <vector>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/line_export.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "plumbline/viz/snapshot.hpp"
+#include "stages/stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+const std::vector<viz::View> kViews{viz::View::kIso,  viz::View::kTop,  viz::View::kBottom, viz::View::kFront,
+                                    viz::View::kBack, viz::View::kLeft, viz::View::kRight};
+
+class OutputStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    table.boolean("ply", ply_, "Write map.ply");
+    table.boolean("pcd", pcd_, "Write map.pcd");
+    table.integer("levels", levels_, {0, 6}, "",
+                  "Coarser clouds for viewing in levels/, each of twice the voxel size of the one before");
+    table.boolean("lines", lines_, "Write lines.ply, the 3D line landmarks");
+    table.text("views", views_,
+               "Pictures in snapshots/: any of iso top bottom front back left right; empty: none");
+    table.integer("width", width_px_, {64, 8192}, "px", "Width of the pictures");
+    table.integer("height", height_px_, {64, 8192}, "px", "Height of the pictures");
+  }
+
+  void check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
+             core::ConfigProblems& problems) override {
+    std::istringstream words(views_);
+    std::vector<std::string> names;
+    for (const viz::View view : kViews) names.push_back(viz::view_name(view));
+    for (std::string word; words >> word;) {
+      const auto found = std::find(names.begin(), names.end(), word);
+      if (found != names.end()) {
+        chosen_.push_back(kViews[static_cast<std::size_t>(found - names.begin())]);
+        continue;
+      }
+      problems.push_back(
+          {mark, path + ".views", fmt::format("there is no view '{}'{}", word, core::hint(word, names))});
+    }
+  }
+
+  [[nodiscard]] std::vector<std::string> files() const override {
+    std::vector<std::string> files{"trajectory.txt", "keyframes.txt", "frames.csv"};
+    if (ply_) files.emplace_back("map.ply");
+    if (pcd_) files.emplace_back("map.pcd");
+    if (lines_) files.emplace_back("lines.ply");
+    if (levels_ > 0) files.emplace_back("levels/map_*mm.ply");
+    for (const viz::View view : chosen_) files.push_back("snapshots/" + viz::view_name(view) + ".png");
+    return files;
+  }
+
+  core::Result<void> start(const RunContext& context) override {
+    context_ = &context;
+    return {};
+  }
+  core::Result<void> process(StageIo& /*io*/) override { return {}; }  // all its inputs come at the end
+
+  core::Result<void> finish(StageIo& io) override {
+    const auto dense = io.input<DenseCloud>("cloud");
+    const auto given = io.input<MapResult>("map");
+    if (given->map != nullptr) path_ = maps::check_path(given->frame_poses, *given->map);
+    const MapResult map = moved(*given, dense->output_from_map);
+    const std::filesystem::path& folder = context_->output_folder;
+    const cloud::CloudColumns& columns = dense->columns;
+    const core::Result<void> nothing;
+    const std::vector<std::function<core::Result<void>()>> steps{
+        [&] { return ply_ ? cloud::write_ply(folder / "map.ply", *dense->cloud, columns) : nothing; },
+        [&] { return pcd_ ? cloud::write_pcd(folder / "map.pcd", *dense->cloud, columns) : nothing; },
+        [&] { return write_levels(folder / "levels", *dense); },
+        [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
+        [&] { return write_trajectories(folder, map, dense->output_from_map); },
+        [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
+    };
+    std::vector<core::Result<void>> written(steps.size());
+    context_->executor->parallel_for(steps.size(), [&](std::size_t i) { written[i] = steps[i](); });
+    for (const auto& one : written) {
+      if (!one) return one;
+    }
+    return write_snapshots(folder / "snapshots", map, *dense);
+  }
+
+  void summarise(RunSummary& summary) const override { summary.path.check = path_; }
+
+ private:
+  /// Poses and lines in the output's frame.
+  static MapResult moved(MapResult map, const geometry::Rigid3& output_from_map) {
+    for (geometry::StampedPose& pose : map.trajectory) {
+      pose.world_from_camera = output_from_map * pose.world_from_camera;
+    }
+    for (KeyframePose& keyframe : map.keyframes) {
+      keyframe.world_from_camera = output_from_map * keyframe.world_from_camera;
+    }
+    for (auto& [start, end] : map.lines) {
+      start = output_from_map * start;
+      end = output_from_map * end;
+    }
+    return map;
+  }
+
+  static core::Result<void> make_folder(const std::filesystem::path& folder) {
+    std::error_code ec;
+    std::filesystem::create_directories(folder, ec);
+    if (!ec) return {};
+    return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  }
+
+  core::Result<void> write_levels(const std::filesystem::path& folder, const DenseCloud& dense) const {
+    if (levels_ == 0) return {};
+    if (auto made = make_folder(folder); !made) return made;
+    double voxel_m = dense.voxel_m;
+    for (int level = 0; level < levels_; ++level) {
+      voxel_m *= 2.0;
+      const cloud::FusedCloud coarse = cloud::coarser(*dense.cloud, dense.columns, voxel_m);
+      const std::string name = fmt::format("map_{:g}mm.ply", std::round(1e6 * voxel_m) / 1e3);
+      if (auto written = cloud::write_ply(folder / name, *coarse.cloud, coarse.columns); !written)
+        return written;
+    }
+    return {};
+  }
+
+  static geometry::Trajectory keyframe_trajectory(const MapResult& map, std::optional<std::int32_t> robot) {
+    geometry::Trajectory poses;
+    for (const KeyframePose& keyframe : map.keyframes) {
+      if (!robot || keyframe.id.robot == *robot)
+        poses.push_back({keyframe.stamp, keyframe.world_from_camera});
+    }
+    return poses;
+  }
+
+  /// Several robots: each in its own folder.
+  static core::Result<void> write_trajectories(const std::filesystem::path& folder, const MapResult& map,
+                                               const geometry::Rigid3& output_from_map) {
+    if (map.robots.size() < 2) {
+      auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory);
+      return written ? dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(map, {}))
+                     : written;
+    }
+    for (const RobotInfo& robot : map.robots) {
+      const std::filesystem::path own = folder / "robots" / robot.name;
+      if (auto made = make_folder(own); !made) return made;
+      geometry::Trajectory poses = trajectory_of(map, robot.number);
+      for (geometry::StampedPose& pose : poses)
+        pose.world_from_camera = output_from_map * pose.world_from_camera;
+      auto written = dataset::write_trajectory(own / "trajectory.txt", poses);
+      if (!written) return written;
+      written = dataset::write_trajectory(own / "keyframes.txt", keyframe_trajectory(map, robot.number));
+      if (!written) return written;
+    }
+    return {};
+  }
+
+  /// One line for every frame of the run, the unreadable ones too.
+  static core::Result<void> write_frames(const std::filesystem::path& file, const MapResult& map,
+                                         std::size_t frames) {
+    const auto commas = std::count(map.frame_columns.begin(), map.frame_columns.end(), ',');
+    const std::string nothing(static_cast<std::size_t>(commas), ',');
+    core::OutputFile out(file);
+    out.write("frame,state," + map.frame_columns + "\n");
+    auto row = map.frames.begin();
+    for (std::size_t f = 0; f < frames; ++f) {
+      if (row != map.frames.end() && row->frame == f) {
+        out.write(fmt::format("{},{},{}\n", f, row->state, row->columns));
+        ++row;
+      } else {
+        out.write(fmt::format("{},unreadable,{}\n", f, nothing));
+      }
+    }
+    return out.commit();
+  }
+
+  core::Result<void> write_snapshots(const std::filesystem::path& folder, const MapResult& map,
+                                     const DenseCloud& dense) const {
+    if (chosen_.empty()) return {};
+    if (auto made = make_folder(folder); !made) return made;
+    viz::Scene scene;
+    scene.cloud = dense.cloud;
+    scene.title = context_->source->name();
+    if (map.robots.size() < 2) {
+      viz::CameraPath path;
+      path.trajectory = map.trajectory;
+      scene.paths.push_back(std::move(path));
+    }
+    add_robots(map, dense, scene);
+    for (const viz::View view : chosen_) {
+      if (map.robots.size() > 1 && !dense.columns.robot.empty()) {
+        if (auto drawn = draw(folder / ("robots_" + viz::view_name(view) + ".png"), view,
+                              viz::ColorMode::kRobot, scene, dense);
+            !drawn) {
+          return drawn;
+        }
+      }
+      auto drawn = draw(folder / (viz::view_name(view) + ".png"), view, viz::ColorMode::kRgb, scene, dense);
+      if (!drawn) return drawn;
+    }
+    return {};
+  }
+
+  /// Paths of several robots, and who saw which point.
+  static void add_robots(const MapResult& map, const DenseCloud& dense, viz::Scene& scene) {
+    if (map.robots.size() < 2) return;
+    for (const RobotInfo& robot : map.robots) {
+      const auto number = static_cast<std::size_t>(robot.number);
+      viz::CameraPath path;
+      path.name = robot.name;
+      path.color = viz::category_color(number);
+      path.trajectory = trajectory_of(map, robot.number);
+      for (geometry::StampedPose& pose : path.trajectory) {
+        pose.world_from_camera = dense.output_from_map * pose.world_from_camera;
+      }
+      scene.paths.push_back(std::move(path));
+      if (scene.robot_names.size() <= number) scene.robot_names.resize(number + 1);
+      scene.robot_names[number] = robot.name;
+    }
+    scene.scalars.assign(dense.columns.robot.begin(), dense.columns.robot.end());
+  }
+
+  core::Result<void> draw(const std::filesystem::path& file, viz::View view, viz::ColorMode color,
+                          const viz::Scene& scene, const DenseCloud& dense) const {
+    viz::SnapshotOptions options;
+    options.view = view;
+    options.color = color;
+    if (dense.upright) options.up = Eigen::Vector3d::UnitZ();
+    options.width_px = width_px_;
+    options.height_px = height_px_;
+    return viz::render_snapshot(scene, options, file);
+  }
+
+  bool ply_ = true;
+  bool pcd_ = true;
+  int levels_ = 0;
+  bool lines_ = true;
+  std::string views_ = "iso top front";
+  int width_px_ = 1600;
+  int height_px_ = 1200;
+  std::vector<viz::View> chosen_;
+  const RunContext* context_ = nullptr;
+  maps::PathCheck path_;
+};
+
+}  // namespace
+
+StageType output_stage() {
+  return {"output",
+          "Writes the result folder: clouds, trajectories, lines, tables and pictures",
+          Mode::kSerial,
+          {{"map", map_port()}, {"cloud", cloud_port()}},
+          {},
+          [] { return std::make_unique<OutputStage>(); },
+          true};
+}
+
+}  // namespace plumbline::pipeline

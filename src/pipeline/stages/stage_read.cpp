@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// read: frames of the recording, decoded and rectified.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <utility>
+
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "run/resumed_run.hpp"
+#include "stages/stages.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+constexpr std::size_t kToldOneByOne = 5;
+
+class ReadStage : public Stage {
+ public:
+  core::Result<void> start(const RunContext& context) override {
+    source_ = context.source;
+    log_ = context.log;
+    if (source_ == nullptr || source_->size() == 0) return core::input_error("the recording has no frames");
+    if (context.resumed != nullptr) {
+      resumed_ = context.resumed->rows.size();
+      read_ = resumed_;
+      unreadable_ = context.resumed->frames - resumed_;
+    }
+    return {};
+  }
+  [[nodiscard]] std::size_t frames() const override { return source_->size(); }
+
+  /// A frame that cannot be read is skipped: what comes after it need not suffer.
+  core::Result<void> process(StageIo& io) override {
+    auto frame = source_->read(io.frame());
+    if (!frame) {
+      const std::size_t told = unreadable_++;
+      const std::string text = fmt::format("frame {} is skipped: {}", io.frame(), frame.error().message);
+      if (told < kToldOneByOne) {
+        log_->warning(text);
+      } else {
+        log_->debug(text);
+      }
+      return {};
+    }
+    ++read_;
+    io.output<sensor::RgbdFrame>("frame", std::make_shared<sensor::RgbdFrame>(std::move(*frame)));
+    return {};
+  }
+
+  core::Result<void> finish(StageIo& io) override {
+    if (io.frame() == 0)
+      return core::input_error("stopped before the first frame was mapped; nothing is written");
+    if (unreadable_ > kToldOneByOne) {
+      log_->warning(
+          fmt::format("{} of {} frames could not be read and were skipped", unreadable_.load(), io.frame()));
+    }
+    if (read_ == 0) {
+      return core::input_error(fmt::format("{}: none of {} frames could be read; see the warnings above",
+                                           source_->name(), io.frame()));
+    }
+    return {};
+  }
+
+  void summarise(RunSummary& summary) const override {
+    summary.frames.read = read_;
+    summary.frames.resumed = resumed_;
+    summary.frames.unreadable = unreadable_;
+  }
+
+ private:
+  const dataset::FrameSource* source_ = nullptr;
+  core::Log* log_ = nullptr;
+  std::size_t resumed_ = 0;
+  std::atomic<std::size_t> read_{0};
+  std::atomic<std::size_t> unreadable_{0};
+};
+
+}  // namespace
+
+StageType read_stage() {
+  return {"read",
+          "Reads the recording: decodes, undistorts and registers colour and depth",
+          Mode::kStateless,
+          {},
+          {{"frame", frame_port()}},
+          [] { return std::make_unique<ReadStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

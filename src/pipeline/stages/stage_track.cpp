@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// track: the SLAM of each robot, frame by frame: poses, keyframes, landmarks.
+#include <fmt/format.h>
+
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "stages/debug_video.hpp"
+#include "plumbline/mapping/slam.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/summary.hpp"
+#include "run/resumed_run.hpp"
+#include "stages/stages.hpp"
+#include "stages/track_rows.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class TrackStage : public Stage {
+ public:
+  void declare(core::OptionTable& table) override { options_.declare(table); }
+
+  core::Result<void> start(const RunContext& context) override {
+    context_ = &context;
+    recordings_ = context.recordings;
+    for (const RobotInfo& robot : recordings_->robots()) {
+      slams_.push_back(std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
+                                                       *context.executor, *context.log));
+      slams_.back()->set_shutter(robot.camera.readout_s);
+    }
+    moments_.resize(slams_.size());
+    if (context.resumed != nullptr) {
+      slams_.front()->restore(context.resumed->map.map, context.resumed->map.frames);
+      moments_.front() = slams_.front()->map().now();
+      rows_ = context.resumed->rows;
+    }
+    return {};
+  }
+
+  core::Result<void> process(StageIo& io) override {
+    const auto frame = io.input<sensor::RgbdFrame>("frame");
+    const auto features = io.input<features::FrameFeatures>("features");
+    const RobotInfo& robot = recordings_->robot(recordings_->robot_of(io.frame()));
+    const auto number = static_cast<std::size_t>(robot.number);
+    mapping::Slam& slam = *slams_[number];
+    const std::size_t poses = slam.frame_poses().size();
+    const mapping::FrameReport report = slam.process(*frame, features);
+    rows_.push_back({io.frame(), tracking::to_string(report.state),
+                     several() ? robot.name + "," + row_columns(report) : row_columns(report)});
+    note_times(io.frame(), report.bundle);
+    auto tracked = std::make_shared<TrackedFrame>();
+    tracked->keyframe = report.keyframe;
+    tracked->stamp = report.stamp;
+    tracked->depth_from_camera = report.depth_from_camera;
+    tracked->row = rows_.back();
+    if (slam.frame_poses().size() > poses) tracked->pose = slam.frame_poses().back();
+    if (report.keyframe.valid()) {
+      if (several()) tracked->map = std::make_shared<maps::Map>(slam.map());
+      if (context_->keep_changes) {
+        tracked->changes = std::make_shared<maps::MapChanges>(slam.map().changes_since(moments_[number]));
+        moments_[number] = slam.map().now();
+      }
+    }
+    io.output<TrackedFrame>("track", tracked);
+    if (context_->debug_folder.empty()) return {};
+    return write_debug_picture(context_->debug_folder, io.frame(), *frame, *features, slam, report,
+                               robot.camera.color);
+  }
+
+  core::Result<void> finish(StageIo& io) override {
+    auto result = std::make_shared<RobotMaps>();
+    for (const RobotInfo& robot : recordings_->robots()) {
+      mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
+      slam.finish();
+      if (several() && slam.map().keyframe_count() == 0) {
+        return core::input_error(
+            fmt::format("{}: no frame could begin a map; leave this recording out", robot.name));
+      }
+      auto map = std::make_shared<maps::Map>(slam.map());
+      if (context_->alter_map) context_->alter_map(*map);
+      result->maps.push_back({robot.name, {robot}, std::move(map), slam.frame_poses()});
+    }
+    result->frame_columns = several() ? std::string("robot,") + kRowColumns : kRowColumns;
+    result->frames = rows_;
+    io.output<RobotMaps>("maps", result);
+    return {};
+  }
+
+  void summarise(RunSummary& summary) const override {
+    count_frames(rows_, summary);
+    for (const RobotInfo& robot : recordings_->robots()) {
+      const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
+      const mapping::LoopCounts& loops = slam.loop_counts();
+      summary.loops.candidates += static_cast<std::size_t>(loops.candidates);
+      summary.loops.verified += static_cast<std::size_t>(loops.verified);
+      summary.loops.accepted += static_cast<std::size_t>(loops.accepted);
+      summary.loops.rejected += static_cast<std::size_t>(loops.rejected);
+      const auto& trials = slam.loop_trials();
+      summary.loops.trials.insert(summary.loops.trials.end(), trials.begin(), trials.end());
+      summary.path.refused += static_cast<std::size_t>(slam.refused());
+      if (several()) summary.robots.push_back({robot.name, slam.map().keyframe_count()});
+    }
+    summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
+    summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
+  }
+
+ private:
+  [[nodiscard]] bool several() const { return slams_.size() > 1; }
+  void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
+    if (!bundle.keyframe.valid()) return;
+    bundle_wait_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
+    bundle_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
+    bundle_wait_ms_.back() = static_cast<float>(bundle.wait_ms);
+    bundle_ms_.back() = static_cast<float>(bundle.solve_ms);
+  }
+
+  const RunContext* context_ = nullptr;
+  const RobotRecordings* recordings_ = nullptr;
+  mapping::SlamOptions options_;
+  std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
+  std::vector<maps::MapMoment> moments_;  ///< by robot, of its map, up to which changes were told
+  std::vector<FrameRow> rows_;
+  std::vector<float> bundle_wait_ms_;  ///< by frame; NaN: no bundle was put back
+  std::vector<float> bundle_ms_;
+};
+
+}  // namespace
+
+StageType track_stage() {
+  return {"track",
+          "Tracks each robot's camera with points, lines and depth, and keeps its map of keyframes and "
+          "landmarks",
+          Mode::kSerial,
+          {{"frame", frame_port()}, {"features", features_port()}},
+          {{"track", track_port()}, {"maps", maps_port()}},
+          [] { return std::make_unique<TrackStage>(); }};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tap of features: a table a frame.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "plumbline/core/output_file.hpp"
+#include "stages/stages.hpp"
+#include "taps/tap_file.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+class FeaturesTap : public Stage {
+ public:
+  void declare(core::OptionTable& table) override {
+    file_.declare(table);
+    table.integer("every", every_, {1, 100000}, "", "Every n-th frame");
+  }
+  void check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
+             core::ConfigProblems& problems) override {
+    file_.check(mark, path, problems);
+  }
+  [[nodiscard]] std::vector<std::string> files() const override { return {file_.name()}; }
+  core::Result<void> start(const RunContext& context) override { return file_.start(context); }
+
+  core::Result<void> process(StageIo& io) override {
+    if (io.frame() % static_cast<std::size_t>(every_) != 0) return {};
+    const auto features = io.input<features::FrameFeatures>("in");
+    core::OutputFile out(file_.path(io.frame()));
+    out.write(
+        "kind,x_px,y_px,end_x_px,end_y_px,depth_m,octave,angle_deg,response,"
+        "start_x_m,start_y_m,start_z_m,end_x_m,end_y_m,end_z_m\n");
+    for (const features::PointFeature& p : features->points) {
+      const std::string depth = p.depth > 0.0F ? fmt::format("{:.4f}", p.depth) : "";
+      out.write(fmt::format("point,{:.2f},{:.2f},,,{},{},{:.2f},{:.6g},,,,,,\n", p.pixel.x(), p.pixel.y(),
+                            depth, p.octave, p.angle, p.response));
+    }
+    for (const features::LineFeature& line : features->lines) {
+      const features::LineSegment& s = line.segment;
+      out.write(fmt::format("line,{:.2f},{:.2f},{:.2f},{:.2f},,,,{:.6g},", s.start.x(), s.start.y(),
+                            s.end.x(), s.end.y(), s.response));
+      if (line.line3) {
+        const Eigen::Vector3d& a = line.line3->start;
+        const Eigen::Vector3d& b = line.line3->end;
+        out.write(fmt::format("{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n", a.x(), a.y(), a.z(), b.x(),
+                              b.y(), b.z()));
+      } else {
+        out.write(",,,,,\n");
+      }
+    }
+    return out.commit();
+  }
+
+ private:
+  TapFile file_{TapFile::Count::kMany, {".csv"}};
+  int every_ = 1;
+};
+
+}  // namespace
+
+StageType features_tap() {
+  return {
+      "features",
+      "Points and lines of a frame, one a line: pixels, depth, and the 3D ends (camera frame) of lines that "
+      "have them",
+      Mode::kStateless,
+      {{"in", features_port()}},
+      {},
+      [] { return std::make_unique<FeaturesTap>(); },
+      true};
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/synth/recording.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/core/version.hpp"
+#include "plumbline/dataset/image_io.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "recording/reference.hpp"
+
+namespace plumbline::synth {
+
+namespace {
+
+namespace fs = std::filesystem;
+using core::Result;
+
+Result<void> make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    return core::output_error(fmt::format("{}: cannot be made ({})", folder.string(), error.message()));
+  return {};
+}
+
+std::string write_png(const fs::path& file, const cv::Mat& image) {
+  constexpr int kQuick = 1;
+  const auto bytes = dataset::encode_png(image, kQuick);
+  if (!bytes) return bytes.error().message;
+  const auto done = core::write_file(file, {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+  return done ? "" : done.error().message;
+}
+
+std::string color_name(const dataset::PairInfo& info) { return fmt::format("rgb/{:.6f}.png", info.stamp); }
+std::string depth_name(const dataset::PairInfo& info) {
+  return fmt::format("depth/{:.6f}.png", info.depth_stamp);
+}
+
+/// Writes one pair; "" or what went wrong.
+std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
+  const auto frame = source.read(index);
+  if (!frame) return frame.error().message;
+  const dataset::PairInfo info = source.info(index);
+  cv::Mat raw;
+  frame->depth.convertTo(raw, CV_16U, source.camera().depth_scale);
+  const std::string problem = write_png(folder / color_name(info), frame->color);
+  return problem.empty() ? write_png(folder / depth_name(info), raw) : problem;
+}
+
+/// Lists, truth and camera of the first `frames` pairs.
+Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs::path& folder) {
+  std::string color = "# timestamp filename\n", depth = color, pairs;
+  geometry::Trajectory truth;
+  for (std::size_t i = 0; i < frames; ++i) {
+    const dataset::PairInfo info = source.info(i);
+    color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
+    depth += fmt::format("{:.6f} {}\n", info.depth_stamp, depth_name(info));
+    pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
+                         depth_name(info));
+    truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
+    if (info.depth_stamp != info.stamp)
+      truth.push_back({info.depth_stamp, source.world_from_camera(info.depth_stamp)});
+  }
+  std::sort(truth.begin(), truth.end(),
+            [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
+  if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
+  if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
+  if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
+  if (auto ok = core::write_file(folder / "camera.yaml", sensor::to_yaml(source.camera())); !ok) return ok;
+  return dataset::write_trajectory(folder / "groundtruth.txt", truth);
+}
+
+/// What one robot's recording takes along.
+struct Job {
+  const SynthSource& source;
+  fs::path folder;
+  std::size_t done_before;  ///< frames of the robots before
+  std::size_t all_frames;
+};
+
+/// Returns how many frames were written; fewer than there are when asked to stop.
+Result<std::size_t> write_frames(const Job& job, const core::Executor& executor, const core::StopToken& stop,
+                                 const Progress& progress) {
+  for (const char* sub : {"rgb", "depth"}) {
+    if (auto ok = make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
+  }
+  const std::size_t batch = static_cast<std::size_t>(executor.threads()) * 4;
+  std::size_t done = 0;
+  while (done < job.source.size() && !stop.stop_requested()) {
+    const std::size_t count = std::min(batch, job.source.size() - done);
+    std::vector<std::string> problems(count);
+    executor.parallel_for(count,
+                          [&](std::size_t i) { problems[i] = write_pair(job.source, done + i, job.folder); });
+    for (const std::string& problem : problems) {
+      if (!problem.empty()) return core::output_error(problem);
+    }
+    done += count;
+    if (progress) progress(job.done_before + done, job.all_frames);
+  }
+  if (auto ok = write_lists(job.source, done, job.folder); !ok)
+    return tl::unexpected<core::Error>(ok.error());
+  return done;
+}
+
+nlohmann::json describe_robot(const SynthSource& source, const std::string& folder,
+                              const std::string& path_name, std::size_t frames) {
+  const auto first = source.info(0), last = source.info(source.size() - 1);
+  const geometry::Rigid3 start = source.world_from_camera(first.stamp);
+  const Eigen::Quaterniond q = start.quaternion();
+  const Eigen::Vector3d& t = start.translation;
+  return {
+      {"folder", folder},
+      {"path", path_name},
+      {"frames", frames},
+      {"path_m", source.path_length()},
+      {"first_stamp", first.stamp},
+      {"last_stamp", last.stamp},
+      {"start", {{"position_m", {t.x(), t.y(), t.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
+}
+
+nlohmann::json describe_options(const SynthOptions& o) {
+  return {{"frames", o.frames},
+          {"robots", o.robots},
+          {"walkers", o.walkers},
+          {"texture", to_string(o.texture)},
+          {"sensor", to_string(o.sensor)},
+          {"motion", to_string(o.motion)},
+          {"seed", o.seed},
+          {"width", o.width},
+          {"height", o.height},
+          {"fps", o.fps},
+          {"speed", o.speed},
+          {"readout", o.readout_s},
+          {"visible_range", o.visible_range},
+          {"events", o.events}};
+}
+
+std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
+
+Result<void> check_free(const fs::path& output) {
+  for (const fs::path& file : {output / "scene.json", output / folder_name(0)}) {
+    if (fs::exists(file)) {
+      return core::output_error(
+          fmt::format("{}: exists already; choose another folder or remove it", file.string()));
+    }
+  }
+  return {};
+}
+
+Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr<const World>& world) {
+  std::vector<std::unique_ptr<SynthSource>> sources;
+  for (int i = 0; i < world->options.robots; ++i) {
+    auto source = SynthSource::create(world, i);
+    if (!source) return tl::unexpected<core::Error>(source.error());
+    sources.push_back(std::move(*source));
+  }
+  return sources;
+}
+
+}  // namespace
+
+Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options, const fs::path& output,
+                                      const core::Executor& executor, const core::StopToken& stop,
+                                      core::Log& log, const Progress& progress) {
+  const auto fail = [](const core::Error& e) { return tl::unexpected<core::Error>(e); };
+  if (auto ok = check_free(output); !ok) return fail(ok.error());
+  auto world = build_world(scene, options, executor);
+  if (!world) return fail(world.error());
+  auto sources = open_all(*world);
+  if (!sources) return fail(sources.error());
+  if (auto ok = make_folder(output); !ok) return fail(ok.error());
+
+  WriteSummary summary;
+  summary.robots = options.robots;
+  std::size_t all_frames = 0;
+  for (const auto& source : *sources) all_frames += source->size();
+  const auto start = std::chrono::steady_clock::now();
+  nlohmann::json robots = nlohmann::json::array();
+  for (int i = 0; i < options.robots && !stop.stop_requested(); ++i) {
+    const SynthSource& source = *(*sources)[static_cast<std::size_t>(i)];
+    const auto written =
+        write_frames({source, output / folder_name(i), summary.frames, all_frames}, executor, stop, progress);
+    if (!written) return fail(written.error());
+    summary.frames += *written;
+    summary.path_m += source.path_length();
+    robots.push_back(describe_robot(source, folder_name(i),
+                                    scene.robots[static_cast<std::size_t>(i) % scene.robots.size()].name,
+                                    *written));
+  }
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  summary.reference_spacing_m =
+      options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
+  if (!stop.stop_requested()) {
+    Visibility visibility(*world, summary.reference_spacing_m);
+    for (const auto& source : *sources) visibility.add(*source, executor, stop);
+    const auto counts =
+        write_reference(output / "reference.ply", **world, visibility, summary.reference_spacing_m, executor);
+    if (!counts) return fail(counts.error());
+    summary.reference_samples = counts->samples;
+    summary.reference_visible = counts->visible;
+  }
+  summary.stopped = stop.stop_requested();
+  const nlohmann::json json = {{"scene", scene.name},
+                               {"scene_file", scene.file.filename().string()},
+                               {"description", scene.description},
+                               {"version", core::version()},
+                               {"options", describe_options(options)},
+                               {"robots", robots},
+                               {"reference",
+                                {{"file", "reference.ply"},
+                                 {"spacing_m", summary.reference_spacing_m},
+                                 {"samples", summary.reference_samples},
+                                 {"visible", summary.reference_visible}}},
+                               {"complete", !summary.stopped}};
+  if (auto ok = core::write_file(output / "scene.json", json.dump(2) + "\n"); !ok) return fail(ok.error());
+  log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
+                       scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
+                       summary.reference_visible));
+  return summary;
+}
+
+}  // namespace plumbline::synth

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/synth/source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "render/depth_sensor.hpp"
+#include "render/path.hpp"
+#include "scene/random.hpp"
+#include "render/render.hpp"
+
+namespace plumbline::synth {
+
+using Eigen::Vector3d;
+using geometry::Rigid3;
+
+sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
+  sensor::Camera camera;
+  camera.name = fmt::format("synth_{}", to_string(sensor));
+  const double s = std::min(width / 640.0, height / 480.0);
+  const bool wide = sensor == Sensor::kRealsense;  // its colour camera is wider in focus: 69 degrees across
+  camera.color = {width,
+                  height,
+                  (wide ? 462.0 : 535.4) * s,
+                  (wide ? 462.0 : 539.2) * s,
+                  0.5 * width + 0.1 * s,
+                  0.5 * height + 7.6 * s};
+  if (sensor == Sensor::kIdeal) camera.color.fx = camera.color.fy = 525.0 * s;
+  if (sensor == Sensor::kIdeal) camera.color.cx = 0.5 * (width - 1);
+  if (sensor != Sensor::kKinect) camera.color.cy = 0.5 * (height - 1);
+  camera.depth_scale = 5000.0;
+  camera.fps = fps;
+  camera.readout_s = 0.0;
+  return camera;
+}
+
+/// Of one frame, seconds.
+struct Stamps {
+  std::int64_t number;  ///< of the frame before any were dropped; the noise's counter
+  double color, depth;
+};
+
+namespace {
+
+constexpr double kFirstStamp = 100.0;  // seconds; stamps of 0 look like missing ones
+
+/// Whole microseconds: what six decimals in a file can say.
+double whole_us(double t) { return std::round(t * 1e6) / 1e6; }
+
+std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>& events, std::size_t frames,
+                                std::uint64_t seed) {
+  Rng rng(seed, 0x57a3);
+  const bool ideal = o.sensor == Sensor::kIdeal;
+  const double offset = ideal ? 0.0 : rng.uniform(0.002, 0.006) * (rng.uniform() < 0.5 ? -1.0 : 1.0);
+  std::vector<Stamps> out;
+  for (std::size_t i = 0; i < frames; ++i) {
+    const double t = static_cast<double>(i) / o.fps;
+    const double jitter = ideal ? 0.0 : rng.uniform(-0.0012, 0.0012),
+                 other = ideal ? 0.0 : rng.uniform(-0.0006, 0.0006);
+    bool dropped = false;
+    for (const Event& e : events) dropped = dropped || (e.kind == EventKind::kDrop && e.active(t));
+    const double stamp = whole_us(kFirstStamp + t + jitter);
+    if (!dropped) out.push_back({static_cast<std::int64_t>(i), stamp, whole_us(stamp + offset + other)});
+  }
+  return out;
+}
+
+}  // namespace
+
+struct SynthSource::Impl {
+  std::shared_ptr<const World> world;
+  int robot = 0;
+  std::string name;
+  std::string format = "synth";
+  sensor::Camera camera;
+  std::uint64_t seed = 0;
+  std::unique_ptr<CameraPath> path;
+  std::vector<Stamps> frames;
+  NoiseTiles tiles;
+  std::vector<float> gains;  ///< automatic exposure, every kGainStep frames
+  static constexpr int kGainStep = 10;
+
+  [[nodiscard]] Rigid3 pose(double stamp) const { return path->world_from_camera(stamp - kFirstStamp); }
+  [[nodiscard]] double event(EventKind kind, double stamp) const {
+    for (const Event& e : world->events) {
+      if (e.kind == kind && e.active(stamp - kFirstStamp)) return e.value;
+    }
+    return 0.0;
+  }
+  [[nodiscard]] core::Result<void> check_way() const;
+  void set_exposure();
+  [[nodiscard]] float gain(std::int64_t number) const;
+  [[nodiscard]] cv::Mat3b color(const Stamps& at) const;
+  [[nodiscard]] cv::Mat3b rolling(const Stamps& at, const Exposure& exposure) const;
+  [[nodiscard]] cv::Mat2f flow(const View& view, const Stamps& at, double extra_px) const;
+};
+
+/// Every step from frame to frame must be free, and must not start inside something.
+core::Result<void> SynthSource::Impl::check_way() const {
+  const RobotPath& robot_path =
+      world->scene.robots[static_cast<std::size_t>(robot) % world->scene.robots.size()];
+  const auto complain = [&](const Vector3d& p, double t, const Hit& hit, const char* how) {
+    const std::size_t k = path->waypoint_at(t), n = robot_path.waypoints.size();
+    const Object& thing =
+        world->scene
+            .objects[static_cast<std::size_t>(world->scene.faces[static_cast<std::size_t>(hit.face)].object)];
+    const core::ConfigMark& mark = robot_path.waypoints[k].mark;
+    return core::usage_error(
+        fmt::format("{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, "
+                    "{:.2f}); move a waypoint "
+                    "or the thing",
+                    mark.file, mark.line, robot_path.name, how, thing.name, thing.mark.line, k, (k + 1) % n,
+                    p.x(), p.y(), p.z()));
+  };
+  const double end = frames.back().color - kFirstStamp;
+  const Vector3d first = path->world_from_camera(0.0).translation;
+  const Vector3d up = Vector3d(0.0123, 0.0211, 1.0).normalized();
+  if (const Hit hit = world->cast(first, up, 1e4); hit.face >= 0 && !hit.front) {
+    return complain(first, 0.0, hit, "starts inside");
+  }
+  Vector3d at = first;
+  const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
+  for (double t = 0.02; t <= once; t += 0.02) {
+    const Vector3d to = path->world_from_camera(t).translation;
+    const Vector3d step = to - at;
+    const double length = step.norm();
+    if (length > 1e-7) {
+      // 5 cm of room in front of the camera body
+      const Hit hit = world->cast(at, step / length, length + 0.05);
+      if (hit.face >= 0) return complain(to, t, hit, "goes through");
+    }
+    at = to;
+  }
+  return {};
+}
+
+void SynthSource::Impl::set_exposure() {
+  const sensor::Camera small = make_camera(world->options.sensor, 64, 48, world->options.fps);
+  const auto last = static_cast<std::size_t>(frames.back().number) / kGainStep + 2;
+  float level = 0.0F;
+  for (std::size_t i = 0; i < last; ++i) {
+    const double t = static_cast<double>(i * kGainStep) / world->options.fps;
+    const float now =
+        std::max(0.02F, mean_level(*world, look(*world, small.color, path->world_from_camera(t))));
+    level = i == 0 ? now : level + 0.25F * (now - level);
+    gains.push_back(std::clamp(0.68F / level, 0.35F, 3.0F));
+  }
+}
+
+float SynthSource::Impl::gain(std::int64_t number) const {
+  const auto k = static_cast<std::size_t>(number / kGainStep);
+  const float s = static_cast<float>(number % kGainStep) / static_cast<float>(kGainStep);
+  return gains[k] + s * (gains[k + 1] - gains[k]);
+}
+
+/// Pixels that things move during the exposure, on a grid 8 times coarser than the picture.
+cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double extra_px) const {
+  constexpr double kExposure = 0.010;
+  const Rigid3 later = pose(at.color + 0.5 * kExposure).inverse(),
+               sooner = pose(at.color - 0.5 * kExposure).inverse();
+  const int w = (view.ids.cols + 7) / 8, h = (view.ids.rows + 7) / 8;
+  cv::Mat2f out(h, w);
+  const double angle = Rng(seed, 0xb1 + static_cast<std::uint64_t>(at.number / 15)).uniform(0.0, 2.0 * M_PI);
+  for (int j = 0; j < h; ++j) {
+    for (int i = 0; i < w; ++i) {
+      const int x = std::min(8 * i + 4, view.ids.cols - 1), y = std::min(8 * j + 4, view.ids.rows - 1);
+      double z = 3.0;
+      if (const int id = view.ids(y, x); id >= 0) {
+        const FaceView& f = view.faces[static_cast<std::size_t>(id)];
+        z = 1.0 /
+            static_cast<double>(f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
+      }
+      const Vector3d p = view.world_from_camera * view.camera.unproject(x, y, z);
+      const Eigen::Vector2d d = view.camera.project(later * p) - view.camera.project(sooner * p);
+      out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)),
+                   static_cast<float>(d.y() + extra_px * std::sin(angle))};
+    }
+  }
+  return out;
+}
+
+/// A few rows at a time, each from where the camera was when they were read out.
+cv::Mat3b SynthSource::Impl::rolling(const Stamps& at, const Exposure& exposure) const {
+  constexpr int kRows = 8;
+  cv::Mat3b image(camera.color.height, camera.color.width);
+  for (int first = 0; first < image.rows; first += kRows) {
+    sensor::Pinhole strip = camera.color;
+    strip.height = std::min(kRows, image.rows - first);
+    strip.cy -= first;
+    const double middle = (first + 0.5 * strip.height) / image.rows - 0.5;
+    const double stamp = at.color + middle * world->options.readout_s;
+    View view = look(*world, strip, pose(stamp), stamp - kFirstStamp);
+    view.first_row = first;
+    view.picture_rows = image.rows;
+    shade(*world, view, exposure).copyTo(image.rowRange(first, first + strip.height));
+  }
+  return image;
+}
+
+cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
+  const Sensor sensor = world->options.sensor;
+  const View view = look(*world, camera.color, pose(at.color), at.color - kFirstStamp);
+  const bool real = sensor != Sensor::kIdeal;
+  Exposure exposure{gain(at.number), real ? 0.18F : 0.0F};
+  if (event(EventKind::kLampOff, at.color) != 0.0) exposure.gain *= 0.08F;
+  if (event(EventKind::kCover, at.color) != 0.0) exposure.gain *= 0.004F;
+  if (event(EventKind::kWhiteout, at.color) != 0.0) exposure.gain *= 60.0F;
+  cv::Mat3b image = world->options.readout_s > 0.0 ? rolling(at, exposure) : shade(*world, view, exposure);
+  const double blur = event(EventKind::kBlur, at.color);
+  if (real) {
+    cv::GaussianBlur(image, image, {3, 3}, 0.6);  // lens and mosaic
+    image = motion_blur(image, flow(view, at, blur));
+  } else if (blur > 0.0) {
+    image = motion_blur(image, flow(view, at, blur));
+  }
+  const float noise_gain = event(EventKind::kLampOff, at.color) != 0.0 ? 3.0F : exposure.gain;
+  add_color_noise(image, sensor, noise_gain, tiles, {seed, at.number});
+  return image;
+}
+
+SynthSource::SynthSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SynthSource::~SynthSource() = default;
+
+/// Everything that needs no picture: motion, stamps, and the check of the way.
+core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_ptr<const World> world,
+                                                                   int robot) {
+  const SynthOptions& o = world->options;
+  if (auto ok = check(o); !ok) return tl::unexpected<core::Error>(ok.error());
+  if (robot < 0 || robot >= o.robots) {
+    return core::usage_error(
+        fmt::format("robot {} of {}: robots count from 0 to {}", robot, o.robots, o.robots - 1));
+  }
+  const auto paths = world->scene.robots.size();
+  const RobotPath& way = world->scene.robots[static_cast<std::size_t>(robot) % paths];
+  auto impl = std::make_unique<Impl>();
+  impl->world = world;
+  impl->robot = robot;
+  impl->name = o.robots > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
+  impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
+  impl->camera.readout_s = o.readout_s;
+  impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
+  CameraPath::Options motion;
+  motion.speed = o.speed;
+  motion.wheeled = (o.motion == Motion::kScene ? world->scene.motion : o.motion) == Motion::kWheeled;
+  motion.seed = impl->seed;
+  // More robots than paths: the next ones start further along.
+  const auto lap = static_cast<std::size_t>(robot) / paths;
+  motion.start_share = 0.381966 * static_cast<double>(lap);
+  motion.events = world->events;
+  impl->path = std::make_unique<CameraPath>(way, motion);
+  const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
+                                          : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
+  impl->frames = make_stamps(o, world->events, frames, impl->seed);
+  if (impl->frames.empty())
+    return core::usage_error("events: every frame is dropped, nothing is left to film");
+  if (auto free = impl->check_way(); !free) return tl::unexpected<core::Error>(free.error());
+  return impl;
+}
+
+core::Result<std::unique_ptr<SynthSource>> SynthSource::create(std::shared_ptr<const World> world,
+                                                               int robot) {
+  auto planned = plan(std::move(world), robot);
+  if (!planned) return tl::unexpected<core::Error>(planned.error());
+  std::unique_ptr<Impl> impl = std::move(*planned);
+  impl->tiles = make_noise(impl->world->options.sensor, impl->seed);
+  impl->set_exposure();
+  return std::unique_ptr<SynthSource>(new SynthSource(std::move(impl)));
+}
+
+core::Result<void> check_paths(const Scene& scene, const SynthOptions& options) {
+  if (auto ok = check(options); !ok) return ok;
+  if (scene.faces.empty() || scene.robots.empty())
+    return core::usage_error(fmt::format("scene '{}' is empty", scene.name));
+  const auto world = std::make_shared<const World>(scene, options);
+  for (int robot = 0; robot < options.robots; ++robot) {
+    if (auto planned = SynthSource::plan(world, robot); !planned)
+      return tl::unexpected<core::Error>(planned.error());
+  }
+  return {};
+}
+
+const std::string& SynthSource::name() const { return impl_->name; }
+const std::string& SynthSource::format() const { return impl_->format; }
+const sensor::Camera& SynthSource::camera() const { return impl_->camera; }
+std::size_t SynthSource::size() const { return impl_->frames.size(); }
+
+dataset::PairInfo SynthSource::info(std::size_t index) const {
+  const Stamps& at = impl_->frames.at(index);
+  return {at.color, at.depth, "", ""};
+}
+
+core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
+  if (index >= impl_->frames.size()) {
+    return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
+  }
+  const Stamps& at = impl_->frames[index];
+  sensor::RgbdFrame frame;
+  frame.index = static_cast<std::int64_t>(index);
+  frame.stamp = at.color;
+  frame.depth_stamp = at.depth;
+  const cv::Mat3b color = impl_->color(at);
+  frame.color = color;
+  cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
+  cv::Mat1w raw;
+  if (blind(index)) {
+    raw = cv::Mat1w::zeros(color.size());
+  } else {
+    const View view = look(*impl_->world, impl_->camera.color, impl_->pose(at.depth), at.depth - kFirstStamp);
+    raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
+                        {impl_->seed, at.number});
+  }
+  raw.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
+  return frame;
+}
+
+std::optional<geometry::Trajectory> SynthSource::truth() const {
+  geometry::Trajectory trajectory;
+  for (const Stamps& at : impl_->frames) trajectory.push_back({at.color, impl_->pose(at.color)});
+  return trajectory;
+}
+
+Rigid3 SynthSource::world_from_camera(double stamp) const {
+  const auto& f = impl_->frames;
+  return impl_->pose(std::clamp(stamp, std::min(f.front().color, f.front().depth),
+                                std::max(f.back().color, f.back().depth)));
+}
+
+ExactFrame SynthSource::exact(std::size_t index) const {
+  const Stamps& at = impl_->frames.at(index);
+  ExactFrame out;
+  out.world_from_color = impl_->pose(at.color);
+  out.world_from_depth = impl_->pose(at.depth);
+  const View view = look(*impl_->world, impl_->camera.color, out.world_from_depth, at.depth - kFirstStamp);
+  out.depth = exact_depth(view);
+  out.face = view.ids;
+  return out;
+}
+
+bool SynthSource::blind(std::size_t index) const {
+  const double stamp = impl_->frames.at(index).depth;
+  return impl_->event(EventKind::kNoDepth, stamp) != 0.0 || impl_->event(EventKind::kCover, stamp) != 0.0;
+}
+
+double SynthSource::path_length() const {
+  double length = 0.0;
+  for (std::size_t i = 1; i < impl_->frames.size(); ++i) {
+    length += (impl_->pose(impl_->frames[i].color).translation -
+               impl_->pose(impl_->frames[i - 1].color).translation)
+                  .norm();
+  }
+  return length;
+}
+
+}  // namespace plumbline::synth

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/builder.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace plumbline::synth {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using geometry::Rigid3;
+
+Rigid3 upright(const Vector3d& origin, double yaw_rad) {
+  Rigid3 frame;
+  frame.rotation = Eigen::AngleAxisd(yaw_rad, Vector3d::UnitZ()).toRotationMatrix();
+  frame.translation = origin;
+  return frame;
+}
+
+void Builder::begin_object(const std::string& type, const std::string& name, const core::ConfigMark& mark) {
+  Object object;
+  object.type = type;
+  object.name = name.empty() ? fmt::format("{} {}", type, scene_.objects.size() + 1) : name;
+  object.mark = mark;
+  scene_.objects.push_back(std::move(object));
+  seed_ = static_cast<int>(scene_.objects.size());
+}
+
+void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hint, const Skin& skin) {
+  Face face;
+  face.normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+  face.u_axis = (u_hint - u_hint.dot(face.normal) * face.normal).normalized();
+  face.v_axis = face.normal.cross(face.u_axis);
+  face.origin = corners[0];
+  double min_u = 0.0, min_v = 0.0, max_u = 0.0, max_v = 0.0;
+  for (const Vector3d& corner : corners) {
+    const Vector3d d = corner - face.origin;
+    const Vector2d uv(d.dot(face.u_axis), d.dot(face.v_axis));
+    face.polygon.push_back(uv);
+    min_u = std::min(min_u, uv.x());
+    min_v = std::min(min_v, uv.y());
+    max_u = std::max(max_u, uv.x());
+    max_v = std::max(max_v, uv.y());
+  }
+  // Texture coordinates count from the lower left corner of the polygon's bounding rectangle.
+  face.origin = face.at(min_u, min_v);
+  for (Vector2d& uv : face.polygon) uv -= Vector2d(min_u, min_v);
+  face.material = skin.material;
+  face.seed = skin.seed >= 0 ? skin.seed : seed_;
+  if (skin.stretched) {
+    face.stretch_u = max_u - min_u;
+    face.stretch_v = max_v - min_v;
+  }
+  face.object = static_cast<int>(scene_.objects.size()) - 1;
+  scene_.faces.push_back(std::move(face));
+}
+
+void Builder::box(const Rigid3& f, const Vector3d& lo, const Vector3d& hi, const Skin& skin,
+                  const Skin* front) {
+  const auto p = [&](int x, int y, int z) {
+    return f * Vector3d(x ? hi.x() : lo.x(), y ? hi.y() : lo.y(), z ? hi.z() : lo.z());
+  };
+  const Vector3d ux = f.rotation.col(0), uy = f.rotation.col(1);
+  polygon({p(0, 0, 0), p(1, 0, 0), p(1, 0, 1), p(0, 0, 1)}, ux,
+          front != nullptr ? *front : skin);                             // front, -y
+  polygon({p(1, 1, 0), p(0, 1, 0), p(0, 1, 1), p(1, 1, 1)}, -ux, skin);  // back, +y
+  polygon({p(0, 1, 0), p(0, 0, 0), p(0, 0, 1), p(0, 1, 1)}, -uy, skin);  // left, -x
+  polygon({p(1, 0, 0), p(1, 1, 0), p(1, 1, 1), p(1, 0, 1)}, uy, skin);   // right, +x
+  polygon({p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)}, ux, skin);   // top, +z
+  polygon({p(0, 1, 0), p(1, 1, 0), p(1, 0, 0), p(0, 0, 0)}, ux, skin);   // bottom, -z
+}
+
+void Builder::cylinder(const Rigid3& f, const Vector3d& bottom, double radius, double top_radius,
+                       double height, int segments, const Skin& skin) {
+  const auto ring = [&](int i, double r, double z) {
+    const double angle = 2.0 * M_PI * i / segments;
+    return Vector3d(f * (bottom + Vector3d(r * std::cos(angle), r * std::sin(angle), z)));
+  };
+  std::vector<Vector3d> top, foot;
+  for (int i = 0; i < segments; ++i) {
+    const Vector3d a = ring(i, radius, 0.0), b = ring(i + 1, radius, 0.0);
+    const Vector3d c = ring(i + 1, top_radius, height), d = ring(i, top_radius, height);
+    polygon({a, b, c, d}, b - a, skin);
+    top.push_back(d);
+    foot.insert(foot.begin(), a);
+  }
+  const Vector3d u = f.rotation.col(0);
+  polygon(top, u, skin);
+  polygon(foot, u, skin);
+}
+
+}  // namespace plumbline::synth

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "scene/builder.hpp"
+#include "plumbline/core/config.hpp"
+
+namespace plumbline::synth {
+
+/// Builds the list under a scene file's `objects`; tells all problems.
+void read_objects(const core::ConfigNode& list, Builder& builder, core::ConfigProblems& problems);
+
+}  // namespace plumbline::synth

@@ -1,7 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-#include <GL/osmesa.h>
-
-#include "drawing.hpp"
-
-PLUMBLINE_PART(plumbline::viz::Drawing, &plumbline::viz::render_snapshot, &plumbline::viz::draw_graph,
-               &OSMesaGetProcAddress)

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/viz/turntable.hpp"
+
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <system_error>
+#include <vector>
+
+#include "scene/view_frame.hpp"
+
+namespace plumbline::viz {
+namespace {
+
+constexpr double kPitch = 35.0 * M_PI / 180.0;
+constexpr double kFieldOfView_deg = 28.0;
+
+/// The middle of what is to be seen and how far it reaches from there, a few specks left out.
+struct SceneExtent {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double radius_m = 1.0;
+};
+
+SceneExtent extent_of(const Scene& scene) {
+  constexpr std::size_t kSample = 100000;
+  std::vector<Eigen::Vector3d> points;
+  if (scene.cloud != nullptr) {
+    const std::size_t step = std::max<std::size_t>(1, scene.cloud->size() / kSample);
+    for (std::size_t i = 0; i < scene.cloud->size(); i += step) {
+      const Eigen::Vector3d p = (*scene.cloud)[i].getVector3fMap().cast<double>();
+      if (p.allFinite()) points.push_back(p);
+    }
+    points = evened(points);
+  }
+  for (const CameraPath& path : scene.paths) {
+    for (const auto& pose : path.trajectory) points.push_back(pose.world_from_camera.translation);
+  }
+  SceneExtent extent;
+  if (points.empty()) return extent;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    values.reserve(points.size());
+    for (const auto& p : points) values.push_back(p[axis]);
+    extent.centre[axis] = 0.5 * (quantile(values, 0.01) + quantile(values, 0.99));
+  }
+  std::vector<double> distances;
+  distances.reserve(points.size());
+  for (const auto& p : points) distances.push_back((p - extent.centre).norm());
+  extent.radius_m = std::max(0.1, quantile(distances, 0.97));
+  return extent;
+}
+
+}  // namespace
+
+core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
+                                    const std::filesystem::path& folder, const TurntableProgress& progress) {
+  if (pictures < 2) return core::usage_error("turntable: at least 2 pictures make one turn");
+  std::error_code ec;
+  std::filesystem::create_directories(folder, ec);
+  if (ec) return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  SnapshotOptions view = options;
+  const SceneAxes axes = scene_axes(scene, options);
+  const SceneExtent extent = extent_of(scene);
+  view.view = View::kExplicit;
+  view.up = axes.up;
+  view.viewpoint.up = axes.up;
+  view.viewpoint.target = extent.centre;
+  view.viewpoint.field_of_view_deg = kFieldOfView_deg;
+  const double distance = 1.02 * extent.radius_m / std::sin(0.5 * kFieldOfView_deg * M_PI / 180.0);
+  for (int k = 0; k < pictures; ++k) {
+    const double turn = 2.0 * M_PI * k / pictures;
+    const Eigen::Vector3d away = -std::cos(turn) * axes.forward + std::sin(turn) * axes.right;
+    view.viewpoint.eye = extent.centre + distance * (std::cos(kPitch) * away + std::sin(kPitch) * axes.up);
+    if (auto drawn = render_snapshot(scene, view, folder / fmt::format("{:04}.png", k)); !drawn) return drawn;
+    if (progress) progress(k + 1, pictures);
+  }
+  return {};
+}
+
+}  // namespace plumbline::viz

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/view_frame.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+namespace plumbline::viz {
+namespace {
+
+constexpr double kIsoPitch = 35.0 * kDegree;
+constexpr double kIsoAzimuth = 35.0 * kDegree;  // not 45: one wall direction stays the longer one
+constexpr double kHeadsRight = 0.2;             // sine of the heading from `forward`
+constexpr double kIsoFieldOfView = 28.0 * kDegree;
+constexpr double kFreeMargin = 0.07;  // of the picture, free on each side
+
+struct Interval {
+  double low = 0.0;
+  double high = 0.0;
+  void include(double v) {
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+};
+
+/// Along one camera axis: all but a few specks of the points, and all of must_see.
+Interval extent(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& must_see,
+                const Eigen::Vector3d& axis) {
+  std::vector<double> values;
+  values.reserve(points.size());
+  for (const auto& p : points) values.push_back(p.dot(axis));
+  Interval interval;
+  if (!values.empty()) {
+    interval = {quantile(values, 0.002), quantile(values, 0.998)};
+  } else if (!must_see.empty()) {
+    interval = {must_see.front().dot(axis), must_see.front().dot(axis)};
+  }
+  for (const auto& p : must_see) interval.include(p.dot(axis));
+  return interval;
+}
+
+void fit_orthographic(Projection& projection, const Interval& x, const Interval& y) {
+  const double room = 1.0 - 2.0 * kFreeMargin;
+  const double per_metre_x = projection.width_px * room / std::max(x.high - x.low, 0.2);
+  const double per_metre_y = projection.height_px * room / std::max(y.high - y.low, 0.2);
+  projection.focal_px = std::min(per_metre_x, per_metre_y);
+}
+
+/// Distance of the eye from the centre so that nearly all points lie inside the four sides of the view.
+double fit_distance(const Projection& projection, const Eigen::Vector3d& centre,
+                    const std::vector<Eigen::Vector3d>& points,
+                    const std::vector<Eigen::Vector3d>& must_see) {
+  const double room = 1.0 - 2.0 * kFreeMargin;
+  const double tan_x = room * 0.5 * projection.width_px / projection.focal_px;
+  const double tan_y = room * 0.5 * projection.height_px / projection.focal_px;
+  const auto needed = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d v = p - centre;
+    return std::max(std::abs(v.dot(projection.right)) / tan_x, std::abs(v.dot(projection.up)) / tan_y) -
+           v.dot(projection.forward);
+  };
+  std::vector<double> distances;
+  distances.reserve(points.size());
+  for (const auto& p : points) distances.push_back(needed(p));
+  double distance = quantile(std::move(distances), 0.996);
+  for (const auto& p : must_see) distance = std::max(distance, needed(p));
+  return std::max(distance, 0.3);
+}
+
+}  // namespace
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  const auto at = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
+  return values[at];
+}
+
+std::vector<Eigen::Vector3d> evened(const std::vector<Eigen::Vector3d>& points) {
+  constexpr double kCells = 60.0;
+  Eigen::Vector3d low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Interval along = extent(points, {}, Eigen::Vector3d::Unit(axis));
+    low[axis] = along.low;
+    high[axis] = along.high;
+  }
+  const double side = std::max((high - low).maxCoeff() / kCells, 1e-3);
+  std::set<std::array<long, 3>> taken;
+  std::vector<Eigen::Vector3d> result;
+  for (const auto& p : points) {
+    // What lies far outside of 99 % of the points shares the border cubes.
+    const Eigen::Array3d cell = ((p - low).array() / side).floor().max(-kCells).min(2.0 * kCells);
+    const auto index = [&cell](int axis) { return std::lround(cell[axis]); };
+    if (taken.insert({index(0), index(1), index(2)}).second) result.push_back(p);
+  }
+  return result;
+}
+
+Eigen::Vector3d Projection::project(const Eigen::Vector3d& p) const {
+  const Eigen::Vector3d v = p - eye;
+  const double depth = v.dot(forward);
+  const double scale = pixels_per_metre(depth);
+  return {0.5 * width_px + scale * v.dot(right), 0.5 * height_px + scale * v.dot(up), depth};
+}
+
+double Projection::pixels_per_metre(double depth_m) const {
+  return orthographic ? focal_px : focal_px / std::max(depth_m, 1e-3);
+}
+
+Eigen::Vector3d Projection::to_viewer(const Eigen::Vector3d& p) const {
+  return orthographic ? Eigen::Vector3d(-forward) : Eigen::Vector3d((eye - p).normalized());
+}
+
+Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes) {
+  Projection view;
+  view.up = axes.up;
+  view.orthographic = options.view != View::kIso && options.view != View::kExplicit;
+  double field_of_view = kIsoFieldOfView;
+  switch (options.view) {
+    case View::kIso: {
+      // To the left, unless that shows the backs of what the cameras saw.
+      const double side = axes.heading.dot(axes.right) > kHeadsRight ? 1.0 : -1.0;
+      view.forward = std::cos(kIsoPitch) *
+                         (std::cos(kIsoAzimuth) * axes.forward + side * std::sin(kIsoAzimuth) * axes.right) -
+                     std::sin(kIsoPitch) * axes.up;
+      break;
+    }
+    case View::kTop:
+      view.forward = -axes.up;
+      view.up = axes.forward;
+      break;
+    case View::kBottom:
+      view.forward = axes.up;
+      view.up = axes.forward;
+      break;
+    case View::kFront:
+      view.forward = axes.forward;
+      break;
+    case View::kBack:
+      view.forward = -axes.forward;
+      break;
+    case View::kLeft:
+      view.forward = axes.right;
+      break;
+    case View::kRight:
+      view.forward = -axes.right;
+      break;
+    case View::kExplicit:
+      view.forward = (options.viewpoint.target - options.viewpoint.eye).normalized();
+      view.up = options.viewpoint.up;
+      view.eye = options.viewpoint.eye;
+      field_of_view = options.viewpoint.field_of_view_deg * kDegree;
+      break;
+  }
+  view.right = view.forward.cross(view.up).normalized();
+  view.up = view.right.cross(view.forward);
+  view.width_px = options.width_px;
+  view.height_px = options.height_px;
+  if (!view.orthographic) view.focal_px = 0.5 * view.height_px / std::tan(0.5 * field_of_view);
+  return view;
+}
+
+void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
+         const std::vector<Eigen::Vector3d>& must_see) {
+  const Interval x = extent(points, must_see, projection.right);
+  const Interval y = extent(points, must_see, projection.up);
+  const Interval z = extent(points, must_see, projection.forward);
+  const double depth = std::max(z.high - z.low, 0.2);
+  const Eigen::Vector3d centre =
+      0.5 * ((x.low + x.high) * projection.right + (y.low + y.high) * projection.up +
+             (z.low + z.high) * projection.forward);
+  double distance = 2.0 * depth + 1.0;
+  if (projection.orthographic) {
+    fit_orthographic(projection, x, y);
+  } else {
+    distance = fit_distance(projection, centre, points, must_see);
+  }
+  projection.eye = centre - distance * projection.forward;
+  // Points left out by that may stick out; half the depth again holds them without wasting depth precision.
+  projection.near_m = std::max(distance - 1.0 * depth, 0.05 * distance);
+  projection.far_m = distance + 1.5 * depth;
+}
+
+}  // namespace plumbline::viz
