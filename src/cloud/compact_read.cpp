@@ -4,6 +4,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -59,16 +60,6 @@ std::vector<std::int32_t> read_numbers(Reader& reader, std::size_t count) {
   return values;
 }
 
-/// Bytes out of their differences modulo 256; empty: they end too early.
-std::vector<std::uint8_t> read_bytes(Reader& reader, std::size_t count) {
-  const std::uint8_t* bytes = reader.take(count);
-  if (bytes == nullptr) return {};
-  std::vector<std::uint8_t> values(count);
-  std::uint8_t sum = 0;
-  for (std::size_t i = 0; i < count; ++i) values[i] = sum = static_cast<std::uint8_t>(sum + bytes[i]);
-  return values;
-}
-
 tl::unexpected<core::Error> damaged(const char* how) {
   return core::input_error(std::string("stored cloud: ") + how + "; it cannot be used");
 }
@@ -95,20 +86,22 @@ core::Result<std::vector<std::uint8_t>> unpack(const std::uint8_t* bytes, std::s
   return content;
 }
 
-/// Colour and normal of the points that are there, which `points` lists.
+/// Colour and normal of the points that are there, which `points` lists: five planes of bytes, each of
+/// differences modulo 256.
 void read_looks(Reader& reader, const std::vector<Point*>& points) {
   const std::size_t count = points.size();
-  const std::vector<std::uint8_t> g = read_bytes(reader, count), r = read_bytes(reader, count),
-                                  b = read_bytes(reader, count), first = read_bytes(reader, count),
-                                  second = read_bytes(reader, count);
-  if (second.size() != count) return;
+  const std::uint8_t* bytes = reader.take(5 * count);
+  if (bytes == nullptr) return;
+  std::array<std::uint8_t, 5> sums{};  // g, r - g, b - g, direction
   for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t plane = 0; plane < sums.size(); ++plane)
+      sums[plane] = static_cast<std::uint8_t>(sums[plane] + bytes[plane * count + i]);
     Point& p = *points[i];
-    p.g = g[i];
-    p.r = static_cast<std::uint8_t>(g[i] + r[i]);
-    p.b = static_cast<std::uint8_t>(g[i] + b[i]);
+    p.g = sums[0];
+    p.r = static_cast<std::uint8_t>(sums[0] + sums[1]);
+    p.b = static_cast<std::uint8_t>(sums[0] + sums[2]);
     p.a = 255;
-    p.getNormalVector3fMap() = unpack_direction({first[i], second[i]});
+    p.getNormalVector3fMap() = unpack_direction({sums[3], sums[4]});
   }
 }
 

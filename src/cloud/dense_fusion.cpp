@@ -158,10 +158,7 @@ class Fusion {
     std::vector<FusedPoint> points = voxels.points();
     voxels = VoxelMap(options_.voxels);
     clean(points, report);
-    if (options_.settle) {
-      voxels.insert(points);
-      points = voxels.points();
-    }
+    if (options_.settle) points = VoxelMap::merged(points, options_.voxels);
     const Eigen::AlignedBox3d box = tile.box(kCell_m);
     const auto least = static_cast<std::uint32_t>(options_.min_observations);
     const auto stays = [&](const FusedPoint& fused) {
@@ -240,9 +237,9 @@ FusedCloud coarser(const Cloud& cloud, const CloudColumns& columns, double voxel
   }
   VoxelMapOptions options;
   options.voxel_m = voxel_m;
-  VoxelMap voxels(options);
-  voxels.insert(points);
-  return voxels.extract();
+  FusedCloud result{std::make_shared<Cloud>(), {}};
+  append(VoxelMap::merged(points, options), false, result);
+  return result;
 }
 
 }  // namespace plumbline::cloud

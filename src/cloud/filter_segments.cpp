@@ -137,6 +137,8 @@ class ClustersFilter : public Filter {
     table.number("leaf", leaf_m_, {0.0, 10.0}, "m",
                  "Cells whose means stand for their points in this, which is quicker; 0: all points");
     table.integer("min_points", min_points_, {1, 100000000}, "", "Clusters with fewer points are none");
+    table.number("min_share", min_share_, {0.0, 1.0}, "ratio",
+                 "Unless they hold this share of all points, as in a small or coarse cloud; 1: only if they are all");
     table.integer("count", count_, {0, 1000000}, "", "How many clusters, the largest first; 0: all");
     table.choice<Mode>("mode", mode_,
                        {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},
@@ -147,6 +149,8 @@ class ClustersFilter : public Filter {
     std::vector<int> segments(points->size(), kNoSegment);
     if (points->empty()) return by_segment(*input, segments, mode_);
     const double distance = std::max(distance_m_, 2.0 * context.spacing_m);
+    const int fewest =
+        std::min(min_points_, static_cast<int>(std::ceil(min_share_ * static_cast<double>(points->size()))));
     std::vector<pcl::Indices> clusters;
     if (leaf_m_ > 0.0) {
       constexpr double kMostCells = 1e9;  // from the origin: pcl::VoxelGrid numbers them with 31 bits
@@ -157,9 +161,9 @@ class ClustersFilter : public Filter {
                         "first (crop_box) or use a leaf of {:.2g} m or more",
                         furthest, leaf_m_, 1.01 * furthest / kMostCells));
       }
-      clusters = clusters_of_cells(points, distance);
+      clusters = clusters_of_cells(points, distance, fewest);
     } else {
-      clusters = clusters_of(points, distance, min_points_);
+      clusters = clusters_of(points, distance, fewest);
     }
     // Largest first; of equals the one that comes first in the cloud.
     std::sort(clusters.begin(), clusters.end(), [](const pcl::Indices& a, const pcl::Indices& b) {
@@ -191,8 +195,8 @@ class ClustersFilter : public Filter {
 
   /// Groups the means of cells; what belongs to a mean goes with it. Block by block: however far the cloud
   /// reaches, no grid has more cells than pcl::VoxelGrid can count.
-  [[nodiscard]] std::vector<pcl::Indices> clusters_of_cells(const CloudConstPtr& points,
-                                                            double distance_m) const {
+  [[nodiscard]] std::vector<pcl::Indices> clusters_of_cells(const CloudConstPtr& points, double distance_m,
+                                                            int min_points) const {
     constexpr float kBlock = 64.0F;  // cells along each side
     const auto leaf = static_cast<float>(leaf_m_);
     const auto block = [&](float x) { return static_cast<int>(std::floor(x / (kBlock * leaf))); };
@@ -230,7 +234,7 @@ class ClustersFilter : public Filter {
     for (std::size_t i = 0; i < points->size(); ++i) {
       clusters[group_of[mean_of[i]]].push_back(static_cast<pcl::index_t>(i));
     }
-    const auto few = [&](const pcl::Indices& c) { return c.size() < static_cast<std::size_t>(min_points_); };
+    const auto few = [&](const pcl::Indices& c) { return c.size() < static_cast<std::size_t>(min_points); };
     clusters.erase(std::remove_if(clusters.begin(), clusters.end(), few), clusters.end());
     return clusters;
   }
@@ -238,6 +242,7 @@ class ClustersFilter : public Filter {
   double distance_m_ = 0.05;
   double leaf_m_ = 0.0;
   int min_points_ = 100;
+  double min_share_ = 1.0;
   int count_ = 1;
   Mode mode_ = Mode::kKeep;
 };

@@ -57,9 +57,11 @@ NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRast
 /// What the views say about each of the sheets `asked`.
 void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vector3f>& positions,
            const std::vector<NearView>& views, std::vector<Votes>& votes) {
+  if (asked.empty()) return;
   for (const NearView& view : views) {
+    const DepthLimits limits(*view.raster);
     for (const std::uint32_t s : asked) {
-      switch (evidence(*view.raster, view.rotation * positions[s] + view.translation)) {
+      switch (limits.evidence(view.rotation * positions[s] + view.translation)) {
         case Evidence::kFree:
           ++votes[s].free;
           break;
@@ -162,38 +164,50 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
   return raster;
 }
 
-Evidence evidence(const DepthRaster& raster, const Eigen::Vector3f& point) {
-  constexpr float kCell = DepthRaster::kCell_px;
+DepthLimits::DepthLimits(const DepthRaster& raster)
+    : raster_(raster), nearest_(raster.nearest.size(), 0), furthest_(raster.nearest.size(), 0) {
   constexpr int kFewestCells = 7;  // of 3 x 3
+  const auto width = static_cast<std::size_t>(raster.width);
+  std::vector<std::uint16_t> least(width), most(width), measured(width);  // of three cells one above another
+  for (int row = 1; row + 1 < raster.height; ++row) {
+    const std::size_t begin = static_cast<std::size_t>(row) * width;
+    const std::uint16_t* at = raster.nearest.data() + begin;
+    for (std::size_t i = 0; i < width; ++i) {
+      const std::uint16_t above = *(at + i - width), here = at[i], below = at[i + width];
+      // 0, which is none, less 1 is the largest number.
+      const auto before = [](std::uint16_t depth) { return static_cast<std::uint16_t>(depth - 1); };
+      least[i] = std::min({before(above), before(here), before(below)});
+      most[i] = std::max({above, here, below});
+      measured[i] = static_cast<std::uint16_t>((above != 0) + (here != 0) + (below != 0));
+    }
+    for (std::size_t i = 1; i + 1 < width; ++i) {
+      if (measured[i - 1] + measured[i] + measured[i + 1] < kFewestCells) continue;
+      nearest_[begin + i] = static_cast<std::uint16_t>(std::min({least[i - 1], least[i], least[i + 1]}) + 1);
+      furthest_[begin + i] = std::max({most[i - 1], most[i], most[i + 1]});
+    }
+  }
+}
+
+Evidence DepthLimits::evidence(const Eigen::Vector3f& point) const {
+  constexpr float kCell = DepthRaster::kCell_px;
   constexpr double kSigmas = 3.0;
   constexpr double kPose_m = 0.03;  // poses are not exact
   const float z = point.z();
-  if (!(z > 0.05F && z <= raster.furthest_m + 0.5F)) return Evidence::kNone;
-  const sensor::Pinhole& camera = raster.camera;
+  if (!(z > 0.05F && z <= raster_.furthest_m + 0.5F)) return Evidence::kNone;
+  const sensor::Pinhole& camera = raster_.camera;
   const float column =
       (static_cast<float>(camera.fx) * point.x() / z + static_cast<float>(camera.cx)) / kCell;
   const float row = (static_cast<float>(camera.fy) * point.y() / z + static_cast<float>(camera.cy)) / kCell;
-  if (!(column >= 1.0F && row >= 1.0F && column < static_cast<float>(raster.width - 1) &&
-        row < static_cast<float>(raster.height - 1))) {
+  if (!(column >= 1.0F && row >= 1.0F && column < static_cast<float>(raster_.width - 1) &&
+        row < static_cast<float>(raster_.height - 1))) {
     return Evidence::kNone;
   }
-  int measured = 0;
-  std::uint16_t before_nearest = 0xFFFF;  // 0, which is none, less 1 is the largest number
-  std::uint16_t furthest = 0;
-  const std::uint16_t* depths = raster.nearest.data() +
-                                static_cast<std::ptrdiff_t>(static_cast<int>(row) - 1) * raster.width +
-                                static_cast<int>(column) - 1;
-  for (int j = 0; j < 3; ++j, depths += raster.width) {
-    for (int i = 0; i < 3; ++i) {
-      measured += depths[i] != 0 ? 1 : 0;
-      before_nearest = std::min(before_nearest, static_cast<std::uint16_t>(depths[i] - 1));
-      furthest = std::max(furthest, depths[i]);
-    }
-  }
-  if (measured < kFewestCells) return Evidence::kNone;
+  const auto cell =
+      static_cast<std::size_t>(static_cast<int>(row) * raster_.width + static_cast<int>(column));
+  if (furthest_[cell] == 0) return Evidence::kNone;
   const auto margin = [](double depth) { return kSigmas * sensor::depth_sigma(depth) + kPose_m; };
-  const double near_m = 0.001 * (before_nearest + 1);
-  const double far_m = 0.001 * furthest;
+  const double near_m = 0.001 * nearest_[cell];
+  const double far_m = 0.001 * furthest_[cell];
   if (static_cast<double>(z) < near_m - margin(near_m)) return Evidence::kFree;
   return static_cast<double>(z) > far_m + margin(far_m) ? Evidence::kHidden : Evidence::kSurface;
 }

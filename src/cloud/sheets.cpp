@@ -2,7 +2,9 @@
 #include "plumbline/cloud/sheets.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 namespace plumbline::cloud {
 namespace {
@@ -67,12 +69,14 @@ Eigen::Vector3d Sheets::position(const Sheet& sheet) const {
   return centre(sheet.block) + (sheet.first / sheet.weight).cast<double>();
 }
 
-template <typename Visit>
-void Sheets::visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal,
-                         const Visit& visit) const {
+std::uint32_t Sheets::first_of(const Eigen::Vector3i& block) const {
   const auto found = first_.find(pack_cell(block));
-  if (found == first_.end()) return;
-  for (std::uint32_t at = found->second; at != kNone; at = next_[at]) {
+  return found == first_.end() ? kNone : found->second;
+}
+
+template <typename Visit>
+void Sheets::visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const {
+  for (std::uint32_t at = first; at != kNone; at = next_[at]) {
     const Sheet& sheet = sheets_[at];
     if (sheet.normal_sum.dot(normal) > kAlike * sheet.normal_length) visit(sheet);
   }
@@ -115,7 +119,7 @@ void Sheets::fit_plane(Sheet& sheet) const {
   for (int k = 0; k < 27; ++k) {
     const Eigen::Vector3i step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
     const Eigen::Vector3f offset = step.cast<float>() * static_cast<float>(block_m_);
-    visit_alike(sheet.block + step, own, [&](const Sheet& other) { gather(other, offset, sums); });
+    visit_alike(first_of(sheet.block + step), own, [&](const Sheet& other) { gather(other, offset, sums); });
   }
   sheet.support = sums.points;
   sheet.noise_m = std::sqrt(sheet.variance / sheet.weight);
@@ -134,6 +138,9 @@ void Sheets::fit_planes() {
 
 void Sheets::settle(std::vector<FusedPoint>& points) const {
   constexpr float kMostSigmas = 3.0F;
+  const auto step_of = [](int k) { return Eigen::Vector3i(k & 1, k >> 1 & 1, k >> 2); };
+  std::array<std::uint32_t, 8> first{};  // of the blocks around `around`: neighbouring points share them
+  Eigen::Vector3i around = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (sheet_of_[i] == kNone || !sheets_[sheet_of_[i]].flat) continue;
     const Sheet& own = sheets_[sheet_of_[i]];
@@ -143,15 +150,19 @@ void Sheets::settle(std::vector<FusedPoint>& points) const {
     const Eigen::Vector3d corner = (position / block_m_).array() - 0.5;
     const Eigen::Vector3i low = cell_of(corner);
     const Eigen::Vector3f part = (corner - low.cast<double>()).cast<float>();
+    if (low != around) {
+      around = low;
+      for (int k = 0; k < 8; ++k) first[static_cast<std::size_t>(k)] = first_of(low + step_of(k));
+    }
     float total = 0.0F;
     float shift = 0.0F;
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     for (int k = 0; k < 8; ++k) {
-      const Eigen::Vector3i step(k & 1, k >> 1 & 1, k >> 2);
+      const Eigen::Vector3i step = step_of(k);
       float share = 1.0F;
       for (int axis = 0; axis < 3; ++axis) share *= step[axis] == 1 ? part[axis] : 1.0F - part[axis];
       const Eigen::Vector3f from_centre = (position - centre(low + step)).cast<float>();
-      visit_alike(low + step, own.normal, [&](const Sheet& sheet) {
+      visit_alike(first[static_cast<std::size_t>(k)], own.normal, [&](const Sheet& sheet) {
         if (!sheet.flat) return;
         const float weight = share * sheet.weight;
         const float along = sheet.normal.dot(own.normal);

@@ -63,15 +63,17 @@ SurfaceSearch::SurfaceSearch(SurfaceCloud::ConstPtr cloud) : cloud_(std::move(cl
 
 int nearest_facing(const SurfaceSearch::Tree& tree, const SurfacePoint& point, float distance_m,
                    float min_cosine) {
-  constexpr int kLookedAt = 8;
   if (!point.getVector3fMap().allFinite()) return -1;
   thread_local pcl::Indices indices;
   thread_local std::vector<float> squares;
-  const int found = tree.nearestKSearch(point, kLookedAt, indices, squares);
-  for (int i = 0; i < found && squares[static_cast<std::size_t>(i)] <= distance_m * distance_m; ++i) {
-    const int index = indices[static_cast<std::size_t>(i)];
-    const SurfacePoint& p = (*tree.getInputCloud())[static_cast<std::size_t>(index)];
-    if (p.getNormalVector3fMap().dot(point.getNormalVector3fMap()) >= min_cosine) return index;
+  for (const int looked_at : {1, 8}) {  // hardly ever is more than one needed
+    const int found = tree.nearestKSearch(point, looked_at, indices, squares);
+    for (int i = 0; i < found; ++i) {
+      if (squares[static_cast<std::size_t>(i)] > distance_m * distance_m) return -1;
+      const int index = indices[static_cast<std::size_t>(i)];
+      const SurfacePoint& p = (*tree.getInputCloud())[static_cast<std::size_t>(index)];
+      if (p.getNormalVector3fMap().dot(point.getNormalVector3fMap()) >= min_cosine) return index;
+    }
   }
   return -1;
 }

@@ -4,6 +4,7 @@
 #include <pcl/point_cloud.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -26,6 +27,13 @@ bool locate(const Eigen::Vector3d& position, double voxel_m, VoxelSample& sample
   sample.side.mean =
       (position - ((sample.voxel.cast<double>().array() + 0.5) * voxel_m).matrix()).cast<float>();
   return true;
+}
+
+/// Whether a sample lies on the other side of a thin wall.
+bool opposed(const VoxelSide& sample, const VoxelSide& front) {
+  if (!(front.weight > 0.0F)) return false;
+  const float along = front.normal.dot(sample.normal);
+  return along < 0.0F && along < kOpposed * front.normal.norm() * sample.normal.norm();
 }
 
 /// Who measured most: whoever has more than all others together is found (Boyer and Moore).
@@ -97,12 +105,18 @@ void VoxelMap::insert(const std::vector<VoxelSample>& view, const Eigen::Aligned
   }
 }
 
-void VoxelMap::insert(const std::vector<FusedPoint>& points) {
-  ++view_;
+/// Points come mostly in the order of their voxels: they are sorted, not looked up.
+std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
+                                         const VoxelMapOptions& options) {
+  constexpr std::uint32_t kOneView = 1;
+  std::vector<VoxelSide> samples;
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;  // voxel and place among the samples
+  samples.reserve(points.size());
+  order.reserve(points.size());
   for (const FusedPoint& fused : points) {
     const Point& p = fused.point;
     VoxelSample sample;
-    if (!locate(p.getVector3fMap().cast<double>(), options_.voxel_m, sample)) continue;
+    if (!locate(p.getVector3fMap().cast<double>(), options.voxel_m, sample)) continue;
     VoxelSide& side = sample.side;
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
     if (normal.allFinite()) {
@@ -116,8 +130,24 @@ void VoxelMap::insert(const std::vector<FusedPoint>& points) {
     side.observations = fused.observations;
     side.robot = fused.robot & 0xFFU;
     side.robot_lead = fused.robot_lead & 0x7FFFFFU;
-    add(sample);
+    order.emplace_back(pack_cell(sample.voxel) << 1U, samples.size());
+    samples.push_back(side);
   }
+  std::sort(order.begin(), order.end());
+  std::vector<FusedPoint> result;
+  result.reserve(samples.size());
+  for (std::size_t i = 0; i < order.size();) {
+    const std::uint64_t key = order[i].first;
+    std::array<VoxelSide, 2> sides;
+    for (; i < order.size() && order[i].first == key; ++i) {
+      const VoxelSide& sample = samples[order[i].second];
+      combine(sample, kOneView, sides[opposed(sample, sides[0]) ? 1 : 0]);
+    }
+    for (std::uint64_t k = 0; k < 2; ++k) {
+      if (sides[k].weight > 0.0F) result.push_back(point_of(key | k, sides[k], options.voxel_m));
+    }
+  }
+  return result;
 }
 
 VoxelSide& VoxelMap::side_at(std::uint64_t key) {
@@ -131,10 +161,7 @@ VoxelSide& VoxelMap::side_at(std::uint64_t key) {
 void VoxelMap::add(const VoxelSample& sample) {
   const std::uint64_t front = pack_cell(sample.voxel) << 1U;
   VoxelSide& side = side_at(front);
-  const float along = side.normal.dot(sample.side.normal);
-  const bool opposed =
-      side.weight > 0.0F && along < 0.0F && along < kOpposed * side.normal.norm() * sample.side.normal.norm();
-  combine(sample.side, view_, opposed ? side_at(front | 1U) : side);
+  combine(sample.side, view_, opposed(sample.side, side) ? side_at(front | 1U) : side);
 }
 
 void VoxelMap::combine(const VoxelSide& sample, std::uint32_t view, VoxelSide& side) {
@@ -169,8 +196,8 @@ void VoxelMap::combine(const VoxelSide& sample, std::uint32_t view, VoxelSide& s
   side.weight = total;
 }
 
-FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side) const {
-  const Eigen::Vector3d centre = (unpack_cell(key >> 1U).cast<double>().array() + 0.5) * options_.voxel_m;
+FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double voxel_m) {
+  const Eigen::Vector3d centre = (unpack_cell(key >> 1U).cast<double>().array() + 0.5) * voxel_m;
   FusedPoint fused;
   Point& p = fused.point;
   p.getVector3fMap() = (centre + side.mean.cast<double>()).cast<float>();
@@ -196,7 +223,9 @@ std::vector<FusedPoint> VoxelMap::points() const {
   std::sort(order.begin(), order.end());
   std::vector<FusedPoint> points;
   points.reserve(order.size());
-  for (const auto& [key, place] : order) points.push_back(point_of(key, sides_[place]));
+  for (const auto& [key, place] : order) {
+    points.push_back(point_of(key, sides_[place], options_.voxel_m));
+  }
   return points;
 }
 

@@ -3,17 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "fast.hpp"
-#include "orb_describe.hpp"
+#include "orb_orientation.hpp"
 
 namespace plumbline::features {
 namespace {
 
+constexpr int kFastRadius = 3;
 constexpr int kEdge = 16;        // the patch of a corner 3 px further in must lie inside the picture
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
-static_assert(kEdge + 3 == kOrbMargin);
 
 /// Which cell of a grid over a width x height area a corner lies in.
 class Cells {
@@ -100,9 +102,11 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
       yy += dy * dy;
     }
   }
-  const double sum = static_cast<double>(xx) + yy;
-  const double difference = std::hypot(static_cast<double>(xx) - yy, 2.0 * xy);
-  return sum - difference < min_corner * (sum + difference);
+  const double sum = static_cast<double>(xx) + yy;  // of the tensor's eigenvalues
+  const double apart = static_cast<double>(xx) - yy;
+  const double squared = apart * apart + 4.0 * xy * xy;  // of their difference
+  const double least = (1.0 - min_corner) / (1.0 + min_corner) * sum;
+  return least * least < squared;
 }
 
 /// FAST over the region, without what lies on edges; cells where the high threshold finds nothing get the low
@@ -126,6 +130,18 @@ std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int hig
     c.y += region.y;
   }
   return corners;
+}
+
+/// cv::ORB's descriptors of one level.
+std::vector<Descriptor256> describe(const cv::Mat& level, std::vector<cv::KeyPoint>& points) {
+  const auto orb = cv::ORB::create(static_cast<int>(points.size()), 1.2F, 1, kEdge + kFastRadius);
+  cv::Mat rows;
+  const std::size_t count = points.size();
+  orb->compute(level, points, rows);
+  CV_Assert(points.size() == count && rows.cols == sizeof(Descriptor256) && rows.isContinuous());
+  std::vector<Descriptor256> descriptors(count);
+  std::memcpy(descriptors.data(), rows.data, count * sizeof(Descriptor256));
+  return descriptors;
 }
 
 }  // namespace
@@ -180,8 +196,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
   OrbFeatures result;
   double share_sum = 0.0;
   for (float s : scale_) share_sum += 1.0 / s;
-  cv::Mat image = gray;  // of the level: where corners are looked for
-  cv::Mat exact = gray;  // the same by OpenCV's exact resize, as cv::ORB describes them
+  cv::Mat image = gray;  // of the level
   for (int level = 0; level < options_.levels; ++level) {
     const float scale = scale_[static_cast<std::size_t>(level)];
     if (level > 0) {
@@ -191,9 +206,6 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
       if (size.width < 2 * kEdge + 8 || size.height < 2 * kEdge + 8) break;
       cv::resize(image, smaller, size, 0, 0, cv::INTER_LINEAR);
       image = smaller;
-      cv::Mat smaller_exact;
-      cv::resize(exact, smaller_exact, size, 0, 0, cv::INTER_LINEAR_EXACT);
-      exact = smaller_exact;
     }
     result.levels.push_back(image);
     const cv::Rect inner = inner_region(region, image.size(), scale);
@@ -204,14 +216,16 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
                       std::min(options_.fast_threshold, options_.fast_threshold_min), options_.min_corner),
                image.size(), wanted);
     if (corners.empty()) continue;
-    const cv::Mat smooth = orb_smooth(exact);
+    std::vector<cv::KeyPoint> on_level;
     for (const Corner& c : corners) {
       const float angle = orb_orientation(image, c.x, c.y);
       const Eigen::Vector2f pixel = in_full_picture(c, image.size(), gray.size());
       result.points.push_back({pixel, 0.0F, angle, static_cast<float>(c.score), level});
-      result.descriptors.push_back(orb_descriptor(smooth, c.x, c.y, angle));
       result.patches.push_back(cut_patch(image, c.x, c.y, pixel));
+      on_level.emplace_back(static_cast<float>(c.x), static_cast<float>(c.y), 31.0F, angle);
     }
+    const std::vector<Descriptor256> descriptors = describe(image, on_level);
+    result.descriptors.insert(result.descriptors.end(), descriptors.begin(), descriptors.end());
   }
   return result;
 }

@@ -107,7 +107,7 @@ class Aligner {
     return align(false) && align(true);
   }
   bool align(bool narrow) {
-    constexpr double kStill_m = 1e-4;
+    constexpr double kStill_m = 5e-4;
     const double distance = narrow ? 0.5 * options_.distance_m : options_.distance_m;
     const double still = narrow ? kStill_m : 0.02 * options_.distance_m;
     estimation_->setNarrow(narrow);
@@ -121,7 +121,6 @@ class Aligner {
     icp.setMaximumIterations(options_.max_iterations);
     icp.setTransformationEpsilon(still * still);
     icp.setTransformationRotationEpsilon(std::cos(still));
-    if (!meet(distance)) return false;
     icp.align(moved_, result_.b_from_a.isometry().matrix());
     result_.b_from_a = rigid_of(icp.getFinalTransformation());
     if (!meet(distance)) return false;

@@ -30,6 +30,15 @@ class Inliers {
  public:
   Inliers(const PosePairs& pairs, const sensor::Pinhole& camera) : pairs_(pairs), camera_(camera) {}
 
+  /// Whether more than `count` pairs fit. Most poses are wrong: it is clear after some of the pairs.
+  [[nodiscard]] bool more_than(std::size_t count, const Rigid3& pose) const {
+    std::size_t possible = pairs_.points.size() + pairs_.lines.size();
+    for (std::size_t i = 0; i < pairs_.points.size() && possible > count; ++i)
+      possible -= fits(pairs_.points[i], pose) ? 0 : 1;
+    for (std::size_t i = 0; i < pairs_.lines.size() && possible > count; ++i)
+      possible -= fits(pairs_.lines[i], pose) ? 0 : 1;
+    return possible > count;
+  }
   [[nodiscard]] RansacPose of(const Rigid3& pose) const {
     RansacPose result;
     result.query_from_match = pose;
@@ -154,11 +163,9 @@ std::optional<RansacPose> ransac_pose(const PosePairs& pairs, const sensor::Pinh
   std::optional<RansacPose> best;
   std::size_t best_count = 0;
   const auto try_pose = [&](const Rigid3& pose) {
-    RansacPose trial = inliers.of(pose);
-    const std::size_t count = trial.points.size() + trial.lines.size();
-    if (count <= best_count) return;
-    best_count = count;
-    best = std::move(trial);
+    if (!inliers.more_than(best_count, pose)) return;
+    best = inliers.of(pose);
+    best_count = best->points.size() + best->lines.size();
   };
   int needed = max_rounds;
   for (int round = 0; round < needed; ++round) {

@@ -48,6 +48,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   registry.filters() = request.filters;
   auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
   if (!graph) return fail(graph.error());
+  for (const std::string& warning : graph->warnings) log.warning(warning);
   if (graph->source().type->name != "maps") {
     return core::usage_error(
         fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "

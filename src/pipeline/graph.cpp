@@ -68,7 +68,7 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
   Drafts drafts = read_stages(*root, registry, problems);
   connect(drafts, problems);
   add_taps(*root, registry, drafts, problems);
-  apply_overrides(overrides, drafts, problems);
+  apply_overrides(overrides, drafts, problems, graph.warnings);
   const CheckContext context{file.parent_path(), pipelines_folder, &registry.filters()};
   for (Draft& draft : drafts) {
     if (draft.node.stage) check_stage(draft, context, problems);

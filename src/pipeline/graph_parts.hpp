@@ -50,7 +50,8 @@ void add_taps(const core::ConfigNode& root, const StageRegistry& registry, Draft
               core::ConfigProblems& problems);
 
 /// graph_set.cpp: "stage.key=value" texts of the command line.
-void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, core::ConfigProblems& problems);
+void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, core::ConfigProblems& problems,
+                     std::vector<std::string>& warnings);
 
 /// graph_shape.cpp: an order in which every stage comes after those it reads from; cycles, unused stages,
 /// missing and second sources are problems.

@@ -2,6 +2,10 @@
 // "--set stage.key=value".
 #include <fmt/format.h>
 
+#include <array>
+#include <string>
+#include <utility>
+
 #include "command_line.hpp"
 #include "graph_parts.hpp"
 
@@ -19,6 +23,23 @@ void place_on_command_line(ConfigNode& node) {
   for (ConfigNode& item : node.items) place_on_command_line(item);
   for (auto& [key, value] : node.entries) place_on_command_line(value);
   for (ConfigMark& mark : node.key_marks) mark = kCommandLine;
+}
+
+/// What an option of a stage that went is called now; else as it is.
+std::string renamed(const std::string& text, std::vector<std::string>& warnings) {
+  constexpr std::array<std::pair<const char*, const char*>, 5> kRenamed{{{"robots.merge.", "merge."},
+                                                                         {"robots.online", "merge.online"},
+                                                                         {"robots.", "track."},
+                                                                         {"maps.", "merge."},
+                                                                         {"keep.", "store."}}};
+  for (const auto& [before, now] : kRenamed) {
+    if (text.rfind(before, 0) != 0) continue;
+    std::string result = now + text.substr(std::string(before).size());
+    warnings.push_back(fmt::format("--set {}: is called {} now", text.substr(0, text.find('=')),
+                                   result.substr(0, result.find('='))));
+    return result;
+  }
+  return text;
 }
 
 void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
@@ -51,8 +72,9 @@ void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
 
 }  // namespace
 
-void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, ConfigProblems& problems) {
-  for (const std::string& text : texts) apply(text, drafts, problems);
+void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, ConfigProblems& problems,
+                     std::vector<std::string>& warnings) {
+  for (const std::string& text : texts) apply(renamed(text, warnings), drafts, problems);
 }
 
 }  // namespace plumbline::pipeline

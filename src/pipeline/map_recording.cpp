@@ -81,24 +81,18 @@ MapRequest in_order(MapRequest request) {
   return request;
 }
 
-/// The recording, or several side by side; these are `recordings`, too.
-core::Result<std::unique_ptr<dataset::FrameSource>> open_inputs(const MapRequest& request,
-                                                                const core::Executor& executor,
-                                                                core::Log& log,
-                                                                const RobotRecordings*& recordings) {
+core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& request,
+                                                           const core::Executor& executor, core::Log& log) {
   const std::filesystem::path scenes = request.pipelines_folder / "scenes";
-  auto first = open_input(request.input, request.open, scenes, executor, log);
-  if (!first || request.others.empty()) return first;
+  std::vector<std::string> inputs{request.input};
+  inputs.insert(inputs.end(), request.others.begin(), request.others.end());
   std::vector<std::unique_ptr<dataset::FrameSource>> all;
-  all.push_back(std::move(*first));
-  for (const std::string& input : request.others) {
-    auto other = open_input(input, request.open, scenes, executor, log);
-    if (!other) return other;
-    all.push_back(std::move(*other));
+  for (const std::string& input : inputs) {
+    auto recording = open_input(input, request.open, scenes, executor, log);
+    if (!recording) return tl::unexpected<core::Error>(recording.error());
+    all.push_back(std::move(*recording));
   }
-  auto several = std::make_unique<RobotRecordings>(std::move(all));
-  recordings = several.get();
-  return several;
+  return std::make_unique<RobotRecordings>(std::move(all));
 }
 
 core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::filesystem::path& pipeline) {
@@ -147,15 +141,14 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   const auto start = std::chrono::steady_clock::now();
   const MapRequest request = in_order(given);
 
-  const bool several = !request.others.empty();
-  const std::string pipeline = several && request.pipeline == "rgbd" ? "robots" : request.pipeline;
-  const auto pipeline_file = find_pipeline(pipeline, request.pipelines_folder);
+  const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
   if (!pipeline_file) return fail(pipeline_file.error());
   StageRegistry registry;
   register_stages(registry);
   registry.filters() = request.filters;
   auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
   if (!graph) return fail(graph.error());
+  for (const std::string& warning : graph->warnings) log.warning(warning);
   const bool tracks = std::any_of(graph->nodes.begin(), graph->nodes.end(),
                                   [](const Node& node) { return node.type->name == "track"; });
   if (!request.debug_video.empty() && !tracks) {
@@ -163,17 +156,15 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
         fmt::format("{}: has no track stage whose work could be drawn; leave out --debug-video",
                     pipeline_file->string()));
   }
-  if (several && graph->source().type->name != "maps" &&
-      std::none_of(graph->nodes.begin(), graph->nodes.end(),
-                   [](const Node& node) { return node.type->name == "robots"; })) {
-    return core::usage_error(fmt::format(
-        "{}: maps one recording; several need a pipeline with a robots stage", pipeline_file->string()));
+  if (graph->source().type->name == "maps") {
+    return core::usage_error(
+        fmt::format("{}: begins with finished maps; it is run by plumbline fuse", pipeline_file->string()));
   }
-  const RobotRecordings* recordings = nullptr;
-  const auto source = open_inputs(request, executor, log, recordings);
+  const auto source = open_inputs(request, executor, log);
   if (!source) return fail(source.error());
-  const bool keeps = std::any_of(graph->nodes.begin(), graph->nodes.end(),
-                                 [](const Node& node) { return node.stage->wants_map_changes(); });
+  const bool keeps =
+      request.others.empty() && std::any_of(graph->nodes.begin(), graph->nodes.end(),
+                                            [](const Node& node) { return node.stage->wants_map_changes(); });
   if (request.resume) {
     if (auto can = can_resume(request, keeps && tracks, *pipeline_file); !can) return fail(can.error());
   }
@@ -204,7 +195,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
 
   RunContext context;
   context.source = source->get();
-  context.recordings = recordings;
+  context.recordings = source->get();
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
@@ -222,7 +213,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   RunSummary summary;
   summary.input = request.input;
   for (const std::string& other : request.others) summary.input += " " + other;
-  summary.pipeline = pipeline;
+  summary.pipeline = request.pipeline;
   summary.threads = executor.threads();
   summary.pace_hz = request.pace_hz;
   add_report(*report, summary);

@@ -16,15 +16,15 @@ void register_stages(StageRegistry& registry) {
   registry.add(fuse_stage());
   registry.add(filter_stage());
   registry.add(store_stage());
-  registry.add(robots_stage());
   registry.add(maps_stage());
-  registry.add(keep_stage());
+  registry.add(merge_stage());
   registry.add(output_stage());
   registry.add_tap(frame_tap());
   registry.add_tap(features_tap());
   registry.add_tap(track_tap());
   registry.add_tap(keyframe_cloud_tap());
   registry.add_tap(map_tap());
+  registry.add_tap(maps_tap());
   registry.add_tap(cloud_tap());
 }
 

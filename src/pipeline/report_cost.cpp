@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a run took: time, memory, messages; its configuration and files.
+// What a run took: time, memory; its configuration and files.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -107,18 +107,6 @@ std::string stages_table(const Json& summary) {
   return table.html();
 }
 
-std::string messages_table(const Json& summary) {
-  HtmlTable table(
-      {{"robot"}, {"messages", true}, {"bytes", true}, {"bytes a message", true}, {"largest (bytes)", true}});
-  for (const Json& robot : list_at(summary, "/robots")) {
-    const double messages = number_at(robot, "/messages");
-    const double bytes = number_at(robot, "/bytes");
-    table.row({text_at(robot, "/name"), count_text(messages), count_text(bytes), count_text(bytes / messages),
-               count_text(number_at(robot, "/largest_message"))});
-  }
-  return table.rows() == 0 ? "" : "<h3>Messages to the fusion end, one a keyframe</h3>\n" + table.html();
-}
-
 /// What the files of a result are, by the end of their name.
 std::string what_is(const std::string& name) {
   struct Known {
@@ -169,7 +157,7 @@ std::string cost_html(const ReportData& data) {
                        fmt::format("{} frames that an earlier run had mapped before it was interrupted",
                                    count_text(number_at(s, "/frames/resumed"))));
   }
-  return facts_html(facts) + stages_table(s) + time_charts(data) + messages_table(s);
+  return facts_html(facts) + stages_table(s) + time_charts(data);
 }
 
 std::string configuration_html(const ReportData& data) {

@@ -93,8 +93,10 @@ std::string frames_text(const ReportData& data) {
 
 std::string frame_of_results(const ReportData& data) {
   const std::string up = text_at(data.summary, "/frame/up");
-  if (up == "floor") return "z up, 0 on the floor; metres";
-  if (up == "camera") return "z up as the cameras were held; metres";
+  const std::string x =
+      text_at(data.summary, "/frame/yaw") == "walls" ? ", x along the walls; metres" : "; metres";
+  if (up == "floor") return "z up, 0 on the floor" + x;
+  if (up == "camera") return "z up as the cameras were held" + x;
   return up.empty() ? up : "that of the first camera: x right, y down, z forward; metres";
 }
 

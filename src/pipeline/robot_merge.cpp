@@ -9,16 +9,20 @@
 namespace plumbline::pipeline {
 namespace {
 
-std::vector<mapping::MapPart> maps_of(const std::vector<RobotPart>& parts) {
+std::vector<mapping::MapPart> maps_of(const std::vector<RobotMap>& parts) {
   std::vector<mapping::MapPart> maps;
-  for (const RobotPart& part : parts) maps.push_back(part.map);
+  for (const RobotMap& part : parts) {
+    mapping::MapPart& map = maps.emplace_back();
+    map.map = part.map.get();
+    for (const RobotInfo& robot : part.robots) map.cameras[robot.number] = robot.camera.color;
+  }
   return maps;
 }
 
 /// The first part of the group that has most keyframes.
-std::size_t largest_group(const std::vector<RobotPart>& parts, const std::vector<std::size_t>& group) {
+std::size_t largest_group(const std::vector<RobotMap>& parts, const std::vector<std::size_t>& group) {
   std::vector<std::size_t> keyframes(parts.size(), 0);
-  for (std::size_t p = 0; p < parts.size(); ++p) keyframes[group[p]] += parts[p].map.map->keyframe_count();
+  for (std::size_t p = 0; p < parts.size(); ++p) keyframes[group[p]] += parts[p].map->keyframe_count();
   return static_cast<std::size_t>(std::max_element(keyframes.begin(), keyframes.end()) - keyframes.begin());
 }
 
@@ -35,7 +39,7 @@ void tell(const RunSummary::Merge& merge, core::Log& log) {
   }
 }
 
-std::string left_out(const std::vector<RobotPart>& parts, const std::vector<std::size_t>& used,
+std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::size_t>& used,
                      const std::vector<RunSummary::Merge>& merges) {
   std::string names;
   for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -56,15 +60,11 @@ std::string left_out(const std::vector<RobotPart>& parts, const std::vector<std:
 
 }  // namespace
 
-mapping::OverlapFinder learn_places(const std::vector<RobotPart>& parts,
-                                    const mapping::MapFusionOptions& options) {
-  return mapping::learn_places(maps_of(parts), options);
-}
-
-MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder& places,
-                          std::size_t anchor, const mapping::MapFusionOptions& options,
-                          const core::Executor& executor, core::Log& log) {
+MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
+                          const mapping::MapFusionOptions& options, const core::Executor& executor,
+                          core::Log& log) {
   const std::vector<mapping::MapPart> maps = maps_of(parts);
+  mapping::OverlapFinder places = mapping::learn_places(maps, options);
   std::vector<mapping::MergeEvidence> evidence =
       mapping::find_overlaps(maps, places.look_at_all(maps, executor), options, executor);
   if (anchor >= parts.size()) {
@@ -83,7 +83,7 @@ MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapF
   map->map = std::make_shared<maps::Map>(std::move(fused.map));
   for (const std::size_t p : fused.parts) {
     map->robots.insert(map->robots.end(), parts[p].robots.begin(), parts[p].robots.end());
-    map->frame_poses.insert(map->frame_poses.end(), parts[p].frames->begin(), parts[p].frames->end());
+    map->frame_poses.insert(map->frame_poses.end(), parts[p].frame_poses.begin(), parts[p].frame_poses.end());
   }
   take_poses_from_map(*map);
   log.debug(

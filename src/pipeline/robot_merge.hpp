@@ -13,29 +13,16 @@
 
 namespace plumbline::pipeline {
 
-/// What one recording or one store gives.
-struct RobotPart {
-  std::string name;
-  mapping::MapPart map;
-  std::vector<RobotInfo> robots;
-  const std::vector<maps::FramePose>* frames = nullptr;
-};
-
 struct MergedRobots {
-  std::shared_ptr<const MapResult> map;
+  std::shared_ptr<MapResult> map;
   std::vector<RunSummary::Merge> merges;
   std::string unconnected;  ///< which maps are left out and what was tried; empty: none
   std::size_t refused = 0;  ///< adjustments that would have torn a map
 };
 
-/// mapping::learn_places of the parts: can be done beside other work.
-mapping::OverlapFinder learn_places(const std::vector<RobotPart>& parts,
-                                    const mapping::MapFusionOptions& options);
-
 /// Fuses the parts that hang together with `anchor`; parts.size(): with the group that has most keyframes.
-/// `places`: of learn_places, for once.
-MergedRobots merge_robots(const std::vector<RobotPart>& parts, mapping::OverlapFinder& places,
-                          std::size_t anchor, const mapping::MapFusionOptions& options,
-                          const core::Executor& executor, core::Log& log);
+MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
+                          const mapping::MapFusionOptions& options, const core::Executor& executor,
+                          core::Log& log);
 
 }  // namespace plumbline::pipeline

@@ -76,8 +76,6 @@ class CloudStage : public Stage {
   }
   [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
   core::Result<void> start(const RunContext& context) override {
-    camera_ = context.source->camera().color;
-    frames_ = context.source->size();
     recordings_ = context.recordings;
     left_out_.start(filters_.chain().size());
     return {};
@@ -85,9 +83,9 @@ class CloudStage : public Stage {
 
   core::Result<void> process(StageIo& io) override {
     const auto track = io.input<TrackedFrame>("track");
-    const std::int32_t robot = recordings_ != nullptr ? recordings_->robot_of(io.frame()) : 0;
-    const std::size_t number = recordings_ != nullptr ? recordings_->frame_of(io.frame()) : io.frame();
-    const std::size_t frames = recordings_ != nullptr ? recordings_->frames_of(robot) : frames_;
+    const std::int32_t robot = recordings_->robot_of(io.frame());
+    const std::size_t number = recordings_->frame_of(io.frame());
+    const std::size_t frames = recordings_->frames_of(robot);
     // The last frame shows what no other does when the camera was on its way somewhere.
     const bool between =
         between_ > 0 && (number % static_cast<std::size_t>(between_) == 0 || number + 1 == frames);
@@ -95,9 +93,7 @@ class CloudStage : public Stage {
     const bool looks = looks_ > 0 && number % static_cast<std::size_t>(looks_) == 0;
     if (!gives_cloud && !looks) return {};
     const auto frame = io.input<sensor::RgbdFrame>("frame");
-    const sensor::Pinhole camera = recordings_ != nullptr
-                                       ? recordings_->robots()[static_cast<std::size_t>(robot)].camera.color
-                                       : camera_;
+    const sensor::Pinhole& camera = recordings_->robot(robot).camera.color;
     core::Result<cloud::CloudPtr> made =
         gives_cloud ? filtered(*frame, camera, track->keyframe)
                     : cloud::depth_look(*frame, camera, options_.min_depth_m, options_.max_depth_m);
@@ -134,11 +130,9 @@ class CloudStage : public Stage {
   cloud::KeyframeCloudOptions options_;
   int between_ = 10;
   int looks_ = 3;
-  std::size_t frames_ = 0;
   ChainOption filters_{"filters/keyframe.yaml"};
   LeftOut left_out_;
-  sensor::Pinhole camera_;
-  const RobotRecordings* recordings_ = nullptr;  ///< null: one robot
+  const RobotRecordings* recordings_ = nullptr;
 };
 
 }  // namespace

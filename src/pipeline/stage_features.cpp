@@ -16,11 +16,6 @@ class FeaturesStage : public Stage {
   void declare(core::OptionTable& table) override { options_.declare(table); }
   core::Result<void> start(const RunContext& context) override {
     recordings_ = context.recordings;
-    if (recordings_ == nullptr) {
-      extractors_.push_back(
-          std::make_unique<features::FeatureExtractor>(options_, context.source->camera().color));
-      return {};
-    }
     for (const RobotInfo& robot : recordings_->robots()) {
       extractors_.push_back(std::make_unique<features::FeatureExtractor>(options_, robot.camera.color));
     }
@@ -28,7 +23,7 @@ class FeaturesStage : public Stage {
   }
   core::Result<void> process(StageIo& io) override {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
-    const std::int32_t robot = recordings_ != nullptr ? recordings_->robot_of(io.frame()) : 0;
+    const std::int32_t robot = recordings_->robot_of(io.frame());
     const features::FeatureExtractor& extractor = *extractors_[static_cast<std::size_t>(robot)];
     io.output<features::FrameFeatures>("features",
                                        std::make_shared<features::FrameFeatures>(extractor.extract(*frame)));

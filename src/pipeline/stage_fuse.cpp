@@ -39,6 +39,10 @@ class FuseStage : public Stage {
                      "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own "
                      "up on average), z up "
                      "as the first camera was held, or the frame of the poses as they are");
+    table.choice<Yaw>(
+        "yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
+        "Where x points unless up is none: along the walls, as near as can be to where the first "
+        "camera looks, or just there");
     table.boolean("depth_field", find_depth_field_,
                   "Find out from overlapping views what the depth camera gets wrong everywhere alike, and "
                   "correct it");
@@ -82,7 +86,7 @@ class FuseStage : public Stage {
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
-    frame_ = find_up(up_, fused->cloud, map->trajectory);
+    frame_ = find_up(up_, yaw_, fused->cloud, map->trajectory);
     dense->output_from_map = frame_.output_from_map;
     dense->upright = frame_.up != "none";
     if (dense->upright) cloud::transform(*fused->cloud, frame_.output_from_map);
@@ -101,6 +105,7 @@ class FuseStage : public Stage {
     summary.cloud_points = points_;
     summary.voxel_m = options_.voxels.voxel_m;
     summary.up = frame_.up;
+    summary.yaw = frame_.yaw;
     summary.output_from_map = frame_.output_from_map;
     summary.depth_fields = told_fields_;
   }
@@ -133,10 +138,8 @@ class FuseStage : public Stage {
   }
 
   [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
-    if (context_->stored_maps != nullptr) return context_->stored_maps->camera_of(robot);
-    if (context_->recordings != nullptr)
-      return context_->recordings->robots()[static_cast<std::size_t>(robot)].camera.color;
-    return context_->source->camera().color;
+    return context_->stored_maps != nullptr ? context_->stored_maps->camera_of(robot)
+                                            : context_->recordings->robot(robot).camera.color;
   }
 
   core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
@@ -274,6 +277,7 @@ class FuseStage : public Stage {
   const RunContext* context_ = nullptr;
   cloud::DenseFusionOptions options_;
   Up up_ = Up::kFloor;
+  Yaw yaw_ = Yaw::kWalls;
   bool find_depth_field_ = true;
   cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;

@@ -8,6 +8,7 @@
 
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "stages.hpp"
 
@@ -26,6 +27,8 @@ class PosesStage : public Stage {
   }
 
   core::Result<void> start(const RunContext& context) override {
+    if (context.recordings->robots().size() > 1)
+      return core::usage_error("known poses are those of one recording; map one at a time");
     if (file_.empty()) {
       const auto truth = context.source->truth();
       if (!truth || truth->empty()) {

@@ -20,9 +20,8 @@ StageType refine_stage();
 StageType fuse_stage();
 StageType filter_stage();
 StageType store_stage();
-StageType robots_stage();
 StageType maps_stage();
-StageType keep_stage();
+StageType merge_stage();
 StageType output_stage();
 
 /// Taps, one a port type: tap_<name>.cpp.
@@ -31,6 +30,7 @@ StageType features_tap();
 StageType track_tap();
 StageType keyframe_cloud_tap();
 StageType map_tap();
+StageType maps_tap();
 StageType cloud_tap();
 
 /// Counts tracked and lost frames and the longest run of lost ones.

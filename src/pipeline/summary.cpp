@@ -56,14 +56,10 @@ nlohmann::ordered_json trials_of(const RunSummary& summary) {
   return list;
 }
 
-nlohmann::ordered_json traffic_of(const RunSummary& summary) {
+nlohmann::ordered_json robots_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const RunSummary::Traffic& robot : summary.traffic) {
-    list.push_back({{"name", robot.robot},
-                    {"messages", robot.messages},
-                    {"bytes", robot.bytes},
-                    {"largest_message", robot.most}});
-  }
+  for (const RunSummary::Robot& robot : summary.robots)
+    list.push_back({{"name", robot.name}, {"keyframes", robot.keyframes}});
   return list;
 }
 
@@ -315,9 +311,9 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"after", fits_of(s.refine.after)}}},
       {"path", path_of(s)},
       {"merges", merges_of(s)},
-      {"robots", traffic_of(s)},
+      {"robots", robots_of(s)},
       {"cloud", cloud_of(s)},
-      {"frame", {{"up", s.up}, {"output_from_map", rows(s.output_from_map)}}},
+      {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
       {"depth_fields", depth_fields_of(s)},
       {"timing",
        {{"wall_s", rounded(s.wall_s)},

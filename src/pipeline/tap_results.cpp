@@ -73,6 +73,21 @@ class MapTap : public Tap {
   }
 };
 
+class MapsTap : public Tap {
+ public:
+  MapsTap() : Tap(TapFile::Count::kMany, {".txt", ".ply"}) {}
+  core::Result<void> finish(StageIo& io) override {
+    const auto maps = io.input<RobotMaps>("in");
+    for (std::size_t i = 0; i < maps->maps.size(); ++i) {
+      const auto path = maps::trajectory(maps->maps[i].frame_poses, *maps->maps[i].map);
+      auto written = file_.ending() == ".txt" ? dataset::write_trajectory(file_.path(i), path)
+                                              : write_trajectory_ply(file_.path(i), path);
+      if (!written) return written;
+    }
+    return {};
+  }
+};
+
 class CloudTap : public Tap {
  public:
   CloudTap() : Tap(TapFile::Count::kOne, {".ply", ".pcd"}) {}
@@ -108,6 +123,11 @@ StageType map_tap() {
   return tap<MapTap>(map_port(),
                      "The camera's path in the map's frame: poses in TUM format (.txt) or edges (.ply)",
                      Mode::kSerial);
+}
+StageType maps_tap() {
+  return tap<MapsTap>(maps_port(),
+                      "Each robot's path in its own map: poses in TUM format (.txt) or edges (.ply)",
+                      Mode::kSerial);
 }
 StageType cloud_tap() {
   return tap<CloudTap>(cloud_port(), "The cloud, in the frame of the results", Mode::kSerial);

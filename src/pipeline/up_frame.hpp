@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The frame of the results: upright, on the floor.
+// The frame of the results: upright, on the floor, square to the walls.
 #include <string>
 
 #include "plumbline/cloud/types.hpp"
@@ -16,14 +16,22 @@ enum class Up {
   kNone,    ///< the map's own frame
 };
 
-struct UpFrame {
-  geometry::Rigid3 output_from_map;
-  std::string up = "none";  ///< what was found: floor, camera or none
+enum class Yaw {
+  kWalls,   ///< x along the direction of most walls that is nearest to where the first camera looks
+  kCamera,  ///< x where the first camera looks
 };
 
-/// z up; x where the first camera looks, as far as that is horizontal; the origin below (floor) or at
-/// (camera) the first camera. kFloor takes the lowest large plane that faces up (cloud::find_floor), and
-/// falls back to kCamera when no such surface is seen. Without poses: none.
-UpFrame find_up(Up wanted, const cloud::CloudConstPtr& cloud, const geometry::Trajectory& trajectory);
+struct UpFrame {
+  geometry::Rigid3 output_from_map;
+  std::string up = "none";   ///< what was found: floor, camera or none
+  std::string yaw = "none";  ///< walls, camera or none
+};
+
+/// z up; x horizontal; the origin below (floor) or at (camera) the first camera. kFloor takes the lowest
+/// large plane that faces up (cloud::find_floor), and falls back to kCamera when no such surface is seen;
+/// kWalls falls back to kCamera when less than a third of the upright surface is square to one direction.
+/// Without poses, or with kNone: the map's own frame.
+UpFrame find_up(Up wanted, Yaw yaw, const cloud::CloudConstPtr& cloud,
+                const geometry::Trajectory& trajectory);
 
 }  // namespace plumbline::pipeline

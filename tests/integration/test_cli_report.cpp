@@ -172,7 +172,7 @@ TEST_F(Report, TellsOfSeveralRobots) {
   const std::string lean = " -q --set output.views= --set output.pcd=off --set fuse.voxel=3cm ";
   ASSERT_EQ(run("map world/robot0 -o a --to 3.5" + lean).code, 0);
   ASSERT_EQ(run("map world/robot0 -o b --from 1.5" + lean).code, 0);
-  const Outcome fused = run("fuse a b -o out --set maps.min_pairs=3" + lean);
+  const Outcome fused = run("fuse a b -o out --set merge.min_pairs=3" + lean);
   ASSERT_EQ(fused.code, 0) << fused;
   const std::string html = page("out --truth world/robot0");
   for (const char* text : {"id=\"merges\"", "Evidence: ", "all, one alignment", "Robots</th><td>a, b",

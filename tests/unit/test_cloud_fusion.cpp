@@ -327,8 +327,9 @@ TEST(FreeSpace, EvidenceOfAView) {
   Views views;
   views.add_whole(with_box(plane_depth({0, 0, 1}, 2.0, 0.0), cv::Rect(0, 0, 160, 480), 1.0F), 0.0);
   const DepthRaster raster = depth_raster(*views.clouds[0], camera());
+  const DepthLimits limits(raster);
   const auto at = [&](double u, double v, double z) {
-    return evidence(raster, camera().unproject(u, v, z).cast<float>());
+    return limits.evidence(camera().unproject(u, v, z).cast<float>());
   };
   EXPECT_EQ(at(400, 240, 1.0), Evidence::kFree);
   EXPECT_EQ(at(400, 240, 2.0), Evidence::kSurface);

@@ -14,7 +14,7 @@ namespace {
 using worlds::point;
 using worlds::slurp;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 
 std::filesystem::path temp(const std::string& name) {
   return std::filesystem::path(testing::TempDir()) / ("plumbline_io_" + name);
@@ -126,8 +126,8 @@ TEST(CloudIo, ReadsWhatPclWrites) {
 
 TEST(CloudIo, NanPointsAreLeftOutOrKeptInTheirPlaceAndCounted) {
   Cloud list = some_points(5);
-  list[1].x = kNan;
-  list[2].normal_y = kNan;
+  list[1].x = kNoNumber;
+  list[2].normal_y = kNoNumber;
   for (const std::string ending : {".ply", ".pcd"}) {
     ASSERT_TRUE(write_cloud(temp("nan" + ending), list));
     const auto read = read_cloud(temp("nan" + ending));
@@ -140,7 +140,7 @@ TEST(CloudIo, NanPointsAreLeftOutOrKeptInTheirPlaceAndCounted) {
   Cloud grid = some_points(6);
   grid.width = 3;
   grid.height = 2;
-  grid[4].z = kNan;
+  grid[4].z = kNoNumber;
   ASSERT_TRUE(write_pcd(temp("grid.pcd"), grid));
   const auto read = read_cloud(temp("grid.pcd"));
   ASSERT_TRUE(read);
@@ -207,11 +207,11 @@ TEST(CloudIo, BrokenFilesSayWhatIsWrong) {
 }
 
 TEST(CloudIo, TextInTheCommonLayouts) {
-  struct Case {
+  struct Layout {
     std::string name, text;
     bool color, normals;
   };
-  const std::vector<Case> cases = {
+  const std::vector<Layout> cases = {
       {"t.xyz", "1 2 3\n4 5 6\n", false, false},
       {"t.xyz", "1 2 3 0 0 -1\n4 5 6 0 1 0\n", false, true},
       {"t.txt", "1;2;3;255;0;10\n4;5;6;1;2;3\n", true, false},

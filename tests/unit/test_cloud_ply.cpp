@@ -15,7 +15,7 @@ std::filesystem::path ply_file(const std::string& name) {
   return std::filesystem::path(testing::TempDir()) / ("plumbline_ply_" + name);
 }
 
-std::string slurp(const std::filesystem::path& file) {
+std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
@@ -42,7 +42,7 @@ PlyData triangle() {
 TEST(Ply, RoundTripKeepsEverythingAndBytes) {
   const auto file = ply_file("round.ply");
   ASSERT_TRUE(write_ply(file, triangle()));
-  const std::string first = slurp(file);
+  const std::string first = bytes_of(file);
   const auto data = read_ply(file);
   ASSERT_TRUE(data) << data.error().message;
   EXPECT_EQ(data->vertex_count, 3U);
@@ -57,7 +57,7 @@ TEST(Ply, RoundTripKeepsEverythingAndBytes) {
   EXPECT_EQ(data->edge_colors, triangle().edge_colors);
   EXPECT_EQ(data->comments, triangle().comments);
   ASSERT_TRUE(write_ply(file, *data));
-  EXPECT_EQ(slurp(file), first);
+  EXPECT_EQ(bytes_of(file), first);
 }
 
 TEST(Ply, AsciiWithPolygonsUnknownElementsAndCrLf) {
@@ -92,7 +92,7 @@ TEST(Ply, BigEndianAndIntegerProperties) {
 TEST(Ply, EveryTruncationIsAnErrorThatNamesTheFile) {
   const auto file = ply_file("whole.ply");
   ASSERT_TRUE(write_ply(file, triangle()));
-  const std::string whole = slurp(file);
+  const std::string whole = bytes_of(file);
   for (std::size_t length = 0; length < whole.size(); ++length) {
     const auto data = read_ply(spill_ply("cut.ply", whole.substr(0, length)));
     ASSERT_FALSE(data) << length;
@@ -148,11 +148,11 @@ TEST(OutputFile, LeavesTheOldFileWhenNotCommitted) {
     core::OutputFile out(file);
     out.write("new");
   }
-  EXPECT_EQ(slurp(file), "old");
+  EXPECT_EQ(bytes_of(file), "old");
   core::OutputFile out(file);
   out.write("new");
   ASSERT_TRUE(out.commit());
-  EXPECT_EQ(slurp(file), "new");
+  EXPECT_EQ(bytes_of(file), "new");
 }
 
 TEST(OutputFile, FullDiskFolderAndMissingFolderAreOutputErrors) {

@@ -102,7 +102,8 @@ TEST(Segments, ClustersLargestFirst) {
 /// Two squares of 900 points, 1 m apart, and a speck of 40 between them.
 CloudPtr two_squares() {
   auto cloud = square(30, 0.01F);
-  for (Point p : *square(30, 0.01F)) {
+  const auto other = square(30, 0.01F);
+  for (Point p : *other) {
     p.x -= 1.3F;  // over the border of blocks
     cloud->push_back(p);
   }
@@ -120,6 +121,7 @@ TEST(Segments, ClustersOverTheMeansOfCells) {
   }
   EXPECT_EQ(must(entry + "40}", cloud)->size(), 1840U);
   EXPECT_EQ(must(entry + "901}", cloud)->size(), 0U);
+  EXPECT_EQ(must(entry + "901, min_share: 45 %}", cloud)->size(), 1800U);
   EXPECT_EQ(must(entry + "901, mode: remove}", cloud)->size(), 1840U);
   const auto labels = must("{type: clusters, distance: 4 cm, leaf: 2 cm, count: 1, mode: label}", cloud);
   EXPECT_EQ(colors(*labels, 0, 900).count(0x808080U), 0U) << "of equals the first";
@@ -128,7 +130,8 @@ TEST(Segments, ClustersOverTheMeansOfCells) {
 
 TEST(Segments, ClustersOfCellsKnowNoLimitOfPclsGrids) {
   auto cloud = two_squares();
-  for (Point p : *square(30, 0.01F)) {
+  const auto other = square(30, 0.01F);
+  for (Point p : *other) {
     p.getVector3fMap() += Eigen::Vector3f(300, 300, 300);  // 3e15 cells of 2 mm
     cloud->push_back(p);
   }

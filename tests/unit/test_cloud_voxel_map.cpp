@@ -163,9 +163,7 @@ TEST(VoxelMap, FusedPointsGoIntoLargerVoxels) {
   fine.insert(cloud, looking(1.0));
   fine.insert(cloud, looking(1.0));
   ASSERT_EQ(fine.size(), 10U);
-  VoxelMap coarse(voxels(1.0));
-  coarse.insert(fine.points());
-  const std::vector<FusedPoint> fused = coarse.points();
+  const std::vector<FusedPoint> fused = VoxelMap::merged(fine.points(), voxels(1.0));
   ASSERT_EQ(fused.size(), 1U);
   EXPECT_EQ(fused[0].observations, 2U) << "no view is counted twice";
   EXPECT_NEAR(fused[0].point.x, 0.05F, 1e-4F);
@@ -190,10 +188,9 @@ TEST(VoxelMap, TellsWhoMeasuredAPointMost) {
   ASSERT_EQ(fused.size(), 1U);
   EXPECT_EQ(fused[0].robot, 3U);
   EXPECT_EQ(fused[0].observations, 7U);
-  VoxelMap settled(voxels(0.1));
-  settled.insert(fused);
-  EXPECT_EQ(settled.points()[0].robot, 3U);
-  EXPECT_EQ(settled.points()[0].observations, 7U);
+  const std::vector<FusedPoint> settled = VoxelMap::merged(fused, voxels(0.1));
+  EXPECT_EQ(settled[0].robot, 3U);
+  EXPECT_EQ(settled[0].observations, 7U);
 }
 
 TEST(VoxelMap, AViewIsTakenUpAsFarAsItLiesInTheRegion) {

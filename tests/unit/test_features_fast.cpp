@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Our FAST and ORB kernels against OpenCV's.
+// Our FAST kernel against OpenCV's.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstring>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "fast.hpp"
-#include "orb_describe.hpp"
 
 namespace plumbline::features {
 namespace {
@@ -65,49 +62,6 @@ TEST(Fast, BlackOnWhiteScoresAsMuchAsCan) {
   EXPECT_EQ(found[0].y, 20);
   EXPECT_EQ(found[0].score, 254);
   expect_same_corners(image, 254);
-}
-
-TEST(OrbDescriptor, HasTheBitsOfOpenCv) {
-  const cv::Mat image = noise(320, 240, 1.5);
-  std::vector<cv::KeyPoint> points;
-  for (int y = kOrbMargin; y < image.rows - kOrbMargin; y += 9) {
-    for (int x = kOrbMargin; x < image.cols - kOrbMargin; x += 7) {
-      points.emplace_back(static_cast<float>(x), static_cast<float>(y), 31.0F, orb_orientation(image, x, y),
-                          1.0F, 0);
-    }
-  }
-  ASSERT_GT(points.size(), 500U);
-  const std::size_t asked = points.size();
-  cv::Mat expected;
-  cv::ORB::create(static_cast<int>(asked), 1.2F, 1, 16, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20)
-      ->compute(image, points, expected);
-  ASSERT_EQ(points.size(), asked);
-  const cv::Mat smooth = orb_smooth(image);
-  int different = 0;
-  for (std::size_t i = 0; i < asked; ++i) {
-    Descriptor256 theirs;
-    std::memcpy(theirs.data(), expected.ptr(static_cast<int>(i)), sizeof theirs);
-    const cv::KeyPoint& p = points[i];
-    different += hamming_distance(theirs, orb_descriptor(smooth, cvRound(p.pt.x), cvRound(p.pt.y), p.angle));
-  }
-  EXPECT_EQ(different, 0);
-}
-
-// The weight of a ramp grows in its own direction.
-TEST(OrbDescriptor, OrientationPointsTowardsTheLight) {
-  for (double degrees = 0.0; degrees < 360.0; degrees += 15.0) {
-    cv::Mat image(64, 64, CV_8UC1);
-    const double cosine = std::cos(degrees * CV_PI / 180.0);
-    const double sine = std::sin(degrees * CV_PI / 180.0);
-    for (int y = 0; y < 64; ++y) {
-      for (int x = 0; x < 64; ++x) {
-        image.at<std::uint8_t>(y, x) =
-            cv::saturate_cast<std::uint8_t>(128.0 + 3.0 * ((x - 32) * cosine + (y - 32) * sine));
-      }
-    }
-    const double found = orb_orientation(image, 32, 32);
-    EXPECT_NEAR(std::remainder(found - degrees, 360.0), 0.0, 1.5) << degrees;
-  }
 }
 
 }  // namespace

@@ -14,9 +14,9 @@ namespace {
 using Eigen::Vector3d;
 using geometry::Rigid3;
 
-class Random {
+class RandomViews {
  public:
-  explicit Random(unsigned seed) : numbers_(seed) {}
+  explicit RandomViews(unsigned seed) : numbers_(seed) {}
   double within(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(numbers_);
   }
@@ -49,7 +49,7 @@ double apart(const Rigid3& a, const Rigid3& b) {
 
 /// Pairs of a view moved by `query_from_match`, `good` of each kind right and as many again wrong.
 PosePairs make_pairs(const Rigid3& query_from_match, int good_points, int good_lines, int wrong,
-                     Random& random) {
+                     RandomViews& random) {
   PosePairs pairs;
   for (int i = 0; i < good_points + wrong; ++i) {
     PointPair pair;
@@ -75,7 +75,7 @@ PosePairs make_pairs(const Rigid3& query_from_match, int good_points, int good_l
 }
 
 TEST(PlacePose, IsFoundAmongThreeTimesAsManyWrongPairs) {
-  Random random(2);
+  RandomViews random(2);
   for (int trial = 0; trial < 20; ++trial) {
     const Rigid3 truth = random.pose();
     const PosePairs pairs = make_pairs(truth, 30, 4, 60, random);
@@ -88,7 +88,7 @@ TEST(PlacePose, IsFoundAmongThreeTimesAsManyWrongPairs) {
 }
 
 TEST(PlacePose, IsFoundFromLinesWherePointsAreFew) {
-  Random random(3);
+  RandomViews random(3);
   const Rigid3 truth = random.pose();
   const PosePairs pairs = make_pairs(truth, 2, 12, 6, random);
   const auto pose = ransac_pose(pairs, camera(), 600, 10, 7);
@@ -98,7 +98,7 @@ TEST(PlacePose, IsFoundFromLinesWherePointsAreFew) {
 }
 
 TEST(PlacePose, IsNoneOfWrongPairsAlone) {
-  Random random(4);
+  RandomViews random(4);
   EXPECT_FALSE(ransac_pose(make_pairs({}, 0, 0, 40, random), camera(), 600, 10, 7).has_value());
   EXPECT_FALSE(ransac_pose({}, camera(), 600, 10, 7).has_value());
 }
@@ -128,7 +128,7 @@ std::vector<std::pair<std::size_t, std::size_t>> slowly(const features::FrameFea
 }
 
 TEST(PlaceMatches, AreThoseThatLookAlikeBothWays) {
-  Random random(6);
+  RandomViews random(6);
   features::FrameFeatures a;
   features::FrameFeatures b;
   const auto add = [&](features::FrameFeatures& to, const features::Descriptor256& descriptor, int flips) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The frame of the results is upright, stands on the floor, and falls back to what is known.
+// The frame of the results is upright, stands on the floor, is square to the walls, and falls back to what is
+// known.
 #include <gtest/gtest.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -53,8 +54,9 @@ class UpFrameTest : public testing::Test {
     world_from_camera.translation = {0, 0, 1.5};
     return {{1.0, map_from_world_ * world_from_camera}};
   }
-  [[nodiscard]] UpFrame find(Up wanted, const geometry::Trajectory& trajectory) const {
-    return find_up(wanted, cloud_, trajectory);
+  [[nodiscard]] UpFrame find(Up wanted, const geometry::Trajectory& trajectory,
+                             Yaw yaw = Yaw::kCamera) const {
+    return find_up(wanted, yaw, cloud_, trajectory);
   }
   [[nodiscard]] Vector3d placed(const UpFrame& frame, const Vector3d& world) const {
     return frame.output_from_map * (map_from_world_ * world);
@@ -108,6 +110,36 @@ TEST_F(UpFrameTest, WithoutAFloorTheCameraTells) {
   cloud_ = nullptr;
   EXPECT_EQ(find(Up::kFloor, path()).up, "camera");
   EXPECT_EQ(find(Up::kFloor, {}).up, "none");
+}
+
+// Walls turned by 25 degrees against where the camera looks, and a cupboard that stands askew.
+TEST_F(UpFrameTest, SquareToTheWalls) {
+  add_square({1, 0, 0}, 1.5, Vector3d::UnitZ(), 4000);
+  const auto facing = [](double degrees) {
+    const double angle = degrees * M_PI / 180.0;
+    return Vector3d(-std::cos(angle), -std::sin(angle), 0.0);
+  };
+  add_square({3, 0, 1.2}, 1.2, facing(25.0), 4000);
+  add_square({1, 3, 1.2}, 1.2, facing(115.0), 3000);
+  add_square({2, 1, 0.5}, 0.5, facing(60.0), 3000);
+  const UpFrame walls = find(Up::kFloor, path(), Yaw::kWalls);
+  EXPECT_EQ(walls.yaw, "walls");
+  const Vector3d ahead = walls.output_from_map.rotation * map_from_world_.rotation * -facing(25.0);
+  EXPECT_NEAR(ahead.x(), 1.0, 1e-4);
+  EXPECT_EQ(find(Up::kFloor, path()).yaw, "camera");
+  EXPECT_EQ(find(Up::kNone, path(), Yaw::kWalls).yaw, "none");
+}
+
+TEST_F(UpFrameTest, WithoutWallsXIsWhereTheCameraLooks) {
+  add_square({1, 0, 0}, 1.5, Vector3d::UnitZ(), 4000);
+  for (int i = 0; i < 180; ++i) {
+    const double angle = 2.0 * M_PI * i / 180.0;  // a column
+    const Vector3d normal(std::cos(angle), std::sin(angle), 0.0);
+    add_square(Vector3d(2, 0, 1) + 0.3 * normal, 0.01, normal, 20);
+  }
+  const UpFrame frame = find(Up::kFloor, path(), Yaw::kWalls);
+  EXPECT_EQ(frame.yaw, "camera");
+  EXPECT_GT(placed(frame, {1, 0, 0}).x(), 0.97);
 }
 
 TEST_F(UpFrameTest, LooksDown) {

@@ -13,7 +13,7 @@ namespace plumbline::synth {
 namespace {
 
 /// A room looked along +y; someone walks across at y = 1.5, 1 m to and fro.
-const char* const kCell = R"(
+const char* const kWalkedCell = R"(
 objects:
   - floor: {from: [-2, -3], to: [2, 2.1], material: lino}
   - wall: {name: front, from: [-2, 2.05], to: [2, 2.05], thickness: 0.1, material: poster_wall}
@@ -36,7 +36,7 @@ SynthOptions small(int walkers, int frames) {
   return options;
 }
 
-core::Result<std::shared_ptr<const World>> world_of(const std::string& yaml, const SynthOptions& options) {
+core::Result<std::shared_ptr<const World>> walked_world(const std::string& yaml, const SynthOptions& options) {
   const auto scene = parse_scene(yaml, "test.yaml");
   if (!scene) return tl::unexpected<core::Error>(scene.error());
   const core::Executor executor(2);
@@ -44,7 +44,7 @@ core::Result<std::shared_ptr<const World>> world_of(const std::string& yaml, con
 }
 
 std::unique_ptr<SynthSource> source_of(const SynthOptions& options) {
-  auto world = world_of(kCell, options);
+  auto world = walked_world(kWalkedCell, options);
   if (!world) throw std::runtime_error(world.error().message);
   auto source = SynthSource::create(*world, 0);
   if (!source) throw std::runtime_error(source.error().message);
@@ -98,7 +98,7 @@ TEST(Walker, IsFilmedWhereItIs) {
 }
 
 TEST(Walker, IsNoPartOfTheReference) {
-  const auto scene = parse_scene(kCell, "test.yaml");
+  const auto scene = parse_scene(kWalkedCell, "test.yaml");
   ASSERT_TRUE(scene);
   const core::Executor executor(2);
   const core::StopToken stop;
@@ -117,10 +117,10 @@ TEST(Walker, IsNoPartOfTheReference) {
 }
 
 TEST(Walker, MoreThanThereAreAndWrongOnesAreRefused) {
-  const auto many = world_of(kCell, small(2, 3));
+  const auto many = walked_world(kWalkedCell, small(2, 3));
   ASSERT_FALSE(many);
   EXPECT_NE(many.error().message.find("has 1, not 2"), std::string::npos) << many.error().message;
-  const std::string start(kCell);
+  const std::string start(kWalkedCell);
   const auto still = parse_scene(start + "  - {from: [0, 0], to: [0, 0]}\n", "test.yaml");
   ASSERT_FALSE(still);
   EXPECT_NE(still.error().message.find("walkers[1]: needs from"), std::string::npos) << still.error().message;

@@ -18,7 +18,7 @@ struct Look {
   sensor::RgbdFrame frame;
   features::FrameFeatures features;
 };
-Look look(const cv::Mat& poster, const Rigid3& camera_from_wall, bool depth = true) {
+Look look_at(const cv::Mat& poster, const Rigid3& camera_from_wall, bool depth = true) {
   Look result;
   result.frame.gray = tests::render_wall(poster, 300.0, 2.0, camera_from_wall);
   result.frame.depth = tests::render_depth({{{0.0, 0.0, 2.0}, {0.0, 0.0, -1.0}, 0.0}}, camera_from_wall);
@@ -87,8 +87,8 @@ TrackerOptions only(bool points, bool lines, bool depth) {
 class TwoPlaces : public testing::Test {
  protected:
   TwoPlaces() {
-    here_ = add_keyframe(map_, look(first_, {}), {});
-    there_ = add_keyframe(map_, look(second_, {}), away_);
+    here_ = add_keyframe(map_, look_at(first_, {}), {});
+    there_ = add_keyframe(map_, look_at(second_, {}), away_);
   }
   TrackResult track(const TrackerOptions& options, const Look& seen) {
     Tracker tracker(options, kTestCamera);
@@ -106,7 +106,7 @@ class TwoPlaces : public testing::Test {
 
 TEST_F(TwoPlaces, LinesOfWhichTheFrameHasNoDepthAreTracked) {
   const Rigid3 truth(geometry::exp_so3({0.01, -0.02, 0.01}), {0.02, 0.01, -0.03});
-  const Look blind = look(first_, truth, false);
+  const Look blind = look_at(first_, truth, false);
   for (const features::LineFeature& line : blind.features.lines) ASSERT_FALSE(line.line3);
   const TrackResult result = track(only(false, true, false), blind);
   EXPECT_EQ(result.state, TrackState::kTracked);
@@ -118,7 +118,7 @@ TEST_F(TwoPlaces, LinesOfWhichTheFrameHasNoDepthAreTracked) {
 
 TEST_F(TwoPlaces, EachFamilyIsLeftOutWhenItIsOff) {
   const Rigid3 truth(geometry::exp_so3({0.0, 0.01, 0.0}), {0.01, 0.0, 0.0});
-  const Look seen = look(first_, truth);
+  const Look seen = look_at(first_, truth);
   const TrackResult points = track(only(true, false, false), seen);
   EXPECT_GT(points.estimate.points.inliers, 0);
   EXPECT_EQ(points.estimate.lines.terms + points.estimate.planes.terms, 0);
@@ -131,7 +131,7 @@ TEST_F(TwoPlaces, EachFamilyIsLeftOutWhenItIsOff) {
 
 TEST_F(TwoPlaces, FoundAgainByLandmarksOrByTheWholePicture) {
   const Rigid3 moved(geometry::exp_so3({0.01, 0.02, 0.01}), {0.02, 0.01, 0.02});
-  const Look seen = look(second_, moved);
+  const Look seen = look_at(second_, moved);
   for (const bool points : {true, false}) {
     const TrackResult result = track(only(points, true, true), seen);
     EXPECT_EQ(result.state, TrackState::kTracked) << points;
@@ -143,7 +143,7 @@ TEST_F(TwoPlaces, FoundAgainByLandmarksOrByTheWholePicture) {
 
 TEST_F(TwoPlaces, APlaceThatTheJudgeRefusesIsNotTaken) {
   const Rigid3 moved(geometry::exp_so3({0.01, 0.02, 0.01}), {0.02, 0.01, 0.02});
-  const Look seen = look(second_, moved);
+  const Look seen = look_at(second_, moved);
   for (const bool believed : {true, false}) {
     Tracker tracker(only(true, true, true), kTestCamera);
     tracker.map_changed(map_, here_, Rigid3());
@@ -164,7 +164,7 @@ TEST_F(TwoPlaces, APlaceThatTheJudgeRefusesIsNotTaken) {
 
 TEST_F(TwoPlaces, PointsAreNotAskedWhenTheyAreOff) {
   // Without lines and points only depth could confirm the place, and a flat wall does not.
-  const Look seen = look(second_, {});
+  const Look seen = look_at(second_, {});
   EXPECT_NE(track(only(false, false, true), seen).state, TrackState::kTracked);
   EXPECT_EQ(track(only(true, false, true), seen).state, TrackState::kTracked);
 }
@@ -172,14 +172,14 @@ TEST_F(TwoPlaces, PointsAreNotAskedWhenTheyAreOff) {
 TEST_F(TwoPlaces, AForeignOrEmptyPictureIsNotFound) {
   // The wall is where it should be, and a few lines fit by chance: they are not to hold what it leaves free.
   for (const std::uint32_t seed : {77U, 78U, 79U, 80U, 81U}) {
-    EXPECT_NE(track({}, look(blocks(seed), {})).state, TrackState::kTracked) << seed;
+    EXPECT_NE(track({}, look_at(blocks(seed), {})).state, TrackState::kTracked) << seed;
   }
-  EXPECT_NE(track({}, look(cv::Mat(1200, 1200, CV_8UC1, cv::Scalar(255)), {}, false)).state,
+  EXPECT_NE(track({}, look_at(cv::Mat(1200, 1200, CV_8UC1, cv::Scalar(255)), {}, false)).state,
             TrackState::kTracked);
 }
 
 TEST_F(TwoPlaces, WhatLooksAlikeComesFirst) {
-  const Look seen = look(second_, {});
+  const Look seen = look_at(second_, {});
   const auto alike = look_alikes(map_, {here_, there_}, seen.features, 5);
   ASSERT_FALSE(alike.empty());
   EXPECT_EQ(alike[0].keyframe, there_);
@@ -187,13 +187,13 @@ TEST_F(TwoPlaces, WhatLooksAlikeComesFirst) {
   EXPECT_TRUE(look_alikes(map_, {here_, there_}, seen.features, 0).empty());
   EXPECT_TRUE(look_alikes(map_, {}, seen.features, 5).empty());
   EXPECT_TRUE(look_alikes(map_, {here_, there_}, {}, 5).empty());
-  const Look white = look(cv::Mat(1200, 1200, CV_8UC1, cv::Scalar(255)), {});
+  const Look white = look_at(cv::Mat(1200, 1200, CV_8UC1, cv::Scalar(255)), {});
   EXPECT_TRUE(look_alikes(map_, {here_, there_}, white.features, 5).empty());
 }
 
 TEST_F(TwoPlaces, ALookAlikeIsAlignedFromAShortWayOff) {
   const Rigid3 moved(geometry::exp_so3({0.02, -0.03, 0.0}), {0.03, 0.0, 0.02});
-  const Rigid3 pose = align_look_alike(map_, there_, look(second_, moved).features, kTestCamera);
+  const Rigid3 pose = align_look_alike(map_, there_, look_at(second_, moved).features, kTestCamera);
   EXPECT_LT(tests::distance(pose, moved * away_), 0.03);
   EXPECT_LT(tests::angle(pose, moved * away_), 0.015);
 }

@@ -31,15 +31,17 @@ inline Eigen::Vector3i unpack_cell(std::uint64_t key) {
 /// The cell that a place lies in; both in the unit of cells.
 inline Eigen::Vector3i cell_of(const Eigen::Vector3d& at) { return at.array().floor().cast<int>(); }
 
-/// Spreads neighbouring cells over a table (finaliser of MurmurHash3, public domain).
+/// Spreads cells over a table (finaliser of MurmurHash3, public domain), eight that follow one another
+/// together: who asks for a cell asks for its neighbours too.
 struct CellHash {
   std::size_t operator()(std::uint64_t key) const {
-    key ^= key >> 33;
-    key *= 0xff51afd7ed558ccdULL;
-    key ^= key >> 33;
-    key *= 0xc4ceb9fe1a85ec53ULL;
-    key ^= key >> 33;
-    return static_cast<std::size_t>(key);
+    std::uint64_t eight = key >> 3U;
+    eight ^= eight >> 33;
+    eight *= 0xff51afd7ed558ccdULL;
+    eight ^= eight >> 33;
+    eight *= 0xc4ceb9fe1a85ec53ULL;
+    eight ^= eight >> 33;
+    return static_cast<std::size_t>(eight << 3U | (key & 7U));
   }
 };
 

@@ -39,10 +39,20 @@ bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 /// What one view says about a place.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
 
-/// `point`: metres, frame of the camera, which took the view. Free: all cells around (3 x 3, at least 7
-/// measured) lie further away than the sensor's noise and 3 cm explain. kNone outside of the picture or where
-/// too little was measured.
-Evidence evidence(const DepthRaster& raster, const Eigen::Vector3f& point);
+/// The nearest and the furthest depth around each cell of a raster, which must outlive it: what a view says
+/// of many places is asked of these.
+class DepthLimits {
+ public:
+  explicit DepthLimits(const DepthRaster& raster);
+  /// `point`: metres, frame of the camera, which took the view. Free: all cells around (3 x 3, at least 7
+  /// measured) lie further away than the sensor's noise and 3 cm explain. kNone outside of the picture or
+  /// where too little was measured.
+  [[nodiscard]] Evidence evidence(const Eigen::Vector3f& point) const;
+
+ private:
+  const DepthRaster& raster_;
+  std::vector<std::uint16_t> nearest_, furthest_;  ///< millimetres, 0: none
+};
 
 /// `is_look`: by view; looks are asked only where clouds alone do not let a sheet go: some cloud looks
 /// through, or fewer than four see a surface. For every sheet whether it is to go: at least half as many

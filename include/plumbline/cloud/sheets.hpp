@@ -66,9 +66,11 @@ class Sheets {
 
  private:
   void add(const FusedPoint& point, std::uint32_t& sheet_of_point);
-  /// Visits the sheets of a block that face like `normal`.
+  /// First sheet of a block, or kNone.
+  [[nodiscard]] std::uint32_t first_of(const Eigen::Vector3i& block) const;
+  /// Visits the sheets of a block, from its first one on, that face like `normal`.
   template <typename Visit>
-  void visit_alike(const Eigen::Vector3i& block, const Eigen::Vector3f& normal, const Visit& visit) const;
+  void visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const;
   /// Over the sheet and what is around it.
   void fit_plane(Sheet& sheet) const;
   /// Plane of a weighted set of points; false when there are too few.

@@ -80,7 +80,9 @@ struct VoxelSample {
 /// same inserts in the same order give the same bytes.
 class VoxelMap {
  public:
-  explicit VoxelMap(const VoxelMapOptions& options = {}) : options_(options) {}
+  explicit VoxelMap(const VoxelMapOptions& options = {}) : options_(options) {
+    places_.max_load_factor(0.8F);  // a small table: inserting is mostly waiting for it
+  }
 
   /// The measurements of one view. `camera_cloud` is in the camera frame (z along the optical axis gives the
   /// depth noise); points that are not finite or beyond +-2^20 voxels of the origin are passed over, points
@@ -93,8 +95,10 @@ class VoxelMap {
   void insert(const Cloud& camera_cloud, const geometry::Rigid3& world_from_cloud);
   /// The same for what measured() gave, as far as it lies in `region` (voxels, both ends included).
   void insert(const std::vector<VoxelSample>& view, const Eigen::AlignedBox3i& region);
-  /// Fuses points that were fused before and moved since. A voxel was seen as often as its most seen point.
-  void insert(const std::vector<FusedPoint>& points);
+  /// Points that were fused before, and moved since, fused anew. A voxel was seen as often as its most seen
+  /// point. In the order of points().
+  static std::vector<FusedPoint> merged(const std::vector<FusedPoint>& points,
+                                        const VoxelMapOptions& options);
 
   /// In the order of their voxel (x, then y, then z), front before back; `curvature` is 0.
   [[nodiscard]] std::vector<FusedPoint> points() const;
@@ -107,7 +111,7 @@ class VoxelMap {
   void add(const VoxelSample& sample);
   VoxelSide& side_at(std::uint64_t key);
   static void combine(const VoxelSide& sample, std::uint32_t view, VoxelSide& side);
-  [[nodiscard]] FusedPoint point_of(std::uint64_t key, const VoxelSide& side) const;
+  static FusedPoint point_of(std::uint64_t key, const VoxelSide& side, double voxel_m);
 
   VoxelMapOptions options_;
   std::deque<VoxelSide> sides_;

@@ -41,6 +41,7 @@ struct TrackedFrame {
   std::optional<maps::FramePose> pose;              ///< none before the map began, or where there is no map
   std::shared_ptr<const maps::MapChanges> changes;  ///< of the map since the last keyframe, with each
                                                     ///< keyframe, when somebody keeps the map
+  std::shared_ptr<const maps::Map> map;             ///< of several robots: as it is with this keyframe
 };
 
 struct KeyframePose {
@@ -54,6 +55,21 @@ struct RobotInfo {
   std::int32_t number = 0;  ///< in the map's ids
   std::string name;
   sensor::Camera camera;
+};
+
+/// The map of one robot when its tracking has ended, or a finished map of one robot or several.
+struct RobotMap {
+  std::string name;
+  std::vector<RobotInfo> robots;
+  std::shared_ptr<const maps::Map> map;
+  std::vector<maps::FramePose> frame_poses;
+};
+
+/// What there is to be merged.
+struct RobotMaps {
+  std::vector<RobotMap> maps;
+  std::string frame_columns;     ///< as MapResult
+  std::vector<FrameRow> frames;  ///< as MapResult
 };
 
 /// The finished map but for its dense cloud; poses after all optimisation.
@@ -109,6 +125,7 @@ inline PortType frame_port() { return port_type<sensor::RgbdFrame>("frame"); }
 inline PortType features_port() { return port_type<features::FrameFeatures>("features"); }
 inline PortType track_port() { return port_type<TrackedFrame>("track"); }
 inline PortType keyframe_cloud_port() { return port_type<KeyframeCloud>("keyframe_cloud"); }
+inline PortType maps_port() { return port_type<RobotMaps>("maps", Rate::kEnd); }
 inline PortType map_port() { return port_type<MapResult>("map", Rate::kEnd); }
 inline PortType cloud_port() { return port_type<DenseCloud>("cloud", Rate::kEnd); }
 

@@ -45,7 +45,8 @@ struct Node {
 /// source, nothing unused, every option in range, every file written once.
 struct Graph {
   std::string description;
-  std::vector<Node> nodes;  ///< each after all it reads from; otherwise in file order, taps last
+  std::vector<Node> nodes;            ///< each after all it reads from; otherwise in file order, taps last
+  std::vector<std::string> warnings;  ///< to be told: options under names of earlier versions
 
   [[nodiscard]] const Node& source() const;
   [[nodiscard]] std::size_t stage_count() const;  ///< taps do not count

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Several recordings side by side, each of a robot of its own, as one source of frames.
+// One recording or several side by side, each of a robot of its own, as one source of frames.
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -21,6 +21,9 @@ class RobotRecordings : public dataset::FrameSource {
   explicit RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings);
 
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
+  [[nodiscard]] const RobotInfo& robot(std::int32_t number) const {
+    return robots_.at(static_cast<std::size_t>(number));
+  }
   [[nodiscard]] std::int32_t robot_of(std::size_t index) const { return order_.at(index).robot; }
   /// Its number within its recording, and how many that has.
   [[nodiscard]] std::size_t frame_of(std::size_t index) const { return order_.at(index).index; }
@@ -36,7 +39,10 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::size_t size() const override { return order_.size(); }
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
-  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
+  /// Of a single recording.
+  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override {
+    return recordings_.size() == 1 ? recordings_.front()->truth() : std::nullopt;
+  }
 
  private:
   struct Place {

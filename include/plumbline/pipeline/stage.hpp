@@ -114,7 +114,7 @@ class StageIo {
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
   const StoredMaps* stored_maps = nullptr;      ///< what a maps stage reads; null: there is none
-  const RobotRecordings* recordings = nullptr;  ///< `source`, when it is several robots'; else null
+  const RobotRecordings* recordings = nullptr;  ///< `source`, when recordings are mapped; else null
   std::string anchor;                           ///< robot whose frame finished maps are laid into; empty: any
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;

@@ -75,15 +75,12 @@ struct RunSummary {
     maps::PathCheck check;
     std::size_t refused = 0;  ///< adjustments of the map that would have torn it and were not used
   } path;
-  /// What a robot told the fusion end.
-  struct Traffic {
-    std::string robot;
-    std::size_t messages = 0;  ///< one a keyframe
-    std::size_t bytes = 0;
-    std::size_t most = 0;  ///< bytes of the largest message
+  struct Robot {
+    std::string name;
+    std::size_t keyframes = 0;
   };
-  std::vector<Traffic> traffic;
-  std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
+  std::vector<Robot> robots;  ///< of several recordings
+  std::string unconnected;    ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;             ///< of the merged cloud; 0: none was to be made
   std::size_t measured_points = 0;  ///< depths on the grid of the keyframes' clouds; 0: not known
@@ -95,6 +92,7 @@ struct RunSummary {
   std::vector<LeftOut> left_out;         ///< in the order in which it was left out
   std::vector<LeftOut> left_out_of_map;  ///< points of the merged cloud that its filters left out
   std::string up = "none";               ///< what the output's frame stands on: floor, camera or none
+  std::string yaw = "none";              ///< where its x points: walls, camera or none
   geometry::Rigid3 output_from_map;      ///< to that frame from the one that tracking began in
   double wall_s = 0.0;                   ///< the whole run
   double map_s = 0.0;                    ///< first frame read to last change of the map
