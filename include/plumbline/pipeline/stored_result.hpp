@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/filter_chain.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/maps/store.hpp"
@@ -42,8 +43,11 @@ class StoredResult {
 
   /// How the run fused its clouds, as far as its configuration tells; else the defaults.
   [[nodiscard]] cloud::DenseFusionOptions fusion_options() const;
-  /// The dense cloud: with the run's own options the one it wrote, before the filters of its merged cloud.
-  /// Errors (kInput): damaged, no clouds.
+  /// The filters of its merged cloud, as far as its configuration tells. None where there is one of a plugin,
+  /// or one that writes a file.
+  [[nodiscard]] cloud::FilterChain fusion_filters() const;
+  /// The dense cloud: with the run's own options the one it wrote, filters and all. Errors (kInput): damaged,
+  /// no clouds; those of filters.
   [[nodiscard]] core::Result<cloud::FusedCloud> lay_down(const cloud::DenseFusionOptions& options,
                                                          const core::Executor& executor) const;
   /// The cloud of each keyframe as FOLDER/<number, six digits>.ply; makes the folder. Returns how many.

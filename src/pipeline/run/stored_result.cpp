@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "chain_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
@@ -152,6 +153,17 @@ cloud::DenseFusionOptions StoredResult::fusion_options() const {
   return options;
 }
 
+cloud::FilterChain StoredResult::fusion_filters() const {
+  const auto root = core::parse_yaml(map_.header.configuration, file_.string());
+  const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
+  const core::ConfigNode* list = stage != nullptr ? stage->find("filters") : nullptr;
+  if (list == nullptr || list->kind != core::ConfigNode::Kind::kSequence) return {};
+  core::ConfigProblems problems;
+  const auto chain =
+      cloud::FilterChain::parse(as_chain(*list, "fuse"), "fuse", cloud::builtin_filters(), problems);
+  return problems.empty() && chain.writes().empty() ? chain : cloud::FilterChain();
+}
+
 core::Result<std::vector<sensor::Pinhole>> StoredResult::cameras_of(
     const std::vector<std::int32_t>& robots) const {
   std::vector<sensor::Pinhole> cameras(robots.size(), map_.header.camera.color);
@@ -194,8 +206,20 @@ core::Result<cloud::FusedCloud> StoredResult::lay_down(const cloud::DenseFusionO
   all.cameras = *cameras;
   all.read = read;
   auto fused = cloud::fuse_views(all, options, executor);
-  if (fused && map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
-  return fused;
+  if (!fused) return fused;
+  if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
+  const cloud::FilterChain filters = fusion_filters();
+  if (filters.size() == 0) return fused;
+  cloud::FusedCloud result;
+  cloud::FilterContext context;
+  context.executor = &executor;
+  context.spacing_m = options.voxels.voxel_m;
+  context.columns = &fused->columns;
+  context.made_columns = &result.columns;
+  auto filtered = filters.apply(std::move(fused->cloud), context);
+  if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+  result.cloud = std::move(*filtered);
+  return result;
 }
 
 core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& folder) const {

@@ -10,12 +10,10 @@
 #include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::pipeline {
-namespace {
 
 using core::ConfigNode;
 using Kind = ConfigNode::Kind;
 
-/// The list as the tree that a chain's file would hold; the stage's name is the chain's.
 ConfigNode as_chain(const ConfigNode& list, const std::string& path) {
   ConfigNode name;
   name.kind = Kind::kScalar;
@@ -28,8 +26,6 @@ ConfigNode as_chain(const ConfigNode& list, const std::string& path) {
   chain.key_marks = {list.mark, list.mark};
   return chain;
 }
-
-}  // namespace
 
 ChainOption::ChainOption(const std::string& file) {
   value_.kind = file.empty() ? Kind::kSequence : Kind::kScalar;
