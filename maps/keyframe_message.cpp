@@ -21,7 +21,8 @@ constexpr double kPixelSteps = 4.0;      // per pixel, for pictures up to 16000 
 constexpr double kLengthSteps = 1000.0;  // per metre
 constexpr double kPictureSteps = 50.0;   // per metre, of the small depth picture
 constexpr double kNoiseSteps = 10000.0;
-constexpr int kTurn = 32;  // directions
+constexpr int kTurn = 32;                       // directions
+constexpr std::size_t kMostPlain = 64U << 20U;  // bytes of a message, unpacked
 
 std::uint16_t unsigned_steps(double value, double steps) {
   return static_cast<std::uint16_t>(std::clamp(std::lround(value * steps), 0L, 65535L));
@@ -272,7 +273,7 @@ std::vector<std::int32_t> numbers_of(const std::vector<IdType>& ids, std::size_t
 }
 
 KeyframeMessage decode(const Bytes& packed) {
-  const Bytes plain = unpack(packed.data(), packed.size());
+  const Bytes plain = unpack(packed.data(), packed.size(), kMostPlain);
   ByteReader bytes(plain);
   if (bytes.get<std::uint16_t>() != kVersion) throw BadBytes("it is of another version");
   KeyframeMessage message;
