@@ -62,11 +62,11 @@ Bytes pack(const Bytes& bytes, const std::vector<std::size_t>& cuts) {
   return packed;
 }
 
-Bytes unpack(const std::uint8_t* bytes, std::size_t size) {
+Bytes unpack(const std::uint8_t* bytes, std::size_t size, std::size_t most_bytes) {
   const unsigned long long length = ZSTD_getFrameContentSize(bytes, size);
   // zstd packs at most about 2^17 times: what promises more is damaged, and takes no memory.
   const unsigned long long most =
-      std::min<unsigned long long>(1ULL << 30U, static_cast<unsigned long long>(size) << 17U);
+      std::min<unsigned long long>(most_bytes, static_cast<unsigned long long>(size) << 17U);
   if (length == ZSTD_CONTENTSIZE_UNKNOWN || length == ZSTD_CONTENTSIZE_ERROR || length > most) {
     throw BadBytes("its head is damaged");
   }

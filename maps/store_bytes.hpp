@@ -62,6 +62,7 @@ class ByteWriter {
     count(text.size());
     bytes_.insert(bytes_.end(), text.begin(), text.end());
   }
+  void raw(const Bytes& bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
   /// All lowest bytes, then all second ones ...: alike bytes side by side, which is what zstd packs best.
   template <typename T>
   void planes(const std::vector<T>& values) {
@@ -170,6 +171,12 @@ class ByteReader {
     }
     return values;
   }
+  /// Everything that is left.
+  Bytes rest() {
+    const std::size_t size = left_;
+    const std::uint8_t* from = take(size);
+    return {from, from + size};
+  }
   [[nodiscard]] bool at_end() const { return left_ == 0; }
   void expect_end() const {
     if (left_ != 0) throw BadBytes("it holds more than it should");
@@ -192,8 +199,8 @@ Bytes pack(const Bytes& bytes);
 /// The same in fewer bytes and more time: the parts between `cuts` (ascending) each get a code of their own,
 /// so that what cannot be packed does not spoil what can.
 Bytes pack(const Bytes& bytes, const std::vector<std::size_t>& cuts);
-/// Throws BadBytes: truncated, damaged, or more than 1 GiB.
-Bytes unpack(const std::uint8_t* bytes, std::size_t size);
+/// Throws BadBytes: truncated, damaged, or more than `most` bytes.
+Bytes unpack(const std::uint8_t* bytes, std::size_t size, std::size_t most = std::size_t{1} << 30U);
 
 /// Number that two different contents hardly ever have in common (2^-64); not against malice.
 std::uint64_t fingerprint(const Bytes& bytes);

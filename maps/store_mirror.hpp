@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "store_schema.hpp"
 #include "store_sqlite.hpp"
 
 namespace plumbline::maps {
@@ -16,9 +17,15 @@ class Mirror {
  public:
   using Key = std::pair<std::int32_t, std::int64_t>;
 
-  Mirror(Database& database, const std::string& table)
+  /// `transaction`: the number of the one that is going on, whenever rows change.
+  Mirror(Database& database, const std::string& table, const std::int64_t& transaction)
       : database_(database),
-        put_(database, ("REPLACE INTO " + table + " VALUES (?, ?, ?)").c_str()),
+        transaction_(transaction),
+        put_(database, ("REPLACE INTO " + table + " VALUES (?, ?, ?, ?)").c_str()),
+        bring_back_(database,
+                    ("DELETE FROM removed WHERE place = " + place_of(table) + " AND robot = ? AND number = ?")
+                        .c_str()),
+        bury_(database, ("REPLACE INTO removed VALUES (" + place_of(table) + ", ?, ?, ?)").c_str()),
         erase_(database, ("DELETE FROM " + table + " WHERE robot = ? AND number = ?").c_str()),
         get_(database, ("SELECT data FROM " + table + " WHERE robot = ? AND number = ?").c_str()),
         keys_("SELECT robot, number FROM " + table) {
@@ -48,7 +55,7 @@ class Mirror {
   }
   /// A row that is there no longer, if it ever was.
   void erase(Key key) {
-    if (rows_.erase(key) != 0) erase_.bind(1, key.first).bind(2, key.second).run();
+    if (rows_.erase(key) != 0) remove(key);
   }
   void put(Key key, const Bytes& bytes) {
     const std::uint64_t print = fingerprint(bytes);
@@ -59,7 +66,9 @@ class Mirror {
     const bool is_there = !is_new && !row->second.known && holds(key, packed);
     row->second.known = true;
     row->second.print = print;
-    if (!is_there) put_.bind(1, key.first).bind(2, key.second).bind(3, packed).run();
+    if (is_there) return;
+    put_.bind(1, key.first).bind(2, key.second).bind(3, transaction_).bind(4, packed).run();
+    if (is_new) bring_back_.bind(1, key.first).bind(2, key.second).run();
   }
   void end() {
     for (auto row = rows_.begin(); row != rows_.end();) {
@@ -67,7 +76,7 @@ class Mirror {
         ++row;
         continue;
       }
-      erase_.bind(1, row->first.first).bind(2, row->first.second).run();
+      remove(row->first);
       row = rows_.erase(row);
     }
   }
@@ -78,6 +87,11 @@ class Mirror {
     bool known = false;  ///< whether `print` is that of the row in the file
     std::uint64_t round = 0;
   };
+  /// What is removed leaves a note, for those who keep a copy.
+  void remove(Key key) {
+    erase_.bind(1, key.first).bind(2, key.second).run();
+    bury_.bind(1, key.first).bind(2, key.second).bind(3, transaction_).run();
+  }
   bool holds(Key key, const Bytes& packed) {
     const bool found = get_.bind(1, key.first).bind(2, key.second).step();
     const bool equal = found && get_.blob(0) == packed;
@@ -86,7 +100,10 @@ class Mirror {
   }
 
   Database& database_;
+  const std::int64_t& transaction_;
   Statement put_;
+  Statement bring_back_;
+  Statement bury_;
   Statement erase_;
   Statement get_;
   std::string keys_;

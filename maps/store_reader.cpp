@@ -45,13 +45,13 @@ void read_landmarks(Database& database, const std::string& table, std::vector<La
 }
 
 Totals read_totals(Database& database) {
-  Statement statement(database, "SELECT value FROM header WHERE key = 'totals'");
+  Statement statement(database, "SELECT data FROM header WHERE key = 'totals'");
   if (!statement.step()) throw BadBytes("its header has no totals");
   return decode_totals(statement.unpacked(0));
 }
 
 bool is_complete(Database& database) {
-  return database.number("SELECT value FROM header WHERE key = 'complete'") == 1;
+  return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
 }
 
 void read_keyframes(Database& database, const sensor::Pinhole& picture, MapParts& parts) {
@@ -112,7 +112,8 @@ StoredMap read_map(Database& database, const StoreHeader& header) {
   read_landmarks(database, "point", parts.points);
   read_landmarks(database, "line", parts.lines);
   read_table(database, "edge", [&](KeyframeId, std::int64_t number, const Bytes& bytes) {
-    parts.edges.emplace_back(static_cast<std::uint64_t>(number), decode_edge(bytes, static_cast<std::uint64_t>(number)));
+    parts.edges.emplace_back(static_cast<std::uint64_t>(number),
+                             decode_edge(bytes, static_cast<std::uint64_t>(number)));
   });
   std::sort(parts.edges.begin(), parts.edges.end(),  // the table is by robot first
             [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -281,7 +282,7 @@ core::Result<StoreContents> StoreReader::contents() const {
     contents.cloud_bytes = count(
         "SELECT (SELECT total(length(data)) FROM cloud)"
         " + (SELECT total(length(data)) FROM frame_cloud)");
-    Statement names(database, "SELECT name FROM attachment ORDER BY name");
+    Statement names(database, "SELECT key FROM attachment ORDER BY key");
     while (names.step()) contents.attachments.push_back(names.text(0));
     return contents;
   });
@@ -290,7 +291,7 @@ core::Result<StoreContents> StoreReader::contents() const {
 core::Result<std::optional<std::vector<std::uint8_t>>> StoreReader::attachment(
     const std::string& name) const {
   return guarded(impl_->file, ErrorKind::kInput, [&]() -> std::optional<std::vector<std::uint8_t>> {
-    Statement row(*impl_->database, "SELECT data FROM attachment WHERE name = ?");
+    Statement row(*impl_->database, "SELECT data FROM attachment WHERE key = ?");
     if (!row.bind(1, name).step()) return std::nullopt;
     return row.unpacked(0);
   });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "store_schema.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "store_codec.hpp"
@@ -8,42 +10,71 @@
 namespace plumbline::maps {
 namespace {
 
-constexpr const char* kTables[] = {"keyframe", "state", "point", "line",    "edge",
-                                   "frame",    "log",   "cloud", "surface", "frame_cloud"};
-
-void create_table(Database& database, const char* name) {
-  database.run((std::string("CREATE TABLE ") + name +
-                " (robot INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL,"
-                " PRIMARY KEY (robot, number))")
-                   .c_str());
+/// `changed`: the number of the transaction that last wrote the row. It stands before the content, so that
+/// looking for it does not read that.
+void create_table(Database& database, const RowTable& table) {
+  const std::string name = table.name;
+  const std::string columns = table.named ? " (key TEXT PRIMARY KEY, changed INTEGER NOT NULL, data NOT NULL)"
+                                          : " (robot INTEGER NOT NULL, number INTEGER NOT NULL, changed "
+                                            "INTEGER NOT NULL, data BLOB NOT NULL,"
+                                            " PRIMARY KEY (robot, number))";
+  database.run(("CREATE TABLE " + name + columns).c_str());
 }
 
-void put_text(Database& database, const char* key, const std::string& text) {
-  Statement(database, "INSERT INTO header VALUES (?, ?)").bind(1, std::string(key)).bind(2, text).run();
+template <typename Value>
+void put_header(Database& database, std::int64_t transaction, const char* key, const Value& value) {
+  Statement(database, "REPLACE INTO header VALUES (?, ?, ?)")
+      .bind(1, std::string(key))
+      .bind(2, transaction)
+      .bind(3, value)
+      .run();
 }
 
 std::string get_text(Database& database, const char* key) {
-  Statement statement(database, "SELECT value FROM header WHERE key = ?");
+  Statement statement(database, "SELECT data FROM header WHERE key = ?");
   if (!statement.bind(1, std::string(key)).step()) throw BadBytes(std::string("its header has no ") + key);
   return statement.text(0);
 }
 
 }  // namespace
 
-void create_tables(Database& database, const StoreHeader& header) {
+std::string place_of(const std::string& table) {
+  const auto* found = std::find_if(std::begin(kRowTables), std::end(kRowTables),
+                                   [&](const RowTable& t) { return table == t.name; });
+  return std::to_string(std::distance(std::begin(kRowTables), found));
+}
+
+void create_tables(Database& database) {
   database.run(("PRAGMA application_id = " + std::to_string(kStoreApplication)).c_str());
-  database.run("CREATE TABLE header (key TEXT PRIMARY KEY, value NOT NULL)");
-  database.run("CREATE TABLE attachment (name TEXT PRIMARY KEY, data BLOB NOT NULL)");
-  for (const char* table : kTables) create_table(database, table);
+  for (const RowTable& table : kRowTables) create_table(database, table);
+  database.run(
+      "CREATE TABLE removed (place INTEGER NOT NULL, robot INTEGER NOT NULL, number INTEGER NOT NULL,"
+      " changed INTEGER NOT NULL, PRIMARY KEY (place, robot, number))");
   database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
-  put_text(database, "robot", header.robot);
-  put_text(database, "input", header.input);
-  put_text(database, "program", header.program_version);
-  put_text(database, "configuration", header.configuration);
+}
+
+void put_header(Database& database, const StoreHeader& header) {
+  constexpr std::int64_t kFirst = 1;
+  put_header(database, kFirst, "robot", header.robot);
+  put_header(database, kFirst, "input", header.input);
+  put_header(database, kFirst, "program", header.program_version);
+  put_header(database, kFirst, "configuration", header.configuration);
   ByteWriter camera;
   encode(header.camera, camera);
-  const Bytes packed = pack(camera.bytes());
-  Statement(database, "INSERT INTO header VALUES ('camera', ?)").bind(1, packed).run();
+  put_header(database, kFirst, "camera", pack(camera.bytes()));
+}
+
+StoreHeads read_heads(Database& database) {
+  StoreHeads heads;
+  const auto last = [&](const std::string& table, const std::string& where) {
+    return database.number(("SELECT max(changed) FROM " + table + where).c_str());
+  };
+  for (const RowTable& table : kRowTables) {
+    std::int64_t& head = heads[table.share];
+    head = std::max(head, last(table.name, ""));
+  }
+  heads.map = std::max(heads.map, last("removed", ""));  // clouds stay
+  return heads;
 }
 
 bool is_blank(Database& database) {
@@ -83,23 +114,29 @@ StoreHeader read_header(Database& database) {
   header.program_version = get_text(database, "program");
   header.configuration = get_text(database, "configuration");
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
-  Statement camera(database, "SELECT value FROM header WHERE key = 'camera'");
+  Statement camera(database, "SELECT data FROM header WHERE key = 'camera'");
   if (!camera.step()) throw BadBytes("its header has no camera");
   header.camera = decode_camera(camera.unpacked(0));
   return header;
 }
 
-void put_result_frame(Database& database, const ResultFrame& frame) {
+void put_totals(Database& database, std::int64_t transaction, const Totals& totals, bool complete) {
+  ByteWriter bytes;
+  encode(totals, bytes);
+  put_header(database, transaction, "totals", pack(bytes.bytes()));
+  put_header(database, transaction, "complete", std::int64_t{complete ? 1 : 0});
+}
+
+void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame) {
   ByteWriter bytes;
   bytes.put(frame.output_from_map);
   bytes.flag(frame.upright);
-  const Bytes packed = pack(bytes.bytes());
-  Statement(database, "REPLACE INTO header VALUES ('result', ?)").bind(1, packed).run();
+  put_header(database, transaction, "result", pack(bytes.bytes()));
 }
 
 ResultFrame read_result_frame(Database& database) {
   ResultFrame frame;
-  Statement statement(database, "SELECT value FROM header WHERE key = 'result'");
+  Statement statement(database, "SELECT data FROM header WHERE key = 'result'");
   if (!statement.step()) return frame;
   const Bytes bytes = statement.unpacked(0);
   ByteReader from(bytes);
@@ -110,13 +147,12 @@ ResultFrame read_result_frame(Database& database) {
 }
 
 Bytes read_loops(Database& database) {
-  Statement statement(database, "SELECT value FROM header WHERE key = 'loops'");
+  Statement statement(database, "SELECT data FROM header WHERE key = 'loops'");
   return statement.step() ? statement.unpacked(0) : Bytes{};
 }
 
-void put_loops(Database& database, const Bytes& loops) {
-  const Bytes packed = pack(loops);
-  Statement(database, "REPLACE INTO header VALUES ('loops', ?)").bind(1, packed).run();
+void put_loops(Database& database, std::int64_t transaction, const Bytes& loops) {
+  put_header(database, transaction, "loops", pack(loops));
 }
 
 std::vector<std::string> read_log(Database& database) {

@@ -99,6 +99,7 @@ void Statement::run() {
   }
 }
 void Statement::rewind() { sqlite3_reset(statement_.get()); }
+int Statement::type(int column) const { return sqlite3_column_type(statement_.get(), column); }
 std::int64_t Statement::integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
 std::string Statement::text(int column) const {
   const auto* begin =

@@ -32,7 +32,8 @@ class Statement {
   /// True: there is a row. After the last one, and after run(), the statement is ready for new values.
   bool step();
   void run();
-  void rewind();  ///< ready for new values before the last row
+  void rewind();                             ///< ready for new values before the last row
+  [[nodiscard]] int type(int column) const;  ///< SQLITE_INTEGER, SQLITE_TEXT, SQLITE_BLOB ...
   [[nodiscard]] std::int64_t integer(int column) const;
   [[nodiscard]] std::string text(int column) const;
   [[nodiscard]] Bytes blob(int column) const;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <chrono>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "store_codec.hpp"
@@ -28,13 +30,18 @@ void use_memory(Database& database) {
   database.run("PRAGMA synchronous = OFF");
 }
 
-/// One file again, that opens in a folder that may not be written. Where that cannot be, for somebody reads
-/// the store, file and log together are whole as well.
+/// One file again, that opens in a folder that may not be written. Where that cannot be, for somebody goes on
+/// reading the store, file and log together are whole as well. SQLite itself does not wait here.
 void leave_one_file(Database& database) {
-  try {
-    database.run("PRAGMA journal_mode = DELETE");
-  } catch (const StoreFailure&) {
-    return;
+  constexpr int kTries = 200;
+  constexpr std::chrono::milliseconds kBetween(10);
+  for (int i = 0; i < kTries; ++i) {
+    try {
+      database.run("PRAGMA journal_mode = DELETE");
+      return;
+    } catch (const StoreFailure&) {
+      std::this_thread::sleep_for(kBetween);
+    }
   }
 }
 
@@ -88,27 +95,20 @@ std::vector<FramePose> read_frames(Database& database) {
   return frames;
 }
 
-void put_summary(Database& database, const Totals& totals, bool complete) {
-  ByteWriter bytes;
-  encode(totals, bytes);
-  const Bytes packed = pack(bytes.bytes());
-  Statement(database, "REPLACE INTO header VALUES ('totals', ?)").bind(1, packed).run();
-  Statement(database, "REPLACE INTO header VALUES ('complete', ?)").bind(1, complete ? 1 : 0).run();
-}
-
 }  // namespace
 
 struct StoreWriter::Impl {
   Impl(std::filesystem::path path, std::unique_ptr<Database> opened)
       : file(std::move(path)),
         database(std::move(opened)),
-        keyframes(*database, "keyframe"),
-        states(*database, "state"),
-        points(*database, "point"),
-        lines(*database, "line"),
-        edges(*database, "edge"),
-        frames(*database, "frame"),
-        log(*database, "log"),
+        transaction(read_heads(*database).last()),
+        keyframes(*database, "keyframe", transaction),
+        states(*database, "state", transaction),
+        points(*database, "point", transaction),
+        lines(*database, "line", transaction),
+        edges(*database, "edge", transaction),
+        frames(*database, "frame", transaction),
+        log(*database, "log", transaction),
         loops(read_loops(*database)),
         frame_list(read_frames(*database)),
         log_lines(read_log(*database)) {}
@@ -126,6 +126,7 @@ struct StoreWriter::Impl {
 
   std::filesystem::path file;
   std::unique_ptr<Database> database;
+  std::int64_t transaction;  ///< the number of the last one, or of the one that is going on
   Mirror keyframes, states, points, lines, edges, frames, log;
   Bytes loops;                         ///< as in the file
   std::vector<FramePose> frame_list;   ///< as in the file
@@ -168,7 +169,7 @@ void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
   bytes.clear();
   encode(map.loops, bytes);
   if (bytes.bytes() == loops) return;
-  put_loops(*database, bytes.bytes());
+  put_loops(*database, transaction, bytes.bytes());
   loops = bytes.bytes();
 }
 
@@ -178,15 +179,16 @@ void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
     Statement(*database, of_keyframe ? of_keyframes : of_frames)
         .bind(1, of_keyframe ? cloud.keyframe.robot : 0)
         .bind(2, of_keyframe ? cloud.keyframe.index : static_cast<std::int64_t>(cloud.frame))
-        .bind(3, bytes)
+        .bind(3, transaction)
+        .bind(4, bytes)
         .run();
   };
-  put("REPLACE INTO cloud VALUES (?, ?, ?)", "REPLACE INTO frame_cloud VALUES (?, ?, ?)", *cloud.bytes);
+  put("REPLACE INTO cloud VALUES (?, ?, ?, ?)", "REPLACE INTO frame_cloud VALUES (?, ?, ?, ?)", *cloud.bytes);
   if (!of_keyframe || cloud.surface == nullptr) return;
   ByteWriter bytes;
   encode(*cloud.surface, bytes);
   const Bytes packed = pack(bytes.bytes());
-  put("REPLACE INTO surface VALUES (?, ?, ?)", nullptr, packed);
+  put("REPLACE INTO surface VALUES (?, ?, ?, ?)", nullptr, packed);
 }
 
 void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
@@ -205,7 +207,7 @@ void StoreWriter::Impl::put_totals(const MapChanges& map, bool complete) {
   totals.frames = frame_list.size();
   totals.log = log_lines.size();
   totals.next = map.next;
-  put_summary(*database, totals, complete);
+  maps::put_totals(*database, transaction, totals, complete);
 }
 
 void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses, bool complete) {
@@ -220,13 +222,15 @@ void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& pose
 template <typename Change>
 core::Result<void> StoreWriter::Impl::transact(const Change& change) {
   core::Result<void> done = guarded(file, ErrorKind::kOutput, [&] {
-    Transaction transaction(*database, true);
+    ++transaction;
+    Transaction whole(*database, true);
     change();
-    transaction.commit();
+    whole.commit();
   });
   if (done) return done;
   const core::Result<void> reread = guarded(file, ErrorKind::kOutput, [&] {
     for (Mirror* mirror : {&keyframes, &states, &points, &lines, &edges, &frames, &log}) mirror->reread();
+    transaction = read_heads(*database).last();
     loops = read_loops(*database);
     frame_list = read_frames(*database);
     log_lines = read_log(*database);
@@ -252,8 +256,9 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
     use == StoreUse::kGrowing ? use_log(*database) : use_memory(*database);
     {
       Transaction transaction(*database, true);
-      create_tables(*database, header);
-      put_summary(*database, {}, false);
+      create_tables(*database);
+      put_header(*database, header);
+      put_totals(*database, 1, {}, false);
       transaction.commit();
     }
     return StoreWriter(std::make_unique<Impl>(file, std::move(database)));
@@ -301,7 +306,11 @@ core::Result<void> StoreWriter::add_cloud(KeyframeId keyframe, const std::vector
 core::Result<void> StoreWriter::attach(const std::string& name, const std::vector<std::uint8_t>& bytes) {
   return impl_->transact([&] {
     const Bytes packed = pack(bytes);
-    Statement(*impl_->database, "REPLACE INTO attachment VALUES (?, ?)").bind(1, name).bind(2, packed).run();
+    Statement(*impl_->database, "REPLACE INTO attachment VALUES (?, ?, ?)")
+        .bind(1, name)
+        .bind(2, impl_->transaction)
+        .bind(3, packed)
+        .run();
   });
 }
 
@@ -314,7 +323,7 @@ core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<Fra
   core::Result<void> done = impl_->transact([&] {
     impl_->put_log_and_clouds(rest);
     impl_->write(map, frames, true);
-    put_result_frame(*impl_->database, result);
+    put_result_frame(*impl_->database, impl_->transaction, result);
   });
   if (done) leave_one_file(*impl_->database);
   return done;

@@ -107,6 +107,8 @@ int run(int argc, char** argv) {
   Session session;
   add_map(app, session);
   add_fuse(app, session);
+  add_hub(app, session);
+  add_robot(app, session);
   add_calibrate(app, session);
   add_info(app, session);
   add_render(app, session);

@@ -77,6 +77,18 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
   }
 }
 
+void Console::status(const std::string& line) {
+  if (quiet_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto now = Clock::now();
+  const double since_last_s = std::chrono::duration<double>(now - last_).count();
+  if (since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
+  last_ = now;
+  clear_bar();
+  put(terminal_ ? line : fmt::format("plumbline: {}\n", line));
+  bar_shown_ = terminal_;
+}
+
 void Console::draw_bar(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
   const double share = total > 0 ? static_cast<double>(done) / static_cast<double>(total) : 1.0;
   const auto filled = static_cast<std::size_t>(std::lround(share * static_cast<double>(kBarWidth)));

@@ -20,6 +20,8 @@ class Console : public core::Log {
 
   /// A bar with rate and time left on a terminal, a line every few seconds elsewhere; nothing when quiet.
   void progress(std::size_t done, std::size_t total, const char* what);
+  /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet.
+  void status(const std::string& line);
   /// Ends the bar's line.
   void end_progress();
 

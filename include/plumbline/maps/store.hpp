@@ -19,7 +19,7 @@
 namespace plumbline::maps {
 
 /// Stores of other formats are refused.
-constexpr int kStoreFormat = 5;
+constexpr int kStoreFormat = 6;
 
 /// What is written once, when a store is made.
 struct StoreHeader {

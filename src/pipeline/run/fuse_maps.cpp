@@ -55,7 +55,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
                     "begins with a maps stage",
                     pipeline_file->string(), graph->source().type->name));
   }
-  if (request.maps.size() < 2) return core::usage_error("name two maps at least");
+  if (request.maps.empty()) return core::usage_error("name a map");
   auto opened = StoredMaps::open(request.maps, executor);
   if (!opened) return fail(opened.error());
   maps = std::move(*opened);

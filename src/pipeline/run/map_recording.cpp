@@ -207,6 +207,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   context.keep_changes = keeps;
   context.alter_map = request.alter_map;
   if (resumed) context.resumed = &*resumed;
+  if (request.prepared) request.prepared(output->path());
   const auto report = run_graph(*graph, context, progress);
   if (!report) return fail(with_what_is_kept(report.error(), *output));
 

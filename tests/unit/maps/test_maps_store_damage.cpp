@@ -209,8 +209,8 @@ TEST(MapStoreDamage, ForeignAndNewerFilesAreRefused) {
   expect_no_store(file, "SQLite file, but no map store");
   std::filesystem::remove(file);
   write_store(file, 1);
-  run_sql(file, "PRAGMA user_version = 6");
-  expect_no_store(file, "format 6, this program reads up to 5; use a newer Plumbline");
+  run_sql(file, "PRAGMA user_version = 7");
+  expect_no_store(file, "format 7, this program reads up to 6; use a newer Plumbline");
 }
 
 TEST(MapStoreDamage, WritersRefuseWhatTheyMayNotWrite) {

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline hub -o OUT
+#include <memory>
+
+#include "app.hpp"
+#include "leftovers.hpp"
+#include "network_options.hpp"
+#include "plumbline/net/hub.hpp"
+#include "plumbline/pipeline/map_recording.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+const char* const kTwoTerminals =
+    "In one terminal:    plumbline hub -o building --robots 2 --interface lo\n"
+    "In another one:     plumbline robot 'synth:office?robots=2&robot=0&frames=300&seed=1' --name r0 "
+    "--interface lo &\n"
+    "                    plumbline robot 'synth:office?robots=2&robot=1&frames=300&seed=1' --name r1 "
+    "--interface lo\n"
+    "Hub and robots may start in any order; docs/network.md has more.";
+
+int hub(Session& session, net::HubRequest request, double quota_gb) {
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return session.fail(pipelines.error());
+  request.fuse.pipelines_folder = *pipelines;
+  const auto filters = session.filters();
+  if (!filters) return session.fail(filters.error());
+  request.fuse.filters = *filters;
+  request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
+  request.fresh_id = fresh_id();
+  if (request.resume && pipeline::is_finished(request.fuse.output)) {
+    session.console().info(request.fuse.output.string() + ": is finished; there is nothing to go on with");
+    return 0;
+  }
+  const core::StopToken stop;
+  stop_on_signals(stop);
+  Console& console = session.console();
+  const auto summary = net::run_hub(
+      request, session.executor(), console, stop, [&](const std::string& line) { console.status(line); },
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); }, &leftovers());
+  console.end_progress();
+  return session.finish(summary, request.fuse.output);
+}
+
+}  // namespace
+
+void add_hub(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<net::HubRequest>();
+  const auto quota_gb = std::make_shared<double>(20.0);
+  CLI::App* command =
+      add_command(app, session, "hub", "Collect the maps of robots over a network and fuse them",
+                  [&session, request, quota_gb] { return hub(session, *request, *quota_gb); });
+  command->footer(kTwoTerminals);
+  command->add_option("-o,--output", request->fuse.output, "Folder for the result")
+      ->required()
+      ->type_name("OUT");
+  command->add_option("--robots", request->robots, "Fuse when so many are done (default: at Ctrl-C)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 64));
+  add_network_options(*command, request->network);
+  command->add_option("--quota", *quota_gb, "Disk that the map of one robot may take, GB (default: 20)")
+      ->type_name("GB")
+      ->check(CLI::PositiveNumber);
+  command->add_option("-p,--pipeline", request->fuse.pipeline, "Shipped pipeline or file (default: fuse)")
+      ->type_name("PIPELINE");
+  command->add_option("--anchor", request->fuse.anchor, "Robot whose frame the maps are laid into")
+      ->type_name("NAME");
+  command->add_option("--set", request->fuse.overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+  command->add_flag("--resume", request->resume, "Go on with what an interrupted hub left in OUT.partial");
+  add_plugin_option(*command, session);
+  command->add_flag("--force", request->fuse.replace, "Replace an earlier result in OUT");
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline robot INPUT --name NAME
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "app.hpp"
+#include "leftovers.hpp"
+#include "network_options.hpp"
+#include "plumbline/net/robot.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
+           const std::filesystem::path& folder) {
+  if (!outcome) return session.fail(outcome.error());
+  const int code = outcome->summary ? session.finish(*outcome->summary, folder) : 0;
+  if (outcome->delivered) {
+    session.console().info("the hub has everything");
+  } else {
+    session.console().warning(outcome->undelivered);
+  }
+  return code;
+}
+
+int robot(Session& session, net::RobotRequest request) {
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return session.fail(pipelines.error());
+  request.map.pipelines_folder = *pipelines;
+  request.map.open.cameras_folder = *pipelines / "cameras";
+  const auto filters = session.filters();
+  if (!filters) return session.fail(filters.error());
+  request.map.filters = *filters;
+  request.fresh_id = fresh_id();
+  request.hand_in = fmt::format("--name {}{}", request.name, network_arguments(request.network));
+  if (request.map.output.empty()) request.map.output = request.name;
+  const core::StopToken stop;
+  stop_on_signals(stop);
+  Console& console = session.console();
+  const auto status = [&](const std::string& line) { console.status(line); };
+  std::filesystem::path earlier = net::earlier_run(request.map.input);
+  if (earlier.empty() && request.map.resume && pipeline::is_finished(request.map.output)) {
+    earlier = request.map.output;
+  }
+  if (!earlier.empty()) {
+    const auto outcome = net::hand_in(request, earlier, console, stop, status);
+    console.end_progress();
+    return finish(session, outcome, earlier);
+  }
+  const auto outcome = net::run_robot(
+      request, session.executor(), console, stop, status,
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); }, &leftovers());
+  console.end_progress();
+  return finish(session, outcome, request.map.output);
+}
+
+}  // namespace
+
+void add_robot(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<net::RobotRequest>();
+  request->map.pipeline = "robot";
+  CLI::App* command =
+      add_command(app, session, "robot", "Map a recording and send the map to a hub meanwhile",
+                  [&session, request] { return robot(session, *request); });
+  command->footer(
+      "Beside a hub:       plumbline hub -o building --robots 1 --interface lo\n"
+      "a robot:            plumbline robot 'synth:room?frames=300&seed=1' --name r0 --interface lo\n"
+      "and once more:      plumbline robot r0 --name r0 --interface lo   (hands in what is in folder r0)\n"
+      "Exit code 4: the hub was there, but has not got everything. docs/network.md has more.");
+  command
+      ->add_option(
+          "INPUT", request->map.input,
+          "A recording, as for plumbline map; or the result folder of an earlier run, whose map is only "
+          "handed in")
+      ->required();
+  command->add_option("--name", request->name, "The robot's name, one of its own in the domain")
+      ->required()
+      ->type_name("NAME");
+  command->add_option("-o,--output", request->map.output, "Folder for the result (default: NAME)")
+      ->type_name("OUT");
+  add_network_options(*command, request->network);
+  command
+      ->add_option("--wait", request->wait_s,
+                   "For a hub that was never heard, after the last frame (default: 30)")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--wait-lost", request->wait_lost_s,
+                   "For a hub that was heard, since it acknowledged something (default: 600)")
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("-p,--pipeline", request->map.pipeline, "Shipped pipeline or file (default: robot)")
+      ->type_name("PIPELINE");
+  command->add_option("--camera", request->map.open.camera, "Shipped calibration or file")
+      ->type_name("NAME|FILE");
+  command->add_option("--set", request->map.overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+  command->add_option("--format", request->map.open.format, "Layout of INPUT (default: auto)")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
+  add_time_range(*command, request->map.open);
+  command->add_option("--every", request->map.open.every, "Use every N-th frame")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000));
+  command
+      ->add_option("--pace", request->map.pace_hz, "Play the recording at so many frames a second, at most")
+      ->type_name("HZ")
+      ->check(CLI::Range(0.0, 1000.0));
+  command->add_flag("--resume", request->map.resume,
+                    "Go on from what a run that was interrupted left in OUT.partial");
+  add_plugin_option(*command, session);
+  command->add_flag("--force", request->map.replace, "Replace an earlier result in OUT");
+}
+
+}  // namespace plumbline::cli

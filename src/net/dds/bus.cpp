@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The part plumbline_dds.so: CycloneDDS behind RobotBus and HubBus.
+#include "bus.hpp"
+
+#include <dds/dds.h>
+#include <fmt/format.h>
+
+#include <map>
+#include <utility>
+
+#include "qos.hpp"
+#include "wire.hpp"
+
+namespace plumbline::net {
+namespace {
+
+constexpr const char* kHubs = "_hub";  ///< a partition that is no robot's: hubs hear each other there
+constexpr const char* kEverybody = "*";
+
+/// A robot is spoken to in its own partition; an entity goes with what was made in it.
+struct Entity {
+  dds_entity_t handle = 0;
+  Entity() = default;
+  explicit Entity(dds_entity_t h) : handle(h) {}
+  Entity(Entity&& other) noexcept : handle(std::exchange(other.handle, 0)) {}
+  Entity& operator=(Entity&& other) noexcept {
+    std::swap(handle, other.handle);
+    return *this;
+  }
+  ~Entity() {
+    if (handle > 0) dds_delete(handle);
+  }
+};
+
+void tell(void* log, const dds_log_data_t* data) {
+  std::string line(data->message, strnlen(data->message, data->size));
+  while (!line.empty() && line.back() == '\n') line.pop_back();
+  if (log != nullptr && *static_cast<BusLog*>(log)) (*static_cast<BusLog*>(log))(line);
+}
+
+/// A participant in a domain of its own configuration.
+class Participant {
+ public:
+  explicit Participant(BusLog log) : log_(std::move(log)) {
+    dds_set_log_sink(&tell, &log_);
+    dds_set_trace_sink(&tell, &log_);
+  }
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
+  ~Participant() {
+    participant_ = Entity();
+    domain_ = Entity();
+    // Its log must not outlive it; by default CycloneDDS would write to stderr.
+    dds_set_log_sink(&tell, nullptr);
+    dds_set_trace_sink(&tell, nullptr);
+  }
+
+  core::Result<void> open(const NetworkOptions& options, bool hub) {
+    const auto id = static_cast<dds_domainid_t>(options.domain);
+    domain_ = Entity(dds_create_domain(id, domain_configuration(options, hub).c_str()));
+    const auto qos = participant_qos(options);
+    if (!qos) return tl::unexpected<core::Error>(qos.error());
+    if (domain_.handle > 0) participant_ = Entity(dds_create_participant(id, qos->get(), nullptr));
+    if (participant_.handle > 0) {
+      waitset_ = dds_create_waitset(participant_.handle);
+      others_ = dds_create_reader(participant_.handle, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
+      return {};
+    }
+    const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
+    return core::usage_error(
+        fmt::format("the network cannot be used on interface {}, domain {} ({}); another program may have "
+                    "the port: choose "
+                    "other values with --interface, --port or --domain",
+                    options.interface, options.domain, dds_strretcode(code)));
+  }
+  [[nodiscard]] dds_entity_t handle() const { return participant_.handle; }
+
+  Entity publisher(const std::vector<std::string>& partitions) const {
+    return Entity(dds_create_publisher(handle(), partition_qos(partitions).get(), nullptr));
+  }
+  Entity subscriber(const std::vector<std::string>& partitions) const {
+    return Entity(dds_create_subscriber(handle(), partition_qos(partitions).get(), nullptr));
+  }
+  [[nodiscard]] dds_entity_t topic(const dds_topic_descriptor_t& type, const char* name) const {
+    return dds_create_topic(handle(), &type, name, nullptr, nullptr);
+  }
+  /// wait() ends when it has something.
+  void watch(dds_entity_t reader) const {
+    dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS | DDS_SUBSCRIPTION_MATCHED_STATUS);
+    dds_waitset_attach(waitset_, dds_create_readcondition(reader, DDS_ANY_STATE), reader);
+  }
+  void wait(std::chrono::milliseconds most) const {
+    dds_attach_t first = 0;
+    dds_waitset_wait(waitset_, &first, 1, DDS_MSECS(most.count()));
+  }
+  [[nodiscard]] int others() const {
+    constexpr std::size_t kMost = 256;
+    std::vector<void*> samples(kMost, nullptr);
+    std::vector<dds_sample_info_t> infos(kMost);
+    const dds_return_t count =
+        dds_read_mask(others_, samples.data(), infos.data(), kMost, kMost,
+                      DDS_ANY_SAMPLE_STATE | DDS_ANY_VIEW_STATE | DDS_ALIVE_INSTANCE_STATE);
+    if (count > 0) dds_return_loan(others_, samples.data(), count);
+    return std::max(0, static_cast<int>(count) - 1);
+  }
+
+ private:
+  BusLog log_;
+  Entity domain_;
+  Entity participant_;
+  dds_entity_t waitset_ = 0;
+  dds_entity_t others_ = 0;
+};
+
+/// Calls use(sample, info) for at most `most` samples that are there.
+template <typename Sample, typename Use>
+void take_some(dds_entity_t reader, int most, const Use& use) {
+  for (int i = 0; i < most; ++i) {
+    void* sample = nullptr;
+    dds_sample_info_t info;
+    const dds_return_t count = dds_take(reader, &sample, &info, 1, 1);
+    if (count <= 0) return;
+    if (info.valid_data) use(*static_cast<const Sample*>(sample), info);
+    dds_return_loan(reader, &sample, count);
+  }
+}
+
+constexpr int kMostWords = 256;
+
+template <typename Wire, typename Message>
+dds_return_t write_message(dds_entity_t writer, const Message& message) {
+  Wire wire;
+  to_wire(message, wire);
+  return dds_write(writer, &wire);
+}
+
+class CycloneRobot : public RobotBus {
+ public:
+  explicit CycloneRobot(const BusLog& log) : participant_(log) {}
+  core::Result<void> open(const NetworkOptions& options, const std::string& name) {
+    if (auto opened = participant_.open(options, false); !opened) return opened;
+    publisher_ = participant_.publisher({name});
+    subscriber_ = participant_.subscriber({name});
+    hellos_ =
+        dds_create_writer(publisher_.handle, participant_.topic(plumbline_wire_Hello_desc, "plumbline_hello"),
+                          word_qos().get(), nullptr);
+    pieces_ =
+        dds_create_writer(publisher_.handle, participant_.topic(plumbline_wire_Piece_desc, "plumbline_piece"),
+                          piece_qos().get(), nullptr);
+    words_ =
+        dds_create_reader(subscriber_.handle, participant_.topic(plumbline_wire_Word_desc, "plumbline_word"),
+                          word_qos().get(), nullptr);
+    if (hellos_ < 0 || pieces_ < 0 || words_ < 0) {
+      return core::usage_error(fmt::format(
+          "the network lets nobody speak as {} here ({}); with --security, give the keys made for this name",
+          name, dds_strretcode(std::min(std::min(hellos_, pieces_), words_))));
+    }
+    participant_.watch(words_);
+    return {};
+  }
+
+  void say(const Hello& hello) override { write_message<plumbline_wire_Hello>(hellos_, hello); }
+  bool send(const Piece& piece) override {
+    return write_message<plumbline_wire_Piece>(pieces_, piece) == DDS_RETCODE_OK;
+  }
+  std::vector<Word> hear() override {
+    std::vector<Word> words;
+    take_some<plumbline_wire_Word>(words_, kMostWords, [&](const plumbline_wire_Word& word, const auto&) {
+      words.push_back(from_wire(word));
+    });
+    return words;
+  }
+  bool listened_to() override {
+    dds_publication_matched_status_t status;
+    return dds_get_publication_matched_status(pieces_, &status) == DDS_RETCODE_OK && status.current_count > 0;
+  }
+  bool all_received() override { return dds_wait_for_acks(pieces_, 0) == DDS_RETCODE_OK; }
+  int others() override { return participant_.others(); }
+  void wait(std::chrono::milliseconds most) override { participant_.wait(most); }
+
+ private:
+  Participant participant_;
+  Entity publisher_;
+  Entity subscriber_;
+  dds_entity_t hellos_ = 0;
+  dds_entity_t pieces_ = 0;
+  dds_entity_t words_ = 0;
+};
+
+class CycloneHub : public HubBus {
+ public:
+  explicit CycloneHub(const BusLog& log) : participant_(log) {}
+  core::Result<void> open(const NetworkOptions& options) {
+    if (auto opened = participant_.open(options, true); !opened) return opened;
+    publisher_ = participant_.publisher({kEverybody, kHubs});
+    subscriber_ = participant_.subscriber({kEverybody});
+    hub_subscriber_ = participant_.subscriber({kHubs});
+    const dds_entity_t words = participant_.topic(plumbline_wire_Word_desc, "plumbline_word");
+    words_ = dds_create_writer(publisher_.handle, words, word_qos().get(), nullptr);
+    hubs_ = dds_create_reader(hub_subscriber_.handle, words, word_qos().get(), nullptr);
+    hellos_ = dds_create_reader(subscriber_.handle,
+                                participant_.topic(plumbline_wire_Hello_desc, "plumbline_hello"),
+                                word_qos().get(), nullptr);
+    piece_topic_ = participant_.topic(plumbline_wire_Piece_desc, "plumbline_piece");
+    if (words_ < 0 || hubs_ < 0 || hellos_ < 0 || piece_topic_ < 0) {
+      return core::usage_error("the network lets nobody be a hub here; with --security, give the hub's keys");
+    }
+    participant_.watch(hellos_);
+    return {};
+  }
+
+  void say(const Word& word) override { write_message<plumbline_wire_Word>(words_, word); }
+  std::vector<HeardHello> hear() override {
+    std::vector<HeardHello> hellos;
+    take_some<plumbline_wire_Hello>(
+        hellos_, kMostWords, [&](const plumbline_wire_Hello& hello, const dds_sample_info_t& info) {
+          hellos.push_back({from_wire(hello), partition_of(info.publication_handle)});
+        });
+    return hellos;
+  }
+  std::vector<Word> hear_hubs() override {
+    std::vector<Word> words;
+    take_some<plumbline_wire_Word>(hubs_, kMostWords, [&](const plumbline_wire_Word& word, const auto&) {
+      words.push_back(from_wire(word));
+    });
+    return words;
+  }
+  core::Result<void> listen_to(const std::string& robot) override {
+    if (robots_.count(robot) != 0) return {};
+    Robot listener;
+    listener.subscriber = participant_.subscriber({robot});
+    listener.pieces = dds_create_reader(listener.subscriber.handle, piece_topic_, piece_qos().get(), nullptr);
+    if (listener.pieces < 0) {
+      return core::usage_error(
+          fmt::format("{}: cannot be listened to ({})", robot, dds_strretcode(listener.pieces)));
+    }
+    participant_.watch(listener.pieces);
+    robots_.emplace(robot, std::move(listener));
+    return {};
+  }
+  void ignore(const std::string& robot) override { robots_.erase(robot); }
+  std::vector<Piece> take(const std::string& robot, int most) override {
+    std::vector<Piece> pieces;
+    const auto found = robots_.find(robot);
+    if (found == robots_.end()) return pieces;
+    take_some<plumbline_wire_Piece>(
+        found->second.pieces, most,
+        [&](const plumbline_wire_Piece& piece, const auto&) { pieces.push_back(from_wire(piece)); });
+    return pieces;
+  }
+  void wait(std::chrono::milliseconds most) override { participant_.wait(most); }
+
+ private:
+  struct Robot {
+    Entity subscriber;
+    dds_entity_t pieces = 0;
+  };
+  /// Empty: not known, or several.
+  std::string partition_of(dds_instance_handle_t writer) const {
+    dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(hellos_, writer);
+    if (endpoint == nullptr) return {};
+    std::string partition;
+    std::uint32_t count = 0;
+    char** names = nullptr;
+    if (dds_qget_partition(endpoint->qos, &count, &names)) {
+      if (count == 1) partition = names[0];
+      for (std::uint32_t i = 0; i < count; ++i) dds_free(names[i]);
+      dds_free(names);
+    }
+    dds_builtintopic_free_endpoint(endpoint);
+    return partition;
+  }
+
+  Participant participant_;
+  Entity publisher_;
+  Entity subscriber_;
+  Entity hub_subscriber_;
+  dds_entity_t words_ = 0;
+  dds_entity_t hubs_ = 0;
+  dds_entity_t hellos_ = 0;
+  dds_entity_t piece_topic_ = 0;
+  std::map<std::string, Robot> robots_;
+};
+
+core::Result<std::unique_ptr<RobotBus>> open_robot(const NetworkOptions& options, const std::string& name,
+                                                   const BusLog& log) {
+  auto bus = std::make_unique<CycloneRobot>(log);
+  if (auto opened = bus->open(options, name); !opened) return tl::unexpected<core::Error>(opened.error());
+  return bus;
+}
+
+core::Result<std::unique_ptr<HubBus>> open_hub(const NetworkOptions& options, const BusLog& log) {
+  auto bus = std::make_unique<CycloneHub>(log);
+  if (auto opened = bus->open(options); !opened) return tl::unexpected<core::Error>(opened.error());
+  return bus;
+}
+
+}  // namespace
+}  // namespace plumbline::net
+
+PLUMBLINE_PART(plumbline::net::BusPart, &plumbline::net::open_robot, &plumbline::net::open_hub)

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/net/hub.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "hub_desk.hpp"
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/pipeline/output_folder.hpp"
+
+namespace plumbline::net {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Everything that is told, into hub.log as well, with the time of day.
+class LogFile : public core::Log {
+ public:
+  LogFile(const fs::path& file, core::Log& next) : file_(file, std::ios::app), next_(next) {}
+  void write(core::LogLevel level, const std::string& message) override {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      const std::time_t now = std::time(nullptr);
+      file_ << fmt::format("{:%Y-%m-%d %H:%M:%S} {}\n", fmt::localtime(now), message) << std::flush;
+    }
+    next_.write(level, message);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::ofstream file_;
+  core::Log& next_;
+};
+
+/// As long as it lives.
+class Goodbye {
+ public:
+  explicit Goodbye(HubDesk& desk) : thread_([this, &desk] { desk.say_goodbye(stop_); }) {}
+  Goodbye(const Goodbye&) = delete;
+  Goodbye& operator=(const Goodbye&) = delete;
+  ~Goodbye() {
+    stop_.request_stop();
+    thread_.join();
+  }
+
+ private:
+  core::StopToken stop_;
+  std::thread thread_;
+};
+
+core::Result<void> move_up(const fs::path& from, const fs::path& to) {
+  std::error_code ec;
+  for (const auto& entry : fs::directory_iterator(from, ec)) {
+    const fs::path target = to / entry.path().filename();
+    if (fs::is_directory(entry.path(), ec) && fs::is_directory(target, ec)) {
+      if (auto moved = move_up(entry.path(), target); !moved) return moved;
+      continue;
+    }
+    fs::remove_all(target, ec);
+    fs::rename(entry.path(), target, ec);
+    if (ec) return core::output_error(fmt::format("{}: cannot be made ({})", target.string(), ec.message()));
+  }
+  fs::remove_all(from, ec);
+  return {};
+}
+
+nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
+  nlohmann::json robots = nlohmann::json::object();
+  for (const RobotTraffic& t : traffic) {
+    robots[t.name] = {{"keyframes", t.keyframes},
+                      {"complete", t.complete},
+                      {"delivered", t.done},
+                      {"bytes", {{"place", t.place_bytes}, {"map", t.map_bytes}, {"cloud", t.cloud_bytes}}},
+                      {"sent_again_bytes", t.again_bytes},
+                      {"longest_break_s", t.longest_break_s},
+                      {"lag_s", {{"median", t.lag_median_s}, {"p95", t.lag_p95_s}}}};
+  }
+  return robots;
+}
+
+/// The summary of the fusion, with what the network did.
+core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
+                               const std::string& reason) {
+  std::ifstream in(file);
+  auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
+  if (summary.is_discarded()) return core::output_error(file.string() + ": cannot be read again");
+  summary["network"] = json_of(traffic);
+  summary["trustworthy"] = reason.empty();
+  summary["reason"] = reason;
+  return core::write_file(file, summary.dump(2) + "\n");
+}
+
+/// Maps that can be fused; what cannot is named in `reason`.
+std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<RobotTraffic>& traffic,
+                                  core::Log& log, std::string& reason) {
+  std::vector<fs::path> maps;
+  const auto leave_out = [&](const std::string& why) { reason += (reason.empty() ? "" : "; ") + why; };
+  for (const RobotTraffic& t : traffic) {
+    const fs::path file = folder / "robots" / t.name / "map.db";
+    if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
+    if (t.keyframes == 0) continue;
+    // One that is damaged must not keep the others from being fused.
+    const auto stored = maps::load_map(file);
+    if (stored && stored->map.keyframe_count() > 0) {
+      maps.push_back(file.parent_path());
+      continue;
+    }
+    const std::string why = stored ? "it has no keyframes" : stored.error().message;
+    log.warning(fmt::format("{}: is left out: {}", t.name, why));
+    leave_out(t.name + " is left out: its map does not load");
+  }
+  return maps;
+}
+
+}  // namespace
+
+core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
+                                           core::Log& console, const core::StopToken& stop,
+                                           const Status& status, const pipeline::Progress& progress,
+                                           pipeline::Leftovers* leftovers) {
+  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+  const auto options = checked(request.network, true);
+  if (!options) return fail(options.error());
+  const pipeline::FuseRequest& fuse = request.fuse;
+  auto output = request.resume ? pipeline::OutputFolder::resume(fuse.output, fuse.replace)
+                               : pipeline::OutputFolder::prepare(fuse.output, fuse.replace);
+  if (!output) return fail(output.error());
+  output->keep();
+  const fs::path folder = output->path();
+  LogFile log(folder / "hub.log", console);
+  if (options->interface != "lo" && options->security.empty()) {
+    log.warning(fmt::format("on {} without --security: whoever is there can read maps and send some",
+                            options->interface));
+  }
+  auto bus = open_hub_bus(*options, [&log](const std::string& line) { log.debug(line); });
+  if (!bus) return fail(bus.error());
+  auto desk = HubDesk::open(folder, request, std::move(*bus), log);
+  if (!desk) return fail(desk.error());
+  if (auto alone = (*desk)->look_for_others(stop); !alone) return fail(alone.error());
+  log.info(
+      fmt::format("waiting for {} on {}, domain {}",
+                  request.robots > 0 ? fmt::format("{} robots", request.robots) : "robots; Ctrl-C ends that",
+                  options->interface, options->domain));
+  const std::vector<RobotTraffic> traffic = (*desk)->serve(stop, status);
+  const Goodbye goodbye(**desk);
+  std::string reason;
+  const std::vector<fs::path> maps = usable_maps(folder, traffic, log, reason);
+  if (traffic.size() < request.robots) {
+    const std::size_t missing = request.robots - traffic.size();
+    reason +=
+        fmt::format("{}{} of {} robots never came", reason.empty() ? "" : "; ", missing, request.robots);
+  }
+  if (maps.empty()) {
+    return core::failure(
+        core::ErrorKind::kUntrustworthy,
+        fmt::format("no map came that could be fused{}; what came is in {}, --resume goes on",
+                    reason.empty() ? "" : " (" + reason + ")", folder.string()));
+  }
+  pipeline::FuseRequest last = fuse;
+  last.maps = maps;
+  last.output = folder / "fused";
+  last.replace = true;
+  auto summary = pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress, leftovers);
+  if (!summary) return fail(summary.error());
+  if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
+  summary->reason = reason;
+  if (auto moved = move_up(last.output, folder); !moved) return fail(moved.error());
+  if (auto added = add_network(folder / "summary.json", traffic, reason); !added) return fail(added.error());
+  if (auto committed = output->commit(); !committed) return fail(committed.error());
+  return summary;
+}
+
+}  // namespace plumbline::net

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "hub_robot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <limits>
+#include <system_error>
+#include <utility>
+
+#include "plumbline/core/version.hpp"
+#include "plumbline/maps/store.hpp"
+
+namespace plumbline::net {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kSilent = 3s;
+constexpr std::uint32_t kMostPieces = 1U << 20U;
+
+tl::unexpected<core::Error> refuse(const char* why) { return core::input_error(why); }
+
+}  // namespace
+
+core::Result<HubRobot> HubRobot::open(std::string name, const std::filesystem::path& file,
+                                      std::uint64_t quota_bytes) {
+  std::error_code ec;
+  std::filesystem::create_directories(file.parent_path(), ec);
+  if (ec) return core::output_error(fmt::format("{}: cannot be made ({})", file.string(), ec.message()));
+  auto copy = maps::StoreReplica::open(file);
+  if (!copy) return tl::unexpected<core::Error>(copy.error());
+  HubRobot robot;
+  robot.name = std::move(name);
+  robot.file_ = file;
+  robot.quota_bytes_ = quota_bytes;
+  robot.copy_.emplace(std::move(*copy));
+  return robot;
+}
+
+bool HubRobot::silent() const { return !heard_at_ || Clock::now() - *heard_at_ > kSilent; }
+
+/// Transactions above the result may be of a process that was ended with the power cut: the robot has others
+/// by these numbers now.
+std::int64_t HubRobot::lost_below(const Hello& next) const {
+  std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
+  if (next.incarnation > incarnation) {
+    const std::uint64_t since = next.incarnation - incarnation;
+    if (since > next.began.size()) return 0;
+    for (auto began = next.began.end() - static_cast<std::ptrdiff_t>(since); began != next.began.end();
+         ++began) {
+      lowest = std::min(lowest, static_cast<std::int64_t>(*began));
+    }
+  }
+  return lowest;
+}
+
+core::Result<bool> HubRobot::hear(const Hello& next) {
+  const auto now = Clock::now();
+  if (heard_at_) {
+    longest_break_s_ = std::max(longest_break_s_, std::chrono::duration<double>(now - *heard_at_).count());
+  }
+  heard_at_ = now;
+  const maps::StoreHeads& heads = copy_->heads();
+  const bool lost =
+      heads.last() > lost_below(next) || heads.map > next.map_head || heads.clouds > next.clouds_head;
+  // A store that is just being opened tells no heads yet.
+  const bool opening = next.map_head == 0 && next.clouds_head == 0;
+  if (next.incarnation > incarnation) forget();
+  incarnation = next.incarnation;
+  run = next.run;
+  hello = next;
+  if (!lost || opening) return false;
+  forget();
+  if (auto cleared = copy_->clear(); !cleared) return tl::unexpected<core::Error>(cleared.error());
+  done = false;
+  return true;
+}
+
+bool HubRobot::has_all() const {
+  return hello.over && copy_->heads().map == hello.map_head && copy_->heads().clouds == hello.clouds_head &&
+         hello.map_head > 0;
+}
+
+void HubRobot::forget() {
+  copy_->forget();
+  number_ = 0;
+  edition_ = 0;
+  pieces_ = 0;
+  changed = true;
+}
+
+core::Result<void> HubRobot::begin(const Piece& piece) {
+  std::error_code ignored;
+  const std::uintmax_t size = std::filesystem::file_size(file_, ignored);
+  if (size != static_cast<std::uintmax_t>(-1) && size > quota_bytes_) {
+    return core::output_error(
+        fmt::format("{}: its map takes {} MB at the hub, more than the {} MB it may have; begin the hub with "
+                    "a larger --quota",
+                    name, size / 1000000, quota_bytes_ / 1000000));
+  }
+  forget();
+  if (auto begun = copy_->begin(static_cast<maps::StoreShare>(piece.share), piece.number); !begun)
+    return begun;
+  number_ = piece.number;
+  edition_ = piece.edition;
+  all_ = {};
+  return {};
+}
+
+core::Result<void> HubRobot::take(const Piece& piece) {
+  received_ += piece.bytes.size();
+  if (piece.share > 1) return refuse("a share that is not known");
+  const auto share = static_cast<maps::StoreShare>(piece.share);
+  if (piece.count == 0 || piece.count > kMostPieces || piece.index >= piece.count || piece.number <= 0) {
+    return refuse("numbers that cannot be");
+  }
+  const bool old = piece.number <= copy_->heads()[share];
+  const bool same = piece.number == number_ && piece.edition == edition_;
+  if (old || (same && piece.index < pieces_)) {
+    again_ += piece.bytes.size();
+    changed = true;
+    return {};
+  }
+  if (piece.after != copy_->heads()[share]) return {};  // something before it was lost: the word tells
+  if (!same) {
+    if (piece.index != 0) return {};
+    if (auto begun = begin(piece); !begun) return begun;
+  }
+  if (piece.index != pieces_) return {};
+  core::Hash hash;
+  hash.bytes(piece.bytes.data(), piece.bytes.size());
+  all_.bytes(piece.bytes.data(), piece.bytes.size());
+  const bool last = piece.index + 1 == piece.count;
+  if (hash.value() != piece.hash || (last && all_.value() != edition_)) {
+    forget();
+    return refuse("bytes were changed on the way");
+  }
+  core::Result<void> taken = copy_->take(piece.bytes.data(), piece.bytes.size());
+  if (taken && last) taken = copy_->commit();
+  if (!taken) {
+    forget();
+    return taken;
+  }
+  ++pieces_;
+  if (last) forget();
+  changed = true;
+  return {};
+}
+
+Word HubRobot::word() const {
+  Word word;
+  word.robot = name;
+  word.run = run;
+  word.incarnation = incarnation;
+  word.answer = answer;
+  word.problem = problem;
+  word.map = copy_->heads().map;
+  word.clouds = copy_->heads().clouds;
+  word.number = number_;
+  word.edition = edition_;
+  word.pieces = pieces_;
+  return word;
+}
+
+RobotTraffic HubRobot::traffic() const {
+  RobotTraffic t;
+  t.name = name;
+  t.keyframes = copy_->keyframes();
+  t.complete = copy_->complete();
+  t.done = done;
+  t.received_bytes = received_;
+  t.place_bytes = copy_->bytes().place;
+  t.map_bytes = copy_->bytes().map;
+  t.cloud_bytes = copy_->bytes().cloud;
+  t.again_bytes = again_;
+  const double silent_s = heard_at_ ? std::chrono::duration<double>(Clock::now() - *heard_at_).count() : 0.0;
+  t.longest_break_s = done ? longest_break_s_ : std::max(longest_break_s_, silent_s);
+  t.lag_median_s = hello.lag_median_s;
+  t.lag_p95_s = hello.lag_p95_s;
+  return t;
+}
+
+}  // namespace plumbline::net

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/net/robot.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "plumbline/pipeline/output_folder.hpp"
+#include "robot_link.hpp"
+
+namespace plumbline::net {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+constexpr const char* kStore = "map.db";
+
+core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request, core::Log& log) {
+  if (!is_robot_name(request.name)) {
+    return core::usage_error(
+        "--name: letters, digits, '.', '_' and '-', the first a letter or digit, 64 at most");
+  }
+  const auto options = checked(request.network, false);
+  if (!options) return tl::unexpected<core::Error>(options.error());
+  if (options->interface != "lo" && options->security.empty()) {
+    log.warning(fmt::format("on {} without --security: whoever is there can read the map and speak as {}",
+                            options->interface, request.name));
+  }
+  auto bus = open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug(line); });
+  if (!bus) return tl::unexpected<core::Error>(bus.error());
+  return std::make_unique<RobotLink>(std::move(*bus), request.name, request.fresh_id, log);
+}
+
+std::string line_of(const LinkStatus& s, double kbytes_per_s) {
+  if (!s.refused.empty()) return "refused by the hub";
+  if (!s.heard) return "no hub yet";
+  if (!s.hub_now) return fmt::format("hub lost, behind by {} transactions", s.behind);
+  return fmt::format("hub, behind by {} transactions, {:.0f} kB/s", s.behind, kbytes_per_s);
+}
+
+/// Rates over the last seconds.
+class Rate {
+ public:
+  double operator()(std::uint64_t bytes) {
+    const double since_s = std::chrono::duration<double>(Clock::now() - at_).count();
+    if (since_s >= 1.0) {
+      value_ = static_cast<double>(bytes - bytes_) / 1000.0 / since_s;
+      at_ = Clock::now();
+      bytes_ = bytes;
+    }
+    return value_;
+  }
+
+ private:
+  Clock::time_point at_ = Clock::now();
+  std::uint64_t bytes_ = 0;
+  double value_ = 0.0;
+};
+
+/// Until the hub has everything, or it is given up.
+core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& folder, const RobotLink& link,
+                                   RobotOutcome outcome, const core::StopToken& stop, bool was_stopped,
+                                   const Status& status) {
+  const std::string command = fmt::format("plumbline robot '{}' {}", folder.string(), request.hand_in);
+  const auto since = Clock::now();
+  Rate rate;
+  while (true) {
+    const LinkStatus now = link.status();
+    if (now.done) {
+      outcome.delivered = true;
+      return outcome;
+    }
+    if (!now.refused.empty()) {
+      return core::usage_error(fmt::format("{}; the map is in {}", now.refused, folder.string()));
+    }
+    if (status) status(line_of(now, rate(now.sent_bytes)));
+    const auto waited_s = [](Clock::time_point from) {
+      return std::chrono::duration<double>(Clock::now() - from).count();
+    };
+    const bool stopped = stop.stop_requested() && !was_stopped;
+    if (!now.heard && (stopped || waited_s(since) > request.wait_s)) {
+      outcome.undelivered = fmt::format("no hub was heard; the map is in {}. To hand it in later: {}",
+                                        folder.string(), command);
+      return outcome;
+    }
+    if (now.heard && (stopped || waited_s(std::max(now.progress, since)) > request.wait_lost_s)) {
+      const std::string why = now.problem.empty() ? "" : " (" + now.problem + ")";
+      return core::failure(
+          core::ErrorKind::kUntrustworthy,
+          fmt::format("the hub has not got everything{}; the map is in {}. To hand in the rest: {}", why,
+                      folder.string(), command));
+    }
+    std::this_thread::sleep_for(50ms);
+  }
+}
+
+}  // namespace
+
+fs::path earlier_run(const std::string& input) {
+  std::error_code ec;
+  if (input.rfind("synth:", 0) == 0) return {};
+  if (fs::exists(fs::path(input) / kStore, ec)) return input;
+  const fs::path partial = pipeline::OutputFolder::partial_of(input);
+  if (fs::exists(partial / kStore, ec)) return partial;
+  return {};
+}
+
+core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& folder, core::Log& log,
+                                   const core::StopToken& stop, const Status& status) {
+  if (auto heads = maps::store_heads(folder / kStore); !heads)
+    return tl::unexpected<core::Error>(heads.error());
+  auto link = open_link(request, log);
+  if (!link) return tl::unexpected<core::Error>(link.error());
+  if (auto followed = (*link)->follow(folder / kStore); !followed) {
+    return tl::unexpected<core::Error>(followed.error());
+  }
+  (*link)->over(folder / kStore);
+  return deliver(request, folder, **link, {}, stop, false, status);
+}
+
+core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
+                                     core::Log& log, const core::StopToken& stop, const Status& status,
+                                     const pipeline::Progress& progress, pipeline::Leftovers* leftovers) {
+  auto link = open_link(request, log);
+  if (!link) return tl::unexpected<core::Error>(link.error());
+  pipeline::MapRequest map = request.map;
+  map.prepared = [&](const fs::path& folder) {
+    if (auto followed = (*link)->follow(folder / kStore); !followed) log.error(followed.error().message);
+    if (request.map.prepared) request.map.prepared(folder);
+  };
+  auto summary = pipeline::map_recording(map, executor, log, stop, progress, leftovers);
+  if (!summary) return tl::unexpected<core::Error>(summary.error());
+  std::error_code ec;
+  const fs::path store = request.map.output / kStore;
+  if (!fs::exists(store, ec)) {
+    return core::usage_error(
+        fmt::format("{}: the pipeline keeps no map.db that could be sent", request.map.pipeline));
+  }
+  (*link)->over(store);
+  RobotOutcome outcome;
+  outcome.summary = std::move(*summary);
+  return deliver(request, request.map.output, **link, std::move(outcome), stop, stop.stop_requested(),
+                 status);
+}
+
+}  // namespace plumbline::net

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A copy of a store, told transaction by transaction, and what a stranger may tell it.
+#include <gtest/gtest.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/maps/store_replica.hpp"
+#include "store_dump.hpp"
+#include "store_folder.hpp"
+#include "store_world.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using tests::dump;
+using tests::equal;
+using tests::header_of;
+using tests::StoreFolder;
+using tests::StoreWorld;
+
+std::vector<std::uint8_t> small_cloud(int points) {
+  cloud::Cloud cloud;
+  for (int i = 0; i < points; ++i) {
+    cloud::Point p;
+    p.x = 0.01F * static_cast<float>(i);
+    p.z = 2.0F;
+    cloud.push_back(p);
+  }
+  return cloud::encode_cloud(cloud);
+}
+
+core::Result<void> take_one(StoreReplica& copy, StoreShare share, const StoreTransaction& one,
+                            std::size_t piece) {
+  if (auto begun = copy.begin(share, one.number); !begun) return begun;
+  for (std::size_t at = 0; at < one.rows.size(); at += piece) {
+    const std::size_t size = std::min(piece, one.rows.size() - at);
+    if (auto taken = copy.take(one.rows.data() + at, size); !taken) return taken;
+  }
+  return copy.commit();
+}
+
+/// Tells the copy what it lacks; how many transactions that were.
+int follow(const std::filesystem::path& store, StoreReplica& copy, std::size_t piece = 1000) {
+  int count = 0;
+  for (const StoreShare share : kStoreShares) {
+    while (true) {
+      const auto next = next_transaction(store, share, copy.heads()[share]);
+      if (!next || !*next) {
+        EXPECT_TRUE(next) << next.error().message;
+        break;
+      }
+      const auto taken = take_one(copy, share, **next, piece);
+      EXPECT_TRUE(taken) << taken.error().message;
+      if (!taken) break;
+      ++count;
+    }
+  }
+  return count;
+}
+
+TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
+  const StoreFolder folder;
+  const auto copied = folder.path / "copy.db";
+  StoreWorld world(31);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer) << writer.error().message;
+  auto copy = StoreReplica::open(copied);
+  ASSERT_TRUE(copy) << copy.error().message;
+  for (int i = 0; i < 24; ++i) {
+    const KeyframeId id = world.step();  // landmarks come and go
+    for (const PointId p : world.map.point_ids()) {
+      if (i == 15 && p.robot == 0 && p.index < 64) world.map.remove_point(p);  // a row goes
+    }
+    ASSERT_TRUE(writer->add_keyframe(world.map, id, small_cloud(i), world.frames));
+    if (i % 5 != 0) continue;
+    follow(folder.file(), *copy, 100 + static_cast<std::size_t>(i) * 97);
+    ASSERT_EQ(dump(copied), dump(folder.file())) << "after " << i;
+    ASSERT_EQ(copy->keyframes(), world.map.keyframe_count());
+    ASSERT_FALSE(copy->complete());
+  }
+  ASSERT_TRUE(writer->attach("robots", {1, 2, 3}));
+  ASSERT_TRUE(writer->save_final(world.map, world.frames));
+  EXPECT_GT(follow(folder.file(), *copy), 2);
+  EXPECT_EQ(dump(copied), dump(folder.file()));
+  EXPECT_TRUE(copy->complete());
+  const auto removed = dump(folder.file());
+  EXPECT_TRUE(std::any_of(removed.begin(), removed.end(), [](const std::string& line) {
+    return line.rfind("removed|", 0) == 0;
+  })) << "the world is too simple";
+  EXPECT_EQ(store_heads(folder.file())->map, copy->heads().map);
+  EXPECT_EQ(store_heads(folder.file())->clouds, copy->heads().clouds);
+  EXPECT_EQ(follow(folder.file(), *copy), 0) << "there is nothing more to tell";
+  const auto stored = load_map(copied);
+  ASSERT_TRUE(stored) << stored.error().message;
+  EXPECT_TRUE(equal(stored->map, world.map));
+  EXPECT_GT(copy->bytes().place, 0U);
+  EXPECT_GT(copy->bytes().map, 0U);
+  EXPECT_GT(copy->bytes().cloud, 0U);
+}
+
+TEST(StoreReplica, OneThatComesLateIsToldLess) {
+  const StoreFolder folder;
+  StoreWorld world(32);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  auto early = StoreReplica::open(folder.path / "early.db");
+  auto late = StoreReplica::open(folder.path / "late.db");
+  ASSERT_TRUE(early && late);
+  for (int i = 0; i < 15; ++i) {
+    ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(5), world.frames));
+    follow(folder.file(), *early);
+  }
+  follow(folder.file(), *late);
+  EXPECT_EQ(dump(folder.path / "early.db"), dump(folder.path / "late.db"));
+  EXPECT_LT(late->bytes().map, early->bytes().map);
+}
+
+TEST(StoreReplica, GoesOnWhereItWasCommitted) {
+  const StoreFolder folder;
+  const auto copied = folder.path / "copy.db";
+  StoreWorld world(33);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(5), world.frames));
+  }
+  StoreHeads before;
+  {
+    auto copy = StoreReplica::open(copied);
+    ASSERT_TRUE(copy);
+    const auto first = next_transaction(folder.file(), StoreShare::kMap, 0);
+    ASSERT_TRUE(first && *first);
+    ASSERT_TRUE(take_one(*copy, StoreShare::kMap, **first, 500));
+    before = copy->heads();
+    const auto second = next_transaction(folder.file(), StoreShare::kMap, before.map);
+    ASSERT_TRUE(second && *second);
+    ASSERT_TRUE(copy->begin(StoreShare::kMap, (*second)->number));
+    ASSERT_TRUE(copy->take((*second)->rows.data(), (*second)->rows.size() / 2));
+    EXPECT_EQ(copy->commit().error().kind, core::ErrorKind::kInput) << "half a row";
+  }
+  auto copy = StoreReplica::open(copied);
+  ASSERT_TRUE(copy);
+  EXPECT_EQ(copy->heads().map, before.map);
+  EXPECT_EQ(copy->begin(StoreShare::kMap, before.map).error().kind, core::ErrorKind::kInput);
+  follow(folder.file(), *copy);
+  EXPECT_EQ(dump(copied), dump(folder.file()));
+  ASSERT_TRUE(copy->clear());
+  EXPECT_EQ(copy->heads().last(), 0);
+  follow(folder.file(), *copy);
+  EXPECT_EQ(dump(copied), dump(folder.file()));
+}
+
+TEST(StoreReplica, MutatedRowsAreRefusedAndDoNoHarm) {
+  const StoreFolder folder;
+  StoreWorld world(34);
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 8; ++i) {
+    ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(30), world.frames));
+  }
+  std::vector<std::pair<StoreShare, StoreTransaction>> all;
+  for (const StoreShare share : kStoreShares) {
+    std::int64_t after = 0;
+    while (auto next = next_transaction(folder.file(), share, after).value()) {
+      after = next->number;
+      all.emplace_back(share, *next);
+    }
+  }
+  std::mt19937 random(5);
+  int refused = 0;
+  for (int round = 0; round < 300; ++round) {
+    const auto copied = folder.path / "mutated.db";
+    std::filesystem::remove(copied);
+    auto copy = StoreReplica::open(copied);
+    ASSERT_TRUE(copy);
+    for (auto [share, one] : all) {
+      for (auto k = random() % 3; k > 0; --k) {
+        const std::size_t at = random() % one.rows.size();
+        if (random() % 2 == 0) {
+          one.rows[at] = static_cast<std::uint8_t>(random());
+        } else {
+          one.rows.erase(one.rows.begin() + static_cast<std::ptrdiff_t>(at));
+        }
+      }
+      const auto taken = take_one(*copy, share, one, 5000);
+      if (taken) continue;
+      ++refused;
+      EXPECT_EQ(taken.error().kind, core::ErrorKind::kInput) << taken.error().message;
+    }
+    const auto stored = load_map(copied);  // may be refused, must not harm
+    (void)stored;
+  }
+  EXPECT_GT(refused, 500);
+}
+
+TEST(Ledger, KeepsTexts) {
+  const StoreFolder folder;
+  const Ledger ledger(folder.path / "network.db");
+  EXPECT_EQ(ledger.get("run").value(), std::nullopt);
+  ASSERT_TRUE(ledger.put({{"run", "7f"}, {"hub", "a'; DROP TABLE text"}}));
+  ASSERT_TRUE(ledger.put({{"run", "80"}}));
+  EXPECT_EQ(ledger.get("run").value(), "80");
+  EXPECT_EQ(ledger.get("hub").value(), "a'; DROP TABLE text");
+  EXPECT_EQ(ledger.all()->size(), 2U);
+  EXPECT_EQ(Ledger(folder.path / "none" / "network.db").put({{"a", "b"}}).error().kind,
+            core::ErrorKind::kOutput);
+  StoreWorld world(35);
+  { ASSERT_TRUE(StoreWriter::create(folder.file(), header_of(world.camera))); }
+  EXPECT_FALSE(Ledger(folder.file()).put({{"a", "b"}})) << "it would spoil a map";
+}
+
+}  // namespace
+}  // namespace plumbline::maps
