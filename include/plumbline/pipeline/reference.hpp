@@ -3,7 +3,9 @@
 
 // What is told of the stages to people and editors, made from their own declarations.
 #include <string>
+#include <vector>
 
+#include "plumbline/core/options.hpp"
 #include "plumbline/pipeline/stage.hpp"
 
 namespace plumbline::pipeline {
@@ -15,10 +17,13 @@ std::string pipeline_schema(const StageRegistry& registry);
 /// The same of one stage's map.
 std::string stage_schema(const StageType& type, const StageRegistry& registry);
 
+/// Options of one stage that are shown, in the order of their declaration; `all`: the advanced ones, too.
+std::vector<core::OptionSpec> shown_options(const StageType& type, bool all = false);
+
 /// Ports and options of one stage as Markdown, a section of stages_reference.
-std::string stage_reference(const StageType& type);
+std::string stage_reference(const StageType& type, bool all = false);
 
 /// docs/stages.md: every stage, port type and tap.
-std::string stages_reference(const StageRegistry& registry);
+std::string stages_reference(const StageRegistry& registry, bool all = false);
 
 }  // namespace plumbline::pipeline

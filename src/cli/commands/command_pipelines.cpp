@@ -22,6 +22,7 @@ struct PipelinesRequest {
   std::vector<std::string> overrides;
   std::filesystem::path output;
   bool markdown = false;
+  bool all = false;  ///< advanced options, too
 };
 using RequestPtr = std::shared_ptr<PipelinesRequest>;
 
@@ -58,7 +59,7 @@ int list(Session& session) {
   if (!registry) return session.fail(registry.error());
   fmt::print("pipelines:\n");
   for (const std::string& name : pipeline::pipeline_names(*folder)) {
-    const auto graph = load({name, {}, {}, false}, *registry, session);
+    const auto graph = load({name, {}, {}, false, false}, *registry, session);
     fmt::print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
   }
   fmt::print("stages:\n");
@@ -81,23 +82,21 @@ int describe(Session& session, const PipelinesRequest& request) {
   const auto registry = all_stages(session);
   if (!registry) return session.fail(registry.error());
   if (request.name.empty()) {
-    fmt::print("{}", pipeline::stages_reference(*registry));
+    fmt::print("{}", pipeline::stages_reference(*registry, request.all));
     return 0;
   }
   const auto type = find_stage(request.name, *registry);
   if (!type) return session.fail(type.error());
   if (request.markdown) {
-    fmt::print("{}", pipeline::stage_reference(**type));
+    fmt::print("{}", pipeline::stage_reference(**type, request.all));
     return 0;
   }
   fmt::print("{}: {}\n", (*type)->name, (*type)->help);
   describe_ports((*type)->inputs, "inputs");
   describe_ports((*type)->outputs, "outputs");
-  const auto stage = (*type)->make();
-  core::OptionTable table;
-  stage->declare(table);
-  if (!table.specs().empty()) fmt::print("\noptions:\n");
-  for (const core::OptionSpec& spec : table.specs()) {
+  const std::vector<core::OptionSpec> options = pipeline::shown_options(**type, request.all);
+  if (!options.empty()) fmt::print("\noptions:\n");
+  for (const core::OptionSpec& spec : options) {
     fmt::print("  {:<22} {} (allowed: {}; default: {})\n", spec.key, spec.help, core::allowed_text(spec),
                spec.default_value);
   }
@@ -185,6 +184,7 @@ void add_pipelines(CLI::App& app, Session& session) {
       command("describe", "A stage: ports and options; without STAGE the whole reference", describe);
   described->add_option("STAGE", request->name, "Type of a stage");
   described->add_flag("--markdown", request->markdown, "As a section of the reference page");
+  described->add_flag("--all", request->all, "Options for those who know what they do, too");
   CLI::App* checked = command("check", "Check a pipeline without running it", check);
   add_pipeline_arguments(*checked, request);
   add_plugin_option(*checked, session);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "graph/option_levels.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "plumbline/pipeline/reference.hpp"
 
@@ -13,7 +14,9 @@ constexpr const char* kIntroduction =
     "What may stand under `stages:` of a [pipeline file](pipelines.md). Lengths, angles and times may carry "
     "a "
     "unit\n"
-    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default.\n";
+    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. "
+    "`plumbline pipelines describe STAGE --all`\n"
+    "shows more options, for those who know what they do.\n";
 
 constexpr const char* kTaps =
     "\n## Taps\n\n"
@@ -55,15 +58,25 @@ std::string tap_row(const StageType& tap) {
 
 }  // namespace
 
-std::string stage_reference(const StageType& type) {
+std::vector<core::OptionSpec> shown_options(const StageType& type, bool all) {
+  std::vector<core::OptionSpec> shown;
+  for (core::OptionSpec& spec : options(type)) {
+    const OptionLevel level = option_level(type.name, spec.key);
+    if (level == OptionLevel::kBasic || (all && level == OptionLevel::kAdvanced))
+      shown.push_back(std::move(spec));
+  }
+  return shown;
+}
+
+std::string stage_reference(const StageType& type, bool all) {
   std::string text = fmt::format("## {}\n\n{}.\n\n{}", type.name, type.help, ports(type));
-  const std::string table = core::options_as_markdown(options(type));
+  const std::string table = core::options_as_markdown(shown_options(type, all));
   return table.empty() ? text : text + "\n" + table;
 }
 
-std::string stages_reference(const StageRegistry& registry) {
+std::string stages_reference(const StageRegistry& registry, bool all) {
   std::string text = kIntroduction;
-  for (const StageType* type : registry.types()) text += "\n" + stage_reference(*type);
+  for (const StageType* type : registry.types()) text += "\n" + stage_reference(*type, all);
   text += kTaps;
   for (const StageType* tap : registry.taps()) text += tap_row(*tap);
   text += "\nTaps of frames and features take `every: N` as well: each N-th frame only.\n";

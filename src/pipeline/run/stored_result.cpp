@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "chain_option.hpp"
+#include "stages/chain_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"

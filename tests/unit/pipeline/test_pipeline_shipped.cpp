@@ -2,11 +2,13 @@
 // Every YAML file that is shipped is read by the code that users' files are read by.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
 
+#include "../../../src/pipeline/graph/option_levels.hpp"
 #include "plumbline/cloud/filter_chain.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
@@ -126,6 +128,31 @@ TEST(Shipped, WhatIsWrittenOutReadsBackTheSame) {
     ASSERT_TRUE(again) << name << ": " << again.error().message << text;
     EXPECT_EQ(to_yaml(*again), text);
   }
+}
+
+TEST(Shipped, LevelsNameOptionsThatAreThere) {
+  StageRegistry registry;
+  register_stages(registry);
+  std::map<OptionLevel, std::size_t> count;
+  for (const auto& [stage, key] : levelled_options()) {
+    const StageType* type = registry.find(stage);
+    ASSERT_NE(type, nullptr) << stage;
+    const auto made = type->make();
+    core::OptionTable table;
+    made->declare(table);
+    EXPECT_TRUE(std::any_of(table.specs().begin(), table.specs().end(),
+                            [key = key](const core::OptionSpec& spec) { return spec.key == key; }))
+        << stage << "." << key;
+  }
+  for (const StageType* type : registry.types()) {
+    const auto made = type->make();
+    core::OptionTable table;
+    made->declare(table);
+    for (const core::OptionSpec& spec : table.specs()) ++count[option_level(type->name, spec.key)];
+  }
+  EXPECT_LE(count[OptionLevel::kBasic], 90U);
+  EXPECT_LE(count[OptionLevel::kAdvanced], 75U);
+  RecordProperty("basic", static_cast<int>(count[OptionLevel::kBasic]));
 }
 
 }  // namespace

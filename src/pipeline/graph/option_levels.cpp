@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "graph/option_levels.hpp"
+
+#include <map>
+#include <set>
+#include <string>
+
+namespace plumbline::pipeline {
+namespace {
+
+using Keys = std::map<std::string, std::set<std::string>>;  ///< by stage
+
+/// For those who know what they do.
+const Keys kAdvanced{
+    {"features",
+     {"orb.levels", "orb.fast_threshold_min", "orb.min_corner", "min_gradient", "border", "max_count", "join",
+      "depth_samples"}},
+    {"track",
+     {"min_surface",
+      "match.max_hamming",
+      "match.ratio",
+      "match.align",
+      "match.max_line_hamming",
+      "local.surface_keyframes",
+      "local.voxel",
+      "solver.point_weight",
+      "solver.line_weight",
+      "solver.plane_weight",
+      "solver.photometric_weight",
+      "keyframe.min_features",
+      "keyframe.cone_patience",
+      "keyframe.cone_max_shared",
+      "keyframe.cone_min_points",
+      "keyframe.cone_min_lines",
+      "landmark.min_found",
+      "landmark.min_keyframes",
+      "landmark.max_turn_rate",
+      "fuse",
+      "fuse.keyframes",
+      "fuse.radius",
+      "triangulate.keyframes",
+      "bundle.max_iterations",
+      "bundle.aligned",
+      "bundle.line_sigma",
+      "bundle.depth_factor",
+      "edges.min_overlap",
+      "surface.min_depth",
+      "loops.robust",
+      "loops.bundle",
+      "loops.max_rival",
+      "vocabulary.branching",
+      "vocabulary.levels",
+      "verify.min_overlap",
+      "verify.max_contradiction",
+      "verify.rounds"}},
+    {"merge", {"few_pairs", "few_inliers", "few_extent", "verifications"}},
+    {"cloud", {"looks", "smooth_position", "base"}},
+    {"refine",
+     {"pairs.min_overlap", "pairs.per_map", "icp.samples", "icp.iterations", "icp.max_rms", "icp.max_shift",
+      "icp.max_turn", "adjust.observations", "adjust.iterations", "adjust.aligned", "adjust.line_sigma",
+      "adjust.depth_factor", "adjust.surface_weight", "adjust.turn_rate", "adjust.first_gate"}},
+    {"fuse", {"min_cos_incidence", "depth_field.views"}},
+};
+
+/// What nobody has been seen to set: accepted, and listed nowhere.
+const Keys kInternal{
+    {"features",
+     {"join_gap", "join_angle", "join_offset", "depth_side", "depth_inlier_sigmas", "depth_min_inlier_share",
+      "depth_min_coverage", "depth_min_inliers", "depth_ransac_rounds", "depth_pixel_sigma"}},
+    {"track", {"match.max_point_angle", "match.aligned_sigma",     "match.max_line_angle",
+               "local.overlap_angle",   "solver.point_loss",       "solver.line_loss",
+               "solver.plane_loss",     "solver.photometric_loss", "keyframe.cone_min_change",
+               "landmark.min_visible",  "landmark.grace",          "triangulate.max_hamming",
+               "triangulate.max_sigma", "triangulate.line_views",  "fuse.earlier",
+               "bundle.rounds",         "bundle.tolerance",        "bundle.point_loss",
+               "bundle.line_loss",      "bundle.edge_loss",        "surface.max_incidence",
+               "loops.max_apart",       "loops.max_turned",        "vocabulary.split",
+               "vocabulary.iterations", "places.min_absolute",     "places.consistent",
+               "places.hits",           "places.groups",           "verify.min_found",
+               "verify.min_evidence",   "verify.min_cells",        "verify.neighbours"}},
+    {"merge",
+     {"min_span",
+      "min_turn",
+      "max_apart",
+      "max_turned",
+      "drift",
+      "rival",
+      "rival_fit",
+      "max_seen_through",
+      "min_confirmed",
+      "robust",
+      "vocabulary.branching",
+      "vocabulary.levels",
+      "vocabulary.split",
+      "vocabulary.iterations",
+      "places.min_score",
+      "places.min_absolute",
+      "places.consistent",
+      "places.hits",
+      "places.groups",
+      "verify.min_inliers",
+      "verify.min_overlap",
+      "verify.max_contradiction",
+      "verify.min_found",
+      "verify.min_evidence",
+      "verify.min_cells",
+      "verify.neighbours"}},
+    {"refine",
+     {"local_map.angle", "icp.min_hold", "icp.correlation", "icp.floor", "adjust.pose_graph", "adjust.bundle",
+      "adjust.rounds", "adjust.tolerance"}},
+    {"fuse", {"depth_field.partners", "depth_field.least_gain"}},
+};
+
+bool lists(const Keys& keys, const std::string& stage, const std::string& key) {
+  const auto found = keys.find(stage);
+  return found != keys.end() && found->second.count(key) != 0;
+}
+
+}  // namespace
+
+OptionLevel option_level(const std::string& stage, const std::string& key) {
+  if (lists(kInternal, stage, key)) return OptionLevel::kInternal;
+  return lists(kAdvanced, stage, key) ? OptionLevel::kAdvanced : OptionLevel::kBasic;
+}
+
+std::vector<std::pair<std::string, std::string>> levelled_options() {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const Keys* keys : {&kAdvanced, &kInternal}) {
+    for (const auto& [stage, names] : *keys) {
+      for (const std::string& name : names) all.emplace_back(stage, name);
+    }
+  }
+  return all;
+}
+
+}  // namespace plumbline::pipeline
