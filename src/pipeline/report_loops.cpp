@@ -227,7 +227,11 @@ std::string refinement_html(const ReportData& data) {
         number_text(number_at(s, "/refine/mean_rms"), 2, "σ of the depth noise")},
        {"Keyframes moved", fmt::format("{} on average, {} at most",
                                        number_text(1e3 * number_at(s, "/refine/mean_shift_m"), 1, "mm"),
-                                       number_text(1e3 * number_at(s, "/refine/max_shift_m"), 1, "mm"))}});
+                                       number_text(1e3 * number_at(s, "/refine/max_shift_m"), 1, "mm"))},
+       {"Standard deviation of keyframes beside the first",
+        fmt::format("{} in the middle, below {} for 90 % of them",
+                    number_text(1e3 * number_at(s, "/refine/sigma_position_m/median"), 1, "mm"),
+                    number_text(1e3 * number_at(s, "/refine/sigma_position_m/p90"), 1, "mm"))}});
   out += adjustment_html(s);
   HtmlTable depth({{"depth camera"},
                    {"correction"},
