@@ -257,8 +257,7 @@ void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
   summary.changed = true;
 }
 
-/// Of the whole map, with the edges of `extra`. `surface_edges`: how many
-/// others there are.
+/// Of the whole map, with the edges of `extra`. `surface_edges`: how many others there are.
 GlobalBundle bundle_of(const maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
                        const GlobalAdjustmentOptions& options, KeyframeId anchor, int& surface_edges) {
   GlobalBuilder builder(map, cameras, options, anchor);
@@ -316,6 +315,7 @@ GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.first_radius = 1e7;
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;
+  sigma_factors = {0.71, 0.71, 2.0};  // docs/refinement.md
 }
 
 void GlobalAdjustmentOptions::declare(core::OptionTable& table) {

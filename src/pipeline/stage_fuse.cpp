@@ -199,8 +199,8 @@ class FuseStage : public Stage {
     return fused;
   }
 
-  /// Of the views' poses: as those of the keyframes, and between these as that
-  /// of the one before; empty: not known.
+  /// Of the views' poses: as those of the keyframes, and between these as that of the one before; empty: not
+  /// known.
   static std::vector<geometry::Matrix6d> covariances_of(const MapResult& map,
                                                         const std::vector<std::int32_t>& robots,
                                                         const std::vector<double>& stamps) {

@@ -170,15 +170,12 @@ class OutputStage : public Stage {
     return {};
   }
 
-  /// Where each keyframe is, how exactly that is known beside the first one,
-  /// and what holds it.
+  /// Where each keyframe is, how exactly that is known beside the first one, and what holds it.
   static core::Result<void> write_keyframes(const std::filesystem::path& file, const MapResult& map) {
     std::map<std::int32_t, std::string> names;
     for (const RobotInfo& robot : map.robots) names[robot.number] = robot.name;
     core::OutputFile out(file);
-    out.write(
-        "robot,keyframe,stamp,tx,ty,tz,qx,qy,qz,qw,sigma_position,sigma_"
-        "rotation,points,lines,edges\n");
+    out.write("robot,keyframe,stamp,tx,ty,tz,qx,qy,qz,qw,sigma_position,sigma_rotation,points,lines,edges\n");
     for (const KeyframePose& keyframe : map.keyframes) {
       const Eigen::Vector3d& t = keyframe.world_from_camera.translation;
       const Eigen::Quaterniond q = keyframe.world_from_camera.quaternion();

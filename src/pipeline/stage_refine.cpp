@@ -123,10 +123,10 @@ class RefineStage : public Stage {
       if (summary.extra.empty() || !summary.extra[i].rejected) believed.push_back(edges[i]);
     }
     auto accuracy = mapping::keyframe_accuracy(map, cameras, believed, adjustment_);
-    summarise(accuracy);
+    note(accuracy);
     return accuracy;
   }
-  void summarise(const std::vector<mapping::KeyframeAccuracy>& accuracy) {
+  void note(const std::vector<mapping::KeyframeAccuracy>& accuracy) {
     std::vector<double> position, rotation;
     for (const mapping::KeyframeAccuracy& keyframe : accuracy) {
       position.push_back(keyframe.sigma_position_m());

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How much larger than at their word the standard deviations of points, lines
-// and edges are to be taken for covariances of keyframes
-// (mapping::SigmaFactors): the factors under which the errors of the keyframes
-// of generated worlds are most likely, and how well the resulting sigma fits
-// worlds that had no say.
-//   sigma_factors [--frames N] [--threads N] [--fit SEEDS] [--check SEEDS]
-//   [--scene NAME]... [--set f=...]
-// Errors are those of positions in the first keyframe's frame, without any
-// alignment; the first keyframe is left out. A table in Markdown; the numbers
-// are the same on every run.
+// By how much the standard deviations of points, lines and edges are to be taken larger than at their word
+// for covariances of keyframes (mapping::SigmaFactors): the factors under which the errors of the keyframes
+// of generated worlds are most likely, and how well sigma then fits worlds that had no say.
+//   sigma_factors [--frames N] [--threads N] [--fit FIRST LAST] [--check FIRST LAST] [--scene NAME]...
+// Errors are those of positions in the first keyframe's frame, without any alignment; the first keyframe is
+// left out. Tables in Markdown; the numbers are the same on every run.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -105,8 +101,7 @@ std::vector<mapping::KeyframeAccuracy> accuracy(const World& world, const SigmaF
   return mapping::keyframe_accuracy(world.map, world.cameras, world.edges, options);
 }
 
-/// Negative logarithm of the likelihood of the errors; each world counts alike,
-/// as its keyframes err alike.
+/// Negative logarithm of the likelihood of the errors; each world counts alike, as its keyframes err alike.
 double unlikeliness(const std::vector<World>& worlds, const SigmaFactors& factors,
                     const core::Executor& executor) {
   std::vector<double> sums(worlds.size(), 0.0);
@@ -124,8 +119,7 @@ double unlikeliness(const std::vector<World>& worlds, const SigmaFactors& factor
   return sum;
 }
 
-/// One family after the other, in steps of the root of 2, until nothing gets
-/// better.
+/// One family after the other, in steps of the root of 2, until nothing gets better.
 SigmaFactors fitted(const std::vector<World>& worlds, const core::Executor& executor) {
   SigmaFactors best;
   double least = unlikeliness(worlds, best, executor);
@@ -224,7 +218,8 @@ int main(int argc, char** argv) {
     print_table("With these factors, worlds of the fit:", scenes, known, factors);
     const std::vector<World> others = worlds_of(check);
     print_table("With these factors, other worlds:", scenes, others, factors);
-    print_table("With the program's factors, other worlds:", scenes, others, SigmaFactors());
+    print_table("With the program's factors, other worlds:", scenes, others,
+                mapping::GlobalAdjustmentOptions().sigma_factors);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "sigma_factors: %s\n", error.what());
     return 1;

@@ -2,6 +2,7 @@
 #pragma once
 
 // What is said of a finished run: summary.json and timing.csv.
+#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <string>
@@ -69,7 +70,7 @@ struct RunSummary {
     double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
     double mean_shift_m = 0.0;  ///< how far keyframes moved
     double max_shift_m = 0.0;
-    Sigma sigma_position_m;     ///< of keyframes beside the first one
+    Sigma sigma_position_m;  ///< of keyframes beside the first one
     Sigma sigma_rotation_rad;
     optimize::BundleFits before;  ///< how well all fits where the pose graph had put it; zeros: not known
     optimize::BundleFits after;   ///< when all was adjusted
