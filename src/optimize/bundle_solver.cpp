@@ -141,9 +141,11 @@ bool BundleRound::tiny_step(const BundleState& state) const {
 }
 
 /// Diagonal blocks of the reduced equations' inverse: with S = L L^T they are X^T X, L X = the pose's columns
-/// of the identity, of which only rows from the pose on are not zero.
+/// of the identity, of which only rows from the pose on are not zero. Several poses at a time, as each asks
+/// for all of L.
 std::vector<Matrix6d> BundleRound::covariances(const BundleState& state) {
   constexpr double kUndamped = std::numeric_limits<double>::infinity();
+  constexpr int kAtATime = 16;
   linearise(state);
   points_.invert(kUndamped);
   lines_.invert(kUndamped);
@@ -151,11 +153,15 @@ std::vector<Matrix6d> BundleRound::covariances(const BundleState& state) {
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(matrix_);
   if (llt.info() != Eigen::Success) return {};
   std::vector<Matrix6d> result(state.poses.size(), Matrix6d::Zero());
-  for (int slot = 0; slot < free_; ++slot) {
-    const Eigen::Index rows = matrix_.rows() - 6 * slot;
-    Eigen::MatrixXd x = Eigen::MatrixXd::Identity(rows, 6);
+  for (int first = 0; first < free_; first += kAtATime) {
+    const Eigen::Index rows = matrix_.rows() - 6 * first;
+    const int end = std::min(free_, first + kAtATime);
+    Eigen::MatrixXd x = Eigen::MatrixXd::Identity(rows, 6 * (end - first));
     matrix_.bottomRightCorner(rows, rows).triangularView<Eigen::Lower>().solveInPlace(x);
-    result[at(slot_pose_[at(slot)])].noalias() = x.transpose() * x;
+    for (int slot = first; slot < end; ++slot) {
+      const auto columns = x.middleCols<6>(6 * (slot - first));
+      result[at(slot_pose_[at(slot)])].noalias() = columns.transpose() * columns;
+    }
   }
   return result;
 }

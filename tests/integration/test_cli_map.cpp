@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline map: what comes out, that it is the same every time, and what happens to OUT.
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <map>
+#include <sstream>
 #include <thread>
 #include <vector>
 
+#include "plumbline/cloud/cloud_io.hpp"
 #include "program.hpp"
 #include "wall_recording.hpp"
 
@@ -23,9 +26,9 @@ class MapCommand : public ProgramTest {
 TEST_F(MapCommand, WritesTheWholeResultFolder) {
   const Outcome o = run("map wall -o out -p known_poses", "env -u DISPLAY ");
   ASSERT_EQ(o.code, 0) << o;
-  for (const char* file :
-       {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "lines.ply", "summary.json", "config.yaml",
-        "frames.csv", "timing.csv", "snapshots/iso.png", "snapshots/top.png", "snapshots/front.png"}) {
+  for (const char* file : {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "keyframes.csv",
+                           "lines.ply", "summary.json", "config.yaml", "frames.csv", "timing.csv",
+                           "snapshots/iso.png", "snapshots/top.png", "snapshots/front.png"}) {
     EXPECT_GT(fs::file_size(path("out") / file), 0U) << file;
   }
   EXPECT_FALSE(fs::exists(path("out.partial")));
@@ -79,6 +82,52 @@ TEST_F(MapCommand, TracksTheWall) {
   EXPECT_EQ(report["tracked_percent"], 100.0);
 }
 
+TEST_F(MapCommand, TellsHowExactlyItIsKnown) {
+  ASSERT_EQ(run("synth room -o film --frames 60 --reference-spacing 0.2 -q").code, 0);
+  const Outcome o = run(std::string("map film/robot0 -o out -q --set fuse.voxel=20mm") + kNoPictures);
+  ASSERT_EQ(o.code, 0) << o;
+  std::istringstream table(slurp(path("out/keyframes.csv")));
+  std::string line;
+  ASSERT_TRUE(std::getline(table, line));
+  EXPECT_EQ(line,
+            "robot,keyframe,stamp,tx,ty,tz,qx,qy,qz,qw,sigma_position,sigma_rotation,points,lines,edges");
+  std::size_t rows = 0;
+  for (; std::getline(table, line); ++rows) {
+    std::vector<std::string> cells;
+    std::istringstream words(line);
+    for (std::string cell; std::getline(words, cell, ',');) cells.push_back(cell);
+    ASSERT_EQ(cells.size(), 15U) << line;
+    for (const int column : {10, 11}) {
+      const double sigma = std::stod(cells[static_cast<std::size_t>(column)]);
+      rows == 0 ? EXPECT_EQ(sigma, 0.0) << line : EXPECT_GT(sigma, 0.0) << line;
+      EXPECT_LT(sigma, 0.2) << line;
+    }
+    EXPECT_GT(std::stoi(cells[12]), 0) << line;
+  }
+  const nlohmann::json summary = read_json(path("out/summary.json"));
+  EXPECT_EQ(summary["keyframes"], rows);
+  EXPECT_GT(rows, 2U);
+  EXPECT_GT(summary["refine"]["sigma_position_m"]["median"], 0.0);
+  EXPECT_GT(summary["cloud"]["sigma_m"]["median"], 0.0);
+  EXPECT_GE(summary["cloud"]["sigma_m"]["p90"], summary["cloud"]["sigma_m"]["median"]);
+  for (const char* file : {"out/map.ply", "out/map.pcd"}) {
+    const auto cloud = cloud::read_cloud(path(file));
+    ASSERT_TRUE(cloud.has_value());
+    ASSERT_EQ(cloud->columns.others.size(), 1U) << file;
+    EXPECT_EQ(cloud->columns.others[0].name, "sigma");
+    for (const float sigma : cloud->columns.others[0].values)
+      ASSERT_TRUE(std::isfinite(sigma) && sigma > 0.0F && sigma < 0.2F) << sigma;
+  }
+  const Outcome drawn = run("render out -o sigma.png --color sigma --size 320x240");
+  EXPECT_EQ(drawn.code, 0) << drawn;
+  EXPECT_GT(fs::file_size(path("sigma.png")), 1000U);
+  EXPECT_EQ(run("map wall -o plain -q -p known_poses --set fuse.voxel=20mm" + std::string(kNoPictures)).code,
+            0);
+  const Outcome unknown = run("render plain -o none.png --color sigma");
+  EXPECT_EQ(unknown.code, 2) << unknown;
+  EXPECT_TRUE(unknown.told("has no sigma of its points")) << unknown;
+}
+
 TEST_F(MapCommand, SameBytesForAnyNumberOfThreadsAndFromItsOwnConfiguration) {
   for (const char* pipeline : {"rgbd", "known_poses"}) {
     const std::string name = pipeline;
@@ -87,8 +136,8 @@ TEST_F(MapCommand, SameBytesForAnyNumberOfThreadsAndFromItsOwnConfiguration) {
     ASSERT_EQ(run(common + " -p " + name + " -o b_" + name + " --threads 3").code, 0);
     const Outcome again = run("map wall -q -o c_" + name + " -p a_" + name + "/config.yaml");
     ASSERT_EQ(again.code, 0) << again;
-    for (const char* file :
-         {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "lines.ply", "frames.csv"}) {
+    for (const char* file : {"map.ply", "map.pcd", "trajectory.txt", "keyframes.txt", "keyframes.csv",
+                             "lines.ply", "frames.csv"}) {
       const std::string bytes = slurp(path("a_" + name) / file);
       EXPECT_EQ(bytes, slurp(path("b_" + name) / file)) << name << " " << file;
       EXPECT_EQ(bytes, slurp(path("c_" + name) / file)) << name << " " << file;

@@ -104,11 +104,13 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       return color_by_value(heights, options.scalar_range.value_or(std::make_pair(0.0, top)), "height (m)");
     }
     case ColorMode::kError:
+    case ColorMode::kSigma:
     case ColorMode::kConfidence: {
       std::vector<double> values;
       values.reserve(points.size());
       for (const auto i : points) values.push_back(scene.scalars[i]);
-      const std::string fallback = options.color == ColorMode::kError ? "error (m)" : "confidence";
+      const std::string fallback =
+          options.color == ColorMode::kError ? "error (m)" : color_mode_name(options.color);
       return color_by_value(values, options.scalar_range.value_or(value_range(values)),
                             scene.scalar_label.empty() ? fallback : scene.scalar_label);
     }

@@ -16,7 +16,8 @@ const std::vector<std::pair<std::string, View>>& views() {
 const std::vector<std::pair<std::string, ColorMode>>& color_modes() {
   static const std::vector<std::pair<std::string, ColorMode>> kModes{
       {"rgb", ColorMode::kRgb},     {"height", ColorMode::kHeight}, {"normal", ColorMode::kNormal},
-      {"robot", ColorMode::kRobot}, {"error", ColorMode::kError},   {"confidence", ColorMode::kConfidence}};
+      {"robot", ColorMode::kRobot}, {"error", ColorMode::kError},   {"confidence", ColorMode::kConfidence},
+      {"sigma", ColorMode::kSigma}};
   return kModes;
 }
 

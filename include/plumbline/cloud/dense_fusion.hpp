@@ -44,6 +44,9 @@ struct FusionReport {
 /// views at a time.
 using ReadView = std::function<core::Result<CloudPtr>(std::size_t)>;
 
+/// Name of the column that says how exactly a point is known along its normal: standard deviation, metres.
+inline constexpr const char* kSigmaColumn = "sigma";
+
 /// The views of a whole run. All vectors: one entry a view. Where a cloud's sensor was as seen from its
 /// camera, the cloud says (sensor_pose).
 struct FusionViews {
@@ -51,11 +54,16 @@ struct FusionViews {
   std::vector<sensor::Pinhole> cameras;  ///< that the clouds were taken with
   std::vector<std::uint8_t> robots;  ///< whose view it is, 0-254; empty: of one robot, and no columns.robot
   ReadView read;
+  /// Of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; empty: not known, and no column
+  /// of kSigmaColumn.
+  std::vector<geometry::Matrix6d> covariances = {};
 };
 
 /// Fuses the views. Reads each once to plan and once for all tiles that are filled together. Points come tile
 /// by tile, in a fixed order; the same for any number of threads. Of several robots, columns.robot tells who
-/// measured each point most. Errors are those of `read`. `report` may be null.
+/// measured each point most. The column kSigmaColumn holds the noise of the poses, as if all views of a place
+/// erred alike, and that of depth, as if it averaged over views but not within one. Errors are those of
+/// `read`. `report` may be null.
 core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,
                                     const core::Executor& executor, FusionReport* report = nullptr);
 

@@ -4,6 +4,7 @@
 // The whole map in one optimisation: all keyframes, points and lines, the surface edges of the map, and edges
 // from elsewhere (aligned local maps, closed loops, overlaps of robots). First a pose graph, which takes out
 // drift and tells wrong edges; then bundle adjustment with the edges that are left (METHOD sections 3 and 6).
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -56,6 +57,15 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
 /// Gives keyframes new poses; points and lines follow the keyframes that see them (mean over these).
 void move_keyframes(maps::Map& map, const KeyframePoses& poses);
 
+/// By how much the standard deviations of one kind of observation are taken larger for covariances: residuals
+/// of neighbours are alike, and so many of them say less than as many independent ones would
+/// (docs/refinement.md tells where the numbers come from).
+struct SigmaFactors {
+  double points = 1.0;
+  double lines = 1.0;
+  double edges = 1.0;  ///< of surfaces, alignments and loops, and from one keyframe to the next
+};
+
 struct GlobalAdjustmentOptions {
   bool pose_graph = true;  ///< before bundle adjustment, when there are edges besides the map's own
   bool bundle = true;
@@ -69,6 +79,7 @@ struct GlobalAdjustmentOptions {
   double first_gate = 3.0;
   optimize::PoseGraphOptions graph;
   optimize::BundleOptions bundle_options;
+  SigmaFactors sigma_factors;
   GlobalAdjustmentOptions();
   void declare(core::OptionTable& table);
 };
@@ -94,5 +105,31 @@ struct GlobalAdjustmentSummary {
 /// gives the same bytes. Every robot of the map must have a camera (throws std::out_of_range).
 GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
                                    const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {});
+
+/// How exactly a keyframe's pose is known beside the anchor's.
+struct KeyframeAccuracy {
+  core::KeyframeId keyframe;
+  /// Of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+  int points = 0;  ///< observations that hold it
+  int lines = 0;
+  int edges = 0;  ///< of its surface, alignments and loops
+
+  /// Root of the covariance's trace.
+  [[nodiscard]] double sigma_position_m() const {
+    return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+  }
+  [[nodiscard]] double sigma_rotation_rad() const {
+    return std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
+  }
+};
+
+/// Of the keyframes of a map that adjust_map has left with the same `extra` (but for rejected ones), by id:
+/// what its observations say, their noise being as large as SigmaFactors make it. Empty when something leaves
+/// a keyframe free, and for more than 600 keyframes: time grows with the cube of their number.
+std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
+                                                const std::vector<PoseEdge>& extra,
+                                                const GlobalAdjustmentOptions& options,
+                                                core::KeyframeId anchor = {});
 
 }  // namespace plumbline::mapping

@@ -16,6 +16,7 @@
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/mapping/global_adjustment.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
@@ -48,6 +49,7 @@ struct KeyframePose {
   core::KeyframeId id;
   double stamp = 0.0;  ///< seconds
   geometry::Rigid3 world_from_camera;
+  std::optional<mapping::KeyframeAccuracy> accuracy = std::nullopt;  ///< beside the map's first keyframe
 };
 
 /// A robot of a map of several.

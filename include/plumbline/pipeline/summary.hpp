@@ -2,6 +2,7 @@
 #pragma once
 
 // What is said of a finished run: summary.json and timing.csv.
+#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <string>
@@ -18,6 +19,23 @@
 #include "plumbline/pipeline/run.hpp"
 
 namespace plumbline::pipeline {
+
+/// Of many standard deviations the middle one and the one that nine of ten do not pass; 0: not known.
+struct Sigma {
+  double median = 0.0;
+  double p90 = 0.0;
+};
+template <typename T>
+Sigma sigma_of(std::vector<T> values) {
+  if (values.empty()) return {};
+  const auto at = [&](double share) {
+    const auto place =
+        values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), place, values.end());
+    return static_cast<double>(*place);
+  };
+  return {at(0.5), at(0.9)};
+}
 
 struct RunSummary {
   std::string input;
@@ -52,6 +70,8 @@ struct RunSummary {
     double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
     double mean_shift_m = 0.0;  ///< how far keyframes moved
     double max_shift_m = 0.0;
+    Sigma sigma_position_m;  ///< of keyframes beside the first one
+    Sigma sigma_rotation_rad;
     optimize::BundleFits before;  ///< how well all fits where the pose graph had put it; zeros: not known
     optimize::BundleFits after;   ///< when all was adjusted
   } refine;
@@ -83,6 +103,7 @@ struct RunSummary {
   std::string unconnected;    ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;             ///< of the merged cloud; 0: none was to be made
+  Sigma cloud_sigma_m;              ///< of its points along their normals
   std::size_t measured_points = 0;  ///< depths on the grid of the keyframes' clouds; 0: not known
   /// What became no point of these clouds.
   struct LeftOut {

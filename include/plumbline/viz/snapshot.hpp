@@ -19,7 +19,7 @@ namespace plumbline::viz {
 /// along the first camera's horizontal viewing direction, iso looks down at 35 degrees.
 enum class View { kIso, kTop, kBottom, kFront, kBack, kLeft, kRight, kExplicit };
 
-enum class ColorMode { kRgb, kHeight, kNormal, kRobot, kError, kConfidence };
+enum class ColorMode { kRgb, kHeight, kNormal, kRobot, kError, kConfidence, kSigma };
 
 /// "iso", "top" ...; the names that options and file names use.
 std::string view_name(View view);

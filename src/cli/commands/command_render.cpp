@@ -12,6 +12,7 @@
 #include "option_flags.hpp"
 #include "paths.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/ply.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
@@ -102,6 +103,12 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
     if (file.columns.confidence.empty()) return missing("confidence");
     scene.scalars = file.columns.confidence;
     scene.scalar_label = "confidence";
+  } else if (mode == viz::ColorMode::kSigma) {
+    for (const auto& column : file.columns.others) {
+      if (column.name == cloud::kSigmaColumn) scene.scalars = column.values;
+    }
+    if (scene.scalars.empty()) return missing("sigma");
+    scene.scalar_label = "standard deviation (m)";
   } else if (mode == viz::ColorMode::kRobot) {
     if (file.columns.robot.empty()) return missing("robot");
     scene.scalars.assign(file.columns.robot.begin(), file.columns.robot.end());

@@ -57,7 +57,8 @@ class Fusion {
   core::Result<FusedCloud> run(FusionReport& report) {
     if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
     FusedCloud all{std::make_shared<Cloud>(), {}};
-    append({}, several_robots(), all);
+    if (!views_.covariances.empty()) all.columns.others.push_back({kSigmaColumn, {}});
+    add({}, all);
     const std::size_t most_cells = cells_at_a_time(options_);
     for (std::size_t first = 0, count = 0; first < tiles_.size(); first += count) {
       std::size_t cells = 0;
@@ -73,7 +74,7 @@ class Fusion {
         parts[k] = finished(tiles_[first + k], std::move(voxels[k]), reports[k]);
       });
       for (std::size_t k = 0; k < count; ++k) {
-        append(parts[k], several_robots(), all);
+        add(parts[k], all);
         parts[k] = {};
         report.dust += reports[k].dust;
         report.seen_through += reports[k].seen_through;
@@ -104,6 +105,7 @@ class Fusion {
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
     });
     if (auto failed = first_error(done); !failed) return failed;
+    if (!views_.covariances.empty()) find_pose_noise(cells);
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
     report.tiles = tiles_.size();
     if (!options_.exposure) return {};
@@ -192,6 +194,50 @@ class Fusion {
     points.resize(kept);
   }
 
+  /// How far poses may be off, carried to what their views saw.
+  void find_pose_noise(const std::vector<std::vector<ColorCell>>& cells) {
+    for (std::size_t v = 0; v < cells.size(); ++v) {
+      const geometry::Rigid3 camera_from_world = views_.world_from_camera[v].inverse();
+      for (const ColorCell& seen : cells[v]) {
+        const Eigen::Vector3d centre = (unpack_cell(seen.cell).cast<double>().array() + 0.5) * kCell_m;
+        Eigen::Matrix<double, 3, 6> by_pose;
+        by_pose << Eigen::Matrix3d::Identity(), -geometry::skew(camera_from_world * centre);
+        by_pose = camera_from_world.rotation.transpose() * by_pose;
+        PoseNoise& noise = pose_noise_[seen.cell];
+        const float weight = 1.0F + seen.points;
+        noise.sum += weight * (by_pose * views_.covariances[v] * by_pose.transpose()).cast<float>();
+        noise.weight += weight;
+      }
+    }
+  }
+
+  /// Puts points of a tile behind the others, and what is known of them.
+  void add(const std::vector<FusedPoint>& points, FusedCloud& all) const {
+    append(points, several_robots(), all);
+    if (views_.covariances.empty()) return;
+    std::vector<float>& sigmas = all.columns.others.front().values;
+    const PoseNoise* pose =
+        nullptr;  // of what has settled beyond the cells that were seen: as the one before
+    for (const FusedPoint& fused : points) {
+      const Eigen::Vector3d at = fused.point.getVector3fMap().cast<double>() / kCell_m;
+      const auto found = pose_noise_.find(pack_cell(cell_of(at)));
+      if (found != pose_noise_.end()) pose = &found->second;
+      float variance = fused.noise_m * fused.noise_m / static_cast<float>(std::max(1U, fused.observations));
+      if (pose != nullptr) {
+        const Eigen::Vector3f normal = fused.point.getNormalVector3fMap();
+        const float sum = normal.allFinite() ? normal.dot(pose->sum * normal) : pose->sum.trace() / 3.0F;
+        variance += std::max(0.0F, sum / pose->weight);
+      }
+      sigmas.push_back(std::sqrt(variance));
+    }
+  }
+
+  /// Weighted covariance of the world positions of what lies in a cell, m^2.
+  struct PoseNoise {
+    Eigen::Matrix3f sum = Eigen::Matrix3f::Zero();
+    float weight = 0.0F;
+  };
+
   const FusionViews& views_;
   std::vector<geometry::Rigid3> world_from_cloud_;  ///< by view
   DenseFusionOptions options_;
@@ -200,6 +246,7 @@ class Fusion {
   std::vector<DepthRaster> rasters_;    ///< by view; empty ones without free space
   std::vector<std::uint8_t> is_look_;   ///< by view
   std::vector<Eigen::Vector3f> gains_;  ///< by view; empty: colours as they are
+  CellMap<PoseNoise> pose_noise_;       ///< by cell; empty: not known
 };
 
 }  // namespace

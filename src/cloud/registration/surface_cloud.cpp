@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <flann/flann.hpp>
 #include <map>
 #include <vector>
 
@@ -39,6 +40,35 @@ void append_filtered(const SurfaceCloud::Ptr& part, float voxel_m, bool independ
   result += means;
 }
 
+/// The tree that pcl::KdTreeFLANN builds, asked as FLANN itself asks it: its knnSearch, which PCL calls,
+/// opens a parallel region of OpenMP for every point, which costs twice as much as the search.
+class SerialSearch : public SurfaceSearch::Tree {
+ public:
+  explicit SerialSearch(const SurfaceCloud::ConstPtr& cloud) : KdTree(false) {
+    input_ = cloud;
+    for (const SurfacePoint& p : *cloud) numbers_.insert(numbers_.end(), p.data, p.data + 3);
+    index_ = std::make_unique<Index>(flann::Matrix<float>(numbers_.data(), cloud->size(), 3),
+                                     flann::KDTreeSingleIndexParams(kLeaf));
+    index_->buildIndex();
+  }
+  int nearestKSearch(const SurfacePoint& point, int k, pcl::Indices& indices,
+                     std::vector<float>& squares) const override {
+    flann::KNNSimpleResultSet<float> found(static_cast<std::size_t>(k));
+    index_->findNeighbors(found, point.data, flann::SearchParams(-1, 0.0F));
+    std::vector<std::size_t> places(found.size());
+    squares.resize(found.size());
+    found.copy(places.data(), squares.data(), found.size(), true);
+    indices.assign(places.begin(), places.end());
+    return static_cast<int>(found.size());
+  }
+
+ private:
+  using Index = flann::KDTreeSingleIndex<flann::L2_Simple<float>>;
+  static constexpr int kLeaf = 15;  // points, as PCL's
+  std::vector<float> numbers_;
+  std::unique_ptr<Index> index_;
+};
+
 }  // namespace
 
 SurfaceCloud voxel_filtered(const SurfaceCloud& cloud, float voxel_m, bool independent) {
@@ -57,8 +87,7 @@ SurfaceCloud voxel_filtered(const SurfaceCloud& cloud, float voxel_m, bool indep
 
 SurfaceSearch::SurfaceSearch(SurfaceCloud::ConstPtr cloud) : cloud_(std::move(cloud)) {
   if (cloud_->empty()) return;  // FLANN has no tree of nothing
-  tree_ = std::make_shared<Tree>();
-  tree_->setInputCloud(cloud_);
+  tree_ = std::make_shared<SerialSearch>(cloud_);
 }
 
 int nearest_facing(const SurfaceSearch::Tree& tree, const SurfacePoint& point, float distance_m,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plumbline/geometry/plucker.hpp"
+#include "plumbline/optimize/pose_covariances.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -256,18 +257,25 @@ void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
   summary.changed = true;
 }
 
-void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
-                const GlobalAdjustmentOptions& options, KeyframeId anchor, GlobalAdjustmentSummary& summary) {
+/// Of the whole map, with the edges of `extra`. `surface_edges`: how many others there are.
+GlobalBundle bundle_of(const maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
+                       const GlobalAdjustmentOptions& options, KeyframeId anchor, int& surface_edges) {
   GlobalBuilder builder(map, cameras, options, anchor);
   builder.add_points();
   builder.add_lines();
-  summary.surface_edges = builder.add_surface_edges();
+  surface_edges = builder.add_surface_edges();
   builder.add_chain();
+  for (const PoseEdge& edge : extra) builder.add_edge(edge.a, edge.b, edge.b_from_a, edge.information);
+  return builder.take();
+}
+
+void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
+                const GlobalAdjustmentOptions& options, KeyframeId anchor, GlobalAdjustmentSummary& summary) {
+  std::vector<PoseEdge> believed;
   for (std::size_t i = 0; i < extra.size(); ++i) {
-    if (!summary.extra.empty() && summary.extra[i].rejected) continue;
-    builder.add_edge(extra[i].a, extra[i].b, extra[i].b_from_a, extra[i].information);
+    if (summary.extra.empty() || !summary.extra[i].rejected) believed.push_back(extra[i]);
   }
-  GlobalBundle bundle = builder.take();
+  GlobalBundle bundle = bundle_of(map, cameras, believed, options, anchor, summary.surface_edges);
   summary.points = static_cast<int>(bundle.points.size());
   summary.lines = static_cast<int>(bundle.lines.size());
   optimize::BundleOptions bundle_options = options.bundle_options;
@@ -277,6 +285,20 @@ void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEd
   if (!summary.bundle.usable || !may_move(map, poses_of(bundle), summary)) return;
   put_back(bundle, map);
   summary.changed = true;
+}
+
+/// Standard deviations as large as the factors make them.
+void widen(const SigmaFactors& factors, optimize::BundleProblem& problem) {
+  for (optimize::BundlePointObservation& o : problem.point_observations) {
+    o.pixel_sigma *= factors.points;
+    o.depth_sigma *= factors.points;
+  }
+  for (optimize::BundleLineObservation& o : problem.line_observations) {
+    o.pixel_sigma *= factors.lines;
+    o.start_sigma *= factors.lines;
+    o.end_sigma *= factors.lines;
+  }
+  for (optimize::BundleEdge& edge : problem.edges) edge.information /= factors.edges * factors.edges;
 }
 
 }  // namespace
@@ -293,6 +315,7 @@ GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.first_radius = 1e7;
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;
+  sigma_factors = {0.71, 0.71, 2.0};  // docs/refinement.md
 }
 
 void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
@@ -341,6 +364,33 @@ GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const
     summary.max_shift_m = std::max(summary.max_shift_m, shift);
   }
   return summary;
+}
+
+std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
+                                                const std::vector<PoseEdge>& extra,
+                                                const GlobalAdjustmentOptions& options, KeyframeId anchor) {
+  constexpr std::size_t kMost = 600;
+  const std::vector<KeyframeId> ids = map.keyframe_ids();
+  if (ids.empty() || ids.size() > kMost) return {};
+  int unused = 0;
+  GlobalBundle bundle =
+      bundle_of(map, cameras, extra, options, anchor.valid() ? anchor : ids.front(), unused);
+  widen(options.sigma_factors, bundle.problem);
+  const std::vector<Matrix6d> covariances =
+      optimize::pose_covariances(bundle.problem, options.bundle_options);
+  if (covariances.empty()) return {};
+  std::vector<KeyframeAccuracy> result(ids.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    result[i].keyframe = ids[i];
+    result[i].covariance = covariances[i];
+    result[i].edges = static_cast<int>(
+        map.edges_of(ids[i]).size() +
+        static_cast<std::size_t>(std::count_if(
+            extra.begin(), extra.end(), [&](const PoseEdge& e) { return e.a == ids[i] || e.b == ids[i]; })));
+  }
+  for (const auto& o : bundle.problem.point_observations) ++result[static_cast<std::size_t>(o.pose)].points;
+  for (const auto& o : bundle.problem.line_observations) ++result[static_cast<std::size_t>(o.pose)].lines;
+  return result;
 }
 
 }  // namespace plumbline::mapping

@@ -167,6 +167,13 @@ std::string cloud_html(const ReportData& data) {
     facts.emplace_back("Bounding box", box_text(extent->size()));
     facts.emplace_back("Bounding box without the outer 0.5 % of each side", box_text(extent->central_size()));
     facts.emplace_back("Coordinates", range_text(extent->low, extent->high));
+    if (const double sigma_m = number_at(data.summary, "/cloud/sigma_m/median"); sigma_m > 0.0) {
+      facts.emplace_back(
+          "Standard deviation along the normal, of poses and depth",
+          fmt::format("{} in the middle, below {} for 90 % of the points",
+                      number_text(1e3 * sigma_m, 1, "mm"),
+                      number_text(1e3 * number_at(data.summary, "/cloud/sigma_m/p90"), 1, "mm")));
+    }
     add_robots(data, facts);
     const double counted = number_at(data.summary, "/cloud/points");
     const auto found = static_cast<double>(data.cloud->cloud->size());

@@ -113,12 +113,13 @@ std::string what_is(const std::string& name) {
     const char* name;
     const char* what;
   };
-  static constexpr std::array<Known, 13> kKnown{
-      {{"map.ply", "merged cloud: position, normal, colour, confidence, observations"},
+  static constexpr std::array<Known, 14> kKnown{
+      {{"map.ply", "merged cloud: position, normal, colour, confidence, observations, sigma"},
        {"map.pcd", "the same for PCL"},
        {"map.db", "the map itself: for fuse, export, render and --resume"},
        {"trajectory.txt", "camera poses of the tracked frames, TUM format"},
        {"keyframes.txt", "camera poses of the keyframes, TUM format"},
+       {"keyframes.csv", "the same, how exactly they are known, and what holds them"},
        {"lines.ply", "3D lines as edges"},
        {"frames.csv", "one line a frame: what tracking saw and decided"},
        {"timing.csv", "one line a frame: milliseconds by stage, memory"},

@@ -147,6 +147,13 @@ std::string fit_html(const ReportData& data) {
   return table.rows() == 0 ? "" : "<h3>How well the finished map fits</h3>\n" + table.html();
 }
 
+std::string sigma_text(const Json& s) {
+  const double median_m = number_at(s, "/refine/sigma_position_m/median");
+  if (!(median_m > 0.0)) return "not known";
+  return fmt::format("{} in the middle, below {} for 90 % of them", number_text(1e3 * median_m, 1, "mm"),
+                     number_text(1e3 * number_at(s, "/refine/sigma_position_m/p90"), 1, "mm"));
+}
+
 }  // namespace
 
 std::string loops_html(const ReportData& data) {
@@ -227,7 +234,8 @@ std::string refinement_html(const ReportData& data) {
         number_text(number_at(s, "/refine/mean_rms"), 2, "σ of the depth noise")},
        {"Keyframes moved", fmt::format("{} on average, {} at most",
                                        number_text(1e3 * number_at(s, "/refine/mean_shift_m"), 1, "mm"),
-                                       number_text(1e3 * number_at(s, "/refine/max_shift_m"), 1, "mm"))}});
+                                       number_text(1e3 * number_at(s, "/refine/max_shift_m"), 1, "mm"))},
+       {"Standard deviation of keyframes beside the first", sigma_text(s)}});
   out += adjustment_html(s);
   HtmlTable depth({{"depth camera"},
                    {"correction"},

@@ -63,6 +63,11 @@ nlohmann::ordered_json robots_of(const RunSummary& summary) {
   return list;
 }
 
+nlohmann::ordered_json sigma_json(const Sigma& sigma) {
+  const auto rounded_finely = [](double value) { return std::round(value * 1e6) / 1e6; };
+  return {{"median", rounded_finely(sigma.median)}, {"p90", rounded_finely(sigma.p90)}};
+}
+
 nlohmann::ordered_json cloud_of(const RunSummary& summary) {
   const auto list_of = [](const std::vector<RunSummary::LeftOut>& parts) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -71,6 +76,7 @@ nlohmann::ordered_json cloud_of(const RunSummary& summary) {
   };
   nlohmann::ordered_json cloud = {{"points", summary.cloud_points}, {"voxel_m", summary.voxel_m}};
   if (!summary.left_out_of_map.empty()) cloud["left_out_of_map"] = list_of(summary.left_out_of_map);
+  if (summary.cloud_sigma_m.median > 0.0) cloud["sigma_m"] = sigma_json(summary.cloud_sigma_m);
   if (summary.measured_points == 0) return cloud;
   cloud["measured"] = summary.measured_points;
   cloud["left_out"] = list_of(summary.left_out);
@@ -307,6 +313,8 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"mean_rms", rounded(s.refine.mean_rms)},
         {"mean_shift_m", rounded(s.refine.mean_shift_m)},
         {"max_shift_m", rounded(s.refine.max_shift_m)},
+        {"sigma_position_m", sigma_json(s.refine.sigma_position_m)},
+        {"sigma_rotation_rad", sigma_json(s.refine.sigma_rotation_rad)},
         {"before", fits_of(s.refine.before)},
         {"after", fits_of(s.refine.after)}}},
       {"path", path_of(s)},

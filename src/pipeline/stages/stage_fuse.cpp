@@ -5,6 +5,7 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -96,6 +97,9 @@ class FuseStage : public Stage {
     clouds_.reset();
     if (auto done = filter(std::move(*fused), *dense); !done) return done;
     points_ = dense->cloud->size();
+    for (const auto& column : dense->columns.others) {
+      if (column.name == cloud::kSigmaColumn) sigma_ = sigma_of(column.values);
+    }
     io.output<DenseCloud>("cloud", dense);
     return {};
   }
@@ -104,6 +108,7 @@ class FuseStage : public Stage {
     add_left_out(reports_, summary);
     summary.cloud_points = points_;
     summary.voxel_m = options_.voxels.voxel_m;
+    summary.cloud_sigma_m = sigma_;
     summary.up = frame_.up;
     summary.yaw = frame_.yaw;
     summary.output_from_map = frame_.output_from_map;
@@ -185,6 +190,7 @@ class FuseStage : public Stage {
       for (const std::int32_t robot : robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
+    views.covariances = covariances_of(map, robots, stamps);
     views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
@@ -195,6 +201,26 @@ class FuseStage : public Stage {
                              : std::string(),
         report.tiles, report.seen_through, report.dust, report.least_gain, report.most_gain));
     return fused;
+  }
+
+  /// Of the views' poses: as those of the keyframes, and between these as that of the one before; empty: not
+  /// known.
+  static std::vector<geometry::Matrix6d> covariances_of(const MapResult& map,
+                                                        const std::vector<std::int32_t>& robots,
+                                                        const std::vector<double>& stamps) {
+    std::map<std::pair<std::int32_t, double>, geometry::Matrix6d> known;
+    for (const KeyframePose& keyframe : map.keyframes) {
+      if (!keyframe.accuracy) return {};
+      known[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
+    }
+    std::vector<geometry::Matrix6d> covariances;
+    for (std::size_t i = 0; i < robots.size(); ++i) {
+      auto after = known.upper_bound({robots[i], stamps[i]});
+      if (after != known.begin() && std::prev(after)->first.first == robots[i]) --after;
+      if (after == known.end()) return {};
+      covariances.push_back(after->second);
+    }
+    return covariances;
   }
 
   /// One depth field for each robot's camera.
@@ -296,6 +322,7 @@ class FuseStage : public Stage {
   std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
   UpFrame frame_;
   std::size_t points_ = 0;
+  Sigma sigma_;
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -59,7 +60,7 @@ class OutputStage : public Stage {
   }
 
   [[nodiscard]] std::vector<std::string> files() const override {
-    std::vector<std::string> files{"trajectory.txt", "keyframes.txt", "frames.csv"};
+    std::vector<std::string> files{"trajectory.txt", "keyframes.txt", "keyframes.csv", "frames.csv"};
     if (ply_) files.emplace_back("map.ply");
     if (pcd_) files.emplace_back("map.pcd");
     if (lines_) files.emplace_back("lines.ply");
@@ -88,6 +89,7 @@ class OutputStage : public Stage {
         [&] { return write_levels(folder / "levels", *dense); },
         [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
         [&] { return write_trajectories(folder, map, dense->output_from_map); },
+        [&] { return write_keyframes(folder / "keyframes.csv", map); },
         [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
     };
     std::vector<core::Result<void>> written(steps.size());
@@ -166,6 +168,26 @@ class OutputStage : public Stage {
       if (!written) return written;
     }
     return {};
+  }
+
+  /// Where each keyframe is, how exactly that is known beside the first one, and what holds it.
+  static core::Result<void> write_keyframes(const std::filesystem::path& file, const MapResult& map) {
+    std::map<std::int32_t, std::string> names;
+    for (const RobotInfo& robot : map.robots) names[robot.number] = robot.name;
+    core::OutputFile out(file);
+    out.write("robot,keyframe,stamp,tx,ty,tz,qx,qy,qz,qw,sigma_position,sigma_rotation,points,lines,edges\n");
+    for (const KeyframePose& keyframe : map.keyframes) {
+      const Eigen::Vector3d& t = keyframe.world_from_camera.translation;
+      const Eigen::Quaterniond q = keyframe.world_from_camera.quaternion();
+      out.write(fmt::format("{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},",
+                            names[keyframe.id.robot], keyframe.id.index, keyframe.stamp, t.x(), t.y(), t.z(),
+                            q.x(), q.y(), q.z(), q.w()));
+      const auto& known = keyframe.accuracy;
+      out.write(known ? fmt::format("{:.6f},{:.7f},{},{},{}\n", known->sigma_position_m(),
+                                    known->sigma_rotation_rad(), known->points, known->lines, known->edges)
+                      : ",,,,\n");
+    }
+    return out.commit();
   }
 
   /// One line for every frame of the run, the unreadable ones too.

@@ -27,6 +27,7 @@ class RefineStage : public Stage {
     pairs_.declare(table);
     alignment_.declare(table);
     adjustment_.declare(table);
+    table.boolean("accuracy", accuracy_, "Find out how exactly the keyframes are known: columns sigma");
   }
   core::Result<void> start(const RunContext& context) override {
     executor_ = context.executor;
@@ -51,9 +52,10 @@ class RefineStage : public Stage {
     auto result = std::make_shared<MapResult>(*before);
     if (adjust_ && before->map != nullptr && before->map->keyframe_count() > 1) {
       auto map = std::make_shared<maps::Map>(*before->map);
-      refine(*map, before->robots);
+      const auto accuracy = refine(*map, before->robots);
       result->map = map;
       take_poses_from_map(*result);
+      for (std::size_t i = 0; i < accuracy.size(); ++i) result->keyframes[i].accuracy = accuracy[i];
     }
     clearing_ = executor_->submit([this] { surfaces_.clear(); });  // beside what comes next
     io.output<MapResult>("map", result);
@@ -89,7 +91,8 @@ class RefineStage : public Stage {
     }
     return {};
   }
-  void refine(maps::Map& map, const std::vector<RobotInfo>& robots) {
+  /// How exactly the keyframes are known then, by id; empty: not known.
+  std::vector<mapping::KeyframeAccuracy> refine(maps::Map& map, const std::vector<RobotInfo>& robots) {
     std::vector<mapping::PoseEdge> edges;
     if (icp_) edges = align(map);
     const std::size_t alignments = edges.size();
@@ -114,6 +117,23 @@ class RefineStage : public Stage {
         "{} iterations; moved by {:.1f} mm on average, {:.1f} mm at most",
         summary.keyframes, summary.points, summary.lines, summary.surface_edges, alignments, loops.size(),
         summary.bundle.iterations, 1e3 * summary.mean_shift_m, 1e3 * summary.max_shift_m));
+    if (!accuracy_) return {};
+    std::vector<mapping::PoseEdge> believed;
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      if (summary.extra.empty() || !summary.extra[i].rejected) believed.push_back(edges[i]);
+    }
+    auto accuracy = mapping::keyframe_accuracy(map, cameras, believed, adjustment_);
+    note(accuracy);
+    return accuracy;
+  }
+  void note(const std::vector<mapping::KeyframeAccuracy>& accuracy) {
+    std::vector<double> position, rotation;
+    for (const mapping::KeyframeAccuracy& keyframe : accuracy) {
+      position.push_back(keyframe.sigma_position_m());
+      rotation.push_back(keyframe.sigma_rotation_rad());
+    }
+    counts_.sigma_position_m = sigma_of(std::move(position));
+    counts_.sigma_rotation_rad = sigma_of(std::move(rotation));
   }
 
   std::vector<mapping::PoseEdge> align(const maps::Map& map) {
@@ -141,6 +161,7 @@ class RefineStage : public Stage {
   sensor::Pinhole camera_;
   bool icp_ = true;
   bool adjust_ = true;
+  bool accuracy_ = true;
   mapping::LocalMapOptions local_maps_;
   mapping::PairOptions pairs_;
   mapping::AlignmentOptions alignment_;

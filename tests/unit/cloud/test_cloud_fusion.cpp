@@ -11,6 +11,7 @@
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 #include "test_cloud_worlds.hpp"
 
 namespace plumbline::cloud {
@@ -92,6 +93,51 @@ TEST(DenseFusion, AWallFarAwayIsThin) {
   EXPECT_LT(rms_to_wall(*fused->cloud, 3.0), 0.0015);  // one measurement: 14 mm
   EXPECT_LT(rms_to_wall(*fused->cloud, 3.0), 0.6 * rms_to_wall(*slab->cloud, 3.0));
   EXPECT_LT(fused->cloud->size(), slab->cloud->size());
+}
+
+TEST(DenseFusion, TellsHowExactlyPointsAreKnown) {
+  Views views = wall_views(2.0);
+  const auto read = [&](std::size_t i) -> core::Result<CloudPtr> {
+    return std::make_shared<Cloud>(*views.clouds[i]);
+  };
+  FusionViews known = views.with(read);
+  const auto sigmas = [&](double along_m, double across_m) {
+    geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+    covariance.diagonal().head<3>() << across_m * across_m, across_m * across_m, along_m * along_m;
+    known.covariances.assign(4, covariance);
+    const auto fused = fuse_views(known, fine(), core::Executor(1));
+    EXPECT_EQ(fused->columns.others.size(), 1U);
+    EXPECT_EQ(fused->columns.others.at(0).name, kSigmaColumn);
+    EXPECT_EQ(fused->columns.others.at(0).values.size(), fused->cloud->size());
+    std::vector<float> values = fused->columns.others.at(0).values;
+    for (const float sigma : values) EXPECT_TRUE(std::isfinite(sigma) && sigma > 0.0F);
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                     values.end());
+    return static_cast<double>(values[values.size() / 2]);
+  };
+  // Four views of a wall 2 m away, most of which all of them see.
+  const double depth = sigmas(0.0, 0.0);
+  EXPECT_LT(depth, 1.05 * sensor::depth_sigma(2.0));
+  EXPECT_GT(depth, 0.4 * sensor::depth_sigma(2.0));
+  EXPECT_NEAR(sigmas(0.0, 0.1), depth, 0.2 * depth);  // along the wall it does not matter
+  EXPECT_NEAR(sigmas(0.02, 0.0), std::hypot(0.02, depth), 1e-3);
+  // A camera that is turned a little is off by more farther away.
+  geometry::Matrix6d turned = geometry::Matrix6d::Zero();
+  turned(4, 4) = 0.01 * 0.01;
+  known.covariances.assign(4, turned);
+  const auto fused = fuse_views(known, fine(), core::Executor(1));
+  const auto sigma_at = [&](double x_m) {
+    double sum = 0.0;
+    int count = 0;
+    for (std::size_t i = 0; i < fused->cloud->size(); ++i) {
+      if (std::abs(static_cast<double>((*fused->cloud)[i].x) - x_m) > 0.05) continue;
+      sum += static_cast<double>(fused->columns.others[0].values[i]);
+      ++count;
+    }
+    return sum / count;
+  };
+  EXPECT_GT(sigma_at(0.6), 1.2 * sigma_at(0.15));
+  EXPECT_TRUE(views.fuse(fine())->columns.others.empty());
 }
 
 TEST(DenseFusion, AStepStaysAStep) {

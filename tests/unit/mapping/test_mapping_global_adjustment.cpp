@@ -147,6 +147,42 @@ TEST(AdjustMap, ExactMeasurementsTakeTheDriftOutAndTheAnchorStays) {
   EXPECT_GT(summary.max_shift_m, 0.0);
 }
 
+TEST(KeyframeAccuracy, FallsWithTheWayAndRisesWithALoop) {
+  RingMap world(0.0);
+  const std::vector<KeyframeAccuracy> open = keyframe_accuracy(world.map, kOneCamera, {}, {});
+  ASSERT_EQ(open.size(), 40U);
+  EXPECT_EQ(open[0].sigma_position_m(), 0.0);
+  EXPECT_EQ(open[0].sigma_rotation_rad(), 0.0);
+  for (std::size_t k : {5U, 10U, 20U, 39U}) {
+    EXPECT_EQ(open[k].keyframe, world.ids[k]);
+    EXPECT_GT(open[k].points, 20) << k;
+    EXPECT_EQ(open[k].lines, 0);
+    EXPECT_EQ(open[k].edges, 0);
+  }
+  EXPECT_GT(open[5].sigma_rotation_rad(), open[1].sigma_rotation_rad());
+  EXPECT_GT(open[20].sigma_rotation_rad(), open[5].sigma_rotation_rad());
+  EXPECT_GT(open[39].sigma_rotation_rad(), open[20].sigma_rotation_rad());
+  const auto closed = keyframe_accuracy(world.map, kOneCamera, {world.edge(0, 39)}, {});
+  ASSERT_EQ(closed.size(), 40U);
+  EXPECT_LT(closed[39].sigma_position_m(), 0.7 * open[39].sigma_position_m());
+  EXPECT_EQ(closed[39].edges, 1);
+}
+
+TEST(KeyframeAccuracy, FactorsWidenIt) {
+  const RingMap world(0.0, 12);
+  GlobalAdjustmentOptions at_their_word;
+  at_their_word.sigma_factors = {1.0, 1.0, 1.0};
+  GlobalAdjustmentOptions wide;
+  wide.sigma_factors = {3.0, 3.0, 3.0};
+  const auto narrow = keyframe_accuracy(world.map, kOneCamera, {}, at_their_word);
+  const auto widened = keyframe_accuracy(world.map, kOneCamera, {}, wide);
+  ASSERT_EQ(narrow.size(), 12U);
+  ASSERT_EQ(widened.size(), 12U);
+  for (std::size_t k = 1; k < 12; ++k)
+    EXPECT_NEAR(widened[k].sigma_position_m(), 3.0 * narrow[k].sigma_position_m(),
+                1e-3 * narrow[k].sigma_position_m());
+}
+
 TEST(AdjustMap, ALoopBringsTheEndsTogether) {
   RingMap open(0.0015);
   RingMap closed(0.0015);

@@ -45,6 +45,63 @@ TEST(PoseCovariances, AreEmptyWhereSomethingIsFree) {
   EXPECT_TRUE(pose_covariances(problem, {}).empty());
 }
 
+/// All residuals of points, one after the other.
+Eigen::VectorXd residuals_of(const BundleProblem& problem, const std::vector<Rigid3>& poses,
+                             const std::vector<Eigen::Vector3d>& points) {
+  Eigen::VectorXd all =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * problem.point_observations.size()));
+  for (std::size_t i = 0; i < problem.point_observations.size(); ++i) {
+    const BundlePointObservation& o = problem.point_observations[i];
+    const Eigen::Vector3d p =
+        poses[static_cast<std::size_t>(o.pose)] * points[static_cast<std::size_t>(o.point)];
+    const Eigen::Vector2d off = (problem.camera.project(p) - o.pixel) / o.pixel_sigma;
+    all.segment<3>(static_cast<Eigen::Index>(3 * i)) << off, (p.z() - o.depth) / o.depth_sigma;
+  }
+  return all;
+}
+
+/// Differences instead of derivatives, and no elimination.
+TEST(PoseCovariances, AreThoseOfTheWholeNormalMatrix) {
+  Scenario s;
+  s.keyframes = 4;
+  s.points = 15;
+  s.lines = 0;
+  const BundleProblem problem = make_world(s).truth;
+  const auto poses = static_cast<Eigen::Index>(problem.poses.size());
+  const auto points = static_cast<Eigen::Index>(problem.points.size());
+  constexpr double kStep = 1e-6;
+  Eigen::MatrixXd jacobian(3 * static_cast<Eigen::Index>(problem.point_observations.size()),
+                           6 * poses + 3 * points);
+  for (Eigen::Index c = 0; c < jacobian.cols(); ++c) {
+    const auto moved = [&](double step) {
+      std::vector<Rigid3> at;
+      for (const BundlePose& pose : problem.poses) at.push_back(pose.camera_from_world);
+      std::vector<Eigen::Vector3d> where = problem.points;
+      if (c < 6 * poses) {
+        Rigid3& pose = at[static_cast<std::size_t>(c / 6)];
+        pose = geometry::exp_se3(step * Vector6d::Unit(c % 6)) * pose;
+      } else {
+        where[static_cast<std::size_t>((c - 6 * poses) / 3)][(c - 6 * poses) % 3] += step;
+      }
+      return residuals_of(problem, at, where);
+    };
+    jacobian.col(c) = (moved(kStep) - moved(-kStep)) / (2.0 * kStep);
+  }
+  ASSERT_TRUE(problem.poses[0].fixed);
+  const Eigen::MatrixXd free = jacobian.rightCols(jacobian.cols() - 6);
+  Eigen::MatrixXd normal = free.transpose() * free;
+  for (Eigen::Index c = 0; c < normal.cols(); ++c) {
+    if (normal(c, c) == 0.0) normal(c, c) = 1.0;  // a point that nobody sees
+  }
+  const Eigen::MatrixXd inverse = normal.inverse();
+  const std::vector<Matrix6d> found = pose_covariances(problem, {});
+  ASSERT_EQ(found.size(), 4U);
+  for (Eigen::Index i = 1; i < poses; ++i) {
+    const Matrix6d expected = inverse.block<6, 6>(6 * (i - 1), 6 * (i - 1));
+    EXPECT_TRUE(found[static_cast<std::size_t>(i)].isApprox(expected, 1e-4)) << i;
+  }
+}
+
 /// Solutions from many draws of the noise: their squared errors over the covariance are 6 on average.
 TEST(PoseCovariances, TellHowSolutionsScatter) {
   Scenario s;
