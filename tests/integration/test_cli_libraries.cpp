@@ -12,8 +12,7 @@ namespace {
 class Libraries : public ProgramTest {
  protected:
   void SetUp() override {
-    std::string script =
-        "set pagination off\nset breakpoint pending on\nset debuginfod enabled off\n";
+    std::string script = "set pagination off\nset breakpoint pending on\nset debuginfod enabled off\n";
     for (const auto& [name, function] : kFunctions) {
       script += std::string("tbreak ") + function + "\ncommands\nsilent\nprintf \"reached " + name +
                 "\\n\"\ncontinue\nend\n";
