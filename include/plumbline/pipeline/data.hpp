@@ -107,13 +107,16 @@ core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe);
 /// Voxels of the surfaces of keyframes that are kept with their clouds: as the stage refine wants them.
 constexpr double kSurfaceVoxel_m = 0.03;
 
+struct FusionState;
+
 /// The merged cloud in the output's frame, which output_from_map leads to: all results are written in it.
 struct DenseCloud {
   cloud::CloudPtr cloud;
   cloud::CloudColumns columns;  ///< of the cloud's points
   double voxel_m = 0.0;
   geometry::Rigid3 output_from_map;
-  bool upright = false;  ///< z is up in the output's frame
+  bool upright = false;                                ///< z is up in the output's frame
+  std::shared_ptr<const FusionState> state = nullptr;  ///< what it was laid down with
 };
 
 /// Tracked frames of one robot.

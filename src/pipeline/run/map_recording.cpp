@@ -10,7 +10,6 @@
 #include <tuple>
 #include <utility>
 
-#include "stages/debug_video.hpp"
 #include "graph/graph_parts.hpp"
 #include "plumbline/core/hash.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -20,6 +19,7 @@
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "run/resumed_run.hpp"
+#include "stages/debug_video.hpp"
 
 namespace plumbline::pipeline {
 namespace {

@@ -10,7 +10,6 @@
 #include <system_error>
 #include <utility>
 
-#include "stages/chain_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
@@ -18,7 +17,9 @@
 #include "plumbline/core/config.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
+#include "run/fusion_state.hpp"
 #include "run/resumed_run.hpp"
+#include "stages/chain_option.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -42,6 +43,7 @@ struct Views {
   std::vector<std::int32_t> robots;
   std::vector<core::KeyframeId> keyframes;  ///< invalid: a frame's
   std::vector<std::size_t> frames;
+  std::vector<double> stamps;
 };
 
 core::Result<Views> views_of(const maps::StoreReader& reader, const maps::StoredMap& stored) {
@@ -56,6 +58,7 @@ core::Result<Views> views_of(const maps::StoreReader& reader, const maps::Stored
     views.robots.push_back(id.robot);
     views.keyframes.push_back(id);
     views.frames.push_back(0);
+    views.stamps.push_back(stored.map.keyframe(id).stamp);
   }
   for (const std::size_t frame : *frames) {
     if (frame >= stored.frames.size() || !stored.frames[frame].tracked) continue;
@@ -65,6 +68,7 @@ core::Result<Views> views_of(const maps::StoreReader& reader, const maps::Stored
     views.robots.push_back(pose.reference.robot);
     views.keyframes.emplace_back();
     views.frames.push_back(frame);
+    views.stamps.push_back(pose.stamp);
   }
   return views;
 }
@@ -189,6 +193,14 @@ core::Result<cloud::FusedCloud> StoredResult::lay_down(const cloud::DenseFusionO
   }
   const auto cameras = cameras_of(views->robots);
   if (!cameras) return tl::unexpected<core::Error>(cameras.error());
+  FusionState state;
+  const auto kept = reader_->attachment(kFusionAttachment);
+  if (!kept) return tl::unexpected<core::Error>(kept.error());
+  if (*kept) {
+    auto read = fusion_state_of(**kept);
+    if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
+    state = std::move(*read);
+  }
   std::mutex one_at_a_time;  // the reader is one connection
   const cloud::ReadView read = [&](std::size_t i) -> core::Result<cloud::CloudPtr> {
     const core::KeyframeId id = views->keyframes[i];
@@ -198,13 +210,17 @@ core::Result<cloud::FusedCloud> StoredResult::lay_down(const cloud::DenseFusionO
     }();
     if (!bytes) return tl::unexpected<core::Error>(bytes.error());
     auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
-    if (cloud) return cloud;
+    if (cloud) {
+      state.correct(views->robots[i], **cloud);
+      return cloud;
+    }
     return core::input_error(fmt::format("{}: {}", file_.string(), cloud.error().message));
   };
   cloud::FusionViews all;
   all.world_from_camera = views->world_from_camera;
   all.cameras = *cameras;
   all.read = read;
+  all.covariances = state.covariances_of(views->robots, views->stamps);
   auto fused = cloud::fuse_views(all, options, executor);
   if (!fused) return fused;
   if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);

@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "stages/chain_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
@@ -24,7 +23,9 @@
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "run/fusion_state.hpp"
 #include "run/resumed_run.hpp"
+#include "stages/chain_option.hpp"
 #include "stages/stages.hpp"
 #include "stages/up_frame.hpp"
 #include "stages/waiting_clouds.hpp"
@@ -90,6 +91,7 @@ class FuseStage : public Stage {
     frame_ = find_up(up_, yaw_, fused->cloud, map->trajectory);
     dense->output_from_map = frame_.output_from_map;
     dense->upright = frame_.up != "none";
+    dense->state = state_;
     if (dense->upright) cloud::transform(*fused->cloud, frame_.output_from_map);
     if (keyframe_clouds_) {
       if (auto written = write_keyframes(*map); !written) return written;
@@ -190,7 +192,14 @@ class FuseStage : public Stage {
       for (const std::int32_t robot : robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    views.covariances = covariances_of(map, robots, stamps);
+    for (const KeyframePose& keyframe : map.keyframes) {
+      if (!keyframe.accuracy) {
+        state_->covariances.clear();
+        break;
+      }
+      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
+    }
+    views.covariances = state_->covariances_of(robots, stamps);
     views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
@@ -201,26 +210,6 @@ class FuseStage : public Stage {
                              : std::string(),
         report.tiles, report.seen_through, report.dust, report.least_gain, report.most_gain));
     return fused;
-  }
-
-  /// Of the views' poses: as those of the keyframes, and between these as that of the one before; empty: not
-  /// known.
-  static std::vector<geometry::Matrix6d> covariances_of(const MapResult& map,
-                                                        const std::vector<std::int32_t>& robots,
-                                                        const std::vector<double>& stamps) {
-    std::map<std::pair<std::int32_t, double>, geometry::Matrix6d> known;
-    for (const KeyframePose& keyframe : map.keyframes) {
-      if (!keyframe.accuracy) return {};
-      known[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
-    }
-    std::vector<geometry::Matrix6d> covariances;
-    for (std::size_t i = 0; i < robots.size(); ++i) {
-      auto after = known.upper_bound({robots[i], stamps[i]});
-      if (after != known.begin() && std::prev(after)->first.first == robots[i]) --after;
-      if (after == known.end()) return {};
-      covariances.push_back(after->second);
-    }
-    return covariances;
   }
 
   /// One depth field for each robot's camera.
@@ -238,7 +227,7 @@ class FuseStage : public Stage {
       const auto field =
           cloud::find_depth_field(own, poses, read, camera, depth_field_, *context_->executor, &report);
       if (!field) return tl::unexpected<core::Error>(field.error());
-      fields_[robot] = *field;
+      state_->depth_fields[robot] = *field;
       std::string name;
       for (const RobotInfo& info : map.robots) {
         if (info.number == robot) name = info.name;
@@ -255,8 +244,7 @@ class FuseStage : public Stage {
 
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
     auto cloud = clouds_->read(place);
-    const auto field = fields_.find(robot);
-    if (cloud && field != fields_.end()) field->second.correct(**cloud);
+    if (cloud) state_->correct(robot, **cloud);
     return cloud;
   }
 
@@ -317,7 +305,7 @@ class FuseStage : public Stage {
     std::size_t place = 0;  ///< among the clouds
   };
   std::vector<Between> between_;
-  std::map<std::int32_t, cloud::DepthField> fields_;  ///< by robot
+  std::shared_ptr<FusionState> state_ = std::make_shared<FusionState>();
   std::vector<RunSummary::DepthField> told_fields_;
   std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
   UpFrame frame_;

@@ -15,6 +15,7 @@
 #include "plumbline/maps/store.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
+#include "run/fusion_state.hpp"
 #include "run/resumed_run.hpp"
 #include "stages/stages.hpp"
 
@@ -146,6 +147,9 @@ class StoreStage : public Stage {
     maps::ResultFrame frame;
     if (const auto dense = io.input<DenseCloud>("result")) {
       frame = {dense->output_from_map, dense->upright};
+      if (dense->state != nullptr) {
+        if (auto kept = writer_->attach(kFusionAttachment, to_bytes(*dense->state)); !kept) return kept;
+      }
     }
     auto saved = writer_->save_final(*map->map, map->frame_poses, frame, step_);
     writer_.reset();

@@ -420,7 +420,7 @@ TEST(SnapshotOptions, EveryChoiceHasItsName) {
     if (spec.key == "view") {
       EXPECT_EQ(spec.choices.size(), 8U);
     } else if (spec.key == "color") {
-      EXPECT_EQ(spec.choices.size(), 6U);
+      EXPECT_EQ(spec.choices.size(), 7U);
     }
   }
   EXPECT_EQ(table.value("view"), "iso");
