@@ -109,6 +109,7 @@ int run(int argc, char** argv) {
   add_fuse(app, session);
   add_hub(app, session);
   add_robot(app, session);
+  add_keys(app, session);
   add_calibrate(app, session);
   add_info(app, session);
   add_render(app, session);

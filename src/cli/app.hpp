@@ -59,6 +59,7 @@ void add_map(CLI::App& app, Session& session);
 void add_fuse(CLI::App& app, Session& session);
 void add_hub(CLI::App& app, Session& session);
 void add_robot(CLI::App& app, Session& session);
+void add_keys(CLI::App& app, Session& session);
 void add_calibrate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);

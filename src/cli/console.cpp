@@ -72,14 +72,18 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
   } else {
     const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
     const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
-    put(fmt::format("plumbline: {} of {} {}, {:.1f} a second, {} left\n", done, total, what, rate,
-                    clock_text(left_s)));
+    put(fmt::format("plumbline: {} of {} {}, {:.1f} a second, {} left{}\n", done, total, what, rate,
+                    clock_text(left_s), note_));
   }
 }
 
 void Console::status(const std::string& line) {
   if (quiet_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (started_) {
+    note_ = "  " + line;
+    return;
+  }
   const auto now = Clock::now();
   const double since_last_s = std::chrono::duration<double>(now - last_).count();
   if (since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
@@ -94,8 +98,8 @@ void Console::draw_bar(std::size_t done, std::size_t total, const char* what, do
   const auto filled = static_cast<std::size_t>(std::lround(share * static_cast<double>(kBarWidth)));
   const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
   const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
-  put(fmt::format("[{}{}] {}/{} {}  {:.1f} fps  ETA {}", std::string(filled, '='),
-                  std::string(kBarWidth - filled, ' '), done, total, what, rate, clock_text(left_s)));
+  put(fmt::format("[{}{}] {}/{} {}  {:.1f} fps  ETA {}{}", std::string(filled, '='),
+                  std::string(kBarWidth - filled, ' '), done, total, what, rate, clock_text(left_s), note_));
   std::fflush(stderr);
 }
 
@@ -110,6 +114,7 @@ void Console::end_progress() {
   if (bar_shown_) put("\n");
   bar_shown_ = false;
   started_ = false;
+  note_.clear();
 }
 
 }  // namespace plumbline::cli

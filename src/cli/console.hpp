@@ -20,7 +20,8 @@ class Console : public core::Log {
 
   /// A bar with rate and time left on a terminal, a line every few seconds elsewhere; nothing when quiet.
   void progress(std::size_t done, std::size_t total, const char* what);
-  /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet.
+  /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet. While
+  /// there is a bar, it stands behind that.
   void status(const std::string& line);
   /// Ends the bar's line.
   void end_progress();
@@ -36,6 +37,7 @@ class Console : public core::Log {
   bool terminal_;
   bool bar_shown_ = false;
   bool started_ = false;
+  std::string note_;  ///< behind the bar
   Clock::time_point start_;
   Clock::time_point last_;
 };

@@ -35,6 +35,10 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
                   "TCP: port of the hub (default: 7500); UDP: where ports are counted from (default: 7400)")
       ->type_name("P")
       ->check(CLI::Range(1, 60000));
+  command
+      .add_option("--security", options.security,
+                  "Folder with this one's keys, made by plumbline keys create (default: none)")
+      ->type_name("DIR");
 }
 
 std::string network_arguments(const net::NetworkOptions& options) {

@@ -122,12 +122,19 @@ struct BusPart {
   core::Result<std::unique_ptr<RobotBus>> (*open_robot)(const NetworkOptions& options,
                                                         const std::string& name, const BusLog& log);
   core::Result<std::unique_ptr<HubBus>> (*open_hub)(const NetworkOptions& options, const BusLog& log);
+  // keys.hpp of the part
+  core::Result<void> (*make_authority)(const std::filesystem::path& folder);
+  core::Result<void> (*make_keys)(const std::filesystem::path& folder, const std::string& name);
+  core::Result<void> (*revoke)(const std::filesystem::path& folder, const std::vector<std::string>& names);
+  core::Result<int> (*days_left)(const std::filesystem::path& folder);
 };
 
 /// Through the part. Errors: (kUsage) no such interface, port in use, keys that cannot be read; (kInternal)
 /// the part is missing.
 core::Result<std::unique_ptr<RobotBus>> open_robot_bus(const NetworkOptions& options, const std::string& name,
                                                        const BusLog& log);
+/// Days until the keys that --security names expire. Errors (kUsage): they cannot be read.
+core::Result<int> days_of_keys(const NetworkOptions& options);
 core::Result<std::unique_ptr<HubBus>> open_hub_bus(const NetworkOptions& options, const BusLog& log);
 
 }  // namespace plumbline::net

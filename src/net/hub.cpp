@@ -14,8 +14,8 @@
 
 #include "hub_desk.hpp"
 #include "plumbline/core/output_file.hpp"
-#include "plumbline/maps/store.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/pipeline/stored_maps.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -101,7 +101,7 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
 
 /// Maps that can be fused; what cannot is named in `reason`.
 std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<RobotTraffic>& traffic,
-                                  core::Log& log, std::string& reason) {
+                                  const core::Executor& executor, core::Log& log, std::string& reason) {
   std::vector<fs::path> maps;
   const auto leave_out = [&](const std::string& why) { reason += (reason.empty() ? "" : "; ") + why; };
   for (const RobotTraffic& t : traffic) {
@@ -109,12 +109,12 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
     if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
     if (t.keyframes == 0) continue;
     // One that is damaged must not keep the others from being fused.
-    const auto stored = maps::load_map(file);
-    if (stored && stored->map.keyframe_count() > 0) {
+    const auto stored = pipeline::StoredMaps::open({file.parent_path()}, executor);
+    if (stored) {
       maps.push_back(file.parent_path());
       continue;
     }
-    const std::string why = stored ? "it has no keyframes" : stored.error().message;
+    const std::string why = stored.error().message;
     log.warning(fmt::format("{}: is left out: {}", t.name, why));
     leave_out(t.name + " is left out: its map does not load");
   }
@@ -141,7 +141,20 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
     log.warning(fmt::format("on {} without --security: whoever is there can read maps and send some",
                             options->interface));
   }
-  auto bus = open_hub_bus(*options, [&log](const std::string& line) { log.debug(line); });
+  if (!options->security.empty()) {
+    constexpr int kSoon = 30;
+    const auto days = days_of_keys(*options);
+    if (!days) return fail(days.error());
+    if (*days < kSoon)
+      log.warning(fmt::format("the keys in {} expire in {} days", options->security.string(), *days));
+  }
+  // Why somebody with foreign keys gets nothing only the hub learns.
+  const bool secured = !options->security.empty();
+  auto bus = open_hub_bus(*options, [&log, secured, told = 0](const std::string& line) mutable {
+    constexpr int kMostTold = 50;
+    const bool keys = secured && line.find("ertificate") != std::string::npos && ++told <= kMostTold;
+    log.write(keys ? core::LogLevel::kWarning : core::LogLevel::kDebug, "DDS: " + line);
+  });
   if (!bus) return fail(bus.error());
   auto desk = HubDesk::open(folder, request, std::move(*bus), log);
   if (!desk) return fail(desk.error());
@@ -153,7 +166,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   const std::vector<RobotTraffic> traffic = (*desk)->serve(stop, status);
   const Goodbye goodbye(**desk);
   std::string reason;
-  const std::vector<fs::path> maps = usable_maps(folder, traffic, log, reason);
+  const std::vector<fs::path> maps = usable_maps(folder, traffic, executor, log, reason);
   if (traffic.size() < request.robots) {
     const std::size_t missing = request.robots - traffic.size();
     reason +=

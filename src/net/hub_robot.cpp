@@ -63,15 +63,15 @@ core::Result<bool> HubRobot::hear(const Hello& next) {
   }
   heard_at_ = now;
   const maps::StoreHeads& heads = copy_->heads();
-  const bool lost =
-      heads.last() > lost_below(next) || heads.map > next.map_head || heads.clouds > next.clouds_head;
   // A store that is just being opened tells no heads yet.
-  const bool opening = next.map_head == 0 && next.clouds_head == 0;
+  const bool tells = next.map_head > 0 || next.clouds_head > 0;
+  const bool lost = heads.last() > lost_below(next) ||
+                    (tells && (heads.map > next.map_head || heads.clouds > next.clouds_head));
   if (next.incarnation > incarnation) forget();
   incarnation = next.incarnation;
   run = next.run;
   hello = next;
-  if (!lost || opening) return false;
+  if (!lost) return false;
   forget();
   if (auto cleared = copy_->clear(); !cleared) return tl::unexpected<core::Error>(cleared.error());
   done = false;

@@ -30,7 +30,15 @@ core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request, 
     log.warning(fmt::format("on {} without --security: whoever is there can read the map and speak as {}",
                             options->interface, request.name));
   }
-  auto bus = open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug(line); });
+  if (!options->security.empty()) {
+    constexpr int kSoon = 30;
+    const auto days = days_of_keys(*options);
+    if (!days) return tl::unexpected<core::Error>(days.error());
+    if (*days < kSoon)
+      log.warning(fmt::format("the keys in {} expire in {} days", options->security.string(), *days));
+  }
+  auto bus =
+      open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug("DDS: " + line); });
   if (!bus) return tl::unexpected<core::Error>(bus.error());
   return std::make_unique<RobotLink>(std::move(*bus), request.name, request.fresh_id, log);
 }
@@ -132,7 +140,13 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
     if (auto followed = (*link)->follow(folder / kStore); !followed) log.error(followed.error().message);
     if (request.map.prepared) request.map.prepared(folder);
   };
-  auto summary = pipeline::map_recording(map, executor, log, stop, progress, leftovers);
+  Rate rate;
+  const auto frames = [&](std::size_t done, std::size_t total) {
+    const LinkStatus now = (*link)->status();
+    if (progress) progress(done, total);
+    if (status) status(line_of(now, rate(now.sent_bytes)));
+  };
+  auto summary = pipeline::map_recording(map, executor, log, stop, frames, leftovers);
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   std::error_code ec;
   const fs::path store = request.map.output / kStore;

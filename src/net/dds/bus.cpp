@@ -5,9 +5,12 @@
 #include <dds/dds.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
+#include <mutex>
 #include <utility>
 
+#include "keys.hpp"
 #include "qos.hpp"
 #include "wire.hpp"
 
@@ -38,10 +41,31 @@ void tell(void* log, const dds_log_data_t* data) {
   if (log != nullptr && *static_cast<BusLog*>(log)) (*static_cast<BusLog*>(log))(line);
 }
 
+/// What CycloneDDS complained of first, from whichever thread.
+class Complaint {
+ public:
+  void note(const std::string& line) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (text_.empty()) text_ = line;
+  }
+  std::string text() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return text_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::string text_;
+};
+
 /// A participant in a domain of its own configuration.
 class Participant {
  public:
-  explicit Participant(BusLog log) : log_(std::move(log)) {
+  explicit Participant(const BusLog& log)
+      : complaint_(std::make_shared<Complaint>()), log_([log, first = complaint_](const std::string& line) {
+          first->note(line);
+          if (log) log(line);
+        }) {
     dds_set_log_sink(&tell, &log_);
     dds_set_trace_sink(&tell, &log_);
   }
@@ -65,6 +89,11 @@ class Participant {
       waitset_ = dds_create_waitset(participant_.handle);
       others_ = dds_create_reader(participant_.handle, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
       return {};
+    }
+    const std::string complaint = complaint_->text();
+    if (!options.security.empty() && !complaint.empty()) {
+      return core::usage_error(
+          fmt::format("--security: the keys in {} cannot be used: {}", options.security.string(), complaint));
     }
     const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
     return core::usage_error(
@@ -105,6 +134,7 @@ class Participant {
   }
 
  private:
+  std::shared_ptr<Complaint> complaint_;
   BusLog log_;
   Entity domain_;
   Entity participant_;
@@ -298,4 +328,6 @@ core::Result<std::unique_ptr<HubBus>> open_hub(const NetworkOptions& options, co
 }  // namespace
 }  // namespace plumbline::net
 
-PLUMBLINE_PART(plumbline::net::BusPart, &plumbline::net::open_robot, &plumbline::net::open_hub)
+PLUMBLINE_PART(plumbline::net::BusPart, &plumbline::net::open_robot, &plumbline::net::open_hub,
+               &plumbline::net::make_authority, &plumbline::net::make_keys, &plumbline::net::revoke,
+               &plumbline::net::days_left)

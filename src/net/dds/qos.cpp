@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <system_error>
+#include <utility>
+
+#include "keys.hpp"
+
 namespace plumbline::net {
 namespace {
 
@@ -49,8 +54,39 @@ Qos piece_qos() {
 }
 
 core::Result<Qos> participant_qos(const NetworkOptions& options) {
-  if (!options.security.empty()) return core::usage_error("--security: is not there yet");
-  return new_qos();
+  Qos qos = new_qos();
+  if (options.security.empty()) return qos;
+  std::error_code ec;
+  const std::filesystem::path folder = std::filesystem::absolute(options.security);
+  const auto set = [&](const char* name, const std::string& value) {
+    dds_qset_prop(qos.get(), name, value.c_str());
+  };
+  for (const auto& [name, file] : {std::pair{"dds.sec.auth.identity_ca", kAuthorityFile},
+                                   {"dds.sec.auth.identity_certificate", kCertificateFile},
+                                   {"dds.sec.auth.private_key", kKeyFile},
+                                   {"org.eclipse.cyclonedds.sec.auth.crl", kRevokedFile},
+                                   {"dds.sec.access.permissions_ca", kAuthorityFile},
+                                   {"dds.sec.access.governance", kGovernanceFile},
+                                   {"dds.sec.access.permissions", kPermissionsFile}}) {
+    if (!std::filesystem::exists(folder / file, ec)) {
+      return core::usage_error(fmt::format(
+          "--security: {} is not there; give a robot's or the hub's folder that plumbline keys create made",
+          (options.security / file).string()));
+    }
+    set(name, "file:" + (folder / file).string());
+  }
+  for (const char* plugin : {"auth", "access", "crypto"}) {
+    const bool access = std::string(plugin) == "access";
+    const std::string head = fmt::format("dds.sec.{}.library.", plugin);
+    const std::string function = access                          ? "access_control"
+                                 : std::string(plugin) == "auth" ? "authentication"
+                                                                 : "crypto";
+    set((head + "path").c_str(),
+        fmt::format("{}/libdds_security_{}.so", PLUMBLINE_DDS_PLUGINS, access ? "ac" : plugin));
+    set((head + "init").c_str(), "init_" + function);
+    set((head + "finalize").c_str(), "finalize_" + function);
+  }
+  return qos;
 }
 
 std::string domain_configuration(const NetworkOptions& options, bool hub) {

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline keys create|add|revoke DIR --robots r0,r1
+#include <fmt/format.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app.hpp"
+#include "plumbline/net/keys.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+struct KeysRequest {
+  std::filesystem::path folder;
+  std::vector<std::string> robots;
+};
+using Action = core::Result<void> (*)(const std::filesystem::path&, const std::vector<std::string>&);
+
+void add_action(CLI::App& group, Session& session, const char* name, const char* help, Action action,
+                const char* then) {
+  const auto request = std::make_shared<KeysRequest>();
+  CLI::App* command = add_command(group, session, name, help, [&session, request, action, then] {
+    const auto done = action(request->folder, request->robots);
+    if (!done) return session.fail(done.error());
+    if (!session.quiet) fmt::print("{}: {}\n", request->folder.string(), then);
+    return 0;
+  });
+  command->add_option("DIR", request->folder, "Folder of the keys")->required();
+  command->add_option("--robots", request->robots, "Names, with commas between")
+      ->required()
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,...");
+}
+
+}  // namespace
+
+void add_keys(CLI::App& app, Session& session) {
+  CLI::App* group = add_group(app, "keys", "Make and revoke keys for hub and robots (--security)");
+  add_action(*group, session, "create", "Make an authority, and keys for a hub and robots", &net::create_keys,
+             "give hub/ to the hub and each robot its own folder; ca/ stays here");
+  add_action(*group, session, "add", "Make keys for more robots", &net::add_keys,
+             "give each new robot its folder; the others need nothing new");
+  add_action(*group, session, "revoke", "Let robots in no longer", &net::revoke_keys,
+             "give the new crl.pem of hub/ to the hub, and begin that again");
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/net/keys.hpp"
+
+#include <fmt/format.h>
+
+#include <set>
+#include <system_error>
+
+#include "bus.hpp"
+#include "plumbline/net/options.hpp"
+
+namespace plumbline::net {
+namespace {
+
+namespace fs = std::filesystem;
+
+core::Result<void> check_names(const std::vector<std::string>& robots) {
+  std::set<std::string> names = {"ca", "hub"};
+  for (const std::string& name : robots) {
+    if (!is_robot_name(name)) {
+      return core::usage_error(
+          fmt::format("--robots: '{}' is no name: letters, digits, '.', '_' and '-'", name));
+    }
+    if (!names.insert(name).second) {
+      return core::usage_error(
+          fmt::format("--robots: {} is there twice, or is none that a robot may have", name));
+    }
+  }
+  return {};
+}
+
+core::Result<const BusPart*> part() {
+  const auto& found = core::part<BusPart>();
+  if (!found) return tl::unexpected<core::Error>(found.error());
+  return *found;
+}
+
+}  // namespace
+
+core::Result<void> create_keys(const fs::path& folder, const std::vector<std::string>& robots) {
+  if (auto names = check_names(robots); !names) return names;
+  const auto keys = part();
+  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  std::error_code ec;
+  if (fs::exists(folder, ec)) {
+    return core::usage_error(
+        folder.string() +
+        ": is there already; more robots are added by plumbline keys add, new keys need a new "
+        "folder");
+  }
+  if (auto made = (*keys)->make_authority(folder); !made) return made;
+  if (auto made = (*keys)->make_keys(folder, "hub"); !made) return made;
+  for (const std::string& name : robots) {
+    if (auto made = (*keys)->make_keys(folder, name); !made) return made;
+  }
+  return {};
+}
+
+core::Result<void> add_keys(const fs::path& folder, const std::vector<std::string>& robots) {
+  if (auto names = check_names(robots); !names) return names;
+  const auto keys = part();
+  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  std::error_code ec;
+  for (const std::string& name : robots) {
+    if (fs::exists(folder / name, ec))
+      return core::usage_error((folder / name).string() + ": is there already");
+  }
+  for (const std::string& name : robots) {
+    if (auto made = (*keys)->make_keys(folder, name); !made) return made;
+  }
+  return {};
+}
+
+core::Result<void> revoke_keys(const fs::path& folder, const std::vector<std::string>& robots) {
+  if (auto names = check_names(robots); !names) return names;
+  const auto keys = part();
+  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  return (*keys)->revoke(folder, robots);
+}
+
+}  // namespace plumbline::net
