@@ -14,9 +14,9 @@ namespace {
 
 const char* const kTwoTerminals =
     "In one terminal:    plumbline hub -o building --robots 2 --interface lo\n"
-    "In another one:     plumbline robot 'synth:office?robots=2&robot=0&frames=300&seed=1' --name r0 "
+    "In another one:     plumbline robot 'synth:room?frames=240&seed=1' --to 6 --name r0 "
     "--interface lo &\n"
-    "                    plumbline robot 'synth:office?robots=2&robot=1&frames=300&seed=1' --name r1 "
+    "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 "
     "--interface lo\n"
     "Hub and robots may start in any order; docs/network.md has more.";
 
