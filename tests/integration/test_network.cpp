@@ -68,7 +68,7 @@ TEST_F(Network, AHubThatIsKilledGoesOn) {
 
 TEST_F(Network, ARobotThatIsKilledGoesOn) {
   Process h = hub();
-  Process a = robot("a", " --pace 10");
+  Process a = robot("a", " --pace 4");
   Process b = robot("b");
   const fs::path copy = path("out.partial/robots/a/map.db");
   ASSERT_TRUE(happens([&] { return fs::exists(copy); }, kLong_s)) << h.told();
