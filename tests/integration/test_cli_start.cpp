@@ -102,5 +102,12 @@ TEST_F(Start, WhoNeedsMoreLoadsThatMuchMore) {
   expect_none(formats, kPictures);
 }
 
+TEST_F(Start, OnlyHubAndRobotsLoadTheNetwork) {
+  const std::vector<std::string> network{"plumbline_dds.so", "libddsc", "libssl"};
+  expect_none(loaded_by("--version"), network);
+  expect_none(loaded_by("robot --help"), network);
+  EXPECT_TRUE(loaded_by("keys create keys --robots r0 -q").has("libddsc"));
+}
+
 }  // namespace
 }  // namespace plumbline::integration

@@ -143,5 +143,21 @@ TEST_F(Network, AHubThatIsLostIsToldWithTheCommand) {
   EXPECT_EQ(slurp(path("a/map.db")), slurp(world("a") / "map.db"));
 }
 
+TEST_F(Network, AFullDiskAtTheHubIsToldOnBothSides) {
+  // The shell's file size limit stands in for the disk's end, in blocks of 512 or 1024 bytes.
+  Process h = hub(" --robots 2", "ulimit -f 700;");
+  fs::copy(world("a"), path("a"), fs::copy_options::recursive);
+  Process a = start("a", "robot a --name a --wait-lost 4" + network());
+  EXPECT_EQ(a.wait(kLong_s), 4) << a.told() << h.told();
+  EXPECT_NE(a.told().find("a cannot be stored at the hub"), std::string::npos) << a.told();
+  EXPECT_NE(h.told().find("a cannot be stored at the hub"), std::string::npos) << h.told();
+  h.end(SIGKILL);
+  h = hub(" --robots 1 --resume");  // there is room again
+  Process again = start("again", "robot a --name a" + network());
+  EXPECT_EQ(again.wait(kLong_s), 0) << again.told() << h.told();
+  EXPECT_EQ(h.wait(kLong_s), 0) << h.told();
+  EXPECT_EQ(dump(path("out/robots/a/map.db")), dump(path("a/map.db")));
+}
+
 }  // namespace
 }  // namespace plumbline::integration
