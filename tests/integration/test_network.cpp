@@ -68,11 +68,11 @@ TEST_F(Network, AHubThatIsKilledGoesOn) {
 
 TEST_F(Network, ARobotThatIsKilledGoesOn) {
   Process h = hub();
-  Process a = robot("a", " --pace 10");
+  Process a = robot("a", " --pace 5");
   Process b = robot("b");
   const fs::path copy = path("out.partial/robots/a/map.db");
   ASSERT_TRUE(happens([&] { return fs::exists(copy); }, kLong_s)) << h.told();
-  usleep(1000000);
+  usleep(500000);
   a.end(SIGKILL);
   a = robot("a", " --resume");
   ASSERT_EQ(a.wait(kLong_s), 0) << a.told() << h.told();
