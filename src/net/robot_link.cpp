@@ -172,7 +172,13 @@ void RobotLink::take(const Word& word) {
     sending_.reset();
   }
   heard_at_ = Clock::now();
-  if (word.robot == name_ && word.run == hello_.run && word.incarnation == hello_.incarnation && following_) {
+  if (word.robot != name_ || word.run != hello_.run || !following_) return;
+  // A hub that is about to leave tells what the process before this one brought; nothing came since.
+  const bool all = word.answer == Answer::kDone && hello_.over && word.map == hello_.map_head &&
+                   word.clouds == hello_.clouds_head &&
+                   hello_.began.back() == static_cast<std::uint64_t>(std::max(word.map, word.clouds));
+  if (all) status_.done = true;
+  if (word.incarnation == hello_.incarnation) {
     take_answer(word);
   }
 }

@@ -72,7 +72,7 @@ TEST_F(Network, ARobotThatIsKilledGoesOn) {
   Process b = robot("b");
   const fs::path copy = path("out.partial/robots/a/map.db");
   ASSERT_TRUE(happens([&] { return fs::exists(copy); }, kLong_s)) << h.told();
-  usleep(1000000);
+  usleep(500000);
   a.end(SIGKILL);
   a = robot("a", " --resume");
   ASSERT_EQ(a.wait(kLong_s), 0) << a.told() << h.told();
