@@ -46,7 +46,8 @@ class Complaint {
  public:
   void note(const std::string& line) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (text_.empty()) text_ = line;
+    const bool of_another_one = line.rfind("Remote ", 0) == 0;
+    if (text_.empty() && !of_another_one) text_ = line;
   }
   std::string text() {
     const std::lock_guard<std::mutex> lock(mutex_);
