@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "canvas/ticks.hpp"
 #include "charts/axis_extent.hpp"
 #include "plumbline/viz/color.hpp"
-#include "canvas/ticks.hpp"
 
 namespace plumbline::viz {
 namespace {

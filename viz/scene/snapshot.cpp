@@ -28,8 +28,8 @@
 
 #include "canvas/image.hpp"
 #include "canvas/offscreen.hpp"
-#include "scene/overlay.hpp"
 #include "canvas/overlay_actor.hpp"
+#include "scene/overlay.hpp"
 #include "scene/point_style.hpp"
 #include "scene/view_frame.hpp"
 

@@ -97,7 +97,7 @@ struct GlobalAdjustmentSummary {
   bool changed = false;  ///< the map was moved
   int refused = 0;       ///< solutions that contradicted what the tracker had measured
   std::string refusal;   ///< what the last of these would have torn
-  std::string message;  ///< why not, or what the solver said
+  std::string message;   ///< why not, or what the solver said
 };
 
 /// Moves all keyframes and landmarks of the map to where everything fits best, and takes observations that do

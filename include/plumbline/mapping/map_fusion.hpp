@@ -177,9 +177,9 @@ struct FusedMap {
   std::vector<geometry::Rigid3> anchor_from_part;  ///< of these, before adjustment
   int merged_points = 0;                           ///< landmarks that were doubles
   int merged_lines = 0;
-  int edges = 0;     ///< pairs of keyframes given to the pose graph
-  int rejected = 0;  ///< of these, taken for wrong
-  int refused = 0;   ///< 1: the pose graph would have torn a map, and parts lie as `anchor_from_part` says
+  int edges = 0;        ///< pairs of keyframes given to the pose graph
+  int rejected = 0;     ///< of these, taken for wrong
+  int refused = 0;      ///< 1: the pose graph would have torn a map, and parts lie as `anchor_from_part` says
   std::string refusal;  ///< where
 };
 

@@ -15,8 +15,8 @@
 #include <optional>
 
 #include "compact/compact_format.hpp"
-#include "finite.hpp"
 #include "compact/octahedral.hpp"
+#include "finite.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -137,8 +137,9 @@ class ClustersFilter : public Filter {
     table.number("leaf", leaf_m_, {0.0, 10.0}, "m",
                  "Cells whose means stand for their points in this, which is quicker; 0: all points");
     table.integer("min_points", min_points_, {1, 100000000}, "", "Clusters with fewer points are none");
-    table.number("min_share", min_share_, {0.0, 1.0}, "ratio",
-                 "Unless they hold this share of all points, as in a small or coarse cloud; 1: only if they are all");
+    table.number(
+        "min_share", min_share_, {0.0, 1.0}, "ratio",
+        "Unless they hold this share of all points, as in a small or coarse cloud; 1: only if they are all");
     table.integer("count", count_, {0, 1000000}, "", "How many clusters, the largest first; 0: all");
     table.choice<Mode>("mode", mode_,
                        {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},

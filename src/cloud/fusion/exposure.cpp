@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plumbline/cloud/cell_map.hpp"
 #include "io/scalar.hpp"
+#include "plumbline/cloud/cell_map.hpp"
 
 namespace plumbline::cloud {
 namespace {

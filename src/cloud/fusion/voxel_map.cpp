@@ -10,8 +10,8 @@
 #include <memory>
 #include <utility>
 
-#include "plumbline/sensor/depth_noise.hpp"
 #include "io/scalar.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::cloud {
 namespace {

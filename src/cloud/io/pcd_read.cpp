@@ -7,9 +7,9 @@
 
 #include <sstream>
 
+#include "filters/pcl_functions.hpp"
 #include "io/byte_reader.hpp"
 #include "io/cloud_table.hpp"
-#include "filters/pcl_functions.hpp"
 #include "io/scalar.hpp"
 
 namespace plumbline::cloud {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "plumbline/core/output_file.hpp"
 #include "io/ply_header.hpp"
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "io/byte_reader.hpp"
-#include "plumbline/core/error.hpp"
 #include "io/scalar.hpp"
+#include "plumbline/core/error.hpp"
 
 namespace plumbline::cloud {
 

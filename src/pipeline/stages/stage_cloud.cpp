@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "stages/chain_option.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
@@ -16,6 +15,7 @@
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "stages/chain_option.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {

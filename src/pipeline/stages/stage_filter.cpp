@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "stages/chain_option.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "stages/chain_option.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {

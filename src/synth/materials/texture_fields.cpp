@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
-#include "scene/random.hpp"
 #include "materials/texture_draw.hpp"
+#include "scene/random.hpp"
 
 namespace plumbline::synth {
 

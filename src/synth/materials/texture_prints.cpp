@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "scene/random.hpp"
 #include "materials/texture_draw.hpp"
+#include "scene/random.hpp"
 
 namespace plumbline::synth {
 

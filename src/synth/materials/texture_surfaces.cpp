@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "scene/random.hpp"
 #include "materials/texture_draw.hpp"
+#include "scene/random.hpp"
 
 namespace plumbline::synth {
 

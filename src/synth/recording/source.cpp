@@ -9,8 +9,8 @@
 
 #include "render/depth_sensor.hpp"
 #include "render/path.hpp"
-#include "scene/random.hpp"
 #include "render/render.hpp"
+#include "scene/random.hpp"
 
 namespace plumbline::synth {
 

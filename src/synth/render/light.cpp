@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "scene/random.hpp"
 #include "render/world.hpp"
+#include "scene/random.hpp"
 
 namespace plumbline::synth {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/builder.hpp"
 #include "render/render.hpp"
+#include "scene/builder.hpp"
 
 namespace plumbline::synth {
 

@@ -8,8 +8,8 @@
 #include <functional>
 #include <map>
 
-#include "scene/builder.hpp"
 #include "plumbline/core/options.hpp"
+#include "scene/builder.hpp"
 
 namespace plumbline::synth {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "scene/builder.hpp"
 #include "plumbline/core/config.hpp"
+#include "scene/builder.hpp"
 
 namespace plumbline::synth {
 

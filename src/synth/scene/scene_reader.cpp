@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/core/options.hpp"
 #include "scene/builder.hpp"
 #include "scene/object_reader.hpp"
-#include "plumbline/core/options.hpp"
 
 namespace plumbline::synth {
 
