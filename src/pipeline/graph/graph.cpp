@@ -65,7 +65,7 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
   if (!root) return refuse();
   Graph graph;
   read_description(*root, graph, problems);
-  Drafts drafts = read_stages(*root, registry, problems);
+  Drafts drafts = read_stages(*root, registry, problems, graph.warnings);
   connect(drafts, problems);
   add_taps(*root, registry, drafts, problems);
   apply_overrides(overrides, drafts, problems, graph.warnings);

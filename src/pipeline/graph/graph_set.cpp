@@ -42,7 +42,8 @@ std::string renamed(const std::string& text, std::vector<std::string>& warnings)
   return text;
 }
 
-void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
+void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems,
+           std::vector<std::string>& warnings) {
   const auto refuse = [&](const std::string& path, std::string what) {
     problems.push_back({kCommandLine, path, std::move(what)});
   };
@@ -66,6 +67,7 @@ void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }
   if (drafts[target].node.type == nullptr) return;  // told already
+  if (is_retired(key)) return warnings.push_back(fmt::format("--set {}: has no effect", path));
   drafts[target].node.options.set(key, *value, stage, problems);
   drafts[target].set.push_back(key);
 }
@@ -74,7 +76,7 @@ void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
 
 void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, ConfigProblems& problems,
                      std::vector<std::string>& warnings) {
-  for (const std::string& text : texts) apply(renamed(text, warnings), drafts, problems);
+  for (const std::string& text : texts) apply(renamed(text, warnings), drafts, problems, warnings);
 }
 
 }  // namespace plumbline::pipeline

@@ -19,7 +19,8 @@ bool is_stage_name(const std::string& name) {
   return !name.empty() && name[0] >= 'a' && name[0] <= 'z' && std::all_of(name.begin(), name.end(), allowed);
 }
 
-void read_stage(const StageRegistry& registry, Draft& draft, ConfigProblems& problems) {
+void read_stage(const StageRegistry& registry, Draft& draft, ConfigProblems& problems,
+                std::vector<std::string>& warnings) {
   const ConfigNode& body = *draft.body;
   if (body.kind != Kind::kMap) {
     problems.push_back({draft.mark, draft.path, "must be a map with a type, e.g. {type: read}"});
@@ -40,10 +41,18 @@ void read_stage(const StageRegistry& registry, Draft& draft, ConfigProblems& pro
   }
   draft.node.stage = draft.node.type->make();
   draft.node.stage->declare(draft.node.options);
-  draft.node.options.set_all(body, draft.path, problems, {"type", "inputs"});
+  std::vector<std::string> others{"type", "inputs"};
+  for (const auto& [key, value] : body.entries) {
+    if (!is_retired(key)) continue;
+    others.push_back(key);
+    warnings.push_back(fmt::format("{}.{}: has no effect", draft.path, key));
+  }
+  draft.node.options.set_all(body, draft.path, problems, others);
 }
 
 }  // namespace
+
+bool is_retired(const std::string& key) { return key == "solver.max_iterations"; }
 
 std::size_t find_draft(const Drafts& drafts, const std::string& name) {
   const auto found =
@@ -59,7 +68,8 @@ std::vector<std::string> names_of(const Drafts& drafts) {
   return names;
 }
 
-Drafts read_stages(const ConfigNode& root, const StageRegistry& registry, ConfigProblems& problems) {
+Drafts read_stages(const ConfigNode& root, const StageRegistry& registry, ConfigProblems& problems,
+                   std::vector<std::string>& warnings) {
   Drafts drafts;
   const ConfigNode* stages = root.find("stages");
   if (stages == nullptr || stages->kind != Kind::kMap || stages->entries.empty()) {
@@ -78,7 +88,7 @@ Drafts read_stages(const ConfigNode& root, const StageRegistry& registry, Config
     draft.mark = stages->key_marks[i];
     draft.path = "stages." + name;
     draft.body = &body;
-    read_stage(registry, draft, problems);
+    read_stage(registry, draft, problems, warnings);
     drafts.push_back(std::move(draft));
   }
   return drafts;
