@@ -66,12 +66,12 @@ std::vector<PlacedView> views_of(const MapPart& part) {
 
 }  // namespace
 
-LaidMaps::Landmark LaidMaps::landmark(const maps::Map& map, core::PointId id) {
+OverlapCheck::Landmark OverlapCheck::landmark(const maps::Map& map, core::PointId id) {
   const maps::MapPoint& point = map.point(id);
   return {point.position, point.view_direction, point.reference_distance, point.descriptor};
 }
 
-LaidMaps::Side LaidMaps::side(const MapPart& part) {
+OverlapCheck::Side OverlapCheck::side(const MapPart& part) {
   Side side;
   side.part = part;
   std::vector<std::pair<std::uint64_t, core::PointId>> order;
@@ -87,7 +87,7 @@ LaidMaps::Side LaidMaps::side(const MapPart& part) {
   return side;
 }
 
-LaidMaps::LaidMaps(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)) {
+OverlapCheck::OverlapCheck(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)) {
   constexpr std::size_t kSample = 300;
   double pairs = 0.0;
   for (std::size_t i = 0; i < a_.landmarks.size(); i += stride(a_.landmarks.size(), kSample)) {
@@ -100,8 +100,8 @@ LaidMaps::LaidMaps(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)
 }
 
 /// Whether the side has a landmark there that looks alike, and how probable that was.
-bool LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
-                     LaidOver& sum) const {
+bool OverlapCheck::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
+                         MapOverlap& sum) const {
   // Cells are twice the reach wide: eight of them hold all that is near.
   const Cell low = cell_of(at - Eigen::Vector3d::Constant(kReach_m), kCell_m);
   bool found = false;
@@ -121,8 +121,8 @@ bool LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Ve
   return found;
 }
 
-void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved, LaidOver& sum,
-                   std::vector<Eigen::Vector3d>* matched) const {
+void OverlapCheck::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved, MapOverlap& sum,
+                       std::vector<Eigen::Vector3d>* matched) const {
   constexpr double kLikeSide = 0.8;  // cosine between the directions from which a landmark was seen
   constexpr double kTimes = 1.8;     // nearer or farther: a corner does not look the same from everywhere
   const std::vector<PlacedView> views = views_of(fixed.part);
@@ -158,7 +158,7 @@ namespace {
 
 /// Surface samples of one map in the views of another.
 void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
-                  LaidMaps::Surfaces& sum) {
+                  OverlapCheck::Surfaces& sum) {
   constexpr double kFacing = 0.25;  // cosine
   const std::vector<PlacedView> views = views_of(fixed);
   const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
@@ -191,15 +191,15 @@ void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixe
 
 }  // namespace
 
-LaidMaps::Surfaces LaidMaps::surfaces(const Rigid3& a_from_b) const {
+OverlapCheck::Surfaces OverlapCheck::surfaces(const Rigid3& a_from_b) const {
   Surfaces sum;
   lay_surfaces(b_.part, a_.part, a_from_b, sum);
   lay_surfaces(a_.part, b_.part, a_from_b.inverse(), sum);
   return sum;
 }
 
-LaidOver LaidMaps::fit(const Rigid3& a_from_b) const {
-  LaidOver sum;
+MapOverlap OverlapCheck::fit(const Rigid3& a_from_b) const {
+  MapOverlap sum;
   lay(b_, a_, a_from_b, sum);
   lay(a_, b_, a_from_b.inverse(), sum);
   return sum;

@@ -13,12 +13,12 @@
 
 namespace plumbline::mapping {
 
-class LaidMaps {
+class OverlapCheck {
  public:
-  LaidMaps(const MapPart& a, const MapPart& b);
+  OverlapCheck(const MapPart& a, const MapPart& b);
 
   /// The fit of b laid over a.
-  [[nodiscard]] LaidOver fit(const geometry::Rigid3& a_from_b) const;
+  [[nodiscard]] MapOverlap fit(const geometry::Rigid3& a_from_b) const;
 
   /// Surface samples of each map, at their place in the other, of which its cameras saw anything and that
   /// face them: where they saw a surface too, and where they saw through.
@@ -56,9 +56,9 @@ class LaidMaps {
   };
   static Side side(const MapPart& part);
   static Landmark landmark(const maps::Map& map, core::PointId id);
-  bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, LaidOver& sum) const;
+  bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, MapOverlap& sum) const;
   /// `matched`: where (in the fixed map's world) landmarks match, added to it; may be null.
-  void lay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved, LaidOver& sum,
+  void lay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved, MapOverlap& sum,
            std::vector<Eigen::Vector3d>* matched = nullptr) const;
   static void vote(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
                    const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps);

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Would another alignment do as well?
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "merging/laid_over.hpp"
+#include "merging/map_fusion_sets.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using geometry::Rigid3;
+
+constexpr double kApart_m = 1.0;     // another place: more than maps drift within what they share
+constexpr double kTurned_rad = 0.3;  // ... or so far turned
+constexpr int kFewLandmarks = 30;    // tell nothing
+constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
+// What rules an alignment out that no landmark speaks against: so many surfaces seen through ...
+constexpr double kNoRival = 0.2;
+constexpr int kSurfaces = 500;
+// ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.
+constexpr int kSpots = 3;
+constexpr double kNoRivalOfFewSpots = 0.1;
+constexpr int kFewSurfaces = 100;
+
+/// How far apart two alignments put the camera of b's keyframes that agree, and how far they turn it.
+struct Difference {
+  double metres = 0.0;
+  double radians = 0.0;
+  [[nodiscard]] bool elsewhere() const { return metres > kApart_m || radians > kTurned_rad; }
+};
+
+Difference between(const maps::Map& b, core::KeyframeId at, const Rigid3& one, const Rigid3& other) {
+  const Eigen::Vector3d camera = b.camera_from_world(at).inverse().translation;
+  return {(one * camera - other * camera).norm(),
+          geometry::rotation_angle(one.rotation.transpose() * other.rotation)};
+}
+
+bool refuted(const MapOverlap& fit, const MapFusionOptions& options) {
+  return fit.expected + fit.contradicted >= kFewLandmarks && fit.seen_through() > options.max_seen_through;
+}
+
+/// Landmarks match beyond chance and nothing speaks against it. Not many can: what repeats was seen from
+/// nearer at one end of the step and from afar at the other, and looks little alike then.
+bool fits_too(const MapOverlap& fit, const MapOverlap& best, const MapFusionOptions& options) {
+  constexpr double kSigmas = 2.5;
+  constexpr double kLeast = 8.0;
+  const double beyond_chance = fit.matched - fit.chance;
+  return fit.expected >= kFewLandmarks && !refuted(fit, options) && beyond_chance >= kLeast &&
+         beyond_chance >= kSigmas * std::sqrt(fit.chance) && fit.share() >= options.rival_fit * best.share();
+}
+
+struct Alternative {
+  Rigid3 a_from_b;
+  Difference apart;
+  int support = 0;  ///< keyframes that speak for it; 0: landmarks alone
+  MapOverlap fit;
+  bool refuted = false;
+};
+
+std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b,
+                                      const OverlapCheck& laid) {
+  std::vector<Alternative> result;
+  for (std::size_t i = 1; i < sets.sets.size(); ++i) {
+    const std::vector<PlacePair> places = sets.places_of(i);
+    const Rigid3 other = mean_alignment(maps, places).a_from_b;
+    const Difference apart = between(maps.map_b(), places.front().b, a_from_b, other);
+    if (apart.elsewhere()) result.push_back({other, apart, support(sets.sets[i]), {}, false});
+  }
+  std::vector<VerifiedPair> agreeing;
+  for (const std::size_t i : sets.sets.front().members) agreeing.push_back(sets.pairs[i]);
+  const core::KeyframeId at = sets.places_of(0).front().b;
+  for (const Rigid3& other : laid.steps(a_from_b, agreeing, kApart_m)) {
+    result.push_back({other, between(maps.map_b(), at, a_from_b, other), 0, {}, false});
+  }
+  return result;
+}
+
+/// Held against the maps. Surfaces are asked where landmarks leave it open; what landmarks alone speak for
+/// must show at several spots.
+void check_against_maps(const OverlapCheck& laid, const Rigid3& a_from_b, const MapOverlap& best,
+                        const MapFusionOptions& options, Alternative& other) {
+  other.fit = laid.fit(other.a_from_b);
+  other.refuted = other.support > 0 ? refuted(other.fit, options) : !fits_too(other.fit, best, options);
+  if (other.refuted) return;
+  const OverlapCheck::Surfaces surfaces = laid.surfaces(other.a_from_b);
+  other.refuted = surfaces.contradict(kNoRival, kSurfaces);
+  if (other.refuted || other.support > 0 || !surfaces.contradict(kNoRivalOfFewSpots, kFewSurfaces)) return;
+  const Eigen::Vector3d step = other.a_from_b.translation - a_from_b.translation;
+  other.refuted = laid.matching_spots(other.a_from_b, step) < kSpots;
+}
+
+std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
+
+}  // namespace
+
+int support(const ConsistentSet& set) { return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b)); }
+
+Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b) {
+  const OverlapCheck laid(maps.parts[maps.a], maps.parts[maps.b]);
+  Ambiguity result;
+  result.overlap = laid.fit(a_from_b);
+  std::vector<Alternative> others = alternatives(maps, sets, a_from_b, laid);
+  maps.executor.parallel_for(others.size(), [&](std::size_t i) {
+    check_against_maps(laid, a_from_b, result.overlap, maps.options, others[i]);
+  });
+  for (const Alternative& other : others) {
+    if (other.refuted) continue;
+    result.alternative = std::max(result.alternative, other.support);
+    if (!fits_too(other.fit, result.overlap, maps.options) ||
+        other.fit.share() <= result.alternative_overlap.share()) {
+      continue;
+    }
+    result.alternative_overlap = other.fit;
+    result.alternative_m = other.apart.metres;
+  }
+  return result;
+}
+
+std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options) {
+  const MapOverlap& overlap = ambiguity.overlap;
+  if (overlap.expected + overlap.contradicted >= kFewLandmarks && overlap.seen_through() > kWrong) {
+    return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",
+                       percent(overlap.seen_through()));
+  }
+  const bool few = agreeing < options.min_pairs;
+  if (few && !fits_too(overlap, overlap, options)) {
+    return fmt::format(
+        "only {} keyframes agree on how the maps lie, and laid over each other the maps have too little in "
+        "common: of {} landmarks {} match, {} were seen through",
+        agreeing, overlap.expected, overlap.matched, overlap.contradicted);
+  }
+  // One keyframe may be mistaken; two that agree are an alternative. Few have no such alternatives at all.
+  if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.rival * agreeing) {
+    return fmt::format(
+        "two answers exclude each other: {} keyframes say one thing, {} another; places look alike here",
+        agreeing, ambiguity.alternative);
+  }
+  if (ambiguity.alternative_m > 0.0) {
+    return fmt::format(
+        "places look alike here: {:.1f} m away the maps fit too ({} of the landmarks are found instead of "
+        "{}, "
+        "and {} seen through)",
+        ambiguity.alternative_m, percent(ambiguity.alternative_overlap.share()), percent(overlap.share()),
+        percent(ambiguity.alternative_overlap.seen_through()));
+  }
+  return {};
+}
+
+}  // namespace plumbline::mapping
