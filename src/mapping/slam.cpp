@@ -28,8 +28,8 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
 }
 
-static SightingNoise noise_of(const SlamOptions& options) {
-  SightingNoise noise = options.mapper.bundle_noise;
+static ObservationNoise noise_of(const SlamOptions& options) {
+  ObservationNoise noise = options.mapper.bundle_noise;
   noise.orb_scale_factor = options.tracker.association.scale_factor;
   return noise;
 }
@@ -167,7 +167,7 @@ void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {
   if (options_.mapper.bundle) bundle_.request(map_, newest, frame_count_);
 }
 
-void Slam::settle_bundles() {
+void Slam::commit_bundles() {
   while (!bundle_.idle()) {
     BundleReport ignored;
     put_back_bundle(ignored);
@@ -178,9 +178,9 @@ void Slam::settle_bundles() {
 /// frame is tracked against the map as it is then, whatever the clock says.
 void Slam::close_loops(core::KeyframeId keyframe) {
   if (!options_.loops.enabled) return;
-  const std::vector<Loop> loops = closer_.look(map_, keyframe);
+  const std::vector<Loop> loops = closer_.detect(map_, keyframe);
   if (loops.empty()) return;
-  settle_bundles();
+  commit_bundles();
   const Rigid3 camera_from_keyframe =
       tracker_.camera_from_world() * map_.camera_from_world(keyframe).inverse();
   std::vector<PoseEdge> edges;
@@ -189,7 +189,7 @@ void Slam::close_loops(core::KeyframeId keyframe) {
   tracker_.map_changed(map_, keyframe, camera_from_keyframe * map_.camera_from_world(keyframe));
 }
 
-void Slam::finish() { settle_bundles(); }
+void Slam::finish() { commit_bundles(); }
 
 geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frame_poses(), map_); }
 

@@ -16,14 +16,15 @@ double BundleRound::cost(const BundleState& state) {
     const Rigid3& pose = state.poses[at(slots_.pose[slot])];
     for (std::size_t i = equations_.points.slot_begin[slot]; i < equations_.points.slot_begin[slot + 1];
          ++i) {
-      point_terms_[i].world = state.points[at(equations_.points.sightings[i].landmark)];
+      point_terms_[i].world = state.points[at(equations_.points.observations[i].landmark)];
       Eigen::Vector3d r;
       const int rows = point_residual(point_terms_[i], pose, problem_.camera, r, nullptr);
       sum += Huber{options_.point_loss}.cost(rows == 0 ? kBehind : r.squaredNorm());
     }
     for (std::size_t i = equations_.lines.slot_begin[slot]; i < equations_.lines.slot_begin[slot + 1]; ++i) {
-      const Eigen::Vector4d r = line_rows(line_views_[i], projection_, pose,
-                                          state.lines[at(equations_.lines.sightings[i].landmark)], nullptr);
+      const Eigen::Vector4d r =
+          line_rows(line_views_[i], projection_, pose,
+                    state.lines[at(equations_.lines.observations[i].landmark)], nullptr);
       sum += Huber{options_.line_loss}.cost(r.squaredNorm());
     }
   }
@@ -41,7 +42,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   Vector6d gradient = Vector6d::Zero();
   double sum = 0.0;
   for (std::size_t i = equations_.points.slot_begin[slot]; i < equations_.points.slot_begin[slot + 1]; ++i) {
-    point_terms_[i].world = state.points[at(equations_.points.sightings[i].landmark)];
+    point_terms_[i].world = state.points[at(equations_.points.observations[i].landmark)];
     Eigen::Vector3d r;
     Eigen::Matrix<double, 3, 6> j;
     if (point_residual(point_terms_[i], pose, problem_.camera, r, &j) == 0) {
@@ -68,7 +69,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   LineDerivatives j;
   for (std::size_t i = equations_.lines.slot_begin[slot]; i < equations_.lines.slot_begin[slot + 1]; ++i) {
     const Eigen::Vector4d r = line_rows(line_views_[i], projection_, pose,
-                                        state.lines[at(equations_.lines.sightings[i].landmark)], &j);
+                                        state.lines[at(equations_.lines.observations[i].landmark)], &j);
     const double squared = r.squaredNorm();
     const double weight = Huber{options_.line_loss}.weight(squared);
     sum += Huber{options_.line_loss}.cost(squared);

@@ -16,7 +16,7 @@ std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmar
 
 }  // namespace
 
-UsedSightings::UsedSightings(const BundleProblem& problem) {
+UsedObservations::UsedObservations(const BundleProblem& problem) {
   const std::vector<int> point_views =
       views(problem.point_observations, &BundlePointObservation::point, problem.points.size());
   for (std::size_t i = 0; i < problem.point_observations.size(); ++i) {
@@ -49,7 +49,7 @@ BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& opti
                                             problem.camera.cy)),
       slots_(problem),
       reduced_(slots_.free) {
-  add_sightings();
+  add_observations();
   for (const BundleEdge& edge : problem.edges)
     equations_.edges.push_back(
         {slots_.of_pose[at(edge.a)], slots_.of_pose[at(edge.b)], EdgeView(edge), true});
@@ -58,8 +58,8 @@ BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& opti
   equations_.damping.resize(at(slots_.free));
 }
 
-void BundleRound::add_sightings() {
-  UsedSightings used(problem_);
+void BundleRound::add_observations() {
+  UsedObservations used(problem_);
   const auto by_slot = [&](std::vector<int>& numbers, const auto& observations) {
     std::stable_sort(numbers.begin(), numbers.end(), [&](int a, int b) {
       return slots_.of_pose[at(observations[at(a)].pose)] < slots_.of_pose[at(observations[at(b)].pose)];
@@ -68,14 +68,14 @@ void BundleRound::add_sightings() {
   by_slot(used.points, problem_.point_observations);
   for (const int i : used.points) {
     const BundlePointObservation& o = problem_.point_observations[at(i)];
-    equations_.points.sightings.push_back({slots_.of_pose[at(o.pose)], o.point});
+    equations_.points.observations.push_back({slots_.of_pose[at(o.pose)], o.point});
     point_terms_.push_back(to_term(o));
   }
   equations_.points.prepare(slots_.pose.size(), problem_.points.size());
   by_slot(used.lines, problem_.line_observations);
   for (const int i : used.lines) {
     const BundleLineObservation& o = problem_.line_observations[at(i)];
-    equations_.lines.sightings.push_back({slots_.of_pose[at(o.pose)], o.line});
+    equations_.lines.observations.push_back({slots_.of_pose[at(o.pose)], o.line});
     line_views_.emplace_back(o, problem_.camera);
   }
   equations_.lines.prepare(slots_.pose.size(), problem_.lines.size());

@@ -120,7 +120,7 @@ class BundleRound {
   [[nodiscard]] std::vector<geometry::Matrix6d> covariances(const BundleState& state);
 
  private:
-  void add_sightings();
+  void add_observations();
   [[nodiscard]] double cost(const BundleState& state);
   double linearise(const BundleState& state);
   double linearise_slot(std::size_t slot, const BundleState& state);
@@ -134,7 +134,7 @@ class BundleRound {
   const BundleOptions& options_;
   Eigen::Matrix3d projection_;
   PoseSlots slots_;
-  std::vector<PointTerm> point_terms_;  ///< of each sighting
+  std::vector<PointTerm> point_terms_;  ///< of each observation
   std::vector<LineView> line_views_;
   NormalEquations equations_;
   SchurComplement reduced_;

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "observability.hpp"
+#include "observable_directions.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/align_points.hpp"
 
@@ -147,7 +147,7 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
 void FrameAligner::associate_intensity(const AlignmentRound& round) {
   if (!in_.options.photometric) return;
   const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
-                     settle_photometric(*problem_.photometric, result_.camera_from_world);
+                     update_photometric(*problem_.photometric, result_.camera_from_world);
   if (!again) {
     problem_.photometric = in_.photometric.associate(
         in_.map, in_.local_map.keyframes, round.pyramid_level,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a pose that was found is worth.
 #include "frame_aligner.hpp"
-#include "observability.hpp"
+#include "observable_directions.hpp"
 
 namespace plumbline::tracking {
 namespace {

@@ -33,8 +33,9 @@ struct MapFusionOptions {
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
-  double rival = 0.1;       ///< a second answer with so many keyframes, as share of the best one, is a doubt
-  double rival_fit = 0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
+  double alternative = 0.1;  ///< a second answer with so many keyframes, as share of the best one, is a doubt
+  double alternative_share =
+      0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
   double max_seen_through = 0.06;  ///< share of landmarks seen through that refutes such an answer
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
@@ -65,7 +66,7 @@ struct VerifiedPair {
 };
 
 /// One map laid over another: landmarks of either one, at their place in the other.
-struct MapOverlap {
+struct OverlayFit {
   int expected = 0;      ///< where the other one measured a surface, from a like side and distance
   int matched = 0;       ///< of these, that the other one has too
   int contradicted = 0;  ///< where the other one saw through
@@ -100,9 +101,9 @@ struct Alignment {
 
 /// Would another alignment do as well?
 struct Ambiguity {
-  MapOverlap overlap;   ///< the maps, as aligned
+  OverlayFit overlap;   ///< the maps, as aligned
   int alternative = 0;  ///< keyframes that speak for another one that the maps do not refute, at most
-  MapOverlap alternative_overlap;  ///< as the best other one has it that they do not refute, and
+  OverlayFit alternative_overlap;  ///< as the best other one has it that they do not refute, and
   double alternative_m = 0.0;      ///< how far off it puts b's cameras; 0: there is none
 };
 
@@ -155,16 +156,16 @@ class OverlapFinder {
   void add(const maps::Map& map, core::KeyframeId keyframe);
   /// Keyframes of other parts that look like this one, best first. `before`: the keyframe before it of its
   /// robot, or an invalid id.
-  std::vector<Candidate> look(const std::vector<MapPart>& parts, std::size_t part, core::KeyframeId keyframe,
-                              core::KeyframeId before);
+  std::vector<Candidate> recognise(const std::vector<MapPart>& parts, std::size_t part,
+                                   core::KeyframeId keyframe, core::KeyframeId before);
   /// The same for all keyframes of all parts, one after the other; the keyframe before each is that of the
   /// lower id.
   std::vector<Candidate> look_at_all(const std::vector<MapPart>& parts, const core::Executor& executor);
   [[nodiscard]] const MapFusionOptions& options() const { return options_; }
 
  private:
-  std::vector<Candidate> look(const places::Database::Scores& scores, const std::vector<MapPart>& parts,
-                              std::size_t part, core::KeyframeId keyframe, core::KeyframeId before);
+  std::vector<Candidate> recognise(const places::Database::Scores& scores, const std::vector<MapPart>& parts,
+                                   std::size_t part, core::KeyframeId keyframe, core::KeyframeId before);
 
   MapFusionOptions options_;
   places::Database database_;

@@ -101,7 +101,7 @@ class Slam {
   void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
   void set_reference(core::KeyframeId keyframe);
   void put_back_bundle(BundleReport& report);
-  void settle_bundles();
+  void commit_bundles();
   void close_loops(core::KeyframeId keyframe);
 
   SlamOptions options_;

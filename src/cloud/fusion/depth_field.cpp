@@ -232,7 +232,7 @@ core::Result<std::vector<View>> sample_views(const std::vector<std::size_t>& vie
       return;
     }
     poses[i] = world_from_camera[view] * sensor_pose(**cloud);
-    if (!is_look(**cloud, camera)) result[i] = sampled(**cloud, camera);
+    if (!is_depth_view(**cloud, camera)) result[i] = sampled(**cloud, camera);
   });
   for (const auto& one : done) {
     if (!one) return tl::unexpected<core::Error>(one.error());
@@ -330,8 +330,8 @@ void DepthField::correct(Cloud& camera_cloud) const {
 
 void DepthFieldOptions::declare(core::OptionTable& table) {
   table.integer("depth_field.views", views, {kLeastViews, 10000}, "", "Views that are compared at most");
-  table.integer("depth_field.partners", partners, {1, 100}, "", "Views that each is compared with");
-  table.number("depth_field.least_gain", least_gain, {0.0, 1.0}, "",
+  table.integer("depth_field.views_per_view", partners, {1, 100}, "", "Views that each is compared with");
+  table.number("depth_field.min_gain", least_gain, {0.0, 1.0}, "",
                "Share of the disagreement between views that a correction must take away to be used");
 }
 
@@ -341,8 +341,8 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
                                           const DepthFieldOptions& options, const core::Executor& executor,
                                           DepthFieldReport* report) {
   DepthFieldReport unused;
-  DepthFieldReport& told = report == nullptr ? unused : *report;
-  told = {};
+  DepthFieldReport& found = report == nullptr ? unused : *report;
+  found = {};
   const std::size_t count = std::min(views.size(), static_cast<std::size_t>(options.views));
   std::vector<geometry::Rigid3> poses;
   const auto samples = sample_views(views, count, world_from_camera, read, camera, executor, poses);
@@ -357,17 +357,17 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
   });
   std::vector<const Rows*> all;
   for (const Comparison& c : comparisons) all.push_back(&c.rows);
-  told.samples = count_of(all);
-  if (told.samples < kLeastSamples) return DepthField();
+  found.samples = count_of(all);
+  if (found.samples < kLeastSamples) return DepthField();
 
   auto disagreement = cross_validate(comparisons, count, camera, executor);
   if (!disagreement) return DepthField();
-  told.before = median(disagreement->before);
-  told.after = median(disagreement->after);
-  told.used = told.after <= (1.0 - options.least_gain) * told.before;
-  if (!told.used) return DepthField();
+  found.before = median(disagreement->before);
+  found.after = median(disagreement->after);
+  found.used = found.after <= (1.0 - options.least_gain) * found.before;
+  if (!found.used) return DepthField();
   const DepthField field = fitted(all, camera, executor);
-  told.most_at_2m = most_at_2m(all, field);
+  found.most_at_2m = most_at_2m(all, field);
   return field;
 }
 

@@ -79,7 +79,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.boolean("keyframe.reuse", reuse,
                 "Plain rule: where an older keyframe serves as well, track against that one again instead of "
                 "making another");
-  table.integer("keyframe.cone_patience", cone_patience, {0, 10000}, "",
+  table.integer("keyframe.cone_max_wait", cone_patience, {0, 10000}, "",
                 "Cone rule: after so many frames a bundle under way no longer holds a keyframe up");
   table.number("keyframe.cone_max_shared", cone_max_shared, {0.05, 1.0}, "",
                "Cone rule: no keyframe while a larger share of the last one's landmarks is matched");

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "merging/laid_over.hpp"
 #include "merging/map_fusion_sets.hpp"
 
 namespace plumbline::mapping {
@@ -18,11 +17,11 @@ constexpr double kTurned_rad = 0.3;  // ... or so far turned
 constexpr int kFewLandmarks = 30;    // tell nothing
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
 // What rules an alignment out that no landmark speaks against: so many surfaces seen through ...
-constexpr double kNoRival = 0.2;
+constexpr double kNoAlternative = 0.2;
 constexpr int kSurfaces = 500;
 // ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.
 constexpr int kSpots = 3;
-constexpr double kNoRivalOfFewSpots = 0.1;
+constexpr double kNoAlternativeOfFewSpots = 0.1;
 constexpr int kFewSurfaces = 100;
 
 /// How far apart two alignments put the camera of b's keyframes that agree, and how far they turn it.
@@ -38,30 +37,31 @@ Difference between(const maps::Map& b, core::KeyframeId at, const Rigid3& one, c
           geometry::rotation_angle(one.rotation.transpose() * other.rotation)};
 }
 
-bool refuted(const MapOverlap& fit, const MapFusionOptions& options) {
+bool refuted(const OverlayFit& fit, const MapFusionOptions& options) {
   return fit.expected + fit.contradicted >= kFewLandmarks && fit.seen_through() > options.max_seen_through;
 }
 
 /// Landmarks match beyond chance and nothing speaks against it. Not many can: what repeats was seen from
 /// nearer at one end of the step and from afar at the other, and looks little alike then.
-bool fits_too(const MapOverlap& fit, const MapOverlap& best, const MapFusionOptions& options) {
+bool fits_as_well(const OverlayFit& fit, const OverlayFit& best, const MapFusionOptions& options) {
   constexpr double kSigmas = 2.5;
   constexpr double kLeast = 8.0;
   const double beyond_chance = fit.matched - fit.chance;
   return fit.expected >= kFewLandmarks && !refuted(fit, options) && beyond_chance >= kLeast &&
-         beyond_chance >= kSigmas * std::sqrt(fit.chance) && fit.share() >= options.rival_fit * best.share();
+         beyond_chance >= kSigmas * std::sqrt(fit.chance) &&
+         fit.share() >= options.alternative_share * best.share();
 }
 
 struct Alternative {
   Rigid3 a_from_b;
   Difference apart;
   int support = 0;  ///< keyframes that speak for it; 0: landmarks alone
-  MapOverlap fit;
+  OverlayFit fit;
   bool refuted = false;
 };
 
 std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b,
-                                      const OverlapCheck& laid) {
+                                      const MapOverlay& laid) {
   std::vector<Alternative> result;
   for (std::size_t i = 1; i < sets.sets.size(); ++i) {
     const std::vector<PlacePair> places = sets.places_of(i);
@@ -80,14 +80,15 @@ std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets
 
 /// Held against the maps. Surfaces are asked where landmarks leave it open; what landmarks alone speak for
 /// must show at several spots.
-void check_against_maps(const OverlapCheck& laid, const Rigid3& a_from_b, const MapOverlap& best,
+void check_against_maps(const MapOverlay& laid, const Rigid3& a_from_b, const OverlayFit& best,
                         const MapFusionOptions& options, Alternative& other) {
   other.fit = laid.fit(other.a_from_b);
-  other.refuted = other.support > 0 ? refuted(other.fit, options) : !fits_too(other.fit, best, options);
+  other.refuted = other.support > 0 ? refuted(other.fit, options) : !fits_as_well(other.fit, best, options);
   if (other.refuted) return;
-  const OverlapCheck::Surfaces surfaces = laid.surfaces(other.a_from_b);
-  other.refuted = surfaces.contradict(kNoRival, kSurfaces);
-  if (other.refuted || other.support > 0 || !surfaces.contradict(kNoRivalOfFewSpots, kFewSurfaces)) return;
+  const MapOverlay::Surfaces surfaces = laid.surfaces(other.a_from_b);
+  other.refuted = surfaces.contradict(kNoAlternative, kSurfaces);
+  if (other.refuted || other.support > 0 || !surfaces.contradict(kNoAlternativeOfFewSpots, kFewSurfaces))
+    return;
   const Eigen::Vector3d step = other.a_from_b.translation - a_from_b.translation;
   other.refuted = laid.matching_spots(other.a_from_b, step) < kSpots;
 }
@@ -99,7 +100,7 @@ std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share
 int support(const ConsistentSet& set) { return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b)); }
 
 Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b) {
-  const OverlapCheck laid(maps.parts[maps.a], maps.parts[maps.b]);
+  const MapOverlay laid(maps.parts[maps.a], maps.parts[maps.b]);
   Ambiguity result;
   result.overlap = laid.fit(a_from_b);
   std::vector<Alternative> others = alternatives(maps, sets, a_from_b, laid);
@@ -109,7 +110,7 @@ Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3&
   for (const Alternative& other : others) {
     if (other.refuted) continue;
     result.alternative = std::max(result.alternative, other.support);
-    if (!fits_too(other.fit, result.overlap, maps.options) ||
+    if (!fits_as_well(other.fit, result.overlap, maps.options) ||
         other.fit.share() <= result.alternative_overlap.share()) {
       continue;
     }
@@ -120,20 +121,20 @@ Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3&
 }
 
 std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options) {
-  const MapOverlap& overlap = ambiguity.overlap;
+  const OverlayFit& overlap = ambiguity.overlap;
   if (overlap.expected + overlap.contradicted >= kFewLandmarks && overlap.seen_through() > kWrong) {
     return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",
                        percent(overlap.seen_through()));
   }
   const bool few = agreeing < options.min_pairs;
-  if (few && !fits_too(overlap, overlap, options)) {
+  if (few && !fits_as_well(overlap, overlap, options)) {
     return fmt::format(
         "only {} keyframes agree on how the maps lie, and laid over each other the maps have too little in "
         "common: of {} landmarks {} match, {} were seen through",
         agreeing, overlap.expected, overlap.matched, overlap.contradicted);
   }
   // One keyframe may be mistaken; two that agree are an alternative. Few have no such alternatives at all.
-  if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.rival * agreeing) {
+  if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.alternative * agreeing) {
     return fmt::format(
         "two answers exclude each other: {} keyframes say one thing, {} another; places look alike here",
         agreeing, ambiguity.alternative);

@@ -106,16 +106,18 @@ void OverlapFinder::add(const maps::Map& map, KeyframeId keyframe) {
   if (features != nullptr) database_.add(keyframe, features);
 }
 
-std::vector<OverlapFinder::Candidate> OverlapFinder::look(const std::vector<MapPart>& parts, std::size_t part,
-                                                          KeyframeId keyframe, KeyframeId before) {
+std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const std::vector<MapPart>& parts,
+                                                               std::size_t part, KeyframeId keyframe,
+                                                               KeyframeId before) {
   const auto& features = parts[part].map->keyframe(keyframe).features;
   if (features == nullptr) return {};
-  return look(database_.query(*features), parts, part, keyframe, before);
+  return recognise(database_.query(*features), parts, part, keyframe, before);
 }
 
-std::vector<OverlapFinder::Candidate> OverlapFinder::look(const places::Database::Scores& scores,
-                                                          const std::vector<MapPart>& parts, std::size_t part,
-                                                          KeyframeId keyframe, KeyframeId before) {
+std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const places::Database::Scores& scores,
+                                                               const std::vector<MapPart>& parts,
+                                                               std::size_t part, KeyframeId keyframe,
+                                                               KeyframeId before) {
   std::vector<Candidate> result;
   const auto neighbours = [&](KeyframeId id) {
     std::vector<KeyframeId> around;
@@ -132,7 +134,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look(const places::Database
     return where != part && where != parts.size();
   };
   const KeyframeId usual = before.valid() && database_.contains(before) ? before : KeyframeId{};
-  for (const places::Candidate& c : recogniser_.look(scores, keyframe, usual, allowed, neighbours)) {
+  for (const places::Candidate& c : recogniser_.recognise(scores, keyframe, usual, allowed, neighbours)) {
     result.push_back({keyframe, c.keyframe, part, part_of(parts, c.keyframe), c.score});
   }
   return result;
@@ -165,7 +167,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
     });
     for (std::size_t i = 0; i < scores.size(); ++i) {  // in order: who looks remembers what it saw
       const Query& q = queries[first + i];
-      const std::vector<Candidate> found = look(scores[i], parts, q.part, q.keyframe, q.before);
+      const std::vector<Candidate> found = recognise(scores[i], parts, q.part, q.keyframe, q.before);
       candidates.insert(candidates.end(), found.begin(), found.end());
     }
   }

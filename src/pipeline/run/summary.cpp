@@ -51,7 +51,7 @@ nlohmann::ordered_json trials_of(const RunSummary& summary) {
                     {"contradiction", rounded(e.contradiction)},
                     {"correction_m", rounded(trial.correction_m)},
                     {"correction_rad", rounded(trial.correction_rad)},
-                    {"way_m", rounded(trial.way_m)}});
+                    {"path_m", rounded(trial.path_m)}});
   }
   return list;
 }
@@ -85,12 +85,12 @@ nlohmann::ordered_json cloud_of(const RunSummary& summary) {
 
 /// What keyframes measured and the cloud does not hold, in words; empty: hardly anything.
 std::string left_out_text(const RunSummary& summary) {
-  constexpr double kWorthTelling_percent = 1.0;
+  constexpr double kWorthReporting_percent = 1.0;
   std::string text;
   for (const RunSummary::LeftOut& part : summary.left_out) {
     const double percent = 100.0 * static_cast<double>(part.points) /
                            static_cast<double>(std::max<std::size_t>(1, summary.measured_points));
-    if (percent < kWorthTelling_percent) continue;
+    if (percent < kWorthReporting_percent) continue;
     text += fmt::format("{}{:.0f} % by {}", text.empty() ? "" : ", ", percent, part.by);
   }
   return text.empty() ? text : text + ", of what keyframes measured (stage cloud)";
@@ -107,7 +107,7 @@ std::string left_out_of_map_text(const RunSummary& summary) {
   return text.empty() ? text : text + ", of the merged cloud";
 }
 
-nlohmann::ordered_json laid(const mapping::MapOverlap& fit) {
+nlohmann::ordered_json laid(const mapping::OverlayFit& fit) {
   return {{"expected", fit.expected},
           {"matched", fit.matched},
           {"chance", rounded(fit.chance)},
@@ -172,7 +172,7 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"verified", e.consistency.verified},
                                     {"refused", refused},
                                     {"agreeing", e.consistency.agreeing},
-                                    {"rival", e.ambiguity.alternative},
+                                    {"alternative", e.ambiguity.alternative},
                                     {"laid_over", laid(e.ambiguity.overlap)},
                                     {"expected", e.validation.expected},
                                     {"confirmed", e.validation.confirmed},
@@ -186,8 +186,8 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"span_rad", rounded(e.consistency.span_rad)},
                                     {"spread_m", rounded(e.alignment.spread_m)}};
     if (e.ambiguity.alternative_m > 0.0) {
-      entry["rival_m"] = rounded(e.ambiguity.alternative_m);
-      entry["rival_laid_over"] = laid(e.ambiguity.alternative_overlap);
+      entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
+      entry["alternative_overlay"] = laid(e.ambiguity.alternative_overlap);
     }
     if (e.accepted) add_alignment(e.alignment, entry);
     if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);

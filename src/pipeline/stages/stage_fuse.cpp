@@ -75,7 +75,7 @@ class FuseStage : public Stage {
     if (keyframe->id.valid()) {
       places_[keyframe->id] = clouds_->size();
     } else {
-      between_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
+      intermediate_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
     }
     return clouds_->append(keyframe->compact.get(), io.frame());
   }
@@ -114,7 +114,7 @@ class FuseStage : public Stage {
     summary.up = frame_.up;
     summary.yaw = frame_.yaw;
     summary.output_from_map = frame_.output_from_map;
-    summary.depth_fields = told_fields_;
+    summary.depth_fields = reported_fields_;
   }
 
  private:
@@ -138,7 +138,7 @@ class FuseStage : public Stage {
       if (!bytes) return fail(bytes.error());
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
-      between_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
+      intermediate_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
       if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     return {};
@@ -166,7 +166,7 @@ class FuseStage : public Stage {
       views.push_back({found->second, keyframe.id.robot, keyframe.stamp, keyframe.world_from_camera});
     }
     std::map<std::int32_t, geometry::Trajectory> trajectories;
-    for (const Between& between : between_) {
+    for (const IntermediateFrame& between : intermediate_) {
       const auto known = trajectories.find(between.robot);
       const geometry::Trajectory& poses =
           known != trajectories.end()
@@ -204,12 +204,12 @@ class FuseStage : public Stage {
     cloud::FusionReport report;
     auto fused = cloud::fuse_views(laid, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
-        "{} clouds{}, fused in {} tiles; {} points seen through, {} of dust; colour gains {:.2f} "
+        "{} clouds{}, fused in {} tiles; {} points seen through, {} isolated; colour gains {:.2f} "
         "to {:.2f}",
         views.size(),
         clouds_->bytes() > 0 ? fmt::format(", {:.1f} MB", static_cast<double>(clouds_->bytes()) / 1e6)
                              : std::string(),
-        report.tiles, report.seen_through, report.dust, report.least_gain, report.most_gain));
+        report.tiles, report.seen_through, report.isolated, report.least_gain, report.most_gain));
     return fused;
   }
 
@@ -241,7 +241,7 @@ class FuseStage : public Stage {
       const auto info = std::find_if(map.robots.begin(), map.robots.end(),
                                      [number = robot](const RobotInfo& r) { return r.number == number; });
       const std::string name = info != map.robots.end() ? info->name : std::string();
-      told_fields_.push_back({name, report, *field});
+      reported_fields_.push_back({name, report, *field});
       context_->log->debug(fmt::format(
           "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
           "explains: {}",
@@ -307,15 +307,15 @@ class FuseStage : public Stage {
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;             ///< camera frame
   std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
-  /// A cloud of a frame between keyframes.
-  struct Between {
+  /// A cloud of a frame intermediate keyframes.
+  struct IntermediateFrame {
     std::int32_t robot = 0;
     double stamp = 0.0;
     std::size_t place = 0;  ///< among the clouds
   };
-  std::vector<Between> between_;
+  std::vector<IntermediateFrame> intermediate_;
   std::shared_ptr<FusionState> state_ = std::make_shared<FusionState>();
-  std::vector<RunSummary::DepthField> told_fields_;
+  std::vector<RunSummary::DepthField> reported_fields_;
   std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
   UpFrame frame_;
   std::size_t points_ = 0;

@@ -48,7 +48,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
                             ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
                             : std::nullopt);
   }
-  const std::size_t best = likeliest_guess(agreement);
+  const std::size_t best = best_hypothesis(agreement);
   const Rigid3 likeliest = poses[best];
   if (best > 0) {
     poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(best));

@@ -2,7 +2,7 @@
 // What the motion model holds of a pose, and how much it believes of a step.
 #include <gtest/gtest.h>
 
-#include "../../../src/tracking/observability.hpp"
+#include "../../../src/tracking/observable_directions.hpp"
 
 namespace plumbline::tracking {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "observability.hpp"
+#include "observable_directions.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
