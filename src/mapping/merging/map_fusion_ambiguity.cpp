@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "merging/map_fusion_sets.hpp"
+#include "merging/map_overlay.hpp"
 
 namespace plumbline::mapping {
 namespace {
