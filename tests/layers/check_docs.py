@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the pages: check_docs.py ROOT PROGRAM
 
-Links to files and headings of the tree must lead somewhere, every page of docs/ is in an index, every `plumbline` command in
-a page is one that the program has, with the flags it is shown with (but for the notes, which keep the commands of their
-day), and what the guide's pages are long together is bounded.
+Links to files and headings of the tree must lead somewhere, as must names of pages in sources; every page of
+docs/ is in an index; every `plumbline` command in a page is one that the program has, with the flags it is shown
+with (but for the notes, which keep the commands of their day); and the guide's pages together are not too long.
 """
 import functools
 import re
@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
+PAGE = re.compile(r"docs/[\w/.-]+\.md")
 GUIDE_LINES = 1200
 BLOCK = re.compile(r"^```[a-z]*\n(.*?)^```", re.S | re.M)
 
@@ -24,7 +25,8 @@ def pages(root):
 def anchors(page):
     """The headings of a page as GitHub names them in links."""
     text = BLOCK.sub("", page.read_text())
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in re.findall(r"^#+ (.+)$", text, re.M)}
+    headings = re.findall(r"^#+ (.+)$", text, re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def check_links(root):
@@ -48,9 +50,21 @@ def check_index(root):
     docs = root / "docs"
     listed = set()
     for index in docs.rglob("README.md"):
-        listed |= {(index.parent / target).resolve() for target, _ in LINK.findall(index.read_text()) if target}
+        listed |= {(index.parent / target).resolve() for target, _ in LINK.findall(index.read_text())}
     return [f"docs/README.md:1: does not list {page.relative_to(docs)}" for page in pages(root)
             if docs in page.parents and page != docs / "README.md" and page.resolve() not in listed]
+
+
+def check_citations(root):
+    """Pages that sources and messages name are there."""
+    problems = []
+    for folder in ("src", "include", "maps", "viz", "pipelines", "examples", "scripts"):
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix in (".hpp", ".cpp", ".idl", ".yaml", ".sh", ".txt"):
+                for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+                    gone = [page for page in PAGE.findall(line) if not (root / page).exists()]
+                    problems += [f"{file.relative_to(root)}:{number}: {page} is not there" for page in gone]
+    return problems
 
 
 def check_length(root):
@@ -101,7 +115,8 @@ def check_commands(root, help_of):
 
 
 def check(root, help_of):
-    return check_links(root) + check_index(root) + check_length(root) + check_commands(root, help_of)
+    return (check_links(root) + check_index(root) + check_citations(root) + check_length(root) +
+            check_commands(root, help_of))
 
 
 def main(root, program):

@@ -23,11 +23,13 @@ class CheckDocs(unittest.TestCase):
         self.root = Path(folder.name)
         (self.root / "docs" / "notes").mkdir(parents=True)
         (self.root / "docs" / "guide").mkdir()
-        self.write("docs/README.md", "[a](a.md) [up](../README.md#a-place-here) [notes](notes/README.md) [web](https://example.org/x)\n")
+        self.write("docs/README.md", "[a](a.md) [up](../README.md#a-place-here) [notes](notes/README.md) "
+                   "[web](https://example.org/x)\n")
         self.write("docs/a.md", "words\n")
         self.write("docs/notes/README.md", "[old](old.md)\n")
         self.write("docs/notes/old.md", "```\nplumbline gone\n```\n")
-        self.write("README.md", "[docs](docs/README.md)\n\n## A place, here\n\n```\nplumbline map IN -o OUT --every 2  # --nonsense\n"
+        self.write("README.md", "[docs](docs/README.md)\n\n## A place, here\n\n"
+                   "```\nplumbline map IN -o OUT --every 2  # --nonsense\n"
                    "build/release/bin/plumbline evaluate cloud C --align se3\nplumb x\n```\n")
 
     def write(self, path, text):
@@ -48,6 +50,11 @@ class CheckDocs(unittest.TestCase):
         self.write("docs/a.md", "# Words\n\n[b](#words) [c](#wards) [d](../README.md#a-place)\n")
         self.assertEqual(self.problems(), ["docs/a.md:3:  has no heading #wards",
                                            "docs/a.md:3: ../README.md has no heading #a-place"])
+
+    def test_source_that_names_a_page_that_is_gone(self):
+        (self.root / "src").mkdir()
+        self.write("src/a.cpp", "// docs/a.md\n// docs/old/b.md\n")
+        self.assertEqual(self.problems(), ["src/a.cpp:2: docs/old/b.md is not there"])
 
     def test_guide_that_is_too_long(self):
         self.write("docs/README.md", "[a](a.md) [notes](notes/README.md) [b](guide/b.md)\n")
