@@ -3,14 +3,16 @@
 """Runs what the guide's pages tell users to type: run_pages.py ROOT PROGRAM WORK
 
 Every ```sh block of docs/guide is run, one shell for a block, in the folder WORK; getting_started.md and
-several_robots.md come first, as the others go on with their results. Recordings are made small: fewer frames, smaller images. A comment before
-a block says what else is to be done with it:
+several_robots.md come first, as the others go on with their results. Recordings are made small: fewer frames,
+smaller images. A comment before a block says what else is to be done with it:
 
     <!-- not run: reason -->   it needs what a test has not, and is reported as skipped
     <!-- file: NAME -->        the block is written to WORK/NAME; <!-- append: NAME --> goes on with such a file
 
-A block with a plumbline command must be one of these.
+A block with a plumbline command must be one of these. At the end docs/reference/files.md must know every file,
+column and key of the results out/room and out/both.
 """
+import json
 import os
 import re
 import shutil
@@ -31,7 +33,7 @@ def small(script):
 
     script = re.sub(r"(--frames |frames=)(\d+)", fewer, script)
     script = re.sub(r"(synth:[a-z]+)\?", r"\1?width=320&height=240&", script)
-    script = re.sub(r"^(plumbline synth .*?)( *#.*)?$", rf"\1 --width 320 --height 240", script, flags=re.M)
+    script = re.sub(r"^(plumbline synth .*?)( *#.*)?$", r"\1 --width 320 --height 240", script, flags=re.M)
     script = re.sub(r"^(plumbline synth (?!.*--frames).*)$", rf"\1 --frames {FRAMES}", script, flags=re.M)
     # Not among the hubs and robots of others.
     return re.sub(r"^(plumbline (?:hub|robot) )", r"\1--domain 217 ", script, flags=re.M)
@@ -85,6 +87,24 @@ def do(step, work, program):
     return None
 
 
+def names(result):
+    """Files of a result, columns of its tables and keys of its summary."""
+    found = {file.name + ("/" if file.is_dir() else "") for file in result.iterdir()}
+    for table in ("frames.csv", "keyframes.csv"):
+        with open(result / table, encoding="utf-8") as file:
+            found |= set(file.readline().strip().split(","))
+    return found | set(json.loads((result / "summary.json").read_text(encoding="utf-8")))
+
+
+def check_files(root, work):
+    page = root / "docs" / "reference" / "files.md"
+    text = page.read_text(encoding="utf-8") if page.exists() else ""
+    known = set(re.findall(r"`([\w./]+?)(?:\*\.png|NAME/)?`", text))
+    return [f"docs/reference/files.md: does not tell of {name}, which {result} has"
+            for result in ("out/room", "out/both") if (work / result / "summary.json").is_file()
+            for name in sorted(names(work / result) - known)]
+
+
 def main(root, program, work):
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
@@ -93,6 +113,7 @@ def main(root, program, work):
     for page in pages:
         for step in steps(page.name, page.read_text(encoding="utf-8")):
             problems += filter(None, [do(step, work, program)])
+    problems += check_files(root, work)
     print("\n".join(problems + [f"{len(pages)} pages, {len(problems)} problems"]))
     return 1 if problems or not pages else 0
 

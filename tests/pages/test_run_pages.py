@@ -52,6 +52,19 @@ class RunPages(unittest.TestCase):
         code, out = self.run_page("```\nplumbline map\n```\n")
         self.assertEqual((code, "a.md:2: is no ```sh block" in out), (1, True), out)
 
+    def test_files_that_no_page_tells_of(self):
+        (self.root / "docs" / "reference").mkdir()
+        (self.root / "docs" / "reference" / "files.md").write_text(
+            "`frames.csv` `keyframes.csv` `summary.json` `frame`, `stamp` `snapshots/*.png` `input`")
+        result = self.root / "out" / "room"
+        (result / "snapshots").mkdir(parents=True)
+        (result / "frames.csv").write_text("frame,stamp,odd\n0,1,2\n")
+        (result / "keyframes.csv").write_text("frame\n")
+        (result / "summary.json").write_text('{"input": "a", "more": 1}')
+        self.assertEqual(run_pages.check_files(self.root, self.root),
+                         ["docs/reference/files.md: does not tell of more, which out/room has",
+                          "docs/reference/files.md: does not tell of odd, which out/room has"])
+
     def test_recordings_are_small(self):
         self.assertEqual(run_pages.small("plumbline synth room -o w --frames 900  # x\nplumbline synth plane -o p\n"),
                          "plumbline synth room -o w --frames 80 --width 320 --height 240\n"
