@@ -37,11 +37,11 @@ KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe,
   entry.data = std::move(keyframe);
   entry.pose = camera_from_world;
   keyframes_.insert(id, std::move(entry));
-  forget_patches({id.robot, id.index - kPatchedKeyframes});
+  erase_patches({id.robot, id.index - kPatchedKeyframes});
   return id;
 }
 
-void Map::forget_patches(KeyframeId id) {
+void Map::erase_patches(KeyframeId id) {
   if (!id.valid() || !keyframes_.contains(id)) return;
   std::shared_ptr<const Keyframe>& data = keyframes_.at(id).data;
   if (data->features == nullptr || data->features->patches.empty()) return;

@@ -50,7 +50,7 @@ template <typename IdType, typename Landmark>
 std::vector<LandmarkPage<Landmark>> touched(const IdMap<IdType, Landmark>& all, std::uint64_t since) {
   constexpr std::int32_t kPage = IdMap<IdType, Landmark>::kIdsPerPage;
   std::vector<LandmarkPage<Landmark>> pages;
-  for (const auto& [robot, number] : all.touched_pages(since)) {
+  for (const auto& [robot, number] : all.changed_pages(since)) {
     LandmarkPage<Landmark> page{robot, number, {}};
     for (std::int32_t i = number * kPage; i < (number + 1) * kPage; ++i) {
       if (const Landmark* landmark = all.find({robot, i})) page.landmarks.push_back(*landmark);
@@ -62,7 +62,7 @@ std::vector<LandmarkPage<Landmark>> touched(const IdMap<IdType, Landmark>& all, 
 
 }  // namespace
 
-MapChanges Map::changes_since(const MapMoment& moment) const {
+MapChanges Map::changes_since(const MapRevision& moment) const {
   MapChanges changes;
   changes.whole = moment.points == 0 && moment.lines == 0 && moment.edges == 0;
   for (const KeyframeId id : keyframes_.ids()) {

@@ -12,7 +12,7 @@ using core::ErrorKind;
 
 /// Opens the store and gives `read` one moment of it.
 template <typename Read>
-auto at_one_moment(const std::filesystem::path& file, const Read& read) {
+auto in_one_transaction(const std::filesystem::path& file, const Read& read) {
   return guarded(file, ErrorKind::kInput, [&] {
     check_file(file);
     Database database(file, Database::Access::kRead);
@@ -79,12 +79,12 @@ void read_rows(Database& database, std::size_t place, std::int64_t number, ByteW
 }  // namespace
 
 core::Result<StoreHeads> store_heads(const std::filesystem::path& file) {
-  return at_one_moment(file, [](Database& database) { return read_heads(database); });
+  return in_one_transaction(file, [](Database& database) { return read_heads(database); });
 }
 
 core::Result<std::optional<StoreTransaction>> next_transaction(const std::filesystem::path& file,
                                                                StoreShare share, std::int64_t after) {
-  return at_one_moment(file, [&](Database& database) -> std::optional<StoreTransaction> {
+  return in_one_transaction(file, [&](Database& database) -> std::optional<StoreTransaction> {
     const std::int64_t number = next_number(database, share, after);
     if (number == 0) return std::nullopt;
     ByteWriter rows;

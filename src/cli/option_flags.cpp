@@ -66,9 +66,9 @@ core::Result<void> OptionFlags::apply() {
       auto list = core::parse_yaml(flag->text, "");
       if (list) value = std::move(*list);
     }
-    core::ConfigProblems told;
-    table_.set(flag->key, value, "", told);
-    for (core::ConfigProblem& problem : told) {
+    core::ConfigProblems found;
+    table_.set(flag->key, value, "", found);
+    for (core::ConfigProblem& problem : found) {
       problem.mark = {};
       problem.path = flag_name(flag->key);
       problems.push_back(std::move(problem));

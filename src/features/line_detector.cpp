@@ -77,25 +77,25 @@ bool along_border(const LineSegment& s, const cv::Rect& region, float margin) {
 }  // namespace
 
 void LineDetectorOptions::declare(core::OptionTable& table) {
-  table.choice("method", method,
+  table.choice("line.detector", method,
                {{"lsd", LineMethod::kLsd}, {"edlines", LineMethod::kEdlines}, {"fld", LineMethod::kFld}},
                "Line detector");
   table.choice(
-      "scale", scale, {{"half", LineScale::kHalf}, {"full", LineScale::kFull}},
+      "line.scale", scale, {{"half", LineScale::kHalf}, {"full", LineScale::kFull}},
       "Resolution at which edges are looked for; positions are refined at full resolution either way");
-  table.number("min_gradient", min_gradient, {0.5, 100.0}, "",
+  table.number("line.min_gradient", min_gradient, {0.5, 100.0}, "",
                "LSD: weakest gradient, grey levels per pixel of the detection image; under 5.2 only where "
                "strong ones are few");
-  table.number("min_length", min_length_px, {5.0, 1000.0}, "px", "Shorter lines are dropped");
-  table.number("border", border_px, {0.0, 100.0}, "px",
+  table.number("line.min_length", min_length_px, {5.0, 1000.0}, "px", "Shorter lines are dropped");
+  table.number("line.border", border_px, {0.0, 100.0}, "px",
                "Lines that run within this margin of a side are dropped");
-  table.integer("max_count", max_count, {0, 10000}, "", "Keep the longest so many lines; 0 keeps all");
-  table.boolean("join", join, "Join collinear pieces and drop near-duplicates");
-  table.number("join_gap", join_gap_px, {0.0, 200.0}, "px",
+  table.integer("line.max_count", max_count, {0, 10000}, "", "Keep the longest so many lines; 0 keeps all");
+  table.boolean("line.join", join, "Join collinear pieces and drop near-duplicates");
+  table.number("line.join_gap", join_gap_px, {0.0, 200.0}, "px",
                "Largest gap between collinear pieces that are joined");
-  table.number("join_angle", join_angle_rad, {0.0, 0.5}, "rad",
+  table.number("line.join_angle", join_angle_rad, {0.0, 0.5}, "rad",
                "Largest angle between pieces that are joined");
-  table.number("join_offset", join_offset_px, {0.0, 20.0}, "px",
+  table.number("line.join_offset", join_offset_px, {0.0, 20.0}, "px",
                "Largest sideways offset of pieces that are joined");
 }
 

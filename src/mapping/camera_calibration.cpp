@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "plumbline/geometry/velocity.hpp"
-#include "plumbline/mapping/sighting_noise.hpp"
+#include "plumbline/mapping/observation_noise.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -28,7 +28,7 @@ constexpr int kLeastViews = 3;
 constexpr int kLeastObservations = 300;
 
 /// Everything that was seen; problems are made of parts of it.
-struct Sightings {
+struct Observations {
   struct Point {
     Eigen::Vector3d position;
     std::vector<CalibrationObservation> seen;  ///< `pose` counts the keyframes here; `point` is not set
@@ -53,9 +53,10 @@ std::vector<std::pair<core::KeyframeId, int>> chosen(const maps::Map& map, int w
   return result;
 }
 
-void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Camera& camera, Sightings& to) {
+void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Camera& camera,
+             Observations& to) {
   const geometry::Trajectory path = maps::trajectory(*run.frames, *run.map);
-  const SightingNoise noise;
+  const ObservationNoise noise;
   std::map<core::KeyframeId, int> index;
   for (const auto& [id, part] : chosen(*run.map, wanted)) {
     index[id] = static_cast<int>(to.poses.size());
@@ -68,7 +69,7 @@ void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Ca
   }
   for (const core::PointId id : run.map->point_ids()) {
     const maps::MapPoint& point = run.map->point(id);
-    Sightings::Point sighting{point.position, {}};
+    Observations::Point observation{point.position, {}};
     for (const maps::Observation& o : point.observations) {
       const auto pose = index.find(o.keyframe);
       if (pose == index.end()) continue;
@@ -84,9 +85,9 @@ void add_run(const CalibrationRun& run, int number, int wanted, const sensor::Ca
       seen.ray =
           camera.color.unproject(static_cast<double>(f.pixel.x()), static_cast<double>(f.pixel.y()), 1.0)
               .head<2>();
-      sighting.seen.push_back(seen);
+      observation.seen.push_back(seen);
     }
-    if (static_cast<int>(sighting.seen.size()) >= kLeastViews) to.points.push_back(std::move(sighting));
+    if (static_cast<int>(observation.seen.size()) >= kLeastViews) to.points.push_back(std::move(observation));
   }
 }
 
@@ -97,7 +98,7 @@ struct Share {
   [[nodiscard]] bool has(int part) const { return (only < 0 || part == only) && part != without; }
 };
 
-CalibrationProblem make_problem(const Sightings& all, const Share& share, const sensor::Camera& camera,
+CalibrationProblem make_problem(const Observations& all, const Share& share, const sensor::Camera& camera,
                                 const CameraChange& change, const CalibrationOptions& options) {
   CalibrationProblem problem;
   problem.camera = camera;
@@ -108,7 +109,7 @@ CalibrationProblem make_problem(const Sightings& all, const Share& share, const 
                          options.distortion_prior, options.distortion_prior};
   std::vector<int> index(all.poses.size(), -1);
   std::vector<char> anchored(all.poses.size(), 0);  // by run
-  for (const Sightings::Point& point : all.points) {
+  for (const Observations::Point& point : all.points) {
     const auto in_share = [&](const CalibrationObservation& o) {
       return share.has(all.part[static_cast<std::size_t>(o.pose)]);
     };
@@ -154,7 +155,7 @@ struct Trial {
 
 class Calibrator {
  public:
-  Calibrator(const Sightings& all, const sensor::Camera& given, const CalibrationOptions& options,
+  Calibrator(const Observations& all, const sensor::Camera& given, const CalibrationOptions& options,
              const core::Executor& executor)
       : all_(all), given_(given), options_(options), executor_(executor) {}
 
@@ -194,7 +195,7 @@ class Calibrator {
   }
 
  private:
-  const Sightings& all_;
+  const Observations& all_;
   const sensor::Camera& given_;
   const CalibrationOptions& options_;
   const core::Executor& executor_;
@@ -247,19 +248,19 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                                                  const sensor::Camera& given,
                                                  const CalibrationOptions& options,
                                                  const core::Executor& executor) {
-  Sightings all;
+  Observations all;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     add_run(runs[i], static_cast<int>(i), options.keyframes / static_cast<int>(runs.size()), given, all);
   }
   CameraCalibration result;
   result.keyframes = static_cast<int>(all.poses.size());
-  for (const Sightings::Point& p : all.points) result.observations += static_cast<int>(p.seen.size());
+  for (const Observations::Point& p : all.points) result.observations += static_cast<int>(p.seen.size());
   const Calibrator calibrator(all, given, options, executor);
   Trial best = calibrator.try_out({});
   if (result.keyframes < kLeastKeyframes || result.observations < kLeastObservations ||
       !std::isfinite(best.cost())) {
     return core::input_error(fmt::format(
-        "{} keyframes with {} sightings of points that three or more of them share are too little "
+        "{} keyframes with {} observations of points that three or more of them share are too little "
         "to tell the camera by; film a place with texture for 10 s or more, turning and moving",
         result.keyframes, result.observations));
   }

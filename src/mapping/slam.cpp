@@ -35,8 +35,8 @@ static int points_with_depth(const features::FrameFeatures& features) {
                                         [](const features::PointFeature& f) { return f.depth > 0.0F; }));
 }
 
-static SightingNoise noise_of(const SlamOptions& options) {
-  SightingNoise noise = options.mapper.bundle_noise;
+static ObservationNoise noise_of(const SlamOptions& options) {
+  ObservationNoise noise = options.mapper.bundle_noise;
   noise.orb_scale_factor = options.tracker.association.scale_factor;
   return noise;
 }
@@ -81,7 +81,7 @@ void Slam::set_shutter(std::optional<double> readout_s) {
 }
 
 /// Keyframes know how fast the camera turned because that shears their pictures; not with all rows at once.
-double Slam::shear_rate() const { return all_rows_at_once_ ? 0.0 : tracker_.turn_rate(); }
+double Slam::distorting_turn_rate() const { return all_rows_at_once_ ? 0.0 : tracker_.turn_rate(); }
 
 /// A camera that turns up far from where it was lost must pass as a loop would: corridors look alike from
 /// both ends. Near by there is nothing to confuse.
@@ -120,7 +120,7 @@ void Slam::start_map(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {
   tracking::TrackResult origin;
   report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, {}, {}, 0.0);
-  remember_picture(frame, report.keyframe);
+  record_image(frame, report.keyframe);
   report.reference = report.keyframe;
   report.state = tracking::TrackState::kTracked;
   rule_.keyframe_made();
@@ -180,7 +180,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   if (track.state == tracking::TrackState::kInitialising) {
     if (!can_start_map(frame)) return report;
     start_map(frame, features, report);
-    remember_pose(frame.stamp, Rigid3{}, true);
+    record_pose(frame.stamp, Rigid3{}, true);
     return report;
   }
   report.reference = tracker_.reference();
@@ -192,26 +192,26 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame,
   report.weak_directions = track.weak_directions;
   report.relocalised = track.relocalised;
   if (track.state != tracking::TrackState::kTracked) {
-    remember_pose(frame.stamp, track.camera_from_world, false);
+    record_pose(frame.stamp, track.camera_from_world, false);
     return report;
   }
   last_camera_from_world_ = track.camera_from_world;
   const auto step = motion_since_last(track.camera_from_world);  // in the map that it was tracked in
-  mapper_.count_sightings(map_, track);
+  mapper_.count_observations(map_, track);
   report.decision =
       rule_.decide(map_, tracker_.reference(), track, camera_,
                    {static_cast<int>(features->points.size()), bundle_.idle(), points_with_depth(*features)});
-  if (report.decision.wanted && !report.decision.urgent) return_to_known_ground(report);
+  if (report.decision.wanted && !report.decision.urgent) switch_reference(report);
   if (report.decision.wanted) make_keyframe(frame, features, taken->levels, report);
-  remember_pose(frame.stamp, last_camera_from_world_, true);
+  record_pose(frame.stamp, last_camera_from_world_, true);
   frames_.back().camera_from_previous = step;
   frames_.back().step_sigma_m = track.sigma_m();
   if (options_.tracker.align_stamps) report.depth_from_camera = motion_to_depth(frame, frames_, map_);
   return report;
 }
 
-void Slam::return_to_known_ground(FrameReport& report) {
-  const core::KeyframeId known = rule_.known_ground(map_, tracker_.reference(), last_track_, camera_);
+void Slam::switch_reference(FrameReport& report) {
+  const core::KeyframeId known = rule_.earlier_reference(map_, tracker_.reference(), last_track_, camera_);
   if (!known.valid()) return;
   report.decision.wanted = false;
   report.reference = known;
@@ -222,14 +222,14 @@ void Slam::return_to_known_ground(FrameReport& report) {
 void Slam::make_keyframe(const sensor::RgbdFrame& frame,
                          const std::shared_ptr<const features::FrameFeatures>& features,
                          const std::vector<cv::Mat>& levels, FrameReport& report) {
-  report.keyframe =
-      mapper_.insert(map_, robot_, frame, features, last_track_, levels, tracker_.reference(), shear_rate());
+  report.keyframe = mapper_.insert(map_, robot_, frame, features, last_track_, levels, tracker_.reference(),
+                                   distorting_turn_rate());
   report.reference = report.keyframe;
   if (options_.mapper.edges && options_.tracker.depth) {
     mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_, tracker_.photometric(),
                               tracker_.local_map().keyframes);
   }
-  remember_picture(frame, report.keyframe);
+  record_image(frame, report.keyframe);
   mapper_.refine(map_, report.keyframe);
   rule_.keyframe_made();
   tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
@@ -239,7 +239,7 @@ void Slam::make_keyframe(const sensor::RgbdFrame& frame,
   if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
 }
 
-void Slam::remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe) {
+void Slam::record_image(const sensor::RgbdFrame& frame, core::KeyframeId keyframe) {
   if (!options_.tracker.photometric || last_track_.photometric == nullptr) return;
   tracker_.add_photometric(
       keyframe,
@@ -268,7 +268,7 @@ std::optional<Rigid3> Slam::motion_since_last(const Rigid3& camera_from_world) c
   return camera_from_world * (last.camera_from_reference * map_.camera_from_world(last.reference)).inverse();
 }
 
-void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
+void Slam::record_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
   const core::KeyframeId reference = tracker_.reference();
   maps::FramePose pose;
   pose.stamp = stamp;
@@ -278,7 +278,7 @@ void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tra
   frames_.push_back(pose);
 }
 
-void Slam::settle_bundles() {
+void Slam::commit_bundles() {
   while (!bundle_.idle()) {
     BundleReport ignored;
     put_back_bundle(ignored);
@@ -288,9 +288,9 @@ void Slam::settle_bundles() {
 /// The whole map may move: what was taken from it before must be back. The tracker waits, so that the next
 /// frame is tracked against the map as it is then, whatever the clock says.
 void Slam::close_loops(core::KeyframeId keyframe) {
-  const std::vector<Loop> loops = closer_.look(map_, keyframe);
+  const std::vector<Loop> loops = closer_.detect(map_, keyframe);
   if (loops.empty()) return;
-  settle_bundles();
+  commit_bundles();
   const Rigid3 camera_from_keyframe = last_camera_from_world_ * map_.camera_from_world(keyframe).inverse();
   std::vector<PoseEdge> edges;
   for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
@@ -299,7 +299,7 @@ void Slam::close_loops(core::KeyframeId keyframe) {
   tracker_.map_changed(map_, keyframe, last_camera_from_world_);
 }
 
-void Slam::finish() { settle_bundles(); }
+void Slam::finish() { commit_bundles(); }
 
 geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frames_, map_); }
 

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Everything that is told, into hub.log as well, with the time of day.
+/// Everything that is reported, into hub.log as well, with the time of day.
 class LogFile : public core::Log {
  public:
   LogFile(const fs::path& file, core::Log& next) : file_(file, std::ios::app), next_(next) {}
@@ -126,7 +126,7 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
 core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
                                            core::Log& console, const core::StopToken& stop,
                                            const Status& status, const pipeline::Progress& progress,
-                                           pipeline::Leftovers* leftovers) {
+                                           pipeline::DeferredDestruction* deferred_destruction) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto options = checked(request.network, true);
   if (!options) return fail(options.error());
@@ -150,9 +150,9 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   }
   // Why somebody with foreign keys gets nothing only the hub learns.
   const bool secured = !options->security.empty();
-  auto bus = open_hub_bus(*options, [&log, secured, told = 0](const std::string& line) mutable {
-    constexpr int kMostTold = 50;
-    const bool keys = secured && line.find("ertificate") != std::string::npos && ++told <= kMostTold;
+  auto bus = open_hub_bus(*options, [&log, secured, reported = 0](const std::string& line) mutable {
+    constexpr int kMostReported = 50;
+    const bool keys = secured && line.find("ertificate") != std::string::npos && ++reported <= kMostReported;
     log.write(keys ? core::LogLevel::kWarning : core::LogLevel::kDebug, "DDS: " + line);
   });
   if (!bus) return fail(bus.error());
@@ -182,7 +182,8 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   last.maps = maps;
   last.output = folder / "fused";
   last.replace = true;
-  auto summary = pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress, leftovers);
+  auto summary =
+      pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress, deferred_destruction);
   if (!summary) return fail(summary.error());
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;

@@ -20,9 +20,9 @@ constexpr auto kWait = 50ms;
 constexpr auto kSayAgain = 500ms;
 constexpr auto kLookForOthers = 2500ms;
 constexpr auto kTroubleLasts = 3s;
-constexpr int kPiecesAtATime = 4;        // of one robot, before the next one's
-constexpr std::size_t kMostRobots = 64;  // when their number was not said
-constexpr std::size_t kMostTold = 200;   // what strangers do fills no disk
+constexpr int kPiecesAtATime = 4;           // of one robot, before the next one's
+constexpr std::size_t kMostRobots = 64;     // when their number was not said
+constexpr std::size_t kMostReported = 200;  // what strangers do fills no disk
 constexpr const char* kDone = "done";
 
 std::string key_of(const std::string& robot, const char* what) {
@@ -103,8 +103,8 @@ core::Result<void> HubDesk::look_for_others(const core::StopToken& stop) {
   return {};
 }
 
-void HubDesk::tell_once(const std::string& message) {
-  if (told_.size() < kMostTold && told_.insert(message).second) log_.warning(message);
+void HubDesk::report_once(const std::string& message) {
+  if (reported_.size() < kMostReported && reported_.insert(message).second) log_.warning(message);
 }
 
 std::string HubDesk::refusal(const HeardHello& heard) const {
@@ -134,15 +134,15 @@ std::string HubDesk::refusal(const HeardHello& heard) const {
 
 void HubDesk::hear(const HeardHello& heard) {
   const Hello& hello = heard.hello;
-  if (!is_robot_name(hello.name)) return tell_once("a robot with a name that cannot be is not listened to");
+  if (!is_robot_name(hello.name)) return report_once("a robot with a name that cannot be is not listened to");
   if (heard.partition != hello.name) {
-    return tell_once(
+    return report_once(
         fmt::format("somebody who is not {} speaks in its name, and is not listened to", hello.name));
   }
   if (hello.run.empty()) return;
   const std::string why = refusal(heard);
   if (why.empty()) return let_in(hello);
-  tell_once(why);
+  report_once(why);
   Word word;
   word.robot = hello.name;
   word.run = hello.run;
@@ -155,7 +155,7 @@ void HubDesk::hear(const HeardHello& heard) {
 void HubDesk::let_in(const Hello& hello) {
   auto known = robots_.find(hello.name);
   const bool is_new = known == robots_.end();
-  const auto fail = [&](const core::Error& error) { tell_once(hello.name + ": " + error.message); };
+  const auto fail = [&](const core::Error& error) { report_once(hello.name + ": " + error.message); };
   if (is_new) {
     const auto added = add(hello);
     if (!added) return fail(added.error());
@@ -187,7 +187,7 @@ void HubDesk::close(HubRobot& robot) {
     robot.done = true;
     if (auto put = remember(robot); !put) {
       robot.done = false;
-      return tell_once(robot.name + ": " + put.error().message);
+      return report_once(robot.name + ": " + put.error().message);
     }
     log_.info(fmt::format("{}: everything is here, {} keyframes{}", robot.name, robot.copy().keyframes(),
                           robot.copy().complete() ? "" : "; its run did not come to its end"));
@@ -277,7 +277,7 @@ std::vector<RobotTraffic> HubDesk::serve(const core::StopToken& stop, const Stat
     for (const HeardHello& heard : bus_->hear()) hear(heard);
     for (const Word& word : bus_->hear_hubs()) {
       if (word.hub != id_ && word.up_s >= 0.0)
-        tell_once("another hub is there; robots stay with whom they found first");
+        report_once("another hub is there; robots stay with whom they found first");
     }
     for (auto& [name, robot] : robots_) take_pieces(robot);
     say_all();

@@ -53,7 +53,7 @@ class HubDesk {
   void close(HubRobot& robot);
   void say_all();
   void say(Word word);
-  void tell_once(const std::string& message);
+  void report_once(const std::string& message);
   [[nodiscard]] std::string line(double kbytes_per_s) const;
   [[nodiscard]] std::uint64_t received() const;
   [[nodiscard]] std::size_t done() const;
@@ -70,7 +70,7 @@ class HubDesk {
   std::map<std::string, HubRobot> robots_;
   std::vector<Word> last_words_;
   std::map<std::string, Clock::time_point> trouble_;  ///< until when a robot's pieces are not looked at
-  std::set<std::string> told_;
+  std::set<std::string> reported_;
 };
 
 }  // namespace plumbline::net

@@ -129,7 +129,7 @@ void RobotLink::run() {
       send();
       if (hello_changed_ || Clock::now() - said_at_ >= kSayEvery) say();
     }
-    tell_silence();
+    report_silence();
     const std::lock_guard<std::mutex> publish(published_mutex_);
     published_ = status_;
   }
@@ -144,9 +144,9 @@ void RobotLink::say() {
 }
 
 /// At the latest now somebody should know that nobody answers.
-void RobotLink::tell_silence() {
-  if (told_silence_ || status_.heard || Clock::now() - began_ < kSilence) return;
-  told_silence_ = true;
+void RobotLink::report_silence() {
+  if (silence_reported_ || status_.heard || Clock::now() - began_ < kSilence) return;
+  silence_reported_ = true;
   log_.warning(bus_->others() > 0
                    ? "no answer in 10 s; a participant is there: is it no hub, are keys missing or foreign?"
                    : "no answer in 10 s; is the hub started, in the same domain, and reachable?");
@@ -163,7 +163,8 @@ void RobotLink::take(const Word& word) {
   }
   if (hub_ != word.hub) {
     if (!hub_.empty() && Clock::now() - heard_at_ < kOtherHub) {
-      if (!std::exchange(told_foreign_, true)) log_.warning("another hub is there; it is not listened to");
+      if (!std::exchange(foreign_reported_, true))
+        log_.warning("another hub is there; it is not listened to");
       return;
     }
     log_.info("hub found");
@@ -185,8 +186,8 @@ void RobotLink::take(const Word& word) {
 
 void RobotLink::take_answer(const Word& word) {
   status_.problem = word.answer == Answer::kTrouble ? word.problem : "";
-  if (!word.problem.empty() && word.problem != told_problem_) log_.warning("hub: " + word.problem);
-  told_problem_ = word.problem;
+  if (!word.problem.empty() && word.problem != problem_reported_) log_.warning("hub: " + word.problem);
+  problem_reported_ = word.problem;
   if (word.answer == Answer::kRefused) {
     status_.refused = word.problem;
     return;

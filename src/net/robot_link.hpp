@@ -71,7 +71,7 @@ class RobotLink {
   void send_again();
   [[nodiscard]] Piece piece(std::uint32_t index) const;
   void say();
-  void tell_silence();
+  void report_silence();
   void note_lags();
 
   std::unique_ptr<RobotBus> bus_;
@@ -98,9 +98,9 @@ class RobotLink {
   std::uintmax_t store_size_ = 0;
   std::deque<std::pair<maps::StoreHeads, Clock::time_point>> noticed_;  ///< not acknowledged yet
   std::vector<double> lags_s_;
-  bool told_silence_ = false;
-  bool told_foreign_ = false;
-  std::string told_problem_;
+  bool silence_reported_ = false;
+  bool foreign_reported_ = false;
+  std::string problem_reported_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -15,14 +15,14 @@ double BundleRound::cost(const BundleState& state) {
   for (std::size_t slot = 0; slot < slot_pose_.size(); ++slot) {
     const Rigid3& pose = state.poses[at(slot_pose_[slot])];
     for (std::size_t i = points_.slot_begin[slot]; i < points_.slot_begin[slot + 1]; ++i) {
-      point_terms_[i].world = state.points[at(points_.sightings[i].landmark)];
+      point_terms_[i].world = state.points[at(points_.observations[i].landmark)];
       Eigen::Vector3d r;
       const int rows = point_residual(point_terms_[i], pose, problem_.camera, r, nullptr);
       sum += point_loss_.cost(rows == 0 ? kBehind : r.squaredNorm());
     }
     for (std::size_t i = lines_.slot_begin[slot]; i < lines_.slot_begin[slot + 1]; ++i) {
       const Eigen::Vector4d r = line_rows(line_views_[i], projection_, pose,
-                                          state.lines[at(lines_.sightings[i].landmark)], nullptr);
+                                          state.lines[at(lines_.observations[i].landmark)], nullptr);
       sum += line_loss_.cost(r.squaredNorm());
     }
   }
@@ -40,7 +40,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   Vector6d gradient = Vector6d::Zero();
   double sum = 0.0;
   for (std::size_t i = points_.slot_begin[slot]; i < points_.slot_begin[slot + 1]; ++i) {
-    point_terms_[i].world = state.points[at(points_.sightings[i].landmark)];
+    point_terms_[i].world = state.points[at(points_.observations[i].landmark)];
     Eigen::Vector3d r;
     Eigen::Matrix<double, 3, 6> j;
     if (point_residual(point_terms_[i], pose, problem_.camera, r, &j) == 0) {
@@ -66,7 +66,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   LineDerivatives j;
   for (std::size_t i = lines_.slot_begin[slot]; i < lines_.slot_begin[slot + 1]; ++i) {
     const Eigen::Vector4d r =
-        line_rows(line_views_[i], projection_, pose, state.lines[at(lines_.sightings[i].landmark)], &j);
+        line_rows(line_views_[i], projection_, pose, state.lines[at(lines_.observations[i].landmark)], &j);
     const double squared = r.squaredNorm();
     const double weight = line_loss_.weight(squared);
     sum += line_loss_.cost(squared);

@@ -16,7 +16,7 @@ std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmar
 
 }  // namespace
 
-UsedSightings::UsedSightings(const BundleProblem& problem) {
+UsedObservations::UsedObservations(const BundleProblem& problem) {
   const std::vector<int> point_views =
       views(problem.point_observations, &BundlePointObservation::point, problem.points.size());
   for (std::size_t i = 0; i < problem.point_observations.size(); ++i) {
@@ -40,7 +40,7 @@ BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& opti
       line_loss_{options.line_loss},
       edge_loss_{options.edge_loss} {
   choose_slots();
-  add_sightings();
+  add_observations();
   for (const BundleEdge& edge : problem.edges)
     edges_.push_back({slot_of_[at(edge.a)], slot_of_[at(edge.b)], EdgeView(edge), true});
   normal_.resize(at(free_));
@@ -63,8 +63,8 @@ void BundleRound::choose_slots() {
   }
 }
 
-void BundleRound::add_sightings() {
-  UsedSightings used(problem_);
+void BundleRound::add_observations() {
+  UsedObservations used(problem_);
   const auto by_slot = [&](std::vector<int>& numbers, const auto& observations) {
     std::stable_sort(numbers.begin(), numbers.end(), [&](int a, int b) {
       return slot_of_[at(observations[at(a)].pose)] < slot_of_[at(observations[at(b)].pose)];
@@ -73,14 +73,14 @@ void BundleRound::add_sightings() {
   by_slot(used.points, problem_.point_observations);
   for (const int i : used.points) {
     const BundlePointObservation& o = problem_.point_observations[at(i)];
-    points_.sightings.push_back({slot_of_[at(o.pose)], o.point});
+    points_.observations.push_back({slot_of_[at(o.pose)], o.point});
     point_terms_.push_back(to_term(o));
   }
   points_.prepare(slot_pose_.size(), problem_.points.size());
   by_slot(used.lines, problem_.line_observations);
   for (const int i : used.lines) {
     const BundleLineObservation& o = problem_.line_observations[at(i)];
-    lines_.sightings.push_back({slot_of_[at(o.pose)], o.line});
+    lines_.observations.push_back({slot_of_[at(o.pose)], o.line});
     line_views_.emplace_back(o, problem_.camera);
   }
   lines_.prepare(slot_pose_.size(), problem_.lines.size());

@@ -60,7 +60,7 @@ class BundleRound {
   };
 
   void choose_slots();
-  void add_sightings();
+  void add_observations();
   [[nodiscard]] double cost(const BundleState& state);
   double linearise(const BundleState& state);
   double linearise_slot(std::size_t slot, const BundleState& state);
@@ -89,7 +89,7 @@ class BundleRound {
   int free_ = 0;
   Points points_;
   Lines lines_;
-  std::vector<PointTerm> point_terms_;  ///< of each sighting
+  std::vector<PointTerm> point_terms_;  ///< of each observation
   std::vector<LineView> line_views_;
   std::vector<Edge> edges_;
 

@@ -41,13 +41,13 @@ template <typename Family>
 void BundleRound::eliminate(const Family& family, std::size_t slot) {
   const int row = static_cast<int>(slot);
   for (std::size_t i = family.slot_begin[slot]; i < family.slot_begin[slot + 1]; ++i) {
-    const auto landmark = at(family.sightings[i].landmark);
+    const auto landmark = at(family.observations[i].landmark);
     const typename Family::Cross y = family.cross[i] * family.inverse[landmark];
     pose_steps_.segment<6>(6 * row).noalias() += family.cross[i] * family.step[landmark];
     targets_.clear();
     for (std::size_t k = family.landmark_begin[landmark]; k < family.landmark_begin[landmark + 1]; ++k) {
       const auto other = at(family.by_landmark[k]);
-      const int column = family.sightings[other].slot;
+      const int column = family.observations[other].slot;
       if (column > row) break;
       targets_.push_back({block(row, column), family.cross[other].data()});
     }

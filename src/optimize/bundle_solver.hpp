@@ -37,8 +37,8 @@ RoundSummary solve_bundle_round(const BundleProblem& problem, const BundleOption
 RoundSummary solve_map_round(const BundleProblem& problem, const BundleOptions& options, BundleState& state);
 
 /// Observations that take part in a round, by number.
-struct UsedSightings {
-  explicit UsedSightings(const BundleProblem& problem);
+struct UsedObservations {
+  explicit UsedObservations(const BundleProblem& problem);
   std::vector<int> points;
   std::vector<int> lines;
 };

@@ -34,16 +34,16 @@ struct LandmarkFamily {
   using Square = Eigen::Matrix<double, kUnknowns, kUnknowns>;
   using Cross = Eigen::Matrix<double, 6, kUnknowns>;
 
-  struct Sighting {
+  struct Observation {
     int slot;
     int landmark;
   };
-  std::vector<Sighting> sightings;
-  std::vector<std::size_t> slot_begin;      ///< of each slot, into sightings
+  std::vector<Observation> observations;
+  std::vector<std::size_t> slot_begin;      ///< of each slot, into observations
   std::vector<std::size_t> landmark_begin;  ///< of each landmark, into by_landmark
-  std::vector<int> by_landmark;             ///< sightings of each landmark, in the order of their slots
+  std::vector<int> by_landmark;             ///< observations of each landmark, in the order of their slots
 
-  std::vector<Cross> cross;       ///< of each sighting: J_pose^T J_landmark
+  std::vector<Cross> cross;       ///< of each observation: J_pose^T J_landmark
   std::vector<Square> square;     ///< J_landmark^T J_landmark
   std::vector<Vector> gradients;  ///< J_landmark^T r
 
@@ -53,24 +53,24 @@ struct LandmarkFamily {
   std::vector<Square> inverse;  ///< of the damped Hessian
   std::vector<Vector> step;     ///< of the landmark alone, minus; then the step itself
 
-  /// `sightings` are there; the rest is made room for.
+  /// `observations` are there; the rest is made room for.
   void prepare(std::size_t slots, std::size_t landmarks) {
     slot_begin.assign(slots + 1, 0);
     landmark_begin.assign(landmarks + 1, 0);
-    for (const Sighting& s : sightings) {
+    for (const Observation& s : observations) {
       ++slot_begin[static_cast<std::size_t>(s.slot) + 1];
       ++landmark_begin[static_cast<std::size_t>(s.landmark) + 1];
     }
     for (std::size_t i = 1; i <= slots; ++i) slot_begin[i] += slot_begin[i - 1];
     for (std::size_t i = 1; i <= landmarks; ++i) landmark_begin[i] += landmark_begin[i - 1];
     std::vector<std::size_t> next(landmark_begin.begin(), landmark_begin.end() - 1);
-    by_landmark.resize(sightings.size());
-    for (std::size_t i = 0; i < sightings.size(); ++i) {
-      by_landmark[next[static_cast<std::size_t>(sightings[i].landmark)]++] = static_cast<int>(i);
+    by_landmark.resize(observations.size());
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      by_landmark[next[static_cast<std::size_t>(observations[i].landmark)]++] = static_cast<int>(i);
     }
-    cross.resize(sightings.size());
-    square.resize(sightings.size());
-    gradients.resize(sightings.size());
+    cross.resize(observations.size());
+    square.resize(observations.size());
+    gradients.resize(observations.size());
     damping.resize(landmarks);
     hessian.resize(landmarks);
     gradient.resize(landmarks);
@@ -118,8 +118,8 @@ struct LandmarkFamily {
       Vector pull = Vector::Zero();
       for (std::size_t i = landmark_begin[n]; i < landmark_begin[n + 1]; ++i) {
         const auto seen = static_cast<std::size_t>(by_landmark[i]);
-        if (sightings[seen].slot >= free_slots) break;
-        pull.noalias() += cross[seen].transpose() * pose_steps.segment<6>(6 * sightings[seen].slot);
+        if (observations[seen].slot >= free_slots) break;
+        pull.noalias() += cross[seen].transpose() * pose_steps.segment<6>(6 * observations[seen].slot);
       }
       step[n] = -(step[n] + inverse[n] * pull);
     }

@@ -57,7 +57,7 @@ class MapRound {
         edge_loss_(options.edge_loss),
         ceres_(borrowing()) {
     add_poses();
-    add_sightings();
+    add_observations();
     for (const BundleEdge& edge : problem.edges) add(edge, &edge_loss_);
     for (const BundleEdge& stay : holding_edges(problem, state)) add(stay, nullptr);
   }
@@ -95,8 +95,8 @@ class MapRound {
       ordering_->AddElementToGroup(unknowns_.pose(i), 1);
     }
   }
-  void add_sightings() {
-    const UsedSightings used(problem_);
+  void add_observations() {
+    const UsedObservations used(problem_);
     for (const int i : used.points) {
       const BundlePointObservation& o = problem_.point_observations[static_cast<std::size_t>(i)];
       double* point = unknowns_.point(static_cast<std::size_t>(o.point));

@@ -21,7 +21,7 @@ constexpr int kRoughIterations = 3;
 
 /// Every pose that is not fixed is held to where it is by 30 m and 30 rad: nothing beside a measurement, but
 /// enough for directions that no edge holds.
-constexpr double kHoldInformation = 1e-3;
+constexpr double kWeakInformation = 1e-3;
 
 /// The graph as Ceres wants it, with a weight for each edge that may change between solves. All poses in one
 /// array, so that the order of sums does not hang on where the heap puts them; the last one is the world.
@@ -39,7 +39,7 @@ class Solver {
       add({edge.a, edge.b, edge.b_from_a, edge.information}, losses_.back().get(), block(edge.a));
     }
     for (std::size_t i = 0; i < world; ++i) {
-      const geometry::Matrix6d hold = kHoldInformation * geometry::Matrix6d::Identity();
+      const geometry::Matrix6d hold = kWeakInformation * geometry::Matrix6d::Identity();
       if (!graph.poses[i].fixed)
         add({-1, static_cast<int>(i), graph.poses[i].camera_from_world, hold}, nullptr, block(world));
     }

@@ -31,20 +31,21 @@ void RecogniserOptions::declare(core::OptionTable& table) {
   table.number("places.min_absolute", min_absolute, {0.0, 1.0}, "", "Score of a candidate, at least");
   table.integer("places.consistent", consistent, {1, 100}, "",
                 "Keyframes in a row that must see the same surroundings");
-  table.integer("places.hits", hits, {1, 1000}, "", "Most similar keyframes that are grouped");
-  table.integer("places.groups", groups, {1, 100}, "", "Places that are verified per keyframe, at most");
+  table.integer("places.candidates", hits, {1, 1000}, "", "Most similar keyframes that are grouped");
+  table.integer("places.islands", groups, {1, 100}, "", "Places that are verified per keyframe, at most");
 }
 
-std::vector<Candidate> Recogniser::look(const Database& database, KeyframeId query,
-                                        const features::FrameFeatures& picture, KeyframeId neighbour,
-                                        const std::function<bool(KeyframeId)>& allowed,
-                                        const Neighbours& neighbours) {
-  return look(database.query(picture), query, neighbour, allowed, neighbours);
+std::vector<Candidate> Recogniser::recognise(const Database& database, KeyframeId query,
+                                             const features::FrameFeatures& picture, KeyframeId neighbour,
+                                             const std::function<bool(KeyframeId)>& allowed,
+                                             const Neighbours& neighbours) {
+  return recognise(database.query(picture), query, neighbour, allowed, neighbours);
 }
 
-std::vector<Candidate> Recogniser::look(const Database::Scores& scores, KeyframeId query,
-                                        KeyframeId neighbour, const std::function<bool(KeyframeId)>& allowed,
-                                        const Neighbours& neighbours) {
+std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, KeyframeId query,
+                                             KeyframeId neighbour,
+                                             const std::function<bool(KeyframeId)>& allowed,
+                                             const Neighbours& neighbours) {
   const double usual = neighbour.valid() ? scores.of(neighbour) : 0.0;
   const double threshold = std::max(options_.min_absolute, options_.min_score * usual);
   std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed);

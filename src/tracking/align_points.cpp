@@ -107,12 +107,12 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
   }
 }
 
-std::optional<Eigen::Vector2f> align_sighting(const maps::Map& map, const maps::Observation& seen,
-                                              const Eigen::Vector3d& position,
-                                              const std::vector<cv::Mat>& levels,
-                                              const Eigen::Vector2f& start, const sensor::Pinhole& camera,
-                                              const geometry::Rigid3& camera_from_world,
-                                              double scale_factor) {
+std::optional<Eigen::Vector2f> align_observation(const maps::Map& map, const maps::Observation& seen,
+                                                 const Eigen::Vector3d& position,
+                                                 const std::vector<cv::Mat>& levels,
+                                                 const Eigen::Vector2f& start, const sensor::Pinhole& camera,
+                                                 const geometry::Rigid3& camera_from_world,
+                                                 double scale_factor) {
   if (levels.empty()) return std::nullopt;
   const auto sight = sight_of(map, seen, position, Eigen::Vector3d::Zero(), camera, camera_from_world,
                               std::log(scale_factor));

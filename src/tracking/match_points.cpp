@@ -112,7 +112,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     int best_feature = -1;
     for (std::size_t i = 0; i < near.size(); ++i) {
       if (distances[i] < best) {
-        // Two corners of neighbouring octaves at one place are the same corner, not a rival.
+        // Two corners of neighbouring octaves at one place are the same corner, not an alternative.
         const bool same_place =
             best_feature >= 0 && (frame.points[static_cast<std::size_t>(best_feature)].pixel -
                                   frame.points[static_cast<std::size_t>(near[i])].pixel)

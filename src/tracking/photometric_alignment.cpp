@@ -101,10 +101,10 @@ std::optional<optimize::PhotometricFamily> associate_photometric(const features:
     family.terms.push_back(term);
   }
   if (static_cast<int>(family.terms.size()) < kMinPhotometric) return std::nullopt;
-  return settle_photometric(family, camera_from_world) ? std::optional(std::move(family)) : std::nullopt;
+  return update_photometric(family, camera_from_world) ? std::optional(std::move(family)) : std::nullopt;
 }
 
-bool settle_photometric(optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
+bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
   family.gain = 0.0;  // residuals are what is seen, in grey values
   family.sigma = 1.0;
   for (optimize::PhotometricTerm& term : family.terms) term.weight = 1.0F;
@@ -155,7 +155,7 @@ bool photometric_agrees(const optimize::PhotometricFamily& family, const Rigid3&
   return optimize::photometric_correlation(family, camera_from_world, kMinPhotometric) >= kMinCorrelation;
 }
 
-std::size_t likeliest_guess(const std::vector<std::optional<double>>& agreement) {
+std::size_t best_hypothesis(const std::vector<std::optional<double>>& agreement) {
   std::size_t best = 0;
   for (std::size_t i = 1; i < agreement.size(); ++i) {
     if (!agreement[i]) continue;

@@ -112,12 +112,12 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
   }
   if (pixels.size() < 200) return result;
 
-  constexpr double kLoss = 8.0;       // grey values
-  constexpr double kGreySigma = 4.0;  // what noise and interpolation leave
+  constexpr double kLoss = 8.0;            // grey values
+  constexpr double kIntensitySigma = 4.0;  // what noise and interpolation leave
   // Weak belief in the guess: 5 cm, 3 degrees. It holds what the picture does not show.
   Vector7d belief;
   belief << 400.0, 400.0, 400.0, 365.0, 365.0, 365.0, 0.0;
-  belief *= kGreySigma * kGreySigma;
+  belief *= kIntensitySigma * kIntensitySigma;
   Rigid3 pose = guess;
   double bias = cv::mean(current)[0] - cv::mean(previous)[0];
   double best = -1.0;

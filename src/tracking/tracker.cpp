@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "held_directions.hpp"
+#include "observable_directions.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/align_points.hpp"
 
@@ -163,14 +163,14 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
                           {kFineRadius_px, 0.03, 2400, 0, false, false}};
   constexpr std::size_t kFine = 2;  // the first of the fine rounds
   const PhotometricView view{features.photometric.get(), &frame.depth, depth_from_colour, camera_};
-  bool stiff = !motion_refuted_;
+  bool stiff = !motion_prior_rejected_;
   bool surface_alone = false;
-  std::optional<std::size_t> level_of_grey;  // what problem.photometric was made for
-  const auto see_grey = [&](std::size_t level) {
+  std::optional<std::size_t> intensity_level;  // what problem.photometric was made for
+  const auto see_intensity = [&](std::size_t level) {
     const bool again =
-        level_of_grey == level && problem.photometric && settle_photometric(*problem.photometric, pose);
+        intensity_level == level && problem.photometric && update_photometric(*problem.photometric, pose);
     if (!again) problem.photometric = photometric_family(map, view, level, pose);
-    level_of_grey = level;
+    intensity_level = level;
   };
   const auto run = [&](const Round& round) {
     if (round.rematch) {
@@ -195,7 +195,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
       problem.planes = associate_surface(local_map_.surface, frame.depth, camera_, pose, depth_from_colour,
                                          surface, &result.surface_in_view);
     }
-    if (options_.photometric) see_grey(round.photometric_level);
+    if (options_.photometric) see_intensity(round.photometric_level);
     solver.max_iterations = 4;
     result.estimate = optimize::solve_pose(problem, pose, solver);
     if (problem.photometric && !photometric_agrees(*problem.photometric, result.estimate.camera_from_world)) {
@@ -216,11 +216,12 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
     }
   };
   for (std::size_t i = radius > 0.0 ? 0 : kFine; i < std::size(rounds); ++i) run(rounds[i]);
-  if (stiff && surface_alone && problem.prior && refutes_motion(problem, result.estimate, predicted, pose)) {
+  if (stiff && surface_alone && problem.prior &&
+      rejects_motion_prior(problem, result.estimate, predicted, pose)) {
     stiff = false;
     for (std::size_t i = kFine; i < std::size(rounds); ++i) run(rounds[i]);
   }
-  result.motion_refuted =
+  result.motion_prior_rejected =
       surface_alone && !stiff && !motion_prior(result.estimate.information, predicted, Motion::kUnknown);
   result.camera_from_world = pose;
   judge(std::move(problem), result);
@@ -236,9 +237,11 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     remember(frame, *features, result);
     return result;
   }
-  const Features still = at_one_moment(frame, features, turning());
-  std::optional<TrackResult> found = stale() ? by_picture(map, frame, *still) : by_motion(map, frame, *still);
-  if (!found) found = stale() ? by_motion(map, frame, *still) : by_picture(map, frame, *still);
+  const Features still = synchronised(frame, features, turning());
+  std::optional<TrackResult> found =
+      outdated() ? by_relocalisation(map, frame, *still) : by_motion_model(map, frame, *still);
+  if (!found)
+    found = outdated() ? by_motion_model(map, frame, *still) : by_relocalisation(map, frame, *still);
   if (!found) {
     result.state = TrackState::kLost;
     result.camera_from_world = predict(frame.stamp);
@@ -247,7 +250,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
     return result;
   }
   found->features = still;
-  settle_shutter(map, frame, features, *found);
+  refine_rolling_shutter(map, frame, features, *found);
   found->continuous = knows_motion(frame.stamp);
   found->photometric = found->features->photometric;
   found->features = without_picture(*found->features, found->points, camera_);
@@ -257,8 +260,8 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
 
 /// The motion model lags behind a turn that changes. Now that the pose is known, so is the turn: where the
 /// difference can be seen, the pose is estimated once more.
-void Tracker::settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
-                             TrackResult& found) const {
+void Tracker::refine_rolling_shutter(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                     const Features& features, TrackResult& found) const {
   constexpr double kVisible_px = 1.0;  // at the first and the last row
   const double dt = frame.stamp - last_.stamp;
   if (options_.readout_s == 0.0 || !last_.valid || lost_frames_ > 0 || dt < 1e-4 || dt > 0.5) return;
@@ -268,7 +271,7 @@ void Tracker::settle_shutter(const maps::Map& map, const sensor::RgbdFrame& fram
   const Eigen::Vector3d before = turning();
   const Eigen::Vector3d now = before.isZero(0.0) ? mean : Eigen::Vector3d(mean + 0.5 * (mean - before));
   if ((now - before).norm() * 0.5 * options_.readout_s * camera_.fx < kVisible_px) return;
-  const Features still = at_one_moment(frame, features, now);
+  const Features still = synchronised(frame, features, now);
   TrackResult again = estimate(map, frame, *still, found.camera_from_world, kFineRadius_px);
   if (again.state != TrackState::kTracked) return;
   again.relocalised = found.relocalised;
@@ -285,14 +288,15 @@ void Tracker::remember(const sensor::RgbdFrame& frame, const features::FrameFeat
     velocity_ = geometry::log_se3(result.camera_from_world * last_.camera_from_world.inverse()) / dt;
     // Where little but the motion model holds the camera, steps are noise above all, and would run away with
     // it.
-    if (known && !result.motion_refuted) velocity_ -= kDoubt * (result.unheld * (velocity_ - before));
+    if (known && !result.motion_prior_rejected)
+      velocity_ -= kDoubt * (result.unobserved * (velocity_ - before));
     ++steps_;
     step_s_ = dt;
   } else {
-    stand();
+    reset();
   }
-  coasting_s_ = result.held_by_motion && last_.valid ? coasting_s_ + dt : 0.0;
-  motion_refuted_ = result.motion_refuted;
+  dead_reckoning_s_ = result.constrained_by_motion && last_.valid ? dead_reckoning_s_ + dt : 0.0;
+  motion_prior_rejected_ = result.motion_prior_rejected;
   lost_frames_ = 0;
   last_.stamp = frame.stamp;
   last_.camera_from_world = result.camera_from_world;

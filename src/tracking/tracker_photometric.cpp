@@ -10,10 +10,10 @@ using geometry::Rigid3;
 
 /// Before a bare wall thumbnails fit anywhere, and the motion model lags behind: grain tells which guess is
 /// the best, or how far to the side of it the camera looks.
-void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& view, Guesses& guesses) const {
+void Tracker::rank(const maps::Map& map, const PhotometricView& view, Hypotheses& hypotheses) const {
   constexpr std::size_t kCoarse = 1;
   constexpr double kSure = 0.3;  // correlation of what is looked for
-  std::vector<Rigid3>& poses = guesses.poses;
+  std::vector<Rigid3>& poses = hypotheses.poses;
   std::vector<std::optional<double>> agreement;
   std::vector<std::optional<optimize::PhotometricFamily>> families;
   for (const Rigid3& pose : poses) {
@@ -22,7 +22,7 @@ void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& v
                             ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
                             : std::nullopt);
   }
-  const std::size_t best = likeliest_guess(agreement);
+  const std::size_t best = best_hypothesis(agreement);
   const Rigid3 likeliest = poses[best];
   if (best > 0) {
     poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(best));
@@ -32,7 +32,7 @@ void Tracker::put_likeliest_first(const maps::Map& map, const PhotometricView& v
   const ShiftedPose shifted = search_shift(*families[best], likeliest);
   if (shifted.correlation < std::max(kSure, *agreement[best] + kBetterAgreement)) return;
   poses.insert(poses.begin(), shifted.camera_from_world);
-  guesses.sought = true;
+  hypotheses.sought = true;
 }
 
 /// The surroundings' samples that the picture shows from a pose: of the reference keyframe, or of the first

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a pose that was found is worth.
-#include "held_directions.hpp"
+#include "observable_directions.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
 namespace plumbline::tracking {
@@ -13,7 +13,7 @@ constexpr double kNoisy = 1e4;    // of 1 cm: a step of that accuracy is noise m
 constexpr double kAllTheSurface = 0.9;
 constexpr double kMostOfTheSurface = 0.75;
 constexpr double kNearlyHeld = 0.5;  // of the information that a direction needs
-constexpr double kLongestCoast_s = 2.5;
+constexpr double kLongestDeadReckoning_s = 2.5;
 
 }  // namespace
 
@@ -21,8 +21,8 @@ constexpr double kLongestCoast_s = 2.5;
 /// second along a bare wall it may be wrong by centimetres when the edge of a door comes into view. Only what
 /// holds every direction by itself can: before the wall alone, chance speaks for anything. `pose` becomes the
 /// one that is seen.
-bool Tracker::refutes_motion(optimize::PoseProblem problem, const optimize::PoseSummary& held,
-                             const Rigid3& predicted, Rigid3& pose) const {
+bool Tracker::rejects_motion_prior(optimize::PoseProblem problem, const optimize::PoseSummary& held,
+                                   const Rigid3& predicted, Rigid3& pose) const {
   constexpr double kGain =
       4.0;  // of the cost: 1 at most where the model was right, soon above 8 where it was not
   problem.prior = motion_prior(held.information, predicted, Motion::kUnknown);
@@ -64,19 +64,20 @@ void Tracker::judge(optimize::PoseProblem problem, TrackResult& result) const {
   // A direction that falls short by a little is no chance find yet, though some of the surface does not fit.
   const bool nearly = result.min_eigenvalue >= kNearlyHeld * weak;
   const bool all_surface = by_surface && result.surface_share > (nearly ? kMostOfTheSurface : kAllTheSurface);
-  result.held_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
-  result.unheld = result.held_by_motion ? weak_part(directions, weak)
-                                        : weak_part(weigh_directions(estimate.information), kNoisy);
-  const bool coasts = last_.valid && lost_frames_ == 0 && coasting_s_ < kLongestCoast_s &&
-                      ((by_features && many) || all_surface);
-  const bool held = result.held_by_motion ? coasts : by_features || by_surface;
+  result.constrained_by_motion = result.weak_directions > 0 && !(by_features && by_surface);
+  result.unobserved = result.constrained_by_motion
+                          ? weak_projection(directions, weak)
+                          : weak_projection(weigh_directions(estimate.information), kNoisy);
+  const bool dead_reckons = last_.valid && lost_frames_ == 0 && dead_reckoning_s_ < kLongestDeadReckoning_s &&
+                            ((by_features && many) || all_surface);
+  const bool held = result.constrained_by_motion ? dead_reckons : by_features || by_surface;
   result.state =
       held && result.camera_from_world.translation.allFinite() ? TrackState::kTracked : TrackState::kLost;
 }
 
 /// Places can look alike: what only the small picture suggested must be confirmed by every family that is in
 /// use and has something to say there.
-bool Tracker::beyond_doubt(const TrackResult& result) const {
+bool Tracker::strict(const TrackResult& result) const {
   constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
   if (result.weak_directions > 0) return false;
   if (options_.depth &&

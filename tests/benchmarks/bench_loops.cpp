@@ -74,7 +74,7 @@ void describe(const mapping::LoopTrial& t, const PoseError& error) {
       t.loop.query.index, t.loop.match.index, t.score, error.apart_m, error.apart_degrees, error.metres,
       error.degrees, v.matched_points, v.matched_lines, v.ransac_inliers, v.points, v.lines, v.visible_points,
       v.visible_lines, v.cells, v.rms_px, v.overlap, v.contradiction, v.surface_aligned ? 1 : 0,
-      v.surface_shift_m, t.correction_m, t.correction_rad, t.way_m,
+      v.surface_shift_m, t.correction_m, t.correction_rad, t.path_m,
       t.refused.empty() ? "VERIFIED" : t.refused.c_str());
 }
 
@@ -313,7 +313,7 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   const double start = thread_ms();
   for (const core::KeyframeId id : map.keyframe_ids()) {
     std::vector<mapping::PoseEdge> edges;
-    for (const mapping::Loop& loop : closer.look(map, id))
+    for (const mapping::Loop& loop : closer.detect(map, id))
       edges.push_back(mapping::LoopCloser::to_edge(loop));
     if (!edges.empty()) closer.close(map, edges);
   }
@@ -325,7 +325,7 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   mapping::LoopCloser watcher(options->loops, stored->header.camera.color);  // all that could be closed
   std::vector<mapping::PoseEdge> edges;
   for (const core::KeyframeId id : stored->map.keyframe_ids()) {
-    for (const mapping::Loop& loop : watcher.look(stored->map, id)) {
+    for (const mapping::Loop& loop : watcher.detect(stored->map, id)) {
       edges.push_back(mapping::LoopCloser::to_edge(loop));
     }
   }

@@ -33,8 +33,8 @@ struct PlaneStep {
 class ConstrainedPointToPlane
     : public pcl::registration::TransformationEstimation<SurfacePoint, SurfacePoint, double> {
  public:
-  /// A direction is held when its share of the normals, squared, is larger than `min_hold`.
-  explicit ConstrainedPointToPlane(double min_hold) : min_hold_(min_hold) {}
+  /// A direction is held when its share of the normals, squared, is larger than `min_information`.
+  explicit ConstrainedPointToPlane(double min_information) : min_information_(min_information) {}
   void setNarrow(bool narrow) { narrow_ = narrow; }
 
   /// The step from the source to the target, and what is known of it.
@@ -53,7 +53,7 @@ class ConstrainedPointToPlane
                                    Matrix4& transformation) const override;
 
  private:
-  double min_hold_;
+  double min_information_;
   bool narrow_ = false;
 };
 

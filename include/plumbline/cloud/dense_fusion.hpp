@@ -4,7 +4,7 @@
 // The views of a whole run as one cloud with thin, single walls.
 //
 // Views are laid down in a voxel map tile by tile, so that memory follows the tile and not the run; within a
-// tile the points of flat pieces of surface come to lie on their common plane (sheets.hpp), what other views
+// tile the points of flat pieces of surface come to lie on their common plane (surfels.hpp), what other views
 // look through is removed (free_space.hpp), and colours are evened out between views (exposure.hpp).
 #include <cstddef>
 #include <cstdint>
@@ -22,12 +22,12 @@ namespace plumbline::cloud {
 
 struct DenseFusionOptions {
   VoxelMapOptions voxels;
-  int min_observations = 1;  ///< views that must have seen a voxel for it to stay
-  bool settle = true;        ///< points of flat pieces of surface lie on their plane
-  bool free_space = true;    ///< what other views look through goes
-  bool exposure = true;      ///< colours are evened out between views
-  int min_support = 6;       ///< points with fewer like them within about 3 blocks are dust; 0: none is
-  double tile_mb = 100.0;    ///< memory that one tile may take; tiles of six times that are filled together
+  int min_observations = 1;      ///< views that must have seen a voxel for it to stay
+  bool plane_projection = true;  ///< points of flat pieces of surface lie on their plane
+  bool free_space = true;        ///< what other views look through goes
+  bool exposure = true;          ///< colours are evened out between views
+  int min_support = 6;     ///< points with fewer like them within about 3 blocks are isolated; 0: none is
+  double tile_mb = 100.0;  ///< memory that one tile may take; tiles of six times that are filled together
 
   void declare(core::OptionTable& table);
 };
@@ -35,7 +35,7 @@ struct DenseFusionOptions {
 struct FusionReport {
   std::size_t tiles = 0;
   std::size_t seen_through = 0;  ///< points removed since views look through them
-  std::size_t dust = 0;          ///< points removed as too lonely
+  std::size_t isolated = 0;      ///< points removed as too lonely
   double least_gain = 1.0;       ///< of the colours of a view
   double most_gain = 1.0;
 };

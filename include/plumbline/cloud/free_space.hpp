@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "plumbline/cloud/sheets.hpp"
+#include "plumbline/cloud/surfels.hpp"
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"
@@ -30,11 +30,11 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
 /// A look: what a frame says of the space before it, and nothing else. The nearest depth of each cell of a
 /// raster, as an organised cloud (metres, camera frame) without normals and colours; cells without a
 /// measurement within [min_depth_m, max_depth_m] are NaN.
-CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
+CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
                     double max_depth_m);
 
-/// Whether a view of `camera` is a look.
-bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera);
+/// Whether a view of `camera` is a depth view, which tests free space and adds no points.
+bool is_depth_view(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 
 /// What one view says about a place.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
@@ -54,14 +54,14 @@ class DepthLimits {
   std::vector<std::uint16_t> nearest_, furthest_;  ///< millimetres, 0: none
 };
 
-/// `is_look`: by view; looks are asked only where clouds alone do not let a sheet go: some cloud looks
-/// through, or fewer than four see a surface. For every sheet whether it is to go: at least half as many
-/// views look through it as see a surface there, two at least unless no more than one view sees it. Who walks
-/// towards the camera hides the place that he comes from: sheets that some view looks through, or that three
-/// times as many views cannot see as see them (three at least), go too where at least half of what is certain
-/// within 10 cm goes.
-std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
-                                       const std::vector<std::uint8_t>& is_look,
+/// `is_depth_view`: by view; depth views are tested only where clouds alone do not let a surfel go: some
+/// cloud looks through, or fewer than four see a surface. For every surfel whether it is to go: at least half
+/// as many views look through it as see a surface there, two at least unless no more than one view sees it.
+/// Who walks towards the camera hides the place that he comes from: surfels that some view looks through, or
+/// that three times as many views cannot see as see them (three at least), go too where at least half of what
+/// is certain within 10 cm goes.
+std::vector<std::uint8_t> seen_through(const Surfels& surfels, const std::vector<DepthRaster>& rasters,
+                                       const std::vector<std::uint8_t>& is_depth_view,
                                        const std::vector<geometry::Rigid3>& world_from_camera);
 
 }  // namespace plumbline::cloud

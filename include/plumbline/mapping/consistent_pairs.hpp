@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which of many relative poses between pictures tell the same story. Each says how a keyframe of one map lies
+// Which of many relative poses between images are consistent. Each says how a keyframe of one map lies
 // to a keyframe of another (or of the same map, much later). Two agree when going round through both ends
 // nowhere near; the largest set of which every two agree is taken for true (pairwise consistency
 // maximisation: Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018; docs/method/places.md). Places that repeat
@@ -40,15 +40,15 @@ struct ConsistentSet {
   double span_m = 0.0;  ///< largest distance between two members' cameras, in the map where it is smaller
 };
 
-/// Whether two pairs tell the same story: the pose of the other one's keyframes, found by way of each, is the
+/// Whether two pairs are consistent: the pose of the other one's keyframes, found by way of each, is the
 /// same within the limits. The map says how A's keyframes lie to each
 /// other, and B's.
 bool agree(const maps::Map& map_a, const maps::Map& map_b, const PlacePair& one, const PlacePair& two,
            const ConsistencyOptions& options);
 
-/// Sets that tell different stories, the largest first. What agrees with half of a set belongs to its story
-/// and founds no set of its own, so that sets[1] is the strongest rival of sets[0]. Empty for no pairs; a
-/// pair that agrees with no other is a set of one. The same input in the same order gives the same answer.
+/// Consistent sets, the largest first. What agrees with half of a set belongs to it
+/// and founds no set of its own, so that sets[1] is the strongest alternative of sets[0]. Empty for no pairs;
+/// a pair that agrees with no other is a set of one. The same input in the same order gives the same answer.
 std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::Map& map_b,
                                            const std::vector<PlacePair>& pairs,
                                            const ConsistencyOptions& options);

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "plumbline/core/options.hpp"
-#include "plumbline/mapping/sighting_noise.hpp"
-#include "plumbline/mapping/tracked_way.hpp"
+#include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/mapping/tracked_path.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/optimize/pose_graph.hpp"
@@ -71,7 +71,7 @@ struct GlobalAdjustmentOptions {
   bool pose_graph = true;  ///< before bundle adjustment, when there are edges besides the map's own
   bool bundle = true;
   int observations = 250;  ///< points and lines that a keyframe is tied with at most; those seen most often
-  SightingNoise noise;
+  ObservationNoise noise;
   double surface_weight = 0.3;  ///< of the map's surface edges: their samples are alike from one to the next
   /// Standard deviations. Where a tracker slid along a wall, it is the landmarks of that moment that agree on
   /// it, all alike: in a bundle they would undo what edges from elsewhere have corrected. What is further off

@@ -77,9 +77,9 @@ class KeyframeRule {
   /// `min_shared` of the landmarks that the frame has matched, and the frame is well within the plain rule's
   /// limits for movement and for its surface. Of several the one that saw most; invalid: none. Without it a
   /// map would grow as long as the camera moves, however often it has been there.
-  [[nodiscard]] core::KeyframeId known_ground(const maps::Map& map, core::KeyframeId reference,
-                                              const tracking::TrackResult& track,
-                                              const sensor::Pinhole& camera) const;
+  [[nodiscard]] core::KeyframeId earlier_reference(const maps::Map& map, core::KeyframeId reference,
+                                                   const tracking::TrackResult& track,
+                                                   const sensor::Pinhole& camera) const;
 
  private:
   [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;

@@ -28,7 +28,7 @@ struct TriangulationOptions {
 };
 
 /// What the newest keyframe's corners are aligned in.
-struct NewestPicture {
+struct NewestImage {
   const std::vector<cv::Mat>& levels;  ///< the newest keyframe's picture in each octave
   features::FrameFeatures& newest;     ///< its features, those that the map holds
 };
@@ -44,7 +44,7 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, core::KeyframeId k
                                               const std::vector<core::KeyframeId>& neighbours,
                                               double max_measured_m, const sensor::Pinhole& camera,
                                               const TriangulationOptions& options,
-                                              const NewestPicture* picture = nullptr);
+                                              const NewestImage* picture = nullptr);
 
 /// The same for lines without depth; a line needs three views that agree.
 std::vector<core::LineId> triangulate_lines(maps::Map& map, core::KeyframeId keyframe,

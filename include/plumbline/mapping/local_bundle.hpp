@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "plumbline/mapping/sighting_noise.hpp"
-#include "plumbline/mapping/tracked_way.hpp"
+#include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/mapping/tracked_path.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/camera.hpp"
@@ -33,7 +33,7 @@ struct LocalBundle {
 
 struct LocalBundleOptions {
   int keyframes = 12;  ///< how many may move
-  SightingNoise noise;
+  ObservationNoise noise;
 };
 
 /// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most
@@ -51,7 +51,7 @@ using MapCorrection = std::map<core::KeyframeId, geometry::Rigid3>;
 /// made after the take keep their pose relative to their parent in the spanning tree; landmarks that were not
 /// part of the bundle move with the keyframe that saw them first. Nothing is done when a keyframe's pose is
 /// not the one that was taken: somebody else has moved the map, and knew more.
-/// Nor when it contradicts what the tracker measured (tracked_way.hpp), which is told then.
+/// Nor when it contradicts what the tracker measured (tracked_path.hpp), which is told then.
 std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map,
                                       std::optional<Contradiction>* refused = nullptr);
 

@@ -61,9 +61,9 @@ struct AlignmentOptions {
   double max_rms = 5.0;      ///< of these, in standard deviations
   double max_shift_m = 0.3;  ///< alignments that move further are not believed
   double max_turn_rad = 0.2;
-  double min_hold = 0.02;     ///< share of the normals, squared, that a direction needs to count as held
-  double correlation = 0.15;  ///< samples count by this much: noise of neighbours is alike
-  double floor_m = 0.0012;    ///< what no alignment of this sensor knows better
+  double min_information = 0.02;  ///< share of the normals, squared, that a direction needs to count as held
+  double correlation = 0.15;      ///< samples count by this much: noise of neighbours is alike
+  double floor_m = 0.0012;        ///< what no alignment of this sensor knows better
   void declare(core::OptionTable& table);
 };
 

@@ -10,7 +10,7 @@
 #include "plumbline/mapping/landmark_culling.hpp"
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/landmark_triangulation.hpp"
-#include "plumbline/mapping/sighting_noise.hpp"
+#include "plumbline/mapping/observation_noise.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/frame.hpp"
@@ -27,11 +27,11 @@ struct LocalMapperOptions {
   bool triangulate = true;
   TriangulationOptions triangulation;
   bool fuse = true;
-  bool earlier_sightings = true;
+  bool earlier_observations = true;
   FusionOptions fusion;
   bool bundle = true;
   int bundle_keyframes = 12;
-  SightingNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
+  ObservationNoise bundle_noise;  ///< but for the scale factor, which is the tracker's
   bool edges = true;
   int edge_keyframes = 5;
   bool edge_photometric = true;
@@ -63,7 +63,7 @@ class LocalMapper {
                           core::KeyframeId reference, double turn_rate);
 
   /// Counts which landmarks a tracked frame should have seen and did.
-  void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
+  void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
 
   /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
   /// image and the picture of the new one; what they say about its pose stays in the map as edges.
@@ -78,10 +78,10 @@ class LocalMapper {
  private:
   std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
-  void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestPicture& picture);
-  [[nodiscard]] bool sheared(const maps::Map& map, core::KeyframeId keyframe) const;
-  [[nodiscard]] std::vector<core::KeyframeId> nearest_sharp(const maps::Map& map, core::KeyframeId keyframe,
-                                                            int count) const;
+  void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestImage& picture);
+  [[nodiscard]] bool distorted(const maps::Map& map, core::KeyframeId keyframe) const;
+  [[nodiscard]] std::vector<core::KeyframeId> nearest_undistorted(const maps::Map& map,
+                                                                  core::KeyframeId keyframe, int count) const;
 
   LocalMapperOptions options_;
   sensor::Pinhole camera_;

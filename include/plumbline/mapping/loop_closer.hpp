@@ -23,9 +23,9 @@ namespace plumbline::mapping {
 
 struct LoopOptions {
   bool enabled = true;
-  double min_gap_s = 3.0;  ///< keyframes made within this time are the present, not a loop
-  int agreeing = 2;        ///< verified keyframes, following one another, that must tell the same story
-  double max_rival = 0.5;  ///< another story may have this share of them at most
+  double min_gap_s = 3.0;        ///< keyframes made within this time are the present, not a loop
+  int agreeing = 2;              ///< verified keyframes, following one another, that must be consistent
+  double max_alternative = 0.5;  ///< another consistent set may have this share of them at most
   ConsistencyOptions consistency;
   double max_drift = 0.02;  ///< of the way since the match, that a loop may correct: what looks alike further
                             ///< off (doors of a corridor) is another place
@@ -61,7 +61,7 @@ struct LoopTrial {
   double score = 0.0;         ///< of the pictures
   double correction_m = 0.0;  ///< how far closing it would move the query; 0 when there is no pose
   double correction_rad = 0.0;
-  double way_m = 0.0;   ///< from the match to the query, along the keyframes
+  double path_m = 0.0;  ///< from the match to the query, along the keyframes
   bool closed = false;  ///< the pose graph believed it, and the map was moved
   std::string refused;  ///< why it is no loop; empty: it passed
 };
@@ -76,7 +76,7 @@ class LoopCloser {
 
   /// Asks for the place of a new keyframe of the map and adds it to the database. Loops that are sure enough
   /// to be closed; mostly none.
-  std::vector<Loop> look(const maps::Map& map, core::KeyframeId keyframe);
+  std::vector<Loop> detect(const maps::Map& map, core::KeyframeId keyframe);
 
   /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are in the
   /// map.
@@ -108,7 +108,7 @@ class LoopCloser {
   void measure_correction(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::vector<Loop> confirmed(const maps::Map& map, core::KeyframeId keyframe) const;
-  void merge_doubles(maps::Map& map, const PoseEdge& edge) const;
+  void merge_duplicates(maps::Map& map, const PoseEdge& edge) const;
 
   LoopOptions options_;
   sensor::Pinhole camera_;

@@ -33,8 +33,9 @@ struct MapFusionOptions {
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
-  double rival = 0.1;       ///< a second answer with so many keyframes, as share of the best one, is a doubt
-  double rival_fit = 0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
+  double alternative = 0.1;  ///< a second answer with so many keyframes, as share of the best one, is a doubt
+  double alternative_share =
+      0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
   double max_seen_through = 0.06;  ///< share of landmarks seen through that refutes such an answer
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
@@ -65,7 +66,7 @@ struct VerifiedPair {
 };
 
 /// One map laid over another: landmarks of either one, at their place in the other.
-struct LaidOver {
+struct OverlayFit {
   int expected = 0;      ///< where the other one measured a surface, from a like side and distance
   int matched = 0;       ///< of these, that the other one has too
   int contradicted = 0;  ///< where the other one saw through
@@ -88,18 +89,18 @@ struct MergeEvidence {
   int candidates = 0;  ///< pairs of keyframes that look alike
   int tried = 0;       ///< of these, verified or refused
   int verified = 0;
-  int agreeing = 0;      ///< of the verified, in the largest set that says the same
-  int rival = 0;         ///< in the largest set that says something else and is not refuted by the maps
-  int expected = 0;      ///< keyframes of b that should see what a saw, if the set is right
-  int confirmed = 0;     ///< of these, that do
-  int matches = 0;       ///< of the agreeing pairs, sums: by descriptor,
-  int inliers = 0;       ///< points and lines that fit in the end
-  double rms_px = 0.0;   ///< mean over the agreeing pairs, standard deviations
-  double overlap = 0.0;  ///< of the surfaces, mean
-  LaidOver laid;         ///< the maps, as the set has it
-  LaidOver rival_laid;   ///< as the best other answer has it that the maps do not refute, and
-  double rival_m = 0.0;  ///< how far from the set's it puts b's cameras; 0: there is none
-  double span_m = 0.0;   ///< how far apart the agreeing keyframes lie
+  int agreeing = 0;            ///< of the verified, in the largest set that says the same
+  int alternative = 0;         ///< in the largest set that says something else and is not refuted by the maps
+  int expected = 0;            ///< keyframes of b that should see what a saw, if the set is right
+  int confirmed = 0;           ///< of these, that do
+  int matches = 0;             ///< of the agreeing pairs, sums: by descriptor,
+  int inliers = 0;             ///< points and lines that fit in the end
+  double rms_px = 0.0;         ///< mean over the agreeing pairs, standard deviations
+  double overlap = 0.0;        ///< of the surfaces, mean
+  OverlayFit laid;             ///< the maps, as the set has it
+  OverlayFit alternative_fit;  ///< as the best other answer has it that the maps do not refute, and
+  double alternative_m = 0.0;  ///< how far from the set's it puts b's cameras; 0: there is none
+  double span_m = 0.0;         ///< how far apart the agreeing keyframes lie
   double span_rad = 0.0;
   double spread_m = 0.0;      ///< RMS of what the agreeing pairs say of b's cameras, about the mean
   geometry::Rigid3 a_from_b;  ///< worlds
@@ -129,16 +130,16 @@ class OverlapFinder {
   void add(const maps::Map& map, core::KeyframeId keyframe);
   /// Keyframes of other parts that look like this one, best first. `before`: the keyframe before it of its
   /// robot, or an invalid id.
-  std::vector<Candidate> look(const std::vector<MapPart>& parts, std::size_t part, core::KeyframeId keyframe,
-                              core::KeyframeId before);
+  std::vector<Candidate> recognise(const std::vector<MapPart>& parts, std::size_t part,
+                                   core::KeyframeId keyframe, core::KeyframeId before);
   /// The same for all keyframes of all parts, one after the other; the keyframe before each is that of the
   /// lower id.
   std::vector<Candidate> look_at_all(const std::vector<MapPart>& parts, const core::Executor& executor);
   [[nodiscard]] const MapFusionOptions& options() const { return options_; }
 
  private:
-  std::vector<Candidate> look(const places::Database::Scores& scores, const std::vector<MapPart>& parts,
-                              std::size_t part, core::KeyframeId keyframe, core::KeyframeId before);
+  std::vector<Candidate> recognise(const places::Database::Scores& scores, const std::vector<MapPart>& parts,
+                                   std::size_t part, core::KeyframeId keyframe, core::KeyframeId before);
 
   MapFusionOptions options_;
   places::Database database_;

@@ -99,20 +99,20 @@ class Slam {
   void start_map(const sensor::RgbdFrame& frame,
                  const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
   /// Instead of making a keyframe.
-  void remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe);
-  void return_to_known_ground(FrameReport& report);
+  void record_image(const sensor::RgbdFrame& frame, core::KeyframeId keyframe);
+  void switch_reference(FrameReport& report);
   void make_keyframe(const sensor::RgbdFrame& frame,
                      const std::shared_ptr<const features::FrameFeatures>& features,
                      const std::vector<cv::Mat>& levels, FrameReport& report);
   void put_back_bundle(BundleReport& report);
-  [[nodiscard]] double shear_rate() const;
-  void settle_bundles();
+  [[nodiscard]] double distorting_turn_rate() const;
+  void commit_bundles();
   void close_loops(core::KeyframeId keyframe);
   [[nodiscard]] bool is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                               core::KeyframeId keyframe, const geometry::Rigid3& camera_from_world) const;
   [[nodiscard]] std::optional<geometry::Rigid3> motion_since_last(
       const geometry::Rigid3& camera_from_world) const;
-  void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
+  void record_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;
   sensor::Pinhole camera_;

@@ -19,7 +19,7 @@ struct SurfaceEdgeOptions {
 };
 
 /// What two keyframes' pictures say beside their surfaces: nothing when one is null.
-struct EdgePictures {
+struct EdgeImages {
   const features::PhotometricSamples* of_a = nullptr;
   const features::PhotometricImage* of_b = nullptr;
 };
@@ -33,6 +33,6 @@ struct EdgePictures {
 std::optional<maps::SurfaceEdge> align_surface_edge(
     const maps::Keyframe& a, core::KeyframeId b, const cv::Mat& depth_of_b, const geometry::Rigid3& b_from_a,
     const geometry::Rigid3& depth_from_camera, const sensor::Pinhole& camera,
-    const SurfaceEdgeOptions& options, const EdgePictures& pictures = {});
+    const SurfaceEdgeOptions& options, const EdgeImages& pictures = {});
 
 }  // namespace plumbline::mapping

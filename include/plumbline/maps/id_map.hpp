@@ -101,9 +101,9 @@ class IdMap {
   /// (robot, index / kIdsPerPage)
   using Page = std::pair<std::int32_t, std::int32_t>;
   /// How often anything was inserted, erased or handed out to be changed.
-  [[nodiscard]] std::uint64_t touches() const { return touches_; }
-  /// Pages in which that happened after touches() was `since`, in order.
-  [[nodiscard]] std::vector<Page> touched_pages(std::uint64_t since) const {
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  /// Pages in which that happened after revision() was `since`, in order.
+  [[nodiscard]] std::vector<Page> changed_pages(std::uint64_t since) const {
     std::vector<Page> pages;
     for (const auto& [robot, touched] : touched_) {
       for (std::size_t page = 0; page < touched.size(); ++page) {
@@ -119,7 +119,7 @@ class IdMap {
     auto& pages = touched_[id.robot];
     const auto page = static_cast<std::size_t>(id.index / kIdsPerPage);
     if (page >= pages.size()) pages.resize(page + 1, 0);
-    pages[page] = ++touches_;
+    pages[page] = ++revision_;
   }
   [[nodiscard]] std::int32_t entry_of(IdType id) const {
     const auto robot = slots_.find(id.robot);
@@ -133,8 +133,8 @@ class IdMap {
   std::deque<T> pool_;
   std::vector<std::int32_t> free_;  ///< entries of the pool
   std::map<std::int32_t, std::vector<std::uint64_t>>
-      touched_;  ///< by page: touches_ when it was last touched
-  std::uint64_t touches_ = 0;
+      touched_;  ///< by page: revision_ when it was last touched
+  std::uint64_t revision_ = 0;
 };
 
 }  // namespace plumbline::maps

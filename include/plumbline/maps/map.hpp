@@ -115,8 +115,8 @@ struct NextIds {
   std::uint64_t edge = 0;
 };
 
-/// A moment in the life of a map, to ask later what changed since. The default: before anything was there.
-struct MapMoment {
+/// A revision in the life of a map, to ask later what changed since. The default: before anything was there.
+struct MapRevision {
   std::uint64_t points = 0;
   std::uint64_t lines = 0;
   std::uint64_t edges = 0;
@@ -145,7 +145,7 @@ struct MapParts {
   NextIds next;
 };
 
-/// What a map holds beyond what it held at an earlier moment: a copy that goes on living while the map
+/// What a map holds beyond what it held at an earlier revision: a copy that goes on living while the map
 /// changes, at the cost of what was touched.
 struct MapChanges {
   bool whole = false;                             ///< since before anything was there
@@ -167,8 +167,8 @@ class Map {
   /// contradict each other: an id twice, something names what is not there, two landmarks of one feature.
   explicit Map(MapParts parts);
   [[nodiscard]] NextIds next_ids() const;
-  [[nodiscard]] MapMoment now() const { return {points_.touches(), lines_.touches(), next_edge_}; }
-  [[nodiscard]] MapChanges changes_since(const MapMoment& moment) const;
+  [[nodiscard]] MapRevision now() const { return {points_.revision(), lines_.revision(), next_edge_}; }
+  [[nodiscard]] MapChanges changes_since(const MapRevision& revision) const;
 
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
   KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe,
@@ -262,7 +262,7 @@ class Map {
     std::vector<KeyframeId> children;  ///< by id
   };
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
-  void forget_patches(KeyframeId id);
+  void erase_patches(KeyframeId id);
   void detach(KeyframeId child);
   void restore_tree(const MapParts& parts);
 

@@ -87,7 +87,7 @@ struct MapResult {
 };
 
 /// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame; or of such a frame what it
-/// sees through (cloud::depth_look). Its points are those of the depth camera at the moment of the depth
+/// sees through (cloud::depth_view). Its points are those of the depth camera at the moment of the depth
 /// image: cloud::sensor_pose() leads from there to the camera of the poses.
 struct KeyframeCloud {
   core::KeyframeId id;  ///< not valid: a frame between keyframes

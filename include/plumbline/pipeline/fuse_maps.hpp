@@ -29,9 +29,10 @@ struct FuseRequest {
 
 /// The order of `maps` changes nothing; one alone is refined and laid down as it is. Errors as map_recording;
 /// when maps do not connect, those that do are in the result, and the summary's `reason` names the others.
-/// `leftovers` may be null.
+/// `deferred_destruction` may be null.
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
-                                          const Progress& progress, Leftovers* leftovers = nullptr);
+                                          const Progress& progress,
+                                          DeferredDestruction* deferred_destruction = nullptr);
 
 }  // namespace plumbline::pipeline

@@ -47,9 +47,9 @@ bool is_finished(const std::filesystem::path& out);
 /// output folder: kOutput), then maps. When the result is written but should not be trusted, the summary's
 /// `reason` says why. Errors leave an earlier result untouched; what a run that failed on the way had stored
 /// stays in OUT.partial. `resume` with another input or configuration than that run's is kUsage. `progress`
-/// may be empty, `leftovers` null.
+/// may be empty, `deferred_destruction` null.
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop, const Progress& progress,
-                                       Leftovers* leftovers = nullptr);
+                                       DeferredDestruction* deferred_destruction = nullptr);
 
 }  // namespace plumbline::pipeline

@@ -36,7 +36,7 @@ struct RunReport {
 
 /// What is left of a run when all is written: taking maps apart landmark by landmark takes a while, which
 /// whoever ends next can do without. In the order in which it is to be taken apart.
-using Leftovers = std::vector<std::shared_ptr<void>>;
+using DeferredDestruction = std::vector<std::shared_ptr<void>>;
 
 /// Called in frame order, from one thread at a time.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;

@@ -48,8 +48,8 @@ class StoredResult {
   [[nodiscard]] cloud::FilterChain fusion_filters() const;
   /// The dense cloud: with the run's own options the one it wrote, filters and all. Errors (kInput): damaged,
   /// no clouds; those of filters.
-  [[nodiscard]] core::Result<cloud::FusedCloud> lay_down(const cloud::DenseFusionOptions& options,
-                                                         const core::Executor& executor) const;
+  [[nodiscard]] core::Result<cloud::FusedCloud> fused(const cloud::DenseFusionOptions& options,
+                                                      const core::Executor& executor) const;
   /// The cloud of each keyframe as FOLDER/<number, six digits>.ply; makes the folder. Returns how many.
   /// Errors (kOutput), (kInput): damaged.
   [[nodiscard]] core::Result<std::size_t> write_keyframe_clouds(const std::filesystem::path& folder) const;

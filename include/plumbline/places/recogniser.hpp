@@ -43,15 +43,15 @@ class Recogniser {
   /// that saw nearly the same as the query (usually the one before): its score is what a good score is here;
   /// invalid: scores are not compared. Keyframes that `allowed` refuses (the query's own surroundings) are
   /// left out. Those seen fewer than options.consistent times in a row come too, with their in_a_row.
-  std::vector<Candidate> look(const Database& database, core::KeyframeId query,
-                              const features::FrameFeatures& picture, core::KeyframeId neighbour,
-                              const std::function<bool(core::KeyframeId)>& allowed,
-                              const Neighbours& neighbours);
+  std::vector<Candidate> recognise(const Database& database, core::KeyframeId query,
+                                   const features::FrameFeatures& picture, core::KeyframeId neighbour,
+                                   const std::function<bool(core::KeyframeId)>& allowed,
+                                   const Neighbours& neighbours);
   /// The same with what `database.query` said of the picture.
-  std::vector<Candidate> look(const Database::Scores& scores, core::KeyframeId query,
-                              core::KeyframeId neighbour,
-                              const std::function<bool(core::KeyframeId)>& allowed,
-                              const Neighbours& neighbours);
+  std::vector<Candidate> recognise(const Database::Scores& scores, core::KeyframeId query,
+                                   core::KeyframeId neighbour,
+                                   const std::function<bool(core::KeyframeId)>& allowed,
+                                   const Neighbours& neighbours);
 
   [[nodiscard]] const RecogniserOptions& options() const { return options_; }
 

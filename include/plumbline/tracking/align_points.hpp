@@ -19,10 +19,11 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
 /// Where a picture (`levels`, of `camera_from_world`) shows the corner that a keyframe saw of what lies at
 /// `position`, pixels of the full picture; `start`: where it should be, to two pixels of the corner's octave.
 /// None when the keyframe saw it too differently, or the pictures do not agree.
-std::optional<Eigen::Vector2f> align_sighting(const maps::Map& map, const maps::Observation& seen,
-                                              const Eigen::Vector3d& position,
-                                              const std::vector<cv::Mat>& levels,
-                                              const Eigen::Vector2f& start, const sensor::Pinhole& camera,
-                                              const geometry::Rigid3& camera_from_world, double scale_factor);
+std::optional<Eigen::Vector2f> align_observation(const maps::Map& map, const maps::Observation& seen,
+                                                 const Eigen::Vector3d& position,
+                                                 const std::vector<cv::Mat>& levels,
+                                                 const Eigen::Vector2f& start, const sensor::Pinhole& camera,
+                                                 const geometry::Rigid3& camera_from_world,
+                                                 double scale_factor);
 
 }  // namespace plumbline::tracking

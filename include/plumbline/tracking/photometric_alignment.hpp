@@ -49,7 +49,7 @@ constexpr int kMinPhotometric = 500;
 
 /// Gain, noise and weights as they are at a pose; false when fewer than kMinPhotometric terms are in view.
 /// A term weighs less the further an error of its depth would move it across its gradient.
-bool settle_photometric(optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
+bool update_photometric(optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
 
 /// Whether the picture is the expected one, as far as that can be told at a pose.
 bool photometric_agrees(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
@@ -65,9 +65,9 @@ ShiftedPose search_shift(const optimize::PhotometricFamily& family,
 
 constexpr double kGoodAgreement = 0.8;     ///< correlation of grey values at a guess that needs no search
 constexpr double kBetterAgreement = 0.05;  ///< by so much another guess must agree better to be tried first
-/// Which of some guesses to try first, by how well grey values agree at each (correlation; none: nothing that
-/// can be compared is in view from there). The first, unless another agrees better; one of which nothing is
-/// known gives way to a good one only. `agreement` must not be empty.
-std::size_t likeliest_guess(const std::vector<std::optional<double>>& agreement);
+/// Which of some hypotheses to try first, by how well grey values agree at each (correlation; none: nothing
+/// that can be compared is in view from there). The first, unless another agrees better; one of which nothing
+/// is known gives way to a good one only. `agreement` must not be empty.
+std::size_t best_hypothesis(const std::vector<std::optional<double>>& agreement);
 
 }  // namespace plumbline::tracking

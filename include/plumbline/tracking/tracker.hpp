@@ -68,12 +68,13 @@ struct TrackResult {
   [[nodiscard]] double sigma_m() const {
     return continuous ? 1.0 / std::sqrt(std::max(min_eigenvalue, 1.0)) : 0.1;
   }
-  int weak_directions = 0;      ///< of six, that no trusted family holds, but the motion model at best
-  bool held_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
+  int weak_directions = 0;             ///< of six, that no trusted family holds, but the motion model at best
+  bool constrained_by_motion = false;  ///< the weak directions are the motion model's, for 2.5 s at most
   /// What these directions have of a motion (left perturbation of camera_from_world), to multiply it with;
-  /// zero unless held_by_motion.
-  geometry::Matrix6d unheld = geometry::Matrix6d::Zero();
-  bool motion_refuted = false;  ///< surfaces are all but alone, and have spoken against the motion model
+  /// zero unless constrained_by_motion.
+  geometry::Matrix6d unobserved = geometry::Matrix6d::Zero();
+  bool motion_prior_rejected =
+      false;  ///< surfaces are all but alone, and have spoken against the motion model
   bool relocalised = false;
   std::shared_ptr<const features::PhotometricImage> photometric;  ///< of the frame; null: none was made
   /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
@@ -141,7 +142,7 @@ class Tracker {
     bool valid = false;
   };
   /// Where the camera may be; `rough`: only the small picture says so.
-  struct Guess {
+  struct Hypothesis {
     core::KeyframeId keyframe;
     geometry::Rigid3 camera_from_world;
     bool rough = false;
@@ -153,18 +154,18 @@ class Tracker {
     constexpr double kLonger = 1.5;
     return last_.valid && lost_frames_ == 0 && steps_ >= 2 && stamp - last_.stamp < kLonger * step_s_;
   }
-  void stand() {
+  void reset() {
     velocity_.setZero();
     steps_ = 0;
   }
   /// Where the camera may be by now, the likeliest first.
-  struct Guesses {
+  struct Hypotheses {
     std::vector<geometry::Rigid3> poses;
     bool sought = false;  ///< the first was looked for in the picture: it may be a look-alike
   };
-  [[nodiscard]] Guesses guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                const features::FrameFeatures& features) const;
-  void put_likeliest_first(const maps::Map& map, const PhotometricView& view, Guesses& guesses) const;
+  [[nodiscard]] Hypotheses hypotheses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                      const features::FrameFeatures& features) const;
+  void rank(const maps::Map& map, const PhotometricView& view, Hypotheses& hypotheses) const;
   [[nodiscard]] double evidence(const TrackResult& result) const;
   /// `radius`: px around the guess in which features are looked for at first; 0: the fine rounds alone.
   [[nodiscard]] TrackResult estimate(const maps::Map& map, const sensor::RgbdFrame& frame,
@@ -172,27 +173,29 @@ class Tracker {
                                      double radius) const;
   [[nodiscard]] bool leaps(double stamp, const geometry::Rigid3& camera_from_world) const;
   /// From where the camera should be by now; none when nothing there can be trusted.
-  [[nodiscard]] std::optional<TrackResult> by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                                     const features::FrameFeatures& features) const;
-  [[nodiscard]] std::vector<Guess> guesses_by_picture(const maps::Map& map,
-                                                      const features::FrameFeatures& features) const;
+  [[nodiscard]] std::optional<TrackResult> by_motion_model(const maps::Map& map,
+                                                           const sensor::RgbdFrame& frame,
+                                                           const features::FrameFeatures& features) const;
+  [[nodiscard]] std::vector<Hypothesis> relocalisation_hypotheses(
+      const maps::Map& map, const features::FrameFeatures& features) const;
   /// From what the picture looks like; the local map moves there.
-  [[nodiscard]] std::optional<TrackResult> by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                                      const features::FrameFeatures& features);
+  [[nodiscard]] std::optional<TrackResult> by_relocalisation(const maps::Map& map,
+                                                             const sensor::RgbdFrame& frame,
+                                                             const features::FrameFeatures& features);
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] bool uses_features() const { return options_.points || options_.lines; }
   /// After a while without a pose the last one says little: surfaces near it fit by chance.
-  [[nodiscard]] bool stale() const {
-    constexpr int kStaleFrames = 5;
-    return lost_frames_ >= kStaleFrames;
+  [[nodiscard]] bool outdated() const {
+    constexpr int kOutdatedFrames = 5;
+    return lost_frames_ >= kOutdatedFrames;
   }
-  [[nodiscard]] bool beyond_doubt(const TrackResult& result) const;
-  [[nodiscard]] Features at_one_moment(const sensor::RgbdFrame& frame, const Features& features,
-                                       const Eigen::Vector3d& turn_rate) const;
-  void settle_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
-                      TrackResult& found) const;
-  [[nodiscard]] bool refutes_motion(optimize::PoseProblem problem, const optimize::PoseSummary& held,
-                                    const geometry::Rigid3& predicted, geometry::Rigid3& pose) const;
+  [[nodiscard]] bool strict(const TrackResult& result) const;
+  [[nodiscard]] Features synchronised(const sensor::RgbdFrame& frame, const Features& features,
+                                      const Eigen::Vector3d& turn_rate) const;
+  void refine_rolling_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
+                              TrackResult& found) const;
+  [[nodiscard]] bool rejects_motion_prior(optimize::PoseProblem problem, const optimize::PoseSummary& held,
+                                          const geometry::Rigid3& predicted, geometry::Rigid3& pose) const;
   void judge(optimize::PoseProblem problem, TrackResult& result) const;
   [[nodiscard]] std::optional<optimize::PhotometricFamily> photometric_family(
       const maps::Map& map, const PhotometricView& view, std::size_t level,
@@ -211,8 +214,8 @@ class Tracker {
   int steps_ = 0;        ///< between frames, one after the other, that it was found from
   double step_s_ = 0.0;  ///< how long the last one was
   int lost_frames_ = 0;
-  double coasting_s_ = 0.0;      ///< how long the motion model has held what nothing else does
-  bool motion_refuted_ = false;  ///< by what is seen, since surfaces have been all but alone
+  double dead_reckoning_s_ = 0.0;       ///< how long the motion model has held what nothing else does
+  bool motion_prior_rejected_ = false;  ///< by what is seen, since surfaces have been all but alone
 };
 
 }  // namespace plumbline::tracking

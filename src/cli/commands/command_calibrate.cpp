@@ -106,7 +106,7 @@ class Mapped {
 };
 
 void print(const mapping::CameraCalibration& calibration) {
-  fmt::print("{} keyframes, {} sightings of points\n", calibration.keyframes, calibration.observations);
+  fmt::print("{} keyframes, {} observations of points\n", calibration.keyframes, calibration.observations);
   fmt::print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "gain");
   for (const mapping::CameraFinding& f : calibration.findings) {
     fmt::print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,

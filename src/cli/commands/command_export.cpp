@@ -6,13 +6,13 @@
 #include <system_error>
 
 #include "app.hpp"
-#include "hush.hpp"
 #include "option_flags.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/mesh.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/pipeline/stored_result.hpp"
+#include "silenced_stdio.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -96,7 +96,7 @@ core::Result<cloud::CloudFile> cloud_of(const pipeline::MapPlace& place, const E
   const double voxel_m = options.voxels.voxel_m;
   options = stored->fusion_options();
   options.voxels.voxel_m = voxel_m;
-  auto fused = stored->lay_down(options, executor);
+  auto fused = stored->fused(options, executor);
   if (!fused) return fail(fused.error());
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
@@ -125,7 +125,7 @@ core::Result<void> export_mesh(const pipeline::MapPlace& place, const ExportRequ
   const auto file = cloud_of(place, request, executor);
   if (!file) return tl::unexpected<core::Error>(file.error());
   const auto mesh = [&] {
-    const Hush hush;  // PCL's Poisson prints what it thinks of the points
+    const SilencedStdio silenced;  // PCL's Poisson prints what it thinks of the points
     return cloud::make_mesh(*file->cloud, request.mesh_options);
   }();
   if (!mesh) return tl::unexpected<core::Error>(mesh.error());

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "app.hpp"
-#include "leftovers.hpp"
+#include "deferred_destruction.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
 #include "signals.hpp"
 
@@ -22,7 +22,8 @@ int fuse(Session& session, pipeline::FuseRequest request) {
   Console& console = session.console();
   const auto summary = pipeline::fuse_stored_maps(
       request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); }, &leftovers());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); },
+      &deferred_destruction());
   console.end_progress();
   return session.finish(summary, request.output);
 }

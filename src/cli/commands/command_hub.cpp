@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "app.hpp"
-#include "leftovers.hpp"
+#include "deferred_destruction.hpp"
 #include "network_options.hpp"
 #include "plumbline/net/hub.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
@@ -38,7 +38,8 @@ int hub(Session& session, net::HubRequest request, double quota_gb) {
   Console& console = session.console();
   const auto summary = net::run_hub(
       request, session.executor(), console, stop, [&](const std::string& line) { console.status(line); },
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); }, &leftovers());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); },
+      &deferred_destruction());
   console.end_progress();
   return session.finish(summary, request.fuse.output);
 }

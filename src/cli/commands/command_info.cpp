@@ -98,7 +98,7 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
 
 core::Result<void> describe_map(const pipeline::MapPlace& place) {
   if (place.result) {
-    if (auto told = describe_result(place.result->folder); !told) return told;
+    if (auto described = describe_result(place.result->folder); !described) return described;
   }
   return place.store.empty() ? core::Result<void>() : describe_store(place.store);
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "app.hpp"
-#include "leftovers.hpp"
+#include "deferred_destruction.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
 #include "signals.hpp"
 
@@ -34,7 +34,8 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
   Console& console = session.console();
   const auto summary = pipeline::map_recording(
       request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); }, &leftovers());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); },
+      &deferred_destruction());
   console.end_progress();
   return session.finish(summary, request.output);
 }

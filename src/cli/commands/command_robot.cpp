@@ -6,7 +6,7 @@
 #include <string>
 
 #include "app.hpp"
-#include "leftovers.hpp"
+#include "deferred_destruction.hpp"
 #include "network_options.hpp"
 #include "plumbline/net/robot.hpp"
 #include "signals.hpp"
@@ -52,7 +52,8 @@ int robot(Session& session, net::RobotRequest request) {
   }
   const auto outcome = net::run_robot(
       request, session.executor(), console, stop, status,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); }, &leftovers());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); },
+      &deferred_destruction());
   console.end_progress();
   return finish(session, outcome, request.map.output);
 }

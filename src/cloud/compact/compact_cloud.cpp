@@ -92,7 +92,7 @@ class Writer {
 };
 
 /// Colour (green, and red and blue relative to it) and normal of the finite points.
-void write_looks(const Cloud& cloud, std::size_t points, Writer& writer) {
+void write_columns(const Cloud& cloud, std::size_t points, Writer& writer) {
   std::array<std::vector<std::uint8_t>, 5> columns;
   for (auto& column : columns) column.reserve(points);
   for (const Point& p : cloud.points) {
@@ -120,7 +120,7 @@ void write_grid(const Cloud& cloud, const Rays& rays, double step_m, Writer& wri
   }
   writer.raw(mask.data(), mask.size());
   writer.differences(depth, 3);
-  write_looks(cloud, depth.size(), writer);
+  write_columns(cloud, depth.size(), writer);
 }
 
 /// A copy without points that cannot be coded.
@@ -142,7 +142,7 @@ void write_list(const Cloud& cloud, double step_m, Writer& writer) {
     }
     writer.differences(values, 4);
   }
-  write_looks(cloud, values.size(), writer);
+  write_columns(cloud, values.size(), writer);
 }
 
 /// Of the sensor, behind everything else; a pose that is none takes no bytes.

@@ -88,7 +88,7 @@ core::Result<std::vector<std::uint8_t>> unpack(const std::uint8_t* bytes, std::s
 
 /// Colour and normal of the points that are there, which `points` lists: five planes of bytes, each of
 /// differences modulo 256.
-void read_looks(Reader& reader, const std::vector<Point*>& points) {
+void read_columns(Reader& reader, const std::vector<Point*>& points) {
   const std::size_t count = points.size();
   const std::uint8_t* bytes = reader.take(5 * count);
   if (bytes == nullptr) return;
@@ -126,7 +126,7 @@ void read_grid(Reader& reader, const CompactHead& head, Cloud& cloud) {
     points[k]->getVector3fMap() = Eigen::Vector3f(ray_x[i % head.width] * z, ray_y[i / head.width] * z, z);
   }
   cloud.is_dense = points.size() == cloud.size();
-  read_looks(reader, points);
+  read_columns(reader, points);
 }
 
 void read_list(Reader& reader, const CompactHead& head, Cloud& cloud) {
@@ -139,7 +139,7 @@ void read_list(Reader& reader, const CompactHead& head, Cloud& cloud) {
     for (std::size_t i = 0; i < values.size(); ++i)
       cloud[i].*axis = static_cast<float>(values[i] * head.step_m);
   }
-  read_looks(reader, points);
+  read_columns(reader, points);
 }
 
 /// Of the sensor, behind everything else; a pose that is none takes no bytes.

@@ -13,14 +13,14 @@
 #include "plumbline/cloud/exposure.hpp"
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
-#include "plumbline/cloud/sheets.hpp"
+#include "plumbline/cloud/surfels.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
 constexpr double kCell_m = 0.1;  ///< of plans and colours; also the margin of tiles
 
-/// Edge of the blocks of sheets: wide enough for a plane through noise, narrow enough for furniture.
+/// Edge of the blocks of surfels: wide enough for a plane through noise, narrow enough for furniture.
 double block_m(double voxel_m) { return std::max(0.02, 2.0 * voxel_m); }
 
 /// Occupied cells that `megabytes` hold at so many bytes for one side of a voxel.
@@ -31,7 +31,7 @@ std::size_t cells_within(double megabytes, double bytes_per_side, const DenseFus
       std::max(64.0, megabytes * 1e6 / (kLayers * per_axis * per_axis * bytes_per_side)));
 }
 
-/// Of a tile that is being finished: in the voxel map, as points, and in sheets.
+/// Of a tile that is being finished: in the voxel map, as points, and in surfels.
 std::size_t cells_per_tile(const DenseFusionOptions& options) {
   return cells_within(options.tile_mb, 240.0, options);
 }
@@ -55,7 +55,7 @@ class Fusion {
       : views_(views), world_from_cloud_(views.world_from_camera), options_(options), executor_(executor) {}
 
   core::Result<FusedCloud> run(FusionReport& report) {
-    if (auto looked = look(report); !looked) return tl::unexpected<core::Error>(looked.error());
+    if (auto done = read_views(report); !done) return tl::unexpected<core::Error>(done.error());
     FusedCloud all{std::make_shared<Cloud>(), {}};
     if (!views_.covariances.empty()) all.columns.others.push_back({kSigmaColumn, {}});
     add({}, all);
@@ -76,7 +76,7 @@ class Fusion {
       for (std::size_t k = 0; k < count; ++k) {
         add(parts[k], all);
         parts[k] = {};
-        report.dust += reports[k].dust;
+        report.isolated += reports[k].isolated;
         report.seen_through += reports[k].seen_through;
       }
     }
@@ -87,12 +87,12 @@ class Fusion {
   [[nodiscard]] bool several_robots() const { return !views_.robots.empty(); }
 
   /// Asks every view: where it reaches, what it looks through, its colours.
-  core::Result<void> look(FusionReport& report) {
+  core::Result<void> read_views(FusionReport& report) {
     const std::size_t count = views_.world_from_camera.size();
     std::vector<std::vector<ColorCell>> cells(count);
     std::vector<core::Result<void>> done(count);
     rasters_.resize(count);
-    is_look_.assign(count, 0);
+    is_depth_view_.assign(count, 0);
     executor_.parallel_for(count, [&](std::size_t v) {
       const auto cloud = views_.read(v);
       if (!cloud) {
@@ -100,8 +100,8 @@ class Fusion {
         return;
       }
       world_from_cloud_[v] = views_.world_from_camera[v] * sensor_pose(**cloud);
-      is_look_[v] = is_look(**cloud, views_.cameras[v]) ? 1 : 0;
-      if (is_look_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
+      is_depth_view_[v] = is_depth_view(**cloud, views_.cameras[v]) ? 1 : 0;
+      if (is_depth_view_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
     });
     if (auto failed = first_error(done); !failed) return failed;
@@ -160,7 +160,7 @@ class Fusion {
     std::vector<FusedPoint> points = voxels.points();
     voxels = VoxelMap(options_.voxels);
     clean(points, report);
-    if (options_.settle) points = VoxelMap::merged(points, options_.voxels);
+    if (options_.plane_projection) points = VoxelMap::merged(points, options_.voxels);
     const Eigen::AlignedBox3d box = tile.box(kCell_m);
     const auto least = static_cast<std::uint32_t>(options_.min_observations);
     const auto stays = [&](const FusedPoint& fused) {
@@ -172,21 +172,21 @@ class Fusion {
     return points;
   }
 
-  /// Without what is seen through and without dust; settled.
+  /// Without what is seen through and without isolated points; settled.
   void clean(std::vector<FusedPoint>& points, FusionReport& report) const {
-    Sheets sheets(points, block_m(options_.voxels.voxel_m));
-    std::vector<std::uint8_t> goes(sheets.all().size(), 0);
-    if (options_.free_space) goes = seen_through(sheets, rasters_, is_look_, world_from_cloud_);
-    sheets.fit_planes();
-    if (options_.settle) sheets.settle(points);
+    Surfels surfels(points, block_m(options_.voxels.voxel_m));
+    std::vector<std::uint8_t> goes(surfels.all().size(), 0);
+    if (options_.free_space) goes = seen_through(surfels, rasters_, is_depth_view_, world_from_cloud_);
+    surfels.fit_planes();
+    if (options_.plane_projection) surfels.project(points);
     const auto least = static_cast<std::uint32_t>(options_.min_support);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const std::uint32_t s = sheets.of(i);
-      if (s != Sheets::kNone && goes[s] != 0) {
+      const std::uint32_t s = surfels.of(i);
+      if (s != Surfels::kNone && goes[s] != 0) {
         ++report.seen_through;
-      } else if (s != Sheets::kNone && sheets.all()[s].support < least) {
-        ++report.dust;
+      } else if (s != Surfels::kNone && surfels.all()[s].support < least) {
+        ++report.isolated;
       } else {
         points[kept++] = points[i];
       }
@@ -243,10 +243,10 @@ class Fusion {
   DenseFusionOptions options_;
   const core::Executor& executor_;
   std::vector<FusionTile> tiles_;
-  std::vector<DepthRaster> rasters_;    ///< by view; empty ones without free space
-  std::vector<std::uint8_t> is_look_;   ///< by view
-  std::vector<Eigen::Vector3f> gains_;  ///< by view; empty: colours as they are
-  CellMap<PoseNoise> pose_noise_;       ///< by cell; empty: not known
+  std::vector<DepthRaster> rasters_;         ///< by view; empty ones without free space
+  std::vector<std::uint8_t> is_depth_view_;  ///< by view
+  std::vector<Eigen::Vector3f> gains_;       ///< by view; empty: colours as they are
+  CellMap<PoseNoise> pose_noise_;            ///< by cell; empty: not known
 };
 
 }  // namespace
@@ -255,12 +255,12 @@ void DenseFusionOptions::declare(core::OptionTable& table) {
   voxels.declare(table);
   table.integer("min_observations", min_observations, {1, 1000}, "",
                 "Keyframes that must have seen a voxel for it to stay");
-  table.boolean("settle", settle,
+  table.boolean("plane_projection", plane_projection,
                 "Lay the points of flat pieces of surface on their common plane: thin walls");
   table.boolean("free_space", free_space, "Remove what other keyframes look through: people, flying pixels");
   table.boolean("exposure", exposure, "Even out colours between keyframes");
   table.integer("min_support", min_support, {0, 1000}, "",
-                "Points with fewer others around that face the same way are dust and go; 0: none");
+                "Points with fewer others around that face the same way are isolated and go; 0: none");
   table.number(
       "tile_mb", tile_mb, {16.0, 100000.0}, "",
       "Memory that one tile of the map may take, MB; as many as may take six times that are filled together");

@@ -267,8 +267,8 @@ void DepthField::correct(Cloud& camera_cloud) const {
 
 void DepthFieldOptions::declare(core::OptionTable& table) {
   table.integer("depth_field.views", views, {kLeastViews, 10000}, "", "Views that are compared at most");
-  table.integer("depth_field.partners", partners, {1, 100}, "", "Views that each is compared with");
-  table.number("depth_field.least_gain", least_gain, {0.0, 1.0}, "",
+  table.integer("depth_field.views_per_view", partners, {1, 100}, "", "Views that each is compared with");
+  table.number("depth_field.min_gain", least_gain, {0.0, 1.0}, "",
                "Share of the disagreement between views that a correction must take away to be used");
 }
 
@@ -278,8 +278,8 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
                                           const DepthFieldOptions& options, const core::Executor& executor,
                                           DepthFieldReport* report) {
   DepthFieldReport unused;
-  DepthFieldReport& told = report == nullptr ? unused : *report;
-  told = {};
+  DepthFieldReport& found = report == nullptr ? unused : *report;
+  found = {};
   const std::size_t count = std::min(views.size(), static_cast<std::size_t>(options.views));
   std::vector<View> sampled_views(count);
   std::vector<geometry::Rigid3> poses(count);
@@ -292,7 +292,7 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
       return;
     }
     poses[i] = world_from_camera[view] * sensor_pose(**cloud);
-    if (!is_look(**cloud, camera)) sampled_views[i] = sampled(**cloud, camera);
+    if (!is_depth_view(**cloud, camera)) sampled_views[i] = sampled(**cloud, camera);
   });
   for (const auto& result : done) {
     if (!result) return tl::unexpected<core::Error>(result.error());
@@ -307,8 +307,8 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
   });
   std::vector<const Rows*> all;
   for (const Rows& some : rows) all.push_back(&some);
-  told.samples = count_of(all);
-  if (told.samples < kLeastSamples) return DepthField();
+  found.samples = count_of(all);
+  if (found.samples < kLeastSamples) return DepthField();
 
   // Each part of the run is asked what it makes of a field in which it had no say.
   struct Answer {
@@ -338,12 +338,12 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
     before.insert(before.end(), answer.before.begin(), answer.before.end());
     after.insert(after.end(), answer.after.begin(), answer.after.end());
   }
-  told.before = median(before);
-  told.after = median(after);
-  told.used = told.after <= (1.0 - options.least_gain) * told.before;
-  if (!told.used) return DepthField();
+  found.before = median(before);
+  found.after = median(after);
+  found.used = found.after <= (1.0 - options.least_gain) * found.before;
+  if (!found.used) return DepthField();
   const DepthField field = fitted(all, camera, executor);
-  told.most_at_2m = most_at_2m(all, field);
+  found.most_at_2m = most_at_2m(all, field);
   return field;
 }
 

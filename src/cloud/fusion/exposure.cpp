@@ -22,7 +22,7 @@ constexpr int kDark = 12;
 constexpr int kBright = 245;
 
 /// What a view saw of a cell.
-struct Sighting {
+struct CellColor {
   std::uint64_t cell = 0;
   std::size_t view = 0;
   Eigen::Array3f log_color;
@@ -30,16 +30,16 @@ struct Sighting {
 };
 
 /// Cell by cell, those that two views or more saw in colour.
-std::vector<Sighting> shared_sightings(const std::vector<std::vector<ColorCell>>& views) {
-  std::vector<Sighting> all;
+std::vector<CellColor> shared_colors(const std::vector<std::vector<ColorCell>>& views) {
+  std::vector<CellColor> all;
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (const ColorCell& cell : views[v]) {
       if (cell.points >= kFewestPoints) all.push_back({cell.cell, v, cell.color.array().log(), {1, 1, 1}});
     }
   }
   std::stable_sort(all.begin(), all.end(),
-                   [](const Sighting& a, const Sighting& b) { return a.cell < b.cell; });
-  std::vector<Sighting> shared;
+                   [](const CellColor& a, const CellColor& b) { return a.cell < b.cell; });
+  std::vector<CellColor> shared;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool as_before = i > 0 && all[i - 1].cell == all[i].cell;
     const bool as_after = i + 1 < all.size() && all[i + 1].cell == all[i].cell;
@@ -82,7 +82,7 @@ std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Ri
 }
 
 std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell>>& views) {
-  std::vector<Sighting> sightings = shared_sightings(views);
+  std::vector<CellColor> colors = shared_colors(views);
   struct Sum {
     Eigen::Array3f log_gain = Eigen::Array3f::Zero();
     Eigen::Array3f wanted = Eigen::Array3f::Zero();
@@ -94,17 +94,17 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
       view.wanted.setZero();
       view.weight.setConstant(kPrior);
     }
-    for (std::size_t first = 0, end = 0; first < sightings.size(); first = end) {
+    for (std::size_t first = 0, end = 0; first < colors.size(); first = end) {
       Eigen::Array3f sum = Eigen::Array3f::Zero();
       Eigen::Array3f weight = Eigen::Array3f::Zero();
-      for (end = first; end < sightings.size() && sightings[end].cell == sightings[first].cell; ++end) {
-        const Sighting& s = sightings[end];
+      for (end = first; end < colors.size() && colors[end].cell == colors[first].cell; ++end) {
+        const CellColor& s = colors[end];
         sum += s.weight * (s.log_color + of_views[s.view].log_gain);
         weight += s.weight;
       }
       const Eigen::Array3f mean = sum / weight;
       for (std::size_t i = first; i < end; ++i) {
-        Sighting& s = sightings[i];
+        CellColor& s = colors[i];
         Sum& view = of_views[s.view];
         const Eigen::Array3f wanted = mean - s.log_color;
         s.weight = robust_weight(wanted - view.log_gain);
@@ -121,7 +121,7 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
     for (Sum& view : of_views) view.log_gain -= drift;
   }
   std::vector<Eigen::Vector3f> factors(views.size(), Eigen::Vector3f::Ones());
-  for (const Sighting& s : sightings)
+  for (const CellColor& s : colors)
     factors[s.view] = of_views[s.view].log_gain.max(-kMostLog).min(kMostLog).exp();
   return factors;
 }

@@ -35,11 +35,11 @@ struct NearView {
 };
 struct NearViews {
   std::vector<NearView> clouds;
-  std::vector<NearView> looks;
+  std::vector<NearView> depth_views;
 };
 
 NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
-                     const std::vector<std::uint8_t>& is_look,
+                     const std::vector<std::uint8_t>& is_depth_view,
                      const std::vector<geometry::Rigid3>& world_from_camera) {
   constexpr double kWidest = 1.5;  // distance over depth at the picture's corners, at most
   NearViews views;
@@ -47,14 +47,14 @@ NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRast
     const double distance = box.exteriorDistance(world_from_camera[v].translation);
     if (distance > kWidest * static_cast<double>(rasters[v].furthest_m)) continue;
     const geometry::Rigid3 camera_from_world = world_from_camera[v].inverse();
-    (is_look[v] != 0 ? views.looks : views.clouds)
+    (is_depth_view[v] != 0 ? views.depth_views : views.clouds)
         .push_back({&rasters[v], camera_from_world.rotation.cast<float>(),
                     camera_from_world.translation.cast<float>()});
   }
   return views;
 }
 
-/// What the views say about each of the sheets `asked`.
+/// What the views say about each of the surfels `asked`.
 void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vector3f>& positions,
            const std::vector<NearView>& views, std::vector<Votes>& votes) {
   if (asked.empty()) return;
@@ -86,7 +86,7 @@ Verdict judge(const Votes& v) {
   return v.free > 0 ? Verdict::kDoubtful : Verdict::kStays;
 }
 
-/// Of every sheet. Looks are asked only where clouds leave a doubt.
+/// Of every surfel. Depth views are tested only where clouds leave a doubt.
 std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const NearViews& views) {
   std::vector<Votes> votes(positions.size());
   std::vector<std::uint32_t> asked(positions.size());
@@ -96,7 +96,7 @@ std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const 
     return judge(votes[s]) == Verdict::kGoes || (votes[s].free == 0 && votes[s].surface >= kSolid);
   };
   asked.erase(std::remove_if(asked.begin(), asked.end(), clear), asked.end());
-  count(asked, positions, views.looks, votes);
+  count(asked, positions, views.depth_views, votes);
   std::vector<Verdict> verdicts;
   verdicts.reserve(votes.size());
   for (const Votes& v : votes) verdicts.push_back(judge(v));
@@ -106,25 +106,25 @@ std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const 
 /// What goes with what is around it.
 class Surroundings {
  public:
-  Surroundings(const std::vector<Sheet>& sheets, const std::vector<Eigen::Vector3f>& positions,
+  Surroundings(const std::vector<Surfel>& surfels, const std::vector<Eigen::Vector3f>& positions,
                double radius_m)
-      : sheets_(sheets), positions_(positions), radius_m_(radius_m) {
+      : surfels_(surfels), positions_(positions), radius_m_(radius_m) {
     for (std::uint32_t s = 0; s < positions.size(); ++s) cells_[pack_cell(cell(s))].push_back(s);
   }
 
   /// Whether at least half of the points within the radius that are no matter of doubt go.
-  [[nodiscard]] bool go(std::uint32_t sheet, const std::vector<Verdict>& verdicts) const {
+  [[nodiscard]] bool go(std::uint32_t surfel, const std::vector<Verdict>& verdicts) const {
     std::size_t going = 0;
     std::size_t staying = 0;
     const auto squared = static_cast<float>(radius_m_ * radius_m_);
     for (int k = 0; k < 27; ++k) {
       const auto found =
-          cells_.find(pack_cell(cell(sheet) + Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
+          cells_.find(pack_cell(cell(surfel) + Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
       if (found == cells_.end()) continue;
       for (const std::uint32_t s : found->second) {
         if (verdicts[s] != Verdict::kGoes && verdicts[s] != Verdict::kStays) continue;
-        if ((positions_[s] - positions_[sheet]).squaredNorm() > squared) continue;
-        (verdicts[s] == Verdict::kGoes ? going : staying) += sheets_[s].points;
+        if ((positions_[s] - positions_[surfel]).squaredNorm() > squared) continue;
+        (verdicts[s] == Verdict::kGoes ? going : staying) += surfels_[s].points;
       }
     }
     return going > 0 && going >= staying;
@@ -135,10 +135,10 @@ class Surroundings {
     return cell_of(positions_[s].cast<double>() / radius_m_);
   }
 
-  const std::vector<Sheet>& sheets_;
+  const std::vector<Surfel>& surfels_;
   const std::vector<Eigen::Vector3f>& positions_;
   double radius_m_;
-  CellMap<std::vector<std::uint32_t>> cells_;  ///< sheets by cells of the radius
+  CellMap<std::vector<std::uint32_t>> cells_;  ///< surfels by cells of the radius
 };
 
 }  // namespace
@@ -212,7 +212,7 @@ Evidence DepthLimits::evidence(const Eigen::Vector3f& point) const {
   return static_cast<double>(z) > far_m + margin(far_m) ? Evidence::kHidden : Evidence::kSurface;
 }
 
-CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
+CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
                     double max_depth_m) {
   constexpr int kCell = DepthRaster::kCell_px;
   const auto least = static_cast<float>(min_depth_m), most = static_cast<float>(max_depth_m);
@@ -220,16 +220,16 @@ CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   none.r = none.g = none.b = 0;
-  auto look = std::make_shared<Cloud>();
-  look->points.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), none);
-  look->width = static_cast<std::uint32_t>(columns);
-  look->height = static_cast<std::uint32_t>(rows);
-  look->is_dense = false;
+  auto view = std::make_shared<Cloud>();
+  view->points.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), none);
+  view->width = static_cast<std::uint32_t>(columns);
+  view->height = static_cast<std::uint32_t>(rows);
+  view->is_dense = false;
   const int height = std::min(frame.depth.rows, rows * kCell),
             width = std::min(frame.depth.cols, columns * kCell);
   for (int v = 0; v < height; ++v) {
     const float* depth = frame.depth.ptr<float>(v);
-    Point* cells = look->points.data() + static_cast<std::ptrdiff_t>(v / kCell) * columns;
+    Point* cells = view->points.data() + static_cast<std::ptrdiff_t>(v / kCell) * columns;
     for (int u = 0; u < width; ++u) {
       const float z = depth[u];
       if (!(z >= least && z <= most)) continue;
@@ -240,17 +240,17 @@ CloudPtr depth_look(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
   const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
   constexpr float kMiddle = 0.5F * static_cast<float>(kCell) - 0.5F;
-  for (std::size_t i = 0; i < look->points.size(); ++i) {
-    Point& p = look->points[i];
+  for (std::size_t i = 0; i < view->points.size(); ++i) {
+    Point& p = view->points[i];
     if (!(p.z > 0.0F)) continue;
-    const auto column = static_cast<float>(i % look->width), row = static_cast<float>(i / look->width);
+    const auto column = static_cast<float>(i % view->width), row = static_cast<float>(i / view->width);
     p.x = (static_cast<float>(kCell) * column + kMiddle - cx) / fx * p.z;
     p.y = (static_cast<float>(kCell) * row + kMiddle - cy) / fy * p.z;
   }
-  return look;
+  return view;
 }
 
-bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
+bool is_depth_view(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
   constexpr int kCell = DepthRaster::kCell_px;
   if (camera_cloud.height < 2 ||
       camera_cloud.width != static_cast<std::uint32_t>((camera.width + kCell - 1) / kCell) ||
@@ -261,21 +261,22 @@ bool is_look(const Cloud& camera_cloud, const sensor::Pinhole& camera) {
                       [](const Point& p) { return std::isfinite(p.normal_x); });
 }
 
-std::vector<std::uint8_t> seen_through(const Sheets& sheets, const std::vector<DepthRaster>& rasters,
-                                       const std::vector<std::uint8_t>& is_look,
+std::vector<std::uint8_t> seen_through(const Surfels& surfels, const std::vector<DepthRaster>& rasters,
+                                       const std::vector<std::uint8_t>& is_depth_view,
                                        const std::vector<geometry::Rigid3>& world_from_camera) {
-  std::vector<std::uint8_t> goes(sheets.all().size(), 0);
+  std::vector<std::uint8_t> goes(surfels.all().size(), 0);
   if (goes.empty()) return goes;
   Eigen::AlignedBox3d box;
   std::vector<Eigen::Vector3f> positions;
   positions.reserve(goes.size());
-  for (const Sheet& sheet : sheets.all()) {
-    const Eigen::Vector3d position = sheets.position(sheet);
+  for (const Surfel& surfel : surfels.all()) {
+    const Eigen::Vector3d position = surfels.position(surfel);
     box.extend(position);
     positions.push_back(position.cast<float>());
   }
-  std::vector<Verdict> verdicts = judge(positions, views_near(box, rasters, is_look, world_from_camera));
-  const Surroundings around(sheets.all(), positions, std::max(kAround_m, sheets.block_m()));
+  std::vector<Verdict> verdicts =
+      judge(positions, views_near(box, rasters, is_depth_view, world_from_camera));
+  const Surroundings around(surfels.all(), positions, std::max(kAround_m, surfels.block_m()));
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<Verdict> before = verdicts;
     for (std::uint32_t s = 0; s < goes.size(); ++s) {

@@ -109,7 +109,7 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
   found.directions = eigen.eigenvectors();
   Vector6d step = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
-    found.held[static_cast<std::size_t>(i)] = found.eigenvalues(i) > min_hold_ * weights;
+    found.held[static_cast<std::size_t>(i)] = found.eigenvalues(i) > min_information_ * weights;
     if (!found.held[static_cast<std::size_t>(i)]) continue;
     step -= found.directions.col(i) * (found.directions.col(i).dot(g) / found.eigenvalues(i));
   }

@@ -28,11 +28,11 @@ Matrix6d chain_information() {
 
 /// Landmarks in the order in which they are worth having: those seen most often first.
 template <typename IdType>
-std::vector<std::pair<int, IdType>> by_sightings(const std::vector<IdType>& ids,
-                                                 const std::vector<int>& sightings) {
+std::vector<std::pair<int, IdType>> by_observations(const std::vector<IdType>& ids,
+                                                    const std::vector<int>& observations) {
   std::vector<std::pair<int, IdType>> order;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (sightings[i] >= 2) order.emplace_back(-sightings[i], ids[i]);
+    if (observations[i] >= 2) order.emplace_back(-observations[i], ids[i]);
   }
   std::sort(order.begin(), order.end());
   return order;
@@ -57,7 +57,7 @@ class GlobalBuilder {
     bundle_.problem.camera = cameras.at(anchor.robot);
     for (const KeyframeId id : map.keyframe_ids()) {
       index_.insert(id, static_cast<int>(bundle_.keyframes.size()));
-      unrest_.push_back(options.noise.unrest_of(map.keyframe(id).turn_rate));
+      motion_factor_.push_back(options.noise.motion_factor_of(map.keyframe(id).turn_rate));
       bundle_.keyframes.push_back(id);
       bundle_.problem.poses.push_back({map.camera_from_world(id), id == anchor});
     }
@@ -67,22 +67,22 @@ class GlobalBuilder {
   /// As many landmarks as every keyframe needs: one is left out when all keyframes that see it have enough.
   void add_points() {
     const std::vector<core::PointId> ids = map_.point_ids();
-    std::vector<int> sightings;
+    std::vector<int> observations;
     for (const core::PointId id : ids) {
-      sightings.push_back(static_cast<int>(map_.point(id).observations.size()));
+      observations.push_back(static_cast<int>(map_.point(id).observations.size()));
     }
-    for (const auto& [order, id] : by_sightings(ids, sightings)) {
+    for (const auto& [order, id] : by_observations(ids, observations)) {
       if (wanted(map_.point(id).observations, options_.observations)) add(map_.point(id));
     }
   }
   void add_lines() {
     std::fill(tied_.begin(), tied_.end(), 0);
     const std::vector<core::LineId> ids = map_.line_ids();
-    std::vector<int> sightings;
+    std::vector<int> observations;
     for (const core::LineId id : ids) {
-      sightings.push_back(static_cast<int>(map_.line(id).observations.size()));
+      observations.push_back(static_cast<int>(map_.line(id).observations.size()));
     }
-    for (const auto& [order, id] : by_sightings(ids, sightings)) {
+    for (const auto& [order, id] : by_observations(ids, observations)) {
       if (wanted(map_.line(id).observations, options_.observations)) add(map_.line(id));
     }
   }
@@ -91,8 +91,8 @@ class GlobalBuilder {
     for (const KeyframeId id : bundle_.keyframes) {
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
         if (edge.b != id) continue;  // each edge once, at its newer end
-        const double unrest2 = unrest(edge.a) * unrest(edge.b);
-        add_edge(edge.a, edge.b, edge.b_from_a, options_.surface_weight / unrest2 * edge.information);
+        const double motion_factor2 = motion_factor(edge.a) * motion_factor(edge.b);
+        add_edge(edge.a, edge.b, edge.b_from_a, options_.surface_weight / motion_factor2 * edge.information);
         ++count;
       }
     }
@@ -103,9 +103,9 @@ class GlobalBuilder {
       const KeyframeId a = bundle_.keyframes[i - 1];
       const KeyframeId b = bundle_.keyframes[i];
       if (a.robot != b.robot) continue;
-      const double unrest2 = unrest(a) * unrest(b);
+      const double motion_factor2 = motion_factor(a) * motion_factor(b);
       add_edge(a, b, map_.camera_from_world(b) * map_.camera_from_world(a).inverse(),
-               unrest2 * unrest2 * chain_information());
+               motion_factor2 * motion_factor2 * chain_information());
     }
   }
   void add_edge(KeyframeId a, KeyframeId b, const Rigid3& b_from_a, const Matrix6d& information) {
@@ -121,7 +121,9 @@ class GlobalBuilder {
     return *found;
   }
   /// What standard deviations of a keyframe's measurements are multiplied by.
-  [[nodiscard]] double unrest(KeyframeId id) const { return unrest_[static_cast<std::size_t>(index_of(id))]; }
+  [[nodiscard]] double motion_factor(KeyframeId id) const {
+    return motion_factor_[static_cast<std::size_t>(index_of(id))];
+  }
   [[nodiscard]] double octave_px(int octave) {
     if (octave < 0 || octave > 64) return options_.noise.octave_px(octave);
     while (static_cast<int>(octave_px_.size()) <= octave)
@@ -159,7 +161,7 @@ class GlobalBuilder {
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
       optimize::BundlePointObservation seen =
-          options_.noise.of(f, o.aligned, unrest(o.keyframe), octave_px(f.octave));
+          options_.noise.of(f, o.aligned, motion_factor(o.keyframe), octave_px(f.octave));
       seen.pose = index_of(o.keyframe);
       seen.point = index;
       seen.pixel = pixel(o.keyframe, seen.pixel);
@@ -175,7 +177,7 @@ class GlobalBuilder {
     for (const maps::Observation& o : line.observations) {
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
-      optimize::BundleLineObservation seen = options_.noise.of(f, unrest(o.keyframe));
+      optimize::BundleLineObservation seen = options_.noise.of(f, motion_factor(o.keyframe));
       seen.pose = index_of(o.keyframe);
       seen.line = index;
       seen.start = pixel(o.keyframe, seen.start);
@@ -191,9 +193,9 @@ class GlobalBuilder {
   const GlobalAdjustmentOptions& options_;
   GlobalBundle bundle_;
   maps::IdMap<KeyframeId, int> index_;
-  std::vector<double> unrest_;     ///< of the problem's poses
-  std::vector<double> octave_px_;  ///< as far as it was asked for
-  std::vector<int> tied_;          ///< landmarks taken that a keyframe sees
+  std::vector<double> motion_factor_;  ///< of the problem's poses
+  std::vector<double> octave_px_;      ///< as far as it was asked for
+  std::vector<int> tied_;              ///< landmarks taken that a keyframe sees
 };
 
 /// Landmarks that no keyframe sees any more are gone.
@@ -330,7 +332,7 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
                 "Rounds of the adjustment; between them outliers are put aside");
   table.number("adjust.tolerance", bundle_options.tolerance, {0.0, 0.1}, "",
                "A round ends with an iteration that lowers the cost by a smaller share");
-  table.number("adjust.first_gate", first_gate, {0.0, 1000.0}, "",
+  table.number("adjust.gate", first_gate, {0.0, 1000.0}, "",
                "Observations further off than so many standard deviations, and 0.8 px, where the pose graph "
                "has put the keyframes wait for the second round: those that caused a drift would restore it; "
                "0: none");

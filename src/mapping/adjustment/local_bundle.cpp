@@ -101,17 +101,18 @@ class Builder {
     for (core::LineId id : lines) add_line(id);
   }
 
-  /// A sheared picture's depth is sheared, too: its surfaces say as little about where it was as its corners.
+  /// A distorted picture's depth is distorted, too: its surfaces say as little about where it was as its
+  /// corners.
   void add_edges() {
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {
       const maps::Keyframe& keyframe = map_.keyframe(id);
       for (const maps::SurfaceEdge& edge : map_.edges_of(id)) {
         if (edge.b != id) continue;  // each edge once, at its newer end
-        add_edge(edge.a, id, edge.b_from_a, edge.information / (unrest(edge.a) * unrest(id)));
+        add_edge(edge.a, id, edge.b_from_a, edge.information / (motion_factor(edge.a) * motion_factor(id)));
       }
       if (!keyframe.reference.valid() || !map_.has_keyframe(keyframe.reference)) continue;
       const double turning =
-          unrest(keyframe.reference) * unrest(id);  // what they see holds them all the less
+          motion_factor(keyframe.reference) * motion_factor(id);  // what they see holds them all the less
       add_edge(keyframe.reference, id, keyframe.camera_from_reference,
                turning * turning * tracked_information(keyframe));
     }
@@ -136,8 +137,8 @@ class Builder {
     return bundle_.problem.poses[static_cast<std::size_t>(i)].fixed;
   }
 
-  [[nodiscard]] double unrest(KeyframeId id) const {
-    return options_.noise.unrest_of(map_.keyframe(id).turn_rate);
+  [[nodiscard]] double motion_factor(KeyframeId id) const {
+    return options_.noise.motion_factor_of(map_.keyframe(id).turn_rate);
   }
   void add_edge(KeyframeId from, KeyframeId to, const Rigid3& to_from_from, const Matrix6d& information) {
     if (!has(from)) return;
@@ -177,7 +178,7 @@ class Builder {
       if (!has(o.keyframe)) continue;
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen = options_.noise.of(f, o.aligned, unrest(o.keyframe));
+      optimize::BundlePointObservation seen = options_.noise.of(f, o.aligned, motion_factor(o.keyframe));
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
       bundle_.problem.point_observations.push_back(seen);
@@ -194,7 +195,7 @@ class Builder {
       if (!has(o.keyframe)) continue;
       const features::LineFeature& f =
           map_.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
-      optimize::BundleLineObservation seen = options_.noise.of(f, unrest(o.keyframe));
+      optimize::BundleLineObservation seen = options_.noise.of(f, motion_factor(o.keyframe));
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
       bundle_.problem.line_observations.push_back(seen);

@@ -61,8 +61,8 @@ class EdgeCollector {
 
 /// Errors of one keyframe after another along the way from `a` to `b`, were they independent: covariance of
 /// b_from_a. `steps` counts them.
-Matrix6d covariance_of_way(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
-                           KeyframeId b, int& steps) {
+Matrix6d covariance_of_path(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
+                            KeyframeId b, int& steps) {
   const Matrix6d step = information(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();  // several edges hold each
   Matrix6d sum = Matrix6d::Zero();
   steps = 0;
@@ -101,7 +101,7 @@ Discrepancy discrepancy(const maps::Map& map, const std::vector<KeyframeId>& ids
     d.own = carry * d.own * carry.transpose();
   }
   d.error = geometry::log_se3(error);
-  d.way = covariance_of_way(map, ids, std::min(e.a, e.b), std::max(e.a, e.b), d.steps);
+  d.way = covariance_of_path(map, ids, std::min(e.a, e.b), std::max(e.a, e.b), d.steps);
   return d;
 }
 

@@ -74,7 +74,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.boolean("keyframe.reuse", reuse,
                 "Plain rule: where an older keyframe serves as well, track against that one again instead of "
                 "making another");
-  table.integer("keyframe.cone_patience", cone_patience, {0, 10000}, "",
+  table.integer("keyframe.cone_max_wait", cone_patience, {0, 10000}, "",
                 "Cone rule: after so many frames a bundle under way no longer holds a keyframe up");
   table.number("keyframe.cone_max_shared", cone_max_shared, {0.05, 1.0}, "",
                "Cone rule: no keyframe while a larger share of the last one's landmarks is matched");
@@ -154,9 +154,9 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   return d;
 }
 
-core::KeyframeId KeyframeRule::known_ground(const maps::Map& map, core::KeyframeId reference,
-                                            const tracking::TrackResult& track,
-                                            const sensor::Pinhole& camera) const {
+core::KeyframeId KeyframeRule::earlier_reference(const maps::Map& map, core::KeyframeId reference,
+                                                 const tracking::TrackResult& track,
+                                                 const sensor::Pinhole& camera) const {
   if (!options_.reuse || options_.rule != KeyframeRuleOptions::Rule::kPlain) return {};
   std::map<core::KeyframeId, int> common;  // landmarks matched now that a keyframe saw
   const auto count = [&](const std::vector<maps::Observation>& observations) {

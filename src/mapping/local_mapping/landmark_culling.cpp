@@ -13,7 +13,7 @@ void LandmarkCullingOptions::declare(core::OptionTable& table) {
                 "Frames that should have seen a landmark before that share is judged");
   table.integer("landmark.min_keyframes", min_keyframes, {1, 100}, "",
                 "Landmarks that fewer keyframes see are removed after the grace time; 1: none");
-  table.integer("landmark.grace", grace_keyframes, {1, 1000}, "",
+  table.integer("landmark.min_age", grace_keyframes, {1, 1000}, "",
                 "Keyframes made after a landmark's own before it is judged by those that see it");
 }
 

@@ -15,7 +15,7 @@ using geometry::Rigid3;
 
 constexpr double kReprojectionGate = 5.99;  // chi-square, 2 degrees of freedom, 95 %
 constexpr double kEpipolarGate_px = 2.0;    // at octave 0
-constexpr double kRival_px = 3.0;           // corners of several octaves at one place are one corner
+constexpr double kAlternative_px = 3.0;     // corners of several octaves at one place are one corner
 constexpr double kMaxScaleChange = 1.8;     // of a corner's size in space, between its two pictures
 
 /// One keyframe with what the search needs of it.
@@ -68,12 +68,12 @@ class PairSearch {
       if (off > kEpipolarGate_px * sigma(g) || !alike(f, g)) continue;
       const int distance = features::hamming_distance(a_.features.descriptors[static_cast<std::size_t>(i)],
                                                       b_.features.descriptors[static_cast<std::size_t>(j)]);
-      const bool rival = best < 0 || (g.pixel - pixel_of(best)).norm() > kRival_px;
+      const bool alternative = best < 0 || (g.pixel - pixel_of(best)).norm() > kAlternative_px;
       if (distance < best_distance) {
-        if (rival) second_distance = best_distance;
+        if (alternative) second_distance = best_distance;
         best_distance = distance;
         best = j;
-      } else if (rival && distance < second_distance) {
+      } else if (alternative && distance < second_distance) {
         second_distance = distance;
       }
     }
@@ -151,7 +151,7 @@ struct Meeting {
 /// looked for again by the older one's patch.
 std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, const maps::Observation& newest,
                             const maps::Observation& older, const sensor::Pinhole& camera,
-                            const TriangulationOptions& options, const NewestPicture* picture) {
+                            const TriangulationOptions& options, const NewestImage* picture) {
   const auto point_of = [&](const maps::Observation& c) -> const features::PointFeature& {
     return map.keyframe(c.keyframe).features->points[static_cast<std::size_t>(c.feature)];
   };
@@ -166,8 +166,8 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
   const auto rough = search.meet(point_of(newest), point_of(older), options.aligned);
   if (!rough) return std::nullopt;
   const Rigid3& pose = map.camera_from_world(newest.keyframe);
-  const auto at = tracking::align_sighting(map, older, pose.inverse() * *rough, picture->levels, patch.middle,
-                                           camera, pose, options.scale_factor);
+  const auto at = tracking::align_observation(map, older, pose.inverse() * *rough, picture->levels,
+                                              patch.middle, camera, pose, options.scale_factor);
   if (!at) return alone();
   const Eigen::Vector2f shift = *at - patch.middle;
   features::PointFeature moved = point_of(newest);
@@ -211,11 +211,11 @@ std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyfram
                                               const std::vector<KeyframeId>& neighbours,
                                               double max_measured_m, const sensor::Pinhole& camera,
                                               const TriangulationOptions& options,
-                                              const NewestPicture* picture) {
+                                              const NewestImage* picture) {
   std::vector<core::PointId> made;
   const bool aligns = picture != nullptr && !picture->levels.empty() &&
                       picture->newest.patches.size() == picture->newest.points.size();
-  const NewestPicture* const shown = aligns ? picture : nullptr;
+  const NewestImage* const shown = aligns ? picture : nullptr;
   bool moved = false;
   for (KeyframeId other : neighbours) {
     const FreeCorners a = free_corners_of(map, keyframe, max_measured_m);

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "plumbline/features/depth_delay.hpp"
-#include "plumbline/mapping/earlier_sightings.hpp"
+#include "plumbline/mapping/earlier_observations.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
 #include "plumbline/mapping/surface_edge.hpp"
 
@@ -42,16 +42,17 @@ void move(std::vector<maps::SurfaceSample>& surface, const geometry::Rigid3& cam
 void LocalMapperOptions::declare(core::OptionTable& table) {
   table.number("landmark.max_depth", max_landmark_depth_m, {0.5, 100.0}, "m",
                "Landmarks are made of depth up to here");
-  table.number("landmark.max_turn_rate", max_landmark_turn_rate, {0.0, 100.0}, "rad/s",
-               "Pictures taken while turning faster are sheared by the rolling shutter of common sensors: no "
-               "landmark is "
-               "triangulated, looked for or merged with them");
+  table.number(
+      "landmark.max_turn_rate", max_landmark_turn_rate, {0.0, 100.0}, "rad/s",
+      "Pictures taken while turning faster are distorted by the rolling shutter of common sensors: no "
+      "landmark is "
+      "triangulated, looked for or merged with them");
   culling.declare(table);
   table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
   triangulation.declare(table);
   table.boolean("fuse", fuse, "Look for landmarks in neighbouring keyframes and merge doubles");
   table.boolean(
-      "fuse.earlier", earlier_sightings,
+      "fuse.backward", earlier_observations,
       "Look for new landmarks among corners of older keyframes that see none, as where depth was missing");
   fusion.declare(table);
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
@@ -96,10 +97,10 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const s
   const std::vector<core::PointId> made = add_points(map, id);
   add_lines(map, id);
   map.attach(id);
-  if (options_.fuse && options_.earlier_sightings && !sheared(map, id))
-    add_earlier_sightings(map, made, id, nearest_sharp(map, id, options_.fusion.keyframes), levels, camera_,
-                          options_.fusion.association, *own);
-  if (options_.triangulate && !sheared(map, id)) triangulate(map, id, {levels, *own});
+  if (options_.fuse && options_.earlier_observations && !distorted(map, id))
+    add_earlier_observations(map, made, id, nearest_undistorted(map, id, options_.fusion.keyframes), levels,
+                             camera_, options_.fusion.association, *own);
+  if (options_.triangulate && !distorted(map, id)) triangulate(map, id, {levels, *own});
   own->slants = {};  // corners stay where they are from here on
   return id;
 }
@@ -153,7 +154,7 @@ void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
   }
 }
 
-void LocalMapper::count_sightings(maps::Map& map, const tracking::TrackResult& track) const {
+void LocalMapper::count_observations(maps::Map& map, const tracking::TrackResult& track) const {
   for (core::PointId id : track.visible_points) ++map.point(id).visible;
   for (core::LineId id : track.visible_lines) ++map.line(id).visible;
   for (const tracking::PointMatch& m : track.points) ++map.point(m.point).found;
@@ -179,22 +180,23 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
   }
 }
 
-/// Pictures taken while turning fast are sheared: their rays lie, and what they show does not lie where it
+/// Pictures taken while turning fast are distorted: their rays lie, and what they show does not lie where it
 /// seems to.
-bool LocalMapper::sheared(const maps::Map& map, core::KeyframeId id) const {
+bool LocalMapper::distorted(const maps::Map& map, core::KeyframeId id) const {
   return map.keyframe(id).turn_rate > options_.max_landmark_turn_rate;
 }
 
-std::vector<core::KeyframeId> LocalMapper::nearest_sharp(const maps::Map& map, core::KeyframeId id,
-                                                         int count) const {
+std::vector<core::KeyframeId> LocalMapper::nearest_undistorted(const maps::Map& map, core::KeyframeId id,
+                                                               int count) const {
   std::vector<core::KeyframeId> neighbours = nearest(map, id, count);
-  const auto bad = [&](core::KeyframeId k) { return sheared(map, k); };
+  const auto bad = [&](core::KeyframeId k) { return distorted(map, k); };
   neighbours.erase(std::remove_if(neighbours.begin(), neighbours.end(), bad), neighbours.end());
   return neighbours;
 }
 
-void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestPicture& picture) {
-  const std::vector<core::KeyframeId> neighbours = nearest_sharp(map, id, options_.triangulation.keyframes);
+void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestImage& picture) {
+  const std::vector<core::KeyframeId> neighbours =
+      nearest_undistorted(map, id, options_.triangulation.keyframes);
   const TriangulationOptions& how = options_.triangulation;
   const double measured = options_.max_landmark_depth_m;
   for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how, &picture))
@@ -203,8 +205,8 @@ void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestP
 }
 
 void LocalMapper::refine(maps::Map& map, core::KeyframeId id) {
-  if (options_.fuse && !sheared(map, id)) {
-    const std::vector<core::KeyframeId> neighbours = nearest_sharp(map, id, options_.fusion.keyframes);
+  if (options_.fuse && !distorted(map, id)) {
+    const std::vector<core::KeyframeId> neighbours = nearest_undistorted(map, id, options_.fusion.keyframes);
     fuse_points(map, id, neighbours, camera_, options_.fusion);
     fuse_lines(map, id, neighbours, camera_, options_.fusion);
   }

@@ -155,12 +155,12 @@ std::vector<ConsistentSet> consistent_sets(const maps::Map& map_a, const maps::M
     }
     std::vector<std::size_t> members;
     for (const std::size_t i : maximum_clique(joined, options.budget)) members.push_back(left[i]);
-    const auto same_story = [&](std::size_t i) {
+    const auto agrees = [&](std::size_t i) {
       std::size_t count = 0;
       for (const std::size_t m : members) count += m == i || agreed[i][m] ? 1U : 0U;
       return std::find(members.begin(), members.end(), i) != members.end() || 2 * count >= members.size();
     };
-    left.erase(std::remove_if(left.begin(), left.end(), same_story), left.end());
+    left.erase(std::remove_if(left.begin(), left.end(), agrees), left.end());
     sets.push_back(describe(map_a, map_b, pairs, std::move(members)));
   }
   return sets;

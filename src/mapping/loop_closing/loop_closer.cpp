@@ -37,13 +37,13 @@ void LoopOptions::declare(core::OptionTable& table) {
   table.boolean("loops", enabled, "Recognise places and close loops");
   table.number("loops.min_gap", min_gap_s, {0.0, 3600.0}, "s",
                "Keyframes made within this time of each other never make a loop");
-  table.integer("loops.agreeing", agreeing, {1, 20}, "",
+  table.integer("loops.min_consistent", agreeing, {1, 20}, "",
                 "Verified keyframes that must agree before a loop is closed");
-  table.number("loops.max_rival", max_rival, {0.0, 1.0}, "",
+  table.number("loops.max_alternative", max_alternative, {0.0, 1.0}, "",
                "Share of these that may agree on another place at most");
-  table.number("loops.max_apart", consistency.max_apart_m, {0.0, 10.0}, "m",
+  table.number("loops.max_translation", consistency.max_apart_m, {0.0, 10.0}, "m",
                "How far apart loops that agree may put the camera; 2 cm more for every metre between them");
-  table.number("loops.max_turned", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.number("loops.max_rotation", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
   table.number("loops.max_drift", max_drift, {0.0, 10.0}, "",
                "Share of the way since a place was seen that a loop may correct; 10 cm are always allowed");
   table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
@@ -86,7 +86,7 @@ void LoopCloser::measure_correction(const maps::Map& map, LoopTrial& trial) cons
     const KeyframeId id{loop.query.robot, i};
     if (!map.has_keyframe(id)) continue;
     const Eigen::Vector3d here = map.camera_from_world(id).inverse().translation;
-    trial.way_m += (here - last).norm();
+    trial.path_m += (here - last).norm();
     last = here;
   }
   const Rigid3 correction = world_from_query(map, loop) * map.camera_from_world(loop.query);
@@ -104,24 +104,24 @@ std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
   const bool same_robot = trial.loop.match.robot == trial.loop.query.robot;
   if (same_robot) measure_correction(map, trial);  // else nothing is known of how they lie
   if (!evidence.accepted) return evidence.refused;
-  const double allowed_m = options_.max_drift * trial.way_m;
+  const double allowed_m = options_.max_drift * trial.path_m;
   if (trial.correction_m > kAlways_m + allowed_m ||
       trial.correction_rad > kAlways_rad + kRadiansPerMetre * allowed_m) {
     return fmt::format("{:.2f} m and {:.2f} rad are more than drift explains on {:.1f} m", trial.correction_m,
-                       trial.correction_rad, trial.way_m);
+                       trial.correction_rad, trial.path_m);
   }
   return {};
 }
 
-/// The story that most of the loops found lately tell, with the new keyframe among them: when enough
-/// keyframes tell it and no other story comes near.
+/// The largest consistent set of the loops found lately, with the new keyframe in it: when it holds enough
+/// keyframes and no other set comes near.
 std::vector<Loop> LoopCloser::confirmed(const maps::Map& map, KeyframeId keyframe) const {
   std::vector<PlacePair> pairs;
   for (const Loop& loop : waiting_) pairs.push_back({loop.match, loop.query, loop.evidence.query_from_match});
   const std::vector<ConsistentSet> sets = consistent_sets(map, map, pairs, options_.consistency);
   if (sets.empty() || static_cast<int>(sets[0].keyframes_b) < options_.agreeing) return {};
   if (sets.size() > 1 && static_cast<double>(sets[1].keyframes_b) >
-                             options_.max_rival * static_cast<double>(sets[0].keyframes_b)) {
+                             options_.max_alternative * static_cast<double>(sets[0].keyframes_b)) {
     return {};
   }
   std::vector<Loop> result;
@@ -131,7 +131,7 @@ std::vector<Loop> LoopCloser::confirmed(const maps::Map& map, KeyframeId keyfram
   return fresh ? result : std::vector<Loop>{};
 }
 
-std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
+std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) {
   const auto& features = map.keyframe(keyframe).features;
   if (features == nullptr) return {};
   const auto related = map.covisible(keyframe, kRelated);
@@ -141,7 +141,7 @@ std::vector<Loop> LoopCloser::look(const maps::Map& map, KeyframeId keyframe) {
     return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
   };
   const auto neighbours = [&](KeyframeId id) { return neighbours_of(map, id, kAroundLoop); };
-  const auto candidates = recogniser_.look(database_, keyframe, *features, last_, allowed, neighbours);
+  const auto candidates = recogniser_.recognise(database_, keyframe, *features, last_, allowed, neighbours);
   const std::vector<Loop> verified = verify(map, keyframe, candidates);
   database_.add(keyframe, features);
   last_ = keyframe;
@@ -166,7 +166,7 @@ void LoopCloser::restore(const maps::Map& map, KeyframeId newest) {
   last_ = newest;
 }
 
-void LoopCloser::merge_doubles(maps::Map& map, const PoseEdge& edge) const {
+void LoopCloser::merge_duplicates(maps::Map& map, const PoseEdge& edge) const {
   std::vector<KeyframeId> old_side = neighbours_of(map, edge.a, kAroundLoop);
   old_side.insert(old_side.begin(), edge.a);
   std::vector<KeyframeId> new_side = neighbours_of(map, edge.b, kAroundLoop);
@@ -223,7 +223,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   if (fresh.empty()) return false;
 
   move_keyframes(map, solved.poses);
-  for (const PoseEdge& edge : fresh) merge_doubles(map, edge);
+  for (const PoseEdge& edge : fresh) merge_duplicates(map, edge);
   ++counts_.accepted;
   if (options_.bundle) {
     GlobalAdjustmentOptions adjustment;

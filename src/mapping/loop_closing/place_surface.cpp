@@ -22,8 +22,8 @@ double SurfaceVotes::overlap() const {
 }
 
 double SurfaceVotes::contradiction() const {
-  const int speak = confirmed + contradicted;
-  return speak > 0 ? static_cast<double>(contradicted) / speak : 0.0;
+  const int decided = confirmed + contradicted;
+  return decided > 0 ? static_cast<double>(contradicted) / decided : 0.0;
 }
 
 SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,

@@ -217,8 +217,8 @@ Matrix6d with_floor(const Matrix6d& information) {
 }
 
 /// What depth says of each other's surface. `near`: the match and those around it.
-void ask_surfaces(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& near,
-                  PlaceVerification& result) {
+void compare_surfaces(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& near,
+                      PlaceVerification& result) {
   const maps::Keyframe& q = query.map->keyframe(query.keyframe);
   SurfaceVotes votes;
   const Rigid3& match_from_world = match.map->camera_from_world(match.keyframe);
@@ -326,7 +326,7 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
   result.information = growth.summary.information;
   const std::vector<KeyframeId> near(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(std::min(
                                                                           around.size(), kSurfaceKeyframes)));
-  ask_surfaces(query, match, near, result);
+  compare_surfaces(query, match, near, result);
   result.refused = judge(result, options);
   result.accepted = result.refused.empty();
   if (result.accepted) align(query, match, near, result);

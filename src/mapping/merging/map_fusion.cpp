@@ -63,8 +63,8 @@ std::vector<KeyframeId> surroundings(const maps::Map& map, KeyframeId id) {
 }
 
 /// Landmarks that both ends of an edge have.
-void merge_doubles(const PoseEdge& edge, const MapFusionOptions& options,
-                   std::set<std::pair<KeyframeId, KeyframeId>>& done, FusedMap& fused) {
+void merge_duplicates(const PoseEdge& edge, const MapFusionOptions& options,
+                      std::set<std::pair<KeyframeId, KeyframeId>>& done, FusedMap& fused) {
   const std::vector<KeyframeId> ours = surroundings(fused.map, edge.a);
   for (const KeyframeId id : surroundings(fused.map, edge.b)) {
     std::vector<KeyframeId> others;
@@ -116,14 +116,14 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
                "How far apart the keyframes that agree lie, at least");
   table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
-  table.number(prefix + "max_apart", consistency.max_apart_m, {0.0, 10.0}, "m",
+  table.number(prefix + "max_translation", consistency.max_apart_m, {0.0, 10.0}, "m",
                "How far apart pairs that agree may put the maps");
-  table.number(prefix + "max_turned", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+  table.number(prefix + "max_rotation", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
   table.number(prefix + "drift", consistency.apart_per_metre, {0.0, 1.0}, "",
                "Metres more for every metre between the pairs: maps drift");
-  table.number(prefix + "rival", rival, {0.0, 1.0}, "",
+  table.number(prefix + "max_alternative", alternative, {0.0, 1.0}, "",
                "A second answer with this share of the best one's keyframes makes both doubtful");
-  table.number(prefix + "rival_fit", rival_fit, {0.0, 1.0}, "",
+  table.number(prefix + "alternative_share", alternative_share, {0.0, 1.0}, "",
                "Another answer that fits this share of the landmarks the best one fits is a doubt too");
   table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",
                "Share of the landmarks seen through that rules such an answer out");
@@ -191,7 +191,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
     if (i >= graph.extra.size() || !graph.extra[i].rejected) believed.push_back(edges[i]);
   }
   std::set<std::pair<KeyframeId, KeyframeId>> done;
-  for (const PoseEdge& edge : believed) merge_doubles(edge, options, done, fused);
+  for (const PoseEdge& edge : believed) merge_duplicates(edge, options, done, fused);
   set_loops(fused.map, believed);
   return fused;
 }

@@ -97,16 +97,18 @@ void OverlapFinder::add(const maps::Map& map, KeyframeId keyframe) {
   if (features != nullptr) database_.add(keyframe, features);
 }
 
-std::vector<OverlapFinder::Candidate> OverlapFinder::look(const std::vector<MapPart>& parts, std::size_t part,
-                                                          KeyframeId keyframe, KeyframeId before) {
+std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const std::vector<MapPart>& parts,
+                                                               std::size_t part, KeyframeId keyframe,
+                                                               KeyframeId before) {
   const auto& features = parts[part].map->keyframe(keyframe).features;
   if (features == nullptr) return {};
-  return look(database_.query(*features), parts, part, keyframe, before);
+  return recognise(database_.query(*features), parts, part, keyframe, before);
 }
 
-std::vector<OverlapFinder::Candidate> OverlapFinder::look(const places::Database::Scores& scores,
-                                                          const std::vector<MapPart>& parts, std::size_t part,
-                                                          KeyframeId keyframe, KeyframeId before) {
+std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const places::Database::Scores& scores,
+                                                               const std::vector<MapPart>& parts,
+                                                               std::size_t part, KeyframeId keyframe,
+                                                               KeyframeId before) {
   std::vector<Candidate> result;
   const auto neighbours = [&](KeyframeId id) {
     std::vector<KeyframeId> around;
@@ -123,7 +125,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look(const places::Database
     return where != part && where != parts.size();
   };
   const KeyframeId usual = before.valid() && database_.contains(before) ? before : KeyframeId{};
-  for (const places::Candidate& c : recogniser_.look(scores, keyframe, usual, allowed, neighbours)) {
+  for (const places::Candidate& c : recogniser_.recognise(scores, keyframe, usual, allowed, neighbours)) {
     result.push_back({keyframe, c.keyframe, part, part_of(parts, c.keyframe), c.score});
   }
   return result;
@@ -156,7 +158,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::look_at_all(const std::vect
     });
     for (std::size_t i = 0; i < scores.size(); ++i) {  // in order: who looks remembers what it saw
       const Query& q = queries[first + i];
-      const std::vector<Candidate> found = look(scores[i], parts, q.part, q.keyframe, q.before);
+      const std::vector<Candidate> found = recognise(scores[i], parts, q.part, q.keyframe, q.before);
       candidates.insert(candidates.end(), found.begin(), found.end());
     }
   }
@@ -186,14 +188,14 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
   std::vector<VerifiedPair> pairs = found;
   SortedPairs all = sort_pairs(map_a, map_b, pairs);
   std::vector<ConsistentSet> sets = consistent_sets(map_a, map_b, all.places, options.consistency);
-  if (!sets.empty() && witnesses(sets.front()) < options.min_pairs) {
-    ask_neighbours(parts, all, sets, options, executor, merge, pairs);
+  if (!sets.empty() && support(sets.front()) < options.min_pairs) {
+    expand_candidates(parts, all, sets, options, executor, merge, pairs);
     all = sort_pairs(map_a, map_b, pairs);
     sets = consistent_sets(map_a, map_b, all.places, options.consistency);
   }
   merge.verified = static_cast<int>(all.places.size());
   if (!sets.empty()) {
-    merge.agreeing = witnesses(sets.front());
+    merge.agreeing = support(sets.front());
     merge.span_m = sets.front().span_m;
     std::vector<PlacePair> best;
     for (const std::size_t i : sets.front().members) {
@@ -207,9 +209,9 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
     merge.spread_m = mean.spread_m;
   }
   merge.refused = judge(map_a, map_b, merge, options);
-  if (merge.refused.empty()) merge.refused = doubts(parts, all, sets, options, executor, merge);
+  if (merge.refused.empty()) merge.refused = ambiguity(parts, all, sets, options, executor, merge);
   if (merge.refused.empty()) {
-    ask_others(parts, options, executor, merge);
+    cross_validate(parts, options, executor, merge);
     if (merge.confirmed < options.min_confirmed * merge.expected) {
       merge.refused = fmt::format("of {} keyframes that should see what the other map holds, only {} do",
                                   merge.expected, merge.confirmed);

@@ -31,25 +31,25 @@ struct MeanTransform {
 MeanTransform mean_transform(const maps::Map& a, const maps::Map& b, const std::vector<PlacePair>& pairs);
 
 /// Different keyframes on the side that has fewer: one keyframe seen from ten others is one witness.
-int witnesses(const ConsistentSet& set);
+int support(const ConsistentSet& set);
 
 /// What speaks against the answer of sets[0], of which `merge` has the transform and the pairs: the maps do
 /// not fit where it lays them, or another set of pairs, or a step by which things repeat, would fit as well.
-/// Fills laid, rival, rival_laid and rival_m; empty: nothing.
-std::string doubts(const std::vector<MapPart>& parts, const SortedPairs& all,
-                   const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                   const core::Executor& executor, MergeEvidence& merge);
+/// Fills laid, alternative, alternative_fit and alternative_m; empty: nothing.
+std::string ambiguity(const std::vector<MapPart>& parts, const SortedPairs& all,
+                      const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
+                      const core::Executor& executor, MergeEvidence& merge);
 
 /// More pairs of keyframes that should see the same if one of the first sets is right, verified; nothing that
 /// is in `pairs` already. Uses a and b of `merge`.
-void ask_neighbours(const std::vector<MapPart>& parts, const SortedPairs& all,
-                    const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                    const core::Executor& executor, const MergeEvidence& merge,
-                    std::vector<VerifiedPair>& pairs);
+void expand_candidates(const std::vector<MapPart>& parts, const SortedPairs& all,
+                       const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
+                       const core::Executor& executor, const MergeEvidence& merge,
+                       std::vector<VerifiedPair>& pairs);
 
 /// Keyframes of b with a view of a, as a_from_b of `merge` has it: those that do not agree yet are verified.
 /// Fills expected, confirmed and more pairs.
-void ask_others(const std::vector<MapPart>& parts, const MapFusionOptions& options,
-                const core::Executor& executor, MergeEvidence& merge);
+void cross_validate(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                    const core::Executor& executor, MergeEvidence& merge);
 
 }  // namespace plumbline::mapping

@@ -87,7 +87,7 @@ class Aligner {
         options_(options),
         correspondences_(
             std::make_shared<cloud::TwoWayCorrespondences>(a, b, static_cast<float>(options.min_cosine))),
-        estimation_(std::make_shared<cloud::ConstrainedPointToPlane>(options.min_hold)) {}
+        estimation_(std::make_shared<cloud::ConstrainedPointToPlane>(options.min_information)) {}
 
   SurfaceAlignment run(const Rigid3& start) {
     constexpr double kFar = 0.3;  // of the distance between matches
@@ -239,12 +239,12 @@ void AlignmentOptions::declare(core::OptionTable& table) {
   table.number("icp.max_shift", max_shift_m, {0.0, 10.0}, "m", "Alignments that move further are not used");
   table.number("icp.max_turn", max_turn_rad, {0.0, 3.2}, "rad", "Alignments that turn more are not used");
   table.number(
-      "icp.min_hold", min_hold, {0.0, 0.3}, "",
+      "icp.min_information", min_information, {0.0, 0.3}, "",
       "A direction is held when its share of the normals, squared, is larger: a corridor's length, with "
       "little along it, is not");
   table.number("icp.correlation", correlation, {1e-4, 1.0}, "",
                "By how much samples count: the noise of neighbours is alike");
-  table.number("icp.floor", floor_m, {0.0, 0.1}, "m", "What no alignment of this sensor knows better");
+  table.number("icp.min_sigma", floor_m, {0.0, 0.1}, "m", "What no alignment of this sensor knows better");
 }
 
 SurfaceAlignment align_surfaces(const cloud::SurfaceSearch& a, const cloud::SurfaceSearch& b,

@@ -44,14 +44,14 @@ Eigen::Vector3d middle_in_view(const std::vector<tracking::WorldSurface>& surfac
 
 /// The start, known to hold_m at `middle` and to hold_m at a metre from it: xi = (rho, phi) moves the middle
 /// by rho + phi x middle.
-optimize::PosePrior hold(const Rigid3& start, const Eigen::Vector3d& middle, double hold_m) {
+optimize::PosePrior weak_prior(const Rigid3& start, const Eigen::Vector3d& middle, double hold_m) {
   Matrix6d at_middle = Matrix6d::Identity();
   at_middle.topRightCorner<3, 3>() = -geometry::skew(middle);
   return {start, at_middle.transpose() * at_middle / (hold_m * hold_m)};
 }
 
 /// At the solution with the hold both pull alike: one step on, in what the surfaces hold, is without it.
-Rigid3 without_hold(const Rigid3& held, const optimize::PosePrior& prior, const Matrix6d& information) {
+Rigid3 without_prior(const Rigid3& held, const optimize::PosePrior& prior, const Matrix6d& information) {
   const Vector6d pull =
       prior.information * geometry::log_se3(held * prior.camera_from_world.inverse());  // of the prior
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
@@ -70,12 +70,12 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
                                                     const Rigid3& depth_from_camera,
                                                     const sensor::Pinhole& camera,
                                                     const SurfaceEdgeOptions& options,
-                                                    const EdgePictures& pictures) {
+                                                    const EdgeImages& pictures) {
   if (a.surface.empty()) return std::nullopt;
   const std::vector<tracking::WorldSurface> surface = surface_of(a);
   optimize::PoseProblem problem;
   problem.camera = camera;
-  problem.prior = hold(b_from_a, middle_in_view(surface, b_from_a, camera), options.hold_m);
+  problem.prior = weak_prior(b_from_a, middle_in_view(surface, b_from_a, camera), options.hold_m);
   optimize::PoseSolverOptions solver;
   solver.max_iterations = 3;
   solver.photometric_weight = kPhotometricWeight;
@@ -102,7 +102,7 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   }
   const double overlap = static_cast<double>(summary.planes.inliers) / static_cast<double>(surface.size());
   if (overlap < options.min_overlap) return std::nullopt;
-  return maps::SurfaceEdge{a.id, b, without_hold(pose, *problem.prior, summary.information),
+  return maps::SurfaceEdge{a.id, b, without_prior(pose, *problem.prior, summary.information),
                            summary.information};
 }
 

@@ -35,7 +35,7 @@ struct Entity {
   }
 };
 
-void tell(void* log, const dds_log_data_t* data) {
+void report(void* log, const dds_log_data_t* data) {
   std::string line(data->message, strnlen(data->message, data->size));
   while (!line.empty() && line.back() == '\n') line.pop_back();
   if (log != nullptr && *static_cast<BusLog*>(log)) (*static_cast<BusLog*>(log))(line);
@@ -67,8 +67,8 @@ class Participant {
           first->note(line);
           if (log) log(line);
         }) {
-    dds_set_log_sink(&tell, &log_);
-    dds_set_trace_sink(&tell, &log_);
+    dds_set_log_sink(&report, &log_);
+    dds_set_trace_sink(&report, &log_);
   }
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
@@ -76,8 +76,8 @@ class Participant {
     participant_ = Entity();
     domain_ = Entity();
     // Its log must not outlive it; by default CycloneDDS would write to stderr.
-    dds_set_log_sink(&tell, nullptr);
-    dds_set_trace_sink(&tell, nullptr);
+    dds_set_log_sink(&report, nullptr);
+    dds_set_trace_sink(&report, nullptr);
   }
 
   core::Result<void> open(const NetworkOptions& options, bool hub) {

@@ -210,7 +210,7 @@ void write_crl(const fs::path& folder, const Authority& authority, X509_CRL* crl
 }
 
 template <typename Action>
-core::Result<void> told(core::ErrorKind kind, const Action& action) {
+core::Result<void> guarded(core::ErrorKind kind, const Action& action) {
   try {
     action();
     return {};
@@ -224,7 +224,7 @@ core::Result<void> told(core::ErrorKind kind, const Action& action) {
 }  // namespace
 
 core::Result<void> make_authority(const fs::path& folder) {
-  return told(core::ErrorKind::kOutput, [&] {
+  return guarded(core::ErrorKind::kOutput, [&] {
     make_folder(folder);
     make_folder(folder / "ca");
     make_folder(folder / "ca" / "issued");
@@ -246,7 +246,7 @@ core::Result<void> make_authority(const fs::path& folder) {
 }
 
 core::Result<void> make_keys(const fs::path& folder, const std::string& name) {
-  return told(core::ErrorKind::kOutput, [&] {
+  return guarded(core::ErrorKind::kOutput, [&] {
     const Authority authority = read_authority(folder);
     const Key key = new_key();
     const Certificate certificate = new_certificate(key.get(), name, kKeyDays);
@@ -271,7 +271,7 @@ core::Result<void> make_keys(const fs::path& folder, const std::string& name) {
 }
 
 core::Result<void> revoke(const fs::path& folder, const std::vector<std::string>& names) {
-  return told(core::ErrorKind::kUsage, [&] {
+  return guarded(core::ErrorKind::kUsage, [&] {
     const Authority authority = read_authority(folder);
     const auto crl = read_pem<Crl>(folder / "ca" / kRevokedFile, [](BIO* in) {
       return PEM_read_bio_X509_CRL(in, nullptr, nullptr, nullptr);
@@ -291,7 +291,7 @@ core::Result<void> revoke(const fs::path& folder, const std::vector<std::string>
 
 core::Result<int> days_left(const fs::path& folder) {
   int days = 0;
-  const auto read = told(core::ErrorKind::kUsage, [&] {
+  const auto read = guarded(core::ErrorKind::kUsage, [&] {
     const Certificate certificate = read_certificate(folder / kCertificateFile);
     int seconds = 0;
     demand(ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(certificate.get())) == 1,

@@ -18,18 +18,18 @@ using core::ConfigNode;
 using core::ConfigProblems;
 using Kind = ConfigNode::Kind;
 
-/// A stage's own checks know the stage's place only; a problem of one of its keys is told where that stands.
-void check_stage(Draft& draft, const CheckContext& context, ConfigProblems& problems) {
-  ConfigProblems told;
-  draft.node.stage->check(context, draft.mark, draft.path, told);
-  for (core::ConfigProblem& problem : told) {
-    const std::string prefix = draft.path + ".";
+/// A stage's own checks know the stage's place only; a problem of one of its keys is found where that stands.
+void check_stage(StageSpec& spec, const CheckContext& context, ConfigProblems& problems) {
+  ConfigProblems found;
+  spec.node.stage->check(context, spec.mark, spec.path, found);
+  for (core::ConfigProblem& problem : found) {
+    const std::string prefix = spec.path + ".";
     if (problem.path.compare(0, prefix.size(), prefix) == 0) {
       const std::string key = problem.path.substr(prefix.size());
-      const ConfigNode* value = draft.body->find(key);
-      if (std::find(draft.set.begin(), draft.set.end(), key) != draft.set.end()) {
+      const ConfigNode* value = spec.body->find(key);
+      if (std::find(spec.set.begin(), spec.set.end(), key) != spec.set.end()) {
         problem.mark = {"--set", 0, 0};
-        problem.path = draft.node.name + "." + key;
+        problem.path = spec.node.name + "." + key;
       } else if (value != nullptr) {
         problem.mark = value->mark;
       }
@@ -45,11 +45,11 @@ void read_description(const ConfigNode& root, Graph& graph, ConfigProblems& prob
   graph.description = text->scalar;
 }
 
-void assemble(const std::vector<std::size_t>& order, Drafts& drafts, Graph& graph) {
-  std::map<std::size_t, std::size_t> place;  // draft -> node
+void assemble(const std::vector<std::size_t>& order, StageSpecs& specs, Graph& graph) {
+  std::map<std::size_t, std::size_t> place;  // spec -> node
   for (const std::size_t d : order) {
     place[d] = graph.nodes.size();
-    graph.nodes.push_back(std::move(drafts[d].node));
+    graph.nodes.push_back(std::move(specs[d].node));
     for (auto& input : graph.nodes.back().inputs) {
       if (input) input->node = place.at(input->node);
     }
@@ -61,22 +61,22 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
                                 const std::vector<std::string>& overrides, ConfigProblems problems) {
   const auto refuse = [&] { return tl::unexpected<core::Error>(core::to_error(problems)); };
   if (!own) return refuse();
-  const auto root = with_includes(std::move(*own), file, pipelines_folder, problems);
-  if (!root) return refuse();
   Graph graph;
+  const auto root = with_includes(std::move(*own), file, pipelines_folder, problems, graph.warnings);
+  if (!root) return refuse();
   read_description(*root, graph, problems);
-  Drafts drafts = read_stages(*root, registry, problems);
-  connect(drafts, problems);
-  add_taps(*root, registry, drafts, problems);
-  apply_overrides(overrides, drafts, problems, graph.warnings);
+  StageSpecs specs = read_stages(*root, registry, problems);
+  connect(specs, problems);
+  add_taps(*root, registry, specs, problems);
+  apply_overrides(overrides, specs, problems, graph.warnings);
   const CheckContext context{file.parent_path(), pipelines_folder, &registry.filters()};
-  for (Draft& draft : drafts) {
-    if (draft.node.stage) check_stage(draft, context, problems);
+  for (StageSpec& spec : specs) {
+    if (spec.node.stage) check_stage(spec, context, problems);
   }
-  const std::vector<std::size_t> order = checked_order(drafts, problems);
-  check_files(drafts, problems);
+  const std::vector<std::size_t> order = checked_order(specs, problems);
+  check_files(specs, problems);
   if (!problems.empty()) return refuse();
-  assemble(order, drafts, graph);
+  assemble(order, specs, graph);
   return graph;
 }
 

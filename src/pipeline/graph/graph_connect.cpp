@@ -16,12 +16,12 @@ using core::ConfigProblems;
 using Kind = ConfigNode::Kind;
 
 /// "allowed: ..." for an input of this type.
-std::string givers(const Drafts& drafts, const PortType& type) {
+std::string givers(const StageSpecs& specs, const PortType& type) {
   std::vector<std::string> names;
-  for (const Draft& draft : drafts) {
-    if (draft.node.type == nullptr) continue;
-    for (const Port& port : draft.node.type->outputs) {
-      if (port.type == type) names.push_back(draft.node.name);
+  for (const StageSpec& spec : specs) {
+    if (spec.node.type == nullptr) continue;
+    for (const Port& port : spec.node.type->outputs) {
+      if (port.type == type) names.push_back(spec.node.name);
     }
   }
   if (names.empty()) return fmt::format("no stage of this file gives a {}", type.name);
@@ -40,25 +40,25 @@ std::optional<std::size_t> fitting_output(const StageType& giver, const std::str
 
 class Connector {
  public:
-  Connector(Drafts& drafts, ConfigProblems& problems) : drafts_(drafts), problems_(problems) {}
+  Connector(StageSpecs& specs, ConfigProblems& problems) : specs_(specs), problems_(problems) {}
 
-  void connect(Draft& draft) {
-    const ConfigNode* inputs = draft.body->find("inputs");
-    if (draft.node.type == nullptr) return note_uses(draft, inputs);
-    const std::vector<Port>& ports = draft.node.type->inputs;
-    draft.node.inputs.resize(ports.size());
-    const std::string path = draft.path + ".inputs";
+  void connect(StageSpec& spec) {
+    const ConfigNode* inputs = spec.body->find("inputs");
+    if (spec.node.type == nullptr) return note_uses(spec, inputs);
+    const std::vector<Port>& ports = spec.node.type->inputs;
+    spec.node.inputs.resize(ports.size());
+    const std::string path = spec.path + ".inputs";
     const std::size_t before = problems_.size();
     if (inputs != nullptr && inputs->kind != Kind::kMap && inputs->kind != Kind::kNull) {
       problems_.push_back({inputs->mark, path, "must be a map, e.g. {frame: read}"});
-      draft.dangling = true;
+      spec.dangling = true;
       return;
     }
     meant_.clear();
     if (inputs != nullptr) {
       for (std::size_t i = 0; i < inputs->entries.size(); ++i) {
         const auto& [name, from] = inputs->entries[i];
-        connect_one(draft, name, inputs->key_marks[i], from);
+        connect_one(spec, name, inputs->key_marks[i], from);
       }
     }
     for (const Port& port : ports) {
@@ -66,27 +66,27 @@ class Connector {
       if (std::find(meant_.begin(), meant_.end(), port.name) != meant_.end())
         continue;  // told as a typing error
       problems_.push_back(
-          {inputs != nullptr ? inputs->mark : draft.mark, path,
-           fmt::format("the input {} is missing ({})", port.name, givers(drafts_, port.type))});
+          {inputs != nullptr ? inputs->mark : spec.mark, path,
+           fmt::format("the input {} is missing ({})", port.name, givers(specs_, port.type))});
     }
-    draft.dangling = problems_.size() != before;
+    spec.dangling = problems_.size() != before;
   }
 
  private:
   /// What a stage of unknown type reads from is not unused.
-  void note_uses(Draft& draft, const ConfigNode* inputs) const {
+  void note_uses(StageSpec& spec, const ConfigNode* inputs) const {
     if (inputs == nullptr) return;
     for (const auto& [name, from] : inputs->entries) {
-      const std::size_t giver = find_draft(drafts_, from.scalar.substr(0, from.scalar.find('.')));
-      if (giver < drafts_.size()) draft.reads_from.push_back(giver);
+      const std::size_t giver = find_spec(specs_, from.scalar.substr(0, from.scalar.find('.')));
+      if (giver < specs_.size()) spec.reads_from.push_back(giver);
     }
   }
 
-  void connect_one(Draft& draft, const std::string& name, const ConfigMark& mark, const ConfigNode& from) {
+  void connect_one(StageSpec& spec, const std::string& name, const ConfigMark& mark, const ConfigNode& from) {
     const auto problem = [&](const ConfigMark& at, std::string what) {
-      problems_.push_back({at, draft.path + ".inputs." + name, std::move(what)});
+      problems_.push_back({at, spec.path + ".inputs." + name, std::move(what)});
     };
-    const std::vector<Port>& ports = draft.node.type->inputs;
+    const std::vector<Port>& ports = spec.node.type->inputs;
     const auto port = std::find_if(ports.begin(), ports.end(), [&](const Port& p) { return p.name == name; });
     if (port == ports.end()) {
       std::vector<std::string> names;
@@ -98,18 +98,18 @@ class Connector {
     if (from.kind != Kind::kScalar) return problem(from.mark, "must be a stage or stage.port");
     const std::size_t dot = from.scalar.find('.');
     const std::string stage_name = from.scalar.substr(0, dot);
-    const std::size_t giver = find_draft(drafts_, stage_name);
-    if (giver == drafts_.size()) {
+    const std::size_t giver = find_spec(specs_, stage_name);
+    if (giver == specs_.size()) {
       return problem(from.mark, fmt::format("there is no stage '{}'{}", stage_name.substr(0, 40),
-                                            core::hint(stage_name, names_of(drafts_))));
+                                            core::hint(stage_name, names_of(specs_))));
     }
-    draft.reads_from.push_back(giver);
-    const StageType* type = drafts_[giver].node.type;
+    spec.reads_from.push_back(giver);
+    const StageType* type = specs_[giver].node.type;
     if (type == nullptr) return;  // told already
     const auto output =
         fitting_output(*type, dot == std::string::npos ? "" : from.scalar.substr(dot + 1), port->type);
     if (output) {
-      draft.node.inputs[static_cast<std::size_t>(port - ports.begin())] = OutputRef{giver, *output};
+      spec.node.inputs[static_cast<std::size_t>(port - ports.begin())] = OutputRef{giver, *output};
       return;
     }
     std::vector<std::string> given;
@@ -117,19 +117,19 @@ class Connector {
     problem(from.mark, fmt::format("'{}' does not give the {} that is needed here; it gives {} ({})",
                                    from.scalar, port->type.name,
                                    given.empty() ? "nothing" : fmt::format("{}", fmt::join(given, ", ")),
-                                   givers(drafts_, port->type)));
+                                   givers(specs_, port->type)));
   }
 
-  Drafts& drafts_;
+  StageSpecs& specs_;
   ConfigProblems& problems_;
   std::vector<std::string> meant_;  ///< ports of this stage that were written with a typing error
 };
 
 }  // namespace
 
-void connect(Drafts& drafts, ConfigProblems& problems) {
-  Connector connector(drafts, problems);
-  for (Draft& draft : drafts) connector.connect(draft);
+void connect(StageSpecs& specs, ConfigProblems& problems) {
+  Connector connector(specs, problems);
+  for (StageSpec& spec : specs) connector.connect(spec);
 }
 
 }  // namespace plumbline::pipeline

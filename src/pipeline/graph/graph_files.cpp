@@ -45,23 +45,23 @@ bool clash(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-void check_files(const Drafts& drafts, core::ConfigProblems& problems) {
+void check_files(const StageSpecs& specs, core::ConfigProblems& problems) {
   std::vector<Writer> writers;
   for (const std::string& file : kFilesOfTheRun) writers.push_back({"the run itself", file});
-  for (const Draft& draft : drafts) {
-    if (!draft.node.stage) continue;
+  for (const StageSpec& spec : specs) {
+    if (!spec.node.stage) continue;
     const std::size_t others = writers.size();
-    for (const std::string& file : draft.node.stage->files()) {
+    for (const std::string& file : spec.node.stage->files()) {
       const std::string normal = std::filesystem::path(file).lexically_normal().generic_string();
       const auto taken = std::find_if(writers.begin(), writers.begin() + static_cast<std::ptrdiff_t>(others),
                                       [&](const Writer& writer) { return clash(writer.file, normal); });
       if (taken != writers.begin() + static_cast<std::ptrdiff_t>(others)) {
-        problems.push_back({draft.mark, draft.path,
+        problems.push_back({spec.mark, spec.path,
                             fmt::format("writes {}, which {} writes as well{}", file, taken->name,
                                         taken->file == normal ? "" : fmt::format(" ({})", taken->file))});
         break;  // one is enough: two stages of a kind share all their files
       }
-      writers.push_back({draft.path, normal});
+      writers.push_back({spec.path, normal});
     }
   }
 }

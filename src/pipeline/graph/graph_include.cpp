@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "graph/graph_parts.hpp"
+#include "plumbline/core/renamed_options.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -90,10 +91,27 @@ void change_stage(const ConfigNode& own, ConfigNode& base) {
   }
 }
 
+/// Options under names of earlier versions get those of today. A stage that is changed is known by its name.
+void rename_options(ConfigNode& root, std::vector<std::string>& warnings) {
+  ConfigNode* stages = find(root, "stages");
+  if (stages == nullptr) return;
+  for (auto& [name, body] : stages->entries) {
+    const ConfigNode* type = body.find("type");
+    for (std::size_t i = 0; i < body.entries.size(); ++i) {
+      std::string& key = body.entries[i].first;
+      const std::string now = core::renamed_option(type != nullptr ? type->scalar : name, key);
+      if (now == key) continue;
+      const ConfigMark& at = body.key_marks[i];
+      warnings.push_back(fmt::format("{}:{}: {}.{} is called {} now", at.file, at.line, name, key, now));
+      key = now;
+    }
+  }
+}
+
 class Includer {
  public:
-  Includer(const fs::path& pipelines_folder, ConfigProblems& problems)
-      : pipelines_folder_(pipelines_folder), problems_(problems) {}
+  Includer(const fs::path& pipelines_folder, ConfigProblems& problems, std::vector<std::string>& warnings)
+      : pipelines_folder_(pipelines_folder), problems_(problems), warnings_(warnings) {}
 
   /// `file` is the one that `own` was read from.
   std::optional<ConfigNode> expand(ConfigNode own, const fs::path& file) {
@@ -102,6 +120,7 @@ class Includer {
       return std::nullopt;
     }
     check_top(own);
+    rename_options(own, warnings_);
     const auto includes = words(own, "include", "include: rgbd.yaml", problems_);
     const auto removes = words(own, "remove", "remove: [refine]", problems_);
     if (includes.empty()) {
@@ -242,6 +261,7 @@ class Includer {
 
   fs::path pipelines_folder_;
   ConfigProblems& problems_;
+  std::vector<std::string>& warnings_;
   std::vector<fs::path> open_;  ///< files that are being included
   std::size_t files_ = 0;
 };
@@ -249,8 +269,9 @@ class Includer {
 }  // namespace
 
 std::optional<ConfigNode> with_includes(ConfigNode own, const fs::path& file,
-                                        const fs::path& pipelines_folder, ConfigProblems& problems) {
-  return Includer(pipelines_folder, problems).expand(std::move(own), file);
+                                        const fs::path& pipelines_folder, ConfigProblems& problems,
+                                        std::vector<std::string>& warnings) {
+  return Includer(pipelines_folder, problems, warnings).expand(std::move(own), file);
 }
 
 }  // namespace plumbline::pipeline

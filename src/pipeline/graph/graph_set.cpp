@@ -2,12 +2,12 @@
 // "--set stage.key=value".
 #include <fmt/format.h>
 
-#include <array>
 #include <string>
 #include <utility>
 
 #include "graph/command_line.hpp"
 #include "graph/graph_parts.hpp"
+#include "plumbline/core/renamed_options.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -25,24 +25,17 @@ void place_on_command_line(ConfigNode& node) {
   for (ConfigMark& mark : node.key_marks) mark = kCommandLine;
 }
 
-/// What an option of a stage that went is called now; else as it is.
+/// "stage.key=value" with the name that the option has now.
 std::string renamed(const std::string& text, std::vector<std::string>& warnings) {
-  constexpr std::array<std::pair<const char*, const char*>, 5> kRenamed{{{"robots.merge.", "merge."},
-                                                                         {"robots.online", "merge.online"},
-                                                                         {"robots.", "track."},
-                                                                         {"maps.", "merge."},
-                                                                         {"keep.", "store."}}};
-  for (const auto& [before, now] : kRenamed) {
-    if (text.rfind(before, 0) != 0) continue;
-    std::string result = now + text.substr(std::string(before).size());
-    warnings.push_back(fmt::format("--set {}: is called {} now", text.substr(0, text.find('=')),
-                                   result.substr(0, result.find('='))));
-    return result;
-  }
-  return text;
+  const std::size_t dot = text.find('.'), equals = text.find('=');
+  if (dot == std::string::npos || equals == std::string::npos || equals < dot) return text;
+  const std::string path = text.substr(0, equals);
+  const std::string now = core::renamed_setting(path.substr(0, dot), path.substr(dot + 1));
+  if (now != path) warnings.push_back(fmt::format("--set {}: is called {} now", path, now));
+  return now + text.substr(equals);
 }
 
-void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
+void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems) {
   const auto refuse = [&](const std::string& path, std::string what) {
     problems.push_back({kCommandLine, path, std::move(what)});
   };
@@ -58,23 +51,23 @@ void apply(const std::string& text, Drafts& drafts, ConfigProblems& problems) {
   if (!value) return refuse(path, "the value is not valid YAML");
   if (equals + 1 == text.size()) value->kind = ConfigNode::Kind::kScalar;  // "stage.key=" is the empty text
   place_on_command_line(*value);
-  const std::size_t target = find_draft(drafts, stage);
-  if (target == drafts.size()) {
-    return refuse(path, fmt::format("there is no stage '{}'{}", stage, core::hint(stage, names_of(drafts))));
+  const std::size_t target = find_spec(specs, stage);
+  if (target == specs.size()) {
+    return refuse(path, fmt::format("there is no stage '{}'{}", stage, core::hint(stage, names_of(specs))));
   }
   if (key == "type" || key == "inputs") {
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }
-  if (drafts[target].node.type == nullptr) return;  // told already
-  drafts[target].node.options.set(key, *value, stage, problems);
-  drafts[target].set.push_back(key);
+  if (specs[target].node.type == nullptr) return;  // told already
+  specs[target].node.options.set(key, *value, stage, problems);
+  specs[target].set.push_back(key);
 }
 
 }  // namespace
 
-void apply_overrides(const std::vector<std::string>& texts, Drafts& drafts, ConfigProblems& problems,
+void apply_overrides(const std::vector<std::string>& texts, StageSpecs& specs, ConfigProblems& problems,
                      std::vector<std::string>& warnings) {
-  for (const std::string& text : texts) apply(renamed(text, warnings), drafts, problems);
+  for (const std::string& text : texts) apply(renamed(text, warnings), specs, problems);
 }
 
 }  // namespace plumbline::pipeline

@@ -15,7 +15,7 @@ using core::ConfigProblems;
 using Kind = ConfigNode::Kind;
 
 /// The port that "stage" or "stage.port" means; none: told.
-std::optional<OutputRef> find_port(const Drafts& drafts, const ConfigNode& port, const std::string& path,
+std::optional<OutputRef> find_port(const StageSpecs& specs, const ConfigNode& port, const std::string& path,
                                    ConfigProblems& problems) {
   const auto refuse = [&](std::string what) {
     problems.push_back({port.mark, path + ".port", std::move(what)});
@@ -23,12 +23,12 @@ std::optional<OutputRef> find_port(const Drafts& drafts, const ConfigNode& port,
   };
   const std::size_t dot = port.scalar.find('.');
   const std::string name = port.scalar.substr(0, dot);
-  const std::size_t giver = find_draft(drafts, name);
-  if (giver == drafts.size()) {
+  const std::size_t giver = find_spec(specs, name);
+  if (giver == specs.size()) {
     return refuse(
-        fmt::format("there is no stage '{}'{}", name.substr(0, 40), core::hint(name, names_of(drafts))));
+        fmt::format("there is no stage '{}'{}", name.substr(0, 40), core::hint(name, names_of(specs))));
   }
-  const StageType* type = drafts[giver].node.type;
+  const StageType* type = specs[giver].node.type;
   if (type == nullptr) return std::nullopt;  // told already
   std::vector<std::string> ports;
   for (const Port& p : type->outputs) ports.push_back(p.name);
@@ -46,7 +46,7 @@ std::optional<OutputRef> find_port(const Drafts& drafts, const ConfigNode& port,
 
 }  // namespace
 
-void add_taps(const ConfigNode& root, const StageRegistry& registry, Drafts& drafts,
+void add_taps(const ConfigNode& root, const StageRegistry& registry, StageSpecs& specs,
               ConfigProblems& problems) {
   const ConfigNode* taps = root.find("taps");
   if (taps == nullptr || taps->kind != Kind::kSequence) return;
@@ -59,27 +59,27 @@ void add_taps(const ConfigNode& root, const StageRegistry& registry, Drafts& dra
                           "must name a port, e.g. {port: fuse.cloud, file: cloud.ply}"});
       continue;
     }
-    const auto from = find_port(drafts, *port, path, problems);
+    const auto from = find_port(specs, *port, path, problems);
     if (!from) continue;
-    const StageType& giver = *drafts[from->node].node.type;
-    Draft draft;
-    draft.node.name = fmt::format("tap:{}.{}", drafts[from->node].node.name, giver.outputs[from->port].name);
-    draft.node.tap = true;
-    draft.node.type = registry.find_tap(giver.outputs[from->port].type);
-    draft.node.inputs = {from};
-    draft.mark = entry.mark;
-    draft.path = path;
-    draft.body = &entry;
-    draft.reads_from = {from->node};
-    if (draft.node.type == nullptr) {
+    const StageType& giver = *specs[from->node].node.type;
+    StageSpec spec;
+    spec.node.name = fmt::format("tap:{}.{}", specs[from->node].node.name, giver.outputs[from->port].name);
+    spec.node.tap = true;
+    spec.node.type = registry.find_tap(giver.outputs[from->port].type);
+    spec.node.inputs = {from};
+    spec.mark = entry.mark;
+    spec.path = path;
+    spec.body = &entry;
+    spec.reads_from = {from->node};
+    if (spec.node.type == nullptr) {
       problems.push_back({port->mark, path + ".port",
                           fmt::format("a {} cannot be written", giver.outputs[from->port].type.name)});
       continue;
     }
-    draft.node.stage = draft.node.type->make();
-    draft.node.stage->declare(draft.node.options);
-    draft.node.options.set_all(entry, path, problems, {"port"});
-    drafts.push_back(std::move(draft));
+    spec.node.stage = spec.node.type->make();
+    spec.node.stage->declare(spec.node.options);
+    spec.node.options.set_all(entry, path, problems, {"port"});
+    specs.push_back(std::move(spec));
   }
 }
 

@@ -12,7 +12,7 @@ namespace {
 
 FamilyFit summarise(std::vector<double> distances) {
   FamilyFit fit;
-  fit.sightings = distances.size();
+  fit.observations = distances.size();
   if (distances.empty()) return fit;
   const auto quantile = [&](double q) {
     const auto place = static_cast<std::ptrdiff_t>(q * static_cast<double>(distances.size() - 1));

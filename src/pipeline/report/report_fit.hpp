@@ -13,7 +13,7 @@ namespace plumbline::pipeline {
 
 /// Distances between where something was seen and where the map has it.
 struct FamilyFit {
-  std::size_t sightings = 0;
+  std::size_t observations = 0;
   double median = 0.0;
   double p90 = 0.0;  ///< nine of ten are nearer
 };
@@ -24,8 +24,8 @@ struct MapFit {
   FamilyFit lines_px;   ///< both ends, across the line
 };
 
-/// Over all sightings of landmarks that several keyframes saw. `cameras`: of the robots whose camera is not
-/// `camera`.
+/// Over all observations of landmarks that several keyframes saw. `cameras`: of the robots whose camera is
+/// not `camera`.
 MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
               const std::map<std::int32_t, sensor::Pinhole>& cameras);
 

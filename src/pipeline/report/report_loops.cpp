@@ -39,7 +39,7 @@ void add_trial(const Json& trial, HtmlTable& table) {
              number("/points", 0) + " + " + number("/lines", 0), number("/rms", 2),
              percent(number_at(trial, "/found")), percent(number_at(trial, "/overlap")),
              percent(number_at(trial, "/contradiction")), number("/correction_m", 3),
-             number_text(kDegrees * number_at(trial, "/correction_rad"), 2), number("/way_m", 2),
+             number_text(kDegrees * number_at(trial, "/correction_rad"), 2), number("/path_m", 2),
              text_at(trial, "/reason")});
 }
 
@@ -59,7 +59,7 @@ std::string merge_evidence(const Json& m) {
       {"Keyframes that look alike", fmt::format("{}; {} verified or refused, {} show the same place",
                                                 count("/candidates"), count("/tried"), count("/verified"))},
       {"Keyframes that agree",
-       fmt::format("{}; {} in the best other answer", count("/agreeing"), count("/rival"))},
+       fmt::format("{}; {} in the best other answer", count("/agreeing"), count("/alternative"))},
       {"Asked for confirmation",
        fmt::format("{}, of which {} confirmed", count("/expected"), count("/confirmed"))},
       {"Landmarks laid over each other",
@@ -75,12 +75,13 @@ std::string merge_evidence(const Json& m) {
                    number_text(1e3 * number_at(m, "/spread_m"), 1, "mm"))},
       {"Pairs of the pose graph",
        fmt::format("{}, of which {} were taken for wrong", count("/pairs"), count("/rejected"))}};
-  if (number_at(m, "/rival_m") > 0.0) {
+  if (number_at(m, "/alternative_m") > 0.0) {
     facts.emplace_back(
         "Best other answer",
         fmt::format("{} off; {} landmarks expected, {} found again, {} seen through",
-                    number_text(number_at(m, "/rival_m"), 2, "m"), count("/rival_laid_over/expected"),
-                    count("/rival_laid_over/matched"), count("/rival_laid_over/seen_through")));
+                    number_text(number_at(m, "/alternative_m"), 2, "m"),
+                    count("/alternative_overlay/expected"), count("/alternative_overlay/matched"),
+                    count("/alternative_overlay/seen_through")));
   }
   if (number_at(m, "/time_s") >= 0.0) {
     facts.emplace_back("Certain after", number_text(number_at(m, "/time_s"), 1, "s of the recordings"));
@@ -133,13 +134,13 @@ std::string adjustment_html(const Json& s) {
 std::string fit_html(const ReportData& data) {
   if (!data.fit) return {};
   HtmlTable table({{"what the keyframes saw"},
-                   {"sightings", true},
+                   {"observations", true},
                    {"off by, median", true},
                    {"nine of ten within", true}});
   const auto add = [&](const char* name, const FamilyFit& fit, int decimals, const char* unit) {
-    if (fit.sightings == 0) return;
-    table.row({name, count_text(static_cast<double>(fit.sightings)), number_text(fit.median, decimals, unit),
-               number_text(fit.p90, decimals, unit)});
+    if (fit.observations == 0) return;
+    table.row({name, count_text(static_cast<double>(fit.observations)),
+               number_text(fit.median, decimals, unit), number_text(fit.p90, decimals, unit)});
   };
   add("Points, in the picture", data.fit->points_px, 2, "px");
   add("Points, depth", data.fit->depths_mm, 1, "mm");

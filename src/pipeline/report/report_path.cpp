@@ -106,8 +106,8 @@ class PathChart {
     if (!path.accuracy) return;
     viz::SvgLine line;
     line.kind = "truth";
-    line.label = truth_told_ ? "" : "truth";
-    truth_told_ = true;
+    line.label = truth_reported_ ? "" : "truth";
+    truth_reported_ = true;
     const geometry::Rigid3 estimate_from_truth = path.accuracy->truth_from_estimate.inverse();
     for (const evaluate::PoseError& pose : path.accuracy->poses) {
       put(line, estimate_from_truth * pose.truth.translation);
@@ -154,7 +154,7 @@ class PathChart {
   viz::SvgChart chart_;
   viz::SvgLine lost_;
   viz::SvgDots start_, end_;
-  bool truth_told_ = false;
+  bool truth_reported_ = false;
 };
 
 /// How far a path reaches along an axis.

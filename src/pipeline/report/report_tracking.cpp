@@ -41,7 +41,7 @@ class RobotCharts {
                  {line("", weakest_mm(), "k3")}, true, true);
   }
 
-  void tell(RobotTable& table) const {
+  void report(RobotTable& table) const {
     std::size_t tracked = 0, weak = 0, found_again = 0, keyframes = 0;
     const std::vector<double> weak_directions = column("weak_directions");
     const std::vector<double> relocalised = column("relocalised");
@@ -181,7 +181,7 @@ std::string tracking_html(const ReportData& data) {
     RobotCharts robot(data, frames);
     if (data.frames.size() > 1) charts += "<h3>" + viz::markup_text(frames.robot) + "</h3>\n";
     charts += robot.draw();
-    robot.tell(summary);
+    robot.report(summary);
   }
   return summary.html() +
          note(

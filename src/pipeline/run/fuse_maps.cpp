@@ -37,7 +37,8 @@ std::string names_of(const StoredMaps& maps) {
 
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
-                                          const Progress& progress, Leftovers* leftovers) {
+                                          const Progress& progress,
+                                          DeferredDestruction* deferred_destruction) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
   std::unique_ptr<StoredMaps> maps;  // goes last: stages may still be at work on it
@@ -93,9 +94,9 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   if (auto written = write_summary(output->path() / "summary.json", summary); !written)
     return fail(written.error());
   if (auto committed = output->commit(); !committed) return fail(committed.error());
-  if (leftovers != nullptr) {
-    leftovers->push_back(std::make_shared<Graph>(std::move(*graph)));
-    leftovers->push_back(std::shared_ptr<StoredMaps>(std::move(maps)));
+  if (deferred_destruction != nullptr) {
+    deferred_destruction->push_back(std::make_shared<Graph>(std::move(*graph)));
+    deferred_destruction->push_back(std::shared_ptr<StoredMaps>(std::move(maps)));
   }
   return summary;
 }

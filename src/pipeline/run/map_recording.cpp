@@ -110,7 +110,8 @@ core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::
   return {};
 }
 
-void tell_resumed(const std::filesystem::path& folder, const std::optional<ResumedRun>& run, core::Log& log) {
+void report_resumed(const std::filesystem::path& folder, const std::optional<ResumedRun>& run,
+                    core::Log& log) {
   log.info(run ? fmt::format("going on after frame {}, with {} keyframes of {}", run->frames - 1,
                              run->map.map.keyframe_count(), run->store.string())
                : fmt::format("{}: nothing is there to go on from; beginning with the first frame",
@@ -136,7 +137,7 @@ bool is_finished(const std::filesystem::path& out) {
 
 core::Result<RunSummary> map_recording(const MapRequest& given, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop, const Progress& progress,
-                                       Leftovers* leftovers) {
+                                       DeferredDestruction* deferred_destruction) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
   const MapRequest request = in_order(given);
@@ -177,7 +178,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
                                (*source)->camera());
     if (!opened) return fail(opened.error());
     resumed = std::move(*opened);
-    tell_resumed(output->path(), resumed, log);
+    report_resumed(output->path(), resumed, log);
   }
   if (auto written =
           core::write_file(output->path() / "config.yaml", config_text(request, *graph, executor.threads()));
@@ -234,7 +235,8 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   if (debug) {
     if (auto committed = debug->commit(); !committed) return fail(committed.error());
   }
-  if (leftovers != nullptr) leftovers->push_back(std::make_shared<Graph>(std::move(*graph)));
+  if (deferred_destruction != nullptr)
+    deferred_destruction->push_back(std::make_shared<Graph>(std::move(*graph)));
   return summary;
 }
 

@@ -184,8 +184,8 @@ core::Result<std::vector<sensor::Pinhole>> StoredResult::cameras_of(
   return cameras;
 }
 
-core::Result<cloud::FusedCloud> StoredResult::lay_down(const cloud::DenseFusionOptions& options,
-                                                       const core::Executor& executor) const {
+core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
+                                                    const core::Executor& executor) const {
   const auto views = views_of(*reader_, map_);
   if (!views) return tl::unexpected<core::Error>(views.error());
   if (views->keyframes.empty()) {
@@ -270,7 +270,7 @@ core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core:
   if (written || place.store.empty()) return read_result_cloud(*place.result);
   const auto stored = StoredResult::open(place.store);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
-  auto fused = stored->lay_down(stored->fusion_options(), executor);
+  auto fused = stored->fused(stored->fusion_options(), executor);
   if (!fused) return tl::unexpected<core::Error>(fused.error());
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);

@@ -51,7 +51,7 @@ nlohmann::ordered_json trials_of(const RunSummary& summary) {
                     {"contradiction", rounded(e.contradiction)},
                     {"correction_m", rounded(trial.correction_m)},
                     {"correction_rad", rounded(trial.correction_rad)},
-                    {"way_m", rounded(trial.way_m)}});
+                    {"path_m", rounded(trial.path_m)}});
   }
   return list;
 }
@@ -85,12 +85,12 @@ nlohmann::ordered_json cloud_of(const RunSummary& summary) {
 
 /// What keyframes measured and the cloud does not hold, in words; empty: hardly anything.
 std::string left_out_text(const RunSummary& summary) {
-  constexpr double kWorthTelling_percent = 1.0;
+  constexpr double kWorthReporting_percent = 1.0;
   std::string text;
   for (const RunSummary::LeftOut& part : summary.left_out) {
     const double percent = 100.0 * static_cast<double>(part.points) /
                            static_cast<double>(std::max<std::size_t>(1, summary.measured_points));
-    if (percent < kWorthTelling_percent) continue;
+    if (percent < kWorthReporting_percent) continue;
     text += fmt::format("{}{:.0f} % by {}", text.empty() ? "" : ", ", percent, part.by);
   }
   return text.empty() ? text : text + ", of what keyframes measured (stage cloud)";
@@ -107,7 +107,7 @@ std::string left_out_of_map_text(const RunSummary& summary) {
   return text.empty() ? text : text + ", of the merged cloud";
 }
 
-nlohmann::ordered_json laid(const mapping::LaidOver& fit) {
+nlohmann::ordered_json laid(const mapping::OverlayFit& fit) {
   return {{"expected", fit.expected},
           {"matched", fit.matched},
           {"chance", rounded(fit.chance)},
@@ -164,7 +164,7 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"verified", e.verified},
                                     {"refused", refused},
                                     {"agreeing", e.agreeing},
-                                    {"rival", e.rival},
+                                    {"alternative", e.alternative},
                                     {"laid_over", laid(e.laid)},
                                     {"expected", e.expected},
                                     {"confirmed", e.confirmed},
@@ -177,9 +177,9 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"span_m", rounded(e.span_m)},
                                     {"span_rad", rounded(e.span_rad)},
                                     {"spread_m", rounded(e.spread_m)}};
-    if (e.rival_m > 0.0) {
-      entry["rival_m"] = rounded(e.rival_m);
-      entry["rival_laid_over"] = laid(e.rival_laid);
+    if (e.alternative_m > 0.0) {
+      entry["alternative_m"] = rounded(e.alternative_m);
+      entry["alternative_overlay"] = laid(e.alternative_fit);
     }
     if (e.accepted) {
       entry["sigma"] = sigma;

@@ -26,7 +26,7 @@ std::size_t largest_group(const std::vector<RobotMap>& parts, const std::vector<
   return static_cast<std::size_t>(std::max_element(keyframes.begin(), keyframes.end()) - keyframes.begin());
 }
 
-void tell(const RunSummary::Merge& merge, core::Log& log) {
+void report(const RunSummary::Merge& merge, core::Log& log) {
   const mapping::MergeEvidence& e = merge.evidence;
   const std::string tried =
       fmt::format("{} pairs of keyframes look alike, {} were tried, {} show the same place", e.candidates,
@@ -76,7 +76,7 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
     const std::string& a = parts[merge.a].name;
     const std::string& b = parts[merge.b].name;
     result.merges.push_back({a, b, -1.0, std::move(merge)});
-    tell(result.merges.back(), log);
+    report(result.merges.back(), log);
   }
   result.unconnected = left_out(parts, fused.parts, result.merges);
   auto map = std::make_shared<MapResult>();

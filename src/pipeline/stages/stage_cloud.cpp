@@ -46,7 +46,7 @@ class LeftOut {
       by_filter_[i] += report.points_in - std::min(report.points_in, report.points_out);
     }
   }
-  void tell(const cloud::FilterChain& chain, RunSummary& summary) const {
+  void report(const cloud::FilterChain& chain, RunSummary& summary) const {
     summary.measured_points = measured_;
     summary.left_out = {{"depth_limits", by_depth_}};
     const std::vector<std::string> types = chain.types();
@@ -64,9 +64,9 @@ class CloudStage : public Stage {
   void declare(core::OptionTable& table) override {
     options_.declare(table);
     table.integer(
-        "between", between_, {0, 100000}, "",
+        "intermediate_every", intermediate_every_, {0, 100000}, "",
         "Every so many frames, and at the end, one that is no keyframe gives a cloud as well; 0: none");
-    table.integer("looks", looks_, {0, 100000}, "",
+    table.integer("free_space_every", free_space_every_, {0, 100000}, "",
                   "Every so many frames one that gives no cloud is kept as what it sees through; 0: none");
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
@@ -87,16 +87,18 @@ class CloudStage : public Stage {
     const std::size_t number = recordings_->frame_of(io.frame());
     const std::size_t frames = recordings_->frames_of(robot);
     // The last frame shows what no other does when the camera was on its way somewhere.
-    const bool between =
-        between_ > 0 && (number % static_cast<std::size_t>(between_) == 0 || number + 1 == frames);
-    const bool gives_cloud = track->keyframe.valid() || between;
-    const bool looks = looks_ > 0 && number % static_cast<std::size_t>(looks_) == 0;
-    if (!gives_cloud && !looks) return {};
+    const bool intermediate =
+        intermediate_every_ > 0 &&
+        (number % static_cast<std::size_t>(intermediate_every_) == 0 || number + 1 == frames);
+    const bool gives_cloud = track->keyframe.valid() || intermediate;
+    const bool gives_view =
+        free_space_every_ > 0 && number % static_cast<std::size_t>(free_space_every_) == 0;
+    if (!gives_cloud && !gives_view) return {};
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     const sensor::Pinhole& camera = recordings_->robot(robot).camera.color;
     core::Result<cloud::CloudPtr> made =
         gives_cloud ? filtered(*frame, camera, track->keyframe)
-                    : cloud::depth_look(*frame, camera, options_.min_depth_m, options_.max_depth_m);
+                    : cloud::depth_view(*frame, camera, options_.min_depth_m, options_.max_depth_m);
     if (!made) return tl::unexpected<core::Error>(made.error());
     cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
     auto result = std::make_shared<KeyframeCloud>();
@@ -112,7 +114,7 @@ class CloudStage : public Stage {
     io.output<KeyframeCloud>("cloud", result);
     return {};
   }
-  void summarise(RunSummary& summary) const override { left_out_.tell(filters_.chain(), summary); }
+  void summarise(RunSummary& summary) const override { left_out_.report(filters_.chain(), summary); }
 
  private:
   core::Result<cloud::CloudPtr> filtered(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,
@@ -128,8 +130,8 @@ class CloudStage : public Stage {
   }
 
   cloud::KeyframeCloudOptions options_;
-  int between_ = 10;
-  int looks_ = 3;
+  int intermediate_every_ = 10;
+  int free_space_every_ = 3;
   ChainOption filters_{"filters/keyframe.yaml"};
   LeftOut left_out_;
   const RobotRecordings* recordings_ = nullptr;

@@ -75,7 +75,7 @@ class FuseStage : public Stage {
     if (keyframe->id.valid()) {
       places_[keyframe->id] = clouds_->size();
     } else {
-      between_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
+      intermediate_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
     }
     return clouds_->append(keyframe->compact.get(), io.frame());
   }
@@ -114,7 +114,7 @@ class FuseStage : public Stage {
     summary.up = frame_.up;
     summary.yaw = frame_.yaw;
     summary.output_from_map = frame_.output_from_map;
-    summary.depth_fields = told_fields_;
+    summary.depth_fields = reported_fields_;
   }
 
  private:
@@ -138,7 +138,7 @@ class FuseStage : public Stage {
       if (!bytes) return fail(bytes.error());
       if (frame >= run.map.frames.size()) continue;
       const maps::FramePose& pose = run.map.frames[frame];
-      between_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
+      intermediate_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
       if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
     }
     return {};
@@ -163,19 +163,21 @@ class FuseStage : public Stage {
       stamps.push_back(keyframe.stamp);
     }
     std::map<std::int32_t, geometry::Trajectory> ways;
-    for (const Between& between : between_) {
-      const auto way = ways.find(between.robot);
+    for (const IntermediateFrame& intermediate : intermediate_) {
+      const auto way = ways.find(intermediate.robot);
       const geometry::Trajectory& poses_of_robot =
-          way != ways.end() ? way->second
-                            : ways.emplace(between.robot, trajectory_of(map, between.robot)).first->second;
+          way != ways.end()
+              ? way->second
+              : ways.emplace(intermediate.robot, trajectory_of(map, intermediate.robot)).first->second;
       const auto found =
-          std::lower_bound(poses_of_robot.begin(), poses_of_robot.end(), between.stamp,
+          std::lower_bound(poses_of_robot.begin(), poses_of_robot.end(), intermediate.stamp,
                            [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
-      if (found == poses_of_robot.end() || found->stamp != between.stamp) continue;  // a frame that was lost
+      if (found == poses_of_robot.end() || found->stamp != intermediate.stamp)
+        continue;  // a frame that was lost
       poses.push_back(found->world_from_camera);
-      places.push_back(between.place);
-      robots.push_back(between.robot);
-      stamps.push_back(between.stamp);
+      places.push_back(intermediate.place);
+      robots.push_back(intermediate.robot);
+      stamps.push_back(intermediate.stamp);
     }
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
@@ -203,12 +205,12 @@ class FuseStage : public Stage {
     views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
-        "{} clouds{}, fused in {} tiles; {} points seen through, {} of dust; colour gains {:.2f} "
+        "{} clouds{}, fused in {} tiles; {} points seen through, {} isolated; colour gains {:.2f} "
         "to {:.2f}",
         poses.size(),
         clouds_->bytes() > 0 ? fmt::format(", {:.1f} MB", static_cast<double>(clouds_->bytes()) / 1e6)
                              : std::string(),
-        report.tiles, report.seen_through, report.dust, report.least_gain, report.most_gain));
+        report.tiles, report.seen_through, report.isolated, report.least_gain, report.most_gain));
     return fused;
   }
 
@@ -232,7 +234,7 @@ class FuseStage : public Stage {
       for (const RobotInfo& info : map.robots) {
         if (info.number == robot) name = info.name;
       }
-      told_fields_.push_back({name, report, *field});
+      reported_fields_.push_back({name, report, *field});
       context_->log->debug(fmt::format(
           "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
           "explains: {}",
@@ -298,15 +300,15 @@ class FuseStage : public Stage {
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;             ///< camera frame
   std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
-  /// A cloud of a frame between keyframes.
-  struct Between {
+  /// A cloud of a frame intermediate keyframes.
+  struct IntermediateFrame {
     std::int32_t robot = 0;
     double stamp = 0.0;
     std::size_t place = 0;  ///< among the clouds
   };
-  std::vector<Between> between_;
+  std::vector<IntermediateFrame> intermediate_;
   std::shared_ptr<FusionState> state_ = std::make_shared<FusionState>();
-  std::vector<RunSummary::DepthField> told_fields_;
+  std::vector<RunSummary::DepthField> reported_fields_;
   std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
   UpFrame frame_;
   std::size_t points_ = 0;

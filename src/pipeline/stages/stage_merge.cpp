@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "plumbline/mapping/fusion_end.hpp"
+#include "plumbline/mapping/merge_server.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -99,7 +99,7 @@ class MergeStage : public Stage {
   const RunContext* context_ = nullptr;
   mapping::MapFusionOptions options_;
   bool online_ = true;
-  std::optional<mapping::FusionEnd> end_;
+  std::optional<mapping::MergeServer> end_;
   std::map<std::pair<std::size_t, std::size_t>, double>
       times_;  ///< when two robots' maps were found to overlap
   std::shared_ptr<const MapResult> result_;

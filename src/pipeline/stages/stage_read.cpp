@@ -13,7 +13,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-constexpr std::size_t kToldOneByOne = 5;
+constexpr std::size_t kReportedOneByOne = 5;
 
 class ReadStage : public Stage {
  public:
@@ -36,7 +36,7 @@ class ReadStage : public Stage {
     if (!frame) {
       const std::size_t told = unreadable_++;
       const std::string text = fmt::format("frame {} is skipped: {}", io.frame(), frame.error().message);
-      if (told < kToldOneByOne) {
+      if (told < kReportedOneByOne) {
         log_->warning(text);
       } else {
         log_->debug(text);
@@ -51,7 +51,7 @@ class ReadStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     if (io.frame() == 0)
       return core::input_error("stopped before the first frame was mapped; nothing is written");
-    if (unreadable_ > kToldOneByOne) {
+    if (unreadable_ > kReportedOneByOne) {
       log_->warning(
           fmt::format("{} of {} frames could not be read and were skipped", unreadable_.load(), io.frame()));
     }

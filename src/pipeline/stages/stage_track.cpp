@@ -29,10 +29,10 @@ class TrackStage : public Stage {
                                                        *context.executor, *context.log));
       slams_.back()->set_shutter(robot.camera.readout_s);
     }
-    moments_.resize(slams_.size());
+    revisions_.resize(slams_.size());
     if (context.resumed != nullptr) {
       slams_.front()->restore(context.resumed->map.map, context.resumed->map.frames);
-      moments_.front() = slams_.front()->map().now();
+      revisions_.front() = slams_.front()->map().now();
       rows_ = context.resumed->rows;
     }
     return {};
@@ -58,8 +58,8 @@ class TrackStage : public Stage {
     if (report.keyframe.valid()) {
       if (several()) tracked->map = std::make_shared<maps::Map>(slam.map());
       if (context_->keep_changes) {
-        tracked->changes = std::make_shared<maps::MapChanges>(slam.map().changes_since(moments_[number]));
-        moments_[number] = slam.map().now();
+        tracked->changes = std::make_shared<maps::MapChanges>(slam.map().changes_since(revisions_[number]));
+        revisions_[number] = slam.map().now();
       }
     }
     io.output<TrackedFrame>("track", tracked);
@@ -119,7 +119,7 @@ class TrackStage : public Stage {
   const RobotRecordings* recordings_ = nullptr;
   mapping::SlamOptions options_;
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
-  std::vector<maps::MapMoment> moments_;  ///< by robot, of its map, up to which changes were told
+  std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were told
   std::vector<FrameRow> rows_;
   std::vector<float> bundle_wait_ms_;  ///< by frame; NaN: no bundle was put back
   std::vector<float> bundle_ms_;

@@ -86,7 +86,7 @@ TEST(DenseFusion, AWallFarAwayIsThin) {
   const auto fused = views.fuse(fine());
   ASSERT_TRUE(fused.has_value());
   DenseFusionOptions raw = fine();
-  raw.settle = false;
+  raw.plane_projection = false;
   const auto slab = views.fuse(raw);
   ASSERT_TRUE(slab.has_value());
   EXPECT_GT(fused->cloud->size(), 10000U);
@@ -186,7 +186,7 @@ Views a_box_and_looks(int gone, int there) {
   for (int v = 1; v <= gone + there; ++v) {
     views.add(v <= gone ? wall(v) : with_box(wall(v), box, 1.5F), 0.0);
     views.clouds.back() =
-        depth_look(frame_of(v <= gone ? wall(v) : with_box(wall(v), box, 1.5F)), camera(), 0.2, 8.0);
+        depth_view(frame_of(v <= gone ? wall(v) : with_box(wall(v), box, 1.5F)), camera(), 0.2, 8.0);
   }
   return views;
 }
@@ -210,10 +210,10 @@ TEST(DenseFusion, ALookKeepsTheNearestOfItsCells) {
   depth.at<float>(101, 202) = 1.0F;        // in cell (50, 25)
   depth(cv::Rect(400, 200, 4, 4)) = 0.0F;  // nothing measured
   depth(cv::Rect(404, 200, 4, 4)) = 9.0F;  // out of range
-  const CloudPtr look = depth_look(frame_of(depth), camera(), 0.2, 8.0);
+  const CloudPtr look = depth_view(frame_of(depth), camera(), 0.2, 8.0);
   ASSERT_EQ(look->width, 160U);
   ASSERT_EQ(look->height, 120U);
-  EXPECT_TRUE(is_look(*look, camera()));
+  EXPECT_TRUE(is_depth_view(*look, camera()));
   EXPECT_FLOAT_EQ(look->at(50, 25).z, 1.0F);
   EXPECT_FLOAT_EQ(look->at(51, 25).z, 2.0F);
   EXPECT_TRUE(std::isnan(look->at(100, 50).z));
@@ -221,9 +221,9 @@ TEST(DenseFusion, ALookKeepsTheNearestOfItsCells) {
   const auto bytes = encode_cloud(*look);
   const auto again = decode_cloud(bytes.data(), bytes.size());
   ASSERT_TRUE(again.has_value());
-  EXPECT_TRUE(is_look(**again, camera()));
+  EXPECT_TRUE(is_depth_view(**again, camera()));
   EXPECT_EQ(depth_raster(**again, camera()).nearest, depth_raster(*look, camera()).nearest);
-  EXPECT_FALSE(is_look(*organised_cloud(frame_of(depth), camera()), camera()));
+  EXPECT_FALSE(is_depth_view(*organised_cloud(frame_of(depth), camera()), camera()));
 }
 
 /// Twelve views of a wall, five with a box before it. Of the others, which measure nothing where the right

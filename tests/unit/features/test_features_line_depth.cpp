@@ -205,7 +205,7 @@ TEST(LineOptions, AreDeclaredOnceEach) {
   edlines.kind = core::ConfigNode::Kind::kScalar;
   edlines.scalar = "edlines";
   core::ConfigProblems problems;
-  table.set("method", edlines, "lines.method", problems);
+  table.set("line.detector", edlines, "features", problems);
   EXPECT_TRUE(problems.empty());
   EXPECT_EQ(options.detector.method, LineMethod::kEdlines);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The largest set of pairs that tell one story, and its rivals.
+// The largest set of pairs that tell one story, and its alternatives.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -65,7 +65,7 @@ TEST(ConsistentPairs, RightOnesAreFoundAmongWrongOnes) {
   EXPECT_LE(sets[1].members.size(), 2U);
 }
 
-TEST(ConsistentPairs, PlacesThatRepeatHaveRivals) {
+TEST(ConsistentPairs, PlacesThatRepeatHaveAlternatives) {
   const TwoMaps maps;
   std::vector<PlacePair> pairs;
   for (int i = 0; i < kCount; ++i) {

@@ -140,7 +140,7 @@ TEST(MapFusion, TwoAnswersAreNone) {
   const MergeEvidence doubtful = decide_overlap(parts, 0, 1, pairs, options, executor);
   EXPECT_FALSE(doubtful.accepted);
   EXPECT_EQ(doubtful.agreeing, 14);
-  EXPECT_EQ(doubtful.rival, 8);
+  EXPECT_EQ(doubtful.alternative, 8);
   EXPECT_NE(doubtful.refused.find("exclude each other"), std::string::npos) << doubtful.refused;
 }
 

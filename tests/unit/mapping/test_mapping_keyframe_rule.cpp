@@ -122,7 +122,7 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
   map_.add_keyframe(second, moved(0.5));
   for (int i = 0; i < 200; ++i) map_.observe(core::PointId{0, i}, {0, 1}, i);
   const auto known = [&](const Rigid3& pose, std::size_t points, const KeyframeRuleOptions& options = {}) {
-    return KeyframeRule(options).known_ground(map_, {0, 1}, track(pose, points, 10), kRuleCamera);
+    return KeyframeRule(options).earlier_reference(map_, {0, 1}, track(pose, points, 10), kRuleCamera);
   };
   EXPECT_EQ(known(moved(0.05), 100), (core::KeyframeId{0, 0}));
   EXPECT_FALSE(known(moved(0.22), 100).valid());  // too near to its limit
@@ -135,9 +135,10 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
   }
   auto other = track(moved(0.05), 20, 0);
   for (std::int32_t i = 300; i < 360; ++i) other.points.push_back({{0, i}, i, 0});
-  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 1}, other, kRuleCamera).valid());
+  EXPECT_FALSE(KeyframeRule({}).earlier_reference(map_, {0, 1}, other, kRuleCamera).valid());
   // The reference itself is no news, and who does not want it does not get it.
-  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 0}, track(moved(0.05), 100, 10), kRuleCamera).valid());
+  EXPECT_FALSE(
+      KeyframeRule({}).earlier_reference(map_, {0, 0}, track(moved(0.05), 100, 10), kRuleCamera).valid());
   KeyframeRuleOptions options;
   options.reuse = false;
   EXPECT_FALSE(known(moved(0.05), 100, options).valid());

@@ -105,7 +105,7 @@ TEST(Triangulation, CornersAlignedByTheirPatchesNeedAThirdOfTheWay) {
   const KeyframeId newer = views.add_keyframe(views.newer_from_world, views.newer);
   TriangulationOptions options;
   options.max_relative_sigma = 0.04;
-  const auto triangulate = [&](const NewestPicture* picture) {
+  const auto triangulate = [&](const NewestImage* picture) {
     return triangulate_points(views.map, newer, {older}, 8.0, tests::kTestCamera, options, picture);
   };
   EXPECT_TRUE(triangulate(nullptr).empty()) << "a pixel over 12 cm says little about what is 2 m away";
@@ -116,7 +116,7 @@ TEST(Triangulation, CornersAlignedByTheirPatchesNeedAThirdOfTheWay) {
     return result;
   }();
   const std::vector<cv::Mat> levels = views.newer->levels;
-  const NewestPicture picture{levels, *views.newer};
+  const NewestImage picture{levels, *views.newer};
   const auto made = triangulate(&picture);
   EXPECT_GT(made.size(), 2 * views.wall.size() / 3) << "all but those ahead";
   for (core::PointId id : made) {
@@ -141,10 +141,10 @@ TEST(Triangulation, CornersAreNotAlignedWithPatchesAtBorders) {
   const KeyframeId newer = views.add_keyframe(views.newer_from_world, views.newer);
   for (features::CornerPatch& p : views.older->patches) p.gray.fill(0);
   const std::vector<cv::Mat> levels = views.newer->levels;
-  const NewestPicture picture{levels, *views.newer};
+  const NewestImage picture{levels, *views.newer};
   TriangulationOptions options;
   options.max_relative_sigma = 0.04;
-  const auto triangulate = [&](const NewestPicture& p) {
+  const auto triangulate = [&](const NewestImage& p) {
     return triangulate_points(views.map, newer, {older}, 8.0, tests::kTestCamera, options, &p);
   };
   EXPECT_TRUE(triangulate(picture).empty());

@@ -98,7 +98,7 @@ TEST(LocalBundle, DepthIsBelievedLessThanItsNoiseSays) {
   }
 }
 
-TEST(SightingNoise, UnrestMultipliesEveryStandardDeviation) {
+TEST(ObservationNoise, MotionMultipliesEveryStandardDeviation) {
   features::PointFeature corner;
   corner.depth = 2.0F;
   corner.octave = 3;
@@ -106,19 +106,19 @@ TEST(SightingNoise, UnrestMultipliesEveryStandardDeviation) {
   line.line3 = features::Line3{};
   line.line3->start = {0.0, 0.0, 2.0};
   line.line3->end = {0.5, 0.0, 2.5};
-  const SightingNoise noise;
-  const auto calm = noise.of(corner, false);
+  const ObservationNoise noise;
+  const auto steady = noise.of(corner, false);
   const auto turning = noise.of(corner, false, 3.0);
-  EXPECT_DOUBLE_EQ(calm.pixel_sigma, 1.2 * 1.2 * 1.2);
-  EXPECT_DOUBLE_EQ(turning.pixel_sigma, 3.0 * calm.pixel_sigma);
+  EXPECT_DOUBLE_EQ(steady.pixel_sigma, 1.2 * 1.2 * 1.2);
+  EXPECT_DOUBLE_EQ(turning.pixel_sigma, 3.0 * steady.pixel_sigma);
   EXPECT_DOUBLE_EQ(noise.of(corner, true, 3.0).pixel_sigma, noise.aligned * turning.pixel_sigma);
-  EXPECT_DOUBLE_EQ(turning.depth_sigma, 3.0 * calm.depth_sigma);
-  const auto calm_line = noise.of(line);
+  EXPECT_DOUBLE_EQ(turning.depth_sigma, 3.0 * steady.depth_sigma);
+  const auto steady_line = noise.of(line);
   const auto turning_line = noise.of(line, 3.0);
-  EXPECT_TRUE(calm_line.has_depth);
-  EXPECT_DOUBLE_EQ(calm_line.pixel_sigma, noise.line_sigma_px);
-  EXPECT_DOUBLE_EQ(turning_line.pixel_sigma, 3.0 * calm_line.pixel_sigma);
-  EXPECT_DOUBLE_EQ(turning_line.end_sigma, 3.0 * calm_line.end_sigma);
+  EXPECT_TRUE(steady_line.has_depth);
+  EXPECT_DOUBLE_EQ(steady_line.pixel_sigma, noise.line_sigma_px);
+  EXPECT_DOUBLE_EQ(turning_line.pixel_sigma, 3.0 * steady_line.pixel_sigma);
+  EXPECT_DOUBLE_EQ(turning_line.end_sigma, 3.0 * steady_line.end_sigma);
   line.line3.reset();
   EXPECT_FALSE(noise.of(line).has_depth);
 }
@@ -144,10 +144,11 @@ TEST(LocalBundle, AKeyframeTakenWhileTurningFastSaysLess) {
     }
     return found;
   };
-  const std::vector<double> calm = sigmas(still), sheared = sigmas(turning);
-  ASSERT_FALSE(calm.empty());
-  ASSERT_EQ(calm.size(), sheared.size());
-  for (std::size_t i = 0; i < calm.size(); ++i) EXPECT_DOUBLE_EQ(sheared[i], std::hypot(1.0, 4.0) * calm[i]);
+  const std::vector<double> steady = sigmas(still), distorted = sigmas(turning);
+  ASSERT_FALSE(steady.empty());
+  ASSERT_EQ(steady.size(), distorted.size());
+  for (std::size_t i = 0; i < steady.size(); ++i)
+    EXPECT_DOUBLE_EQ(distorted[i], std::hypot(1.0, 4.0) * steady[i]);
 }
 
 TEST(LocalBundle, AnEdgeOfAKeyframeTakenWhileTurningFastSaysLess) {

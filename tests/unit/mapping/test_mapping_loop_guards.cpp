@@ -27,7 +27,7 @@ class Gallery {
       const KeyframeId id =
           tests::add_view(map_, tests::poster(1200, poster), view, view * place_from_world, stamp_);
       stamp_ += 2.0;
-      const std::vector<Loop> found = closer_.look(map_, id);
+      const std::vector<Loop> found = closer_.detect(map_, id);
       sure.insert(sure.end(), found.begin(), found.end());
     }
     return sure;
@@ -69,7 +69,7 @@ TEST(LoopGuards, WhatDriftDoesNotExplainIsNot) {
     ++refused;
     EXPECT_NE(trial.refused.find("drift"), std::string::npos) << trial.refused;
     EXPECT_NEAR(trial.correction_m, 0.9, 0.05);
-    EXPECT_NEAR(trial.way_m, 13.0, 2.0);
+    EXPECT_NEAR(trial.path_m, 13.0, 2.0);
   }
   EXPECT_GE(refused, 2) << "seen by itself it is the same place";
   LoopOptions credulous = options_for_few();
@@ -83,14 +83,14 @@ TEST(LoopGuards, WhatDriftDoesNotExplainIsNot) {
 
 TEST(LoopGuards, TwoPlacesThatLookTheSameExcludeEachOther) {
   LoopOptions options = options_for_few();
-  options.max_drift = 1.0;  // leave it to the rivals
+  options.max_drift = 1.0;  // leave it to the alternatives
   Gallery gallery(options);
   for (const auto& [poster, metres] : {std::pair{5U, 0.0}, {6U, 3.0}, {5U, 6.0}, {8U, 9.0}}) {
     gallery.visit(poster, metres);
   }
   EXPECT_TRUE(gallery.visit(5, 1.0).empty());
   EXPECT_GE(gallery.closer().counts().verified, 4) << "both places must have been verified";
-  options.max_rival = 1.0;
+  options.max_alternative = 1.0;
   Gallery credulous(options);
   for (const auto& [poster, metres] : {std::pair{5U, 0.0}, {6U, 3.0}, {5U, 6.0}, {8U, 9.0}}) {
     credulous.visit(poster, metres);

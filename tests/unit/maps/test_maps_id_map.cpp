@@ -85,21 +85,21 @@ TEST(IdMap, KnowsWhichPagesWereTouched) {
   for (int i = 0; i < 200; ++i) names.insert({1, i}, "x");
   names.insert({0, 3}, "y");
   using Pages = std::vector<Names::Page>;
-  EXPECT_EQ(names.touched_pages(0), (Pages{{0, 0}, {1, 0}, {1, 1}, {1, 2}, {1, 3}}));
-  const std::uint64_t before = names.touches();
+  EXPECT_EQ(names.changed_pages(0), (Pages{{0, 0}, {1, 0}, {1, 1}, {1, 2}, {1, 3}}));
+  const std::uint64_t before = names.revision();
   const Names& looked_at = names;
   EXPECT_EQ(looked_at.at({1, 5}), "x");
   EXPECT_NE(looked_at.find({1, 70}), nullptr);
   EXPECT_EQ(names.find({1, 999}), nullptr);
   names.erase({1, 999});
-  EXPECT_TRUE(names.touched_pages(before).empty()) << "nothing changed";
+  EXPECT_TRUE(names.changed_pages(before).empty()) << "nothing changed";
   names.at({1, 130}) = "z";
   names.erase({0, 3});
-  EXPECT_EQ(names.touched_pages(before), (Pages{{0, 0}, {1, 2}}));
-  const std::uint64_t later = names.touches();
+  EXPECT_EQ(names.changed_pages(before), (Pages{{0, 0}, {1, 2}}));
+  const std::uint64_t later = names.revision();
   *names.find({1, 63}) = "w";
   names.insert({1, 64}, "v");
-  EXPECT_EQ(names.touched_pages(later), (Pages{{1, 0}, {1, 1}}));
+  EXPECT_EQ(names.changed_pages(later), (Pages{{1, 0}, {1, 1}}));
 }
 
 }  // namespace

@@ -23,18 +23,18 @@ using tests::header_of;
 using tests::StoreFolder;
 using tests::StoreWorld;
 
-struct Told {
+struct Reported {
   std::int64_t number = 0;
   std::vector<StoreRow> rows;
 };
 
 /// What a store tells of its map, row by row.
-std::vector<Told> told_by(const std::filesystem::path& file) {
-  std::vector<Told> all;
+std::vector<Reported> reported_by(const std::filesystem::path& file) {
+  std::vector<Reported> all;
   std::int64_t after = 0;
   while (const auto next = next_transaction(file, StoreShare::kMap, after).value()) {
     after = next->number;
-    Told told{next->number, {}};
+    Reported told{next->number, {}};
     for (std::size_t at = 0; at < next->rows.size();) {
       const Bytes head(next->rows.begin() + static_cast<std::ptrdiff_t>(at),
                        next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength));
@@ -48,7 +48,7 @@ std::vector<Told> told_by(const std::filesystem::path& file) {
   return all;
 }
 
-core::Result<void> tell(StoreReplica& copy, const Told& told) {
+core::Result<void> tell(StoreReplica& copy, const Reported& told) {
   ByteWriter bytes;
   for (const StoreRow& row : told.rows) append(row, bytes);
   if (auto begun = copy.begin(StoreShare::kMap, told.number); !begun) return begun;
@@ -63,7 +63,7 @@ class Nonsense : public testing::Test {
     for (int i = 0; i < 6; ++i) {
       EXPECT_TRUE(writer->add_keyframe(world_.map, world_.step(), {}, world_.frames));
     }
-    all_ = told_by(folder_.file());
+    all_ = reported_by(folder_.file());
   }
   /// What is said when the first row of a table is changed so.
   std::string refusal(const std::string& table, const std::function<void(StoreRow&)>& change) {
@@ -71,7 +71,7 @@ class Nonsense : public testing::Test {
     std::filesystem::remove(copied);
     auto copy = StoreReplica::open(copied);
     bool changed = false;
-    for (Told told : all_) {
+    for (Reported told : all_) {
       for (StoreRow& row : told.rows) {
         if (changed || kRowTables[row.name.place].name != table) continue;
         if (table == "header" && row.name.key != "camera") continue;
@@ -91,7 +91,7 @@ class Nonsense : public testing::Test {
 
   StoreFolder folder_;
   StoreWorld world_;
-  std::vector<Told> all_;
+  std::vector<Reported> all_;
 };
 
 TEST_F(Nonsense, IsNamed) {
@@ -162,7 +162,7 @@ TEST_F(Nonsense, ThatIsPackedAgainDoesNoHarm) {
     const std::size_t victim = random() % all_.size();
     bool taken = true;
     for (std::size_t i = 0; i < all_.size() && taken; ++i) {
-      Told told = all_[i];
+      Reported told = all_[i];
       StoreRow& row = told.rows[random() % told.rows.size()];
       if (i == victim && row.type == SQLITE_BLOB && !row.data.empty()) {
         Bytes plain = unpack(row.data.data(), row.data.size());

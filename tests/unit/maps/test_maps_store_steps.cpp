@@ -66,7 +66,7 @@ class Follower {
 
  private:
   StoreWorld& world_;
-  MapMoment moment_;
+  MapRevision moment_;
   std::size_t frames_ = 0;
 };
 
@@ -112,7 +112,7 @@ TEST(StoreSteps, ChangesAreFewWhenLittleChanged) {
   const MapChanges all = world.map.changes_since({});
   EXPECT_TRUE(all.whole);
   ASSERT_GT(all.points.size(), 3U);
-  const MapMoment moment = world.map.now();
+  const MapRevision moment = world.map.now();
   const MapChanges none = world.map.changes_since(moment);
   EXPECT_FALSE(none.whole);
   EXPECT_TRUE(none.points.empty() && none.lines.empty() && none.edges.empty());

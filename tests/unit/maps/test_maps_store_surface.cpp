@@ -44,7 +44,7 @@ std::vector<KeyframeId> write_store(const std::filesystem::path& file, StoreWorl
   auto writer = StoreWriter::create(file, header_of(world.camera));
   EXPECT_TRUE(writer);
   std::vector<KeyframeId> ids;
-  MapMoment moment;
+  MapRevision moment;
   for (int i = 0; i < keyframes; ++i) {
     StoreStep step;
     ids.push_back(world.step());

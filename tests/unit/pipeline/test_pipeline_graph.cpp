@@ -35,7 +35,7 @@ class GraphFile : public testing::Test {
     EXPECT_EQ(graph.error().kind, core::ErrorKind::kUsage);
     return graph.error().message;
   }
-  void expect_told(const std::string& text, const std::string& told) {
+  void expect_reported(const std::string& text, const std::string& told) {
     const std::string message = refusal(text);
     EXPECT_NE(message.find(told), std::string::npos) << message;
   }
@@ -95,17 +95,17 @@ flags: 1
 }
 
 TEST_F(GraphFile, PortTypesMustFit) {
-  expect_told(
+  expect_reported(
       "stages:\n  a: {type: count}\n  b: {type: collect, inputs: {total: a}}\n",
       "g.yaml:3:38: stages.b.inputs.total: 'a' does not give the total that is needed here; it gives number "
       "(number) (no stage of this file gives a total)");
-  expect_told(
+  expect_reported(
       "stages:\n  a: {type: count}\n  s: {type: sum, inputs: {number: a.total}}\n",
       "'a.total' does not give the number that is needed here; it gives number (number) (allowed: a)");
 }
 
 TEST_F(GraphFile, CyclesAreNamed) {
-  expect_told(R"(stages:
+  expect_reported(R"(stages:
   count: {type: count}
   a: {type: scale, inputs: {number: c}}
   b: {type: scale, inputs: {number: a}}
@@ -113,20 +113,21 @@ TEST_F(GraphFile, CyclesAreNamed) {
   sum: {type: sum, inputs: {number: c, other: count}}
   out: {type: collect, inputs: {total: sum}}
 )",
-              "g.yaml:3:3: stages.a: the stages read from each other in a circle (a <- c <- b <- a)");
-  expect_told("stages:\n  a: {type: scale, inputs: {number: a}}\n", "in a circle (a <- a)");
+                  "g.yaml:3:3: stages.a: the stages read from each other in a circle (a <- c <- b <- a)");
+  expect_reported("stages:\n  a: {type: scale, inputs: {number: a}}\n", "in a circle (a <- a)");
 }
 
 TEST_F(GraphFile, UnusedAndMissingStagesAreTold) {
-  expect_told(std::string(kGood) + "  idle: {type: scale, inputs: {number: count}}\n",
-              "g.yaml:10:3: stages.idle: nothing reads from this stage");
-  expect_told(std::string(kGood) + "  again: {type: count}\n", "a pipeline has one stage that gives frames");
-  expect_told("description: x\n", "stages: must be a map of stages");
-  expect_told("stages: {}\n", "stages: must be a map of stages");
-  expect_told("", "a pipeline is a map");
-  expect_told("stages:\n  Bad Name: {type: count}\n", "a stage's name is made of");
-  expect_told("stages:\n  a:\n", "must be a map with a type");
-  expect_told("stages:\n  a: {n: 3}\n", "needs a type (allowed: collect, count, scale, sum)");
+  expect_reported(std::string(kGood) + "  idle: {type: scale, inputs: {number: count}}\n",
+                  "g.yaml:10:3: stages.idle: nothing reads from this stage");
+  expect_reported(std::string(kGood) + "  again: {type: count}\n",
+                  "a pipeline has one stage that gives frames");
+  expect_reported("description: x\n", "stages: must be a map of stages");
+  expect_reported("stages: {}\n", "stages: must be a map of stages");
+  expect_reported("", "a pipeline is a map");
+  expect_reported("stages:\n  Bad Name: {type: count}\n", "a stage's name is made of");
+  expect_reported("stages:\n  a:\n", "must be a map with a type");
+  expect_reported("stages:\n  a: {n: 3}\n", "needs a type (allowed: collect, count, scale, sum)");
 }
 
 TEST_F(GraphFile, AnUnknownTypeIsToldOnceAndNotForEveryNeighbour) {
@@ -171,8 +172,8 @@ TEST_F(GraphFile, ProblemsOfAFileAreToldTogetherWithThoseOfItsText) {
 }
 
 TEST_F(GraphFile, ProblemsOfAStagesOwnChecksAreToldWhereTheKeyStands) {
-  expect_told("stages:\n  a: {type: count}\n  b: {type: scale, inputs: {number: a}, file: nowhere}\n",
-              "g.yaml:3:47: stages.b.file: no such file");
+  expect_reported("stages:\n  a: {type: count}\n  b: {type: scale, inputs: {number: a}, file: nowhere}\n",
+                  "g.yaml:3:47: stages.b.file: no such file");
   EXPECT_EQ(refusal(kGood, {"twice.file=nowhere"}), "--set twice.file: no such file");
 }
 
@@ -218,9 +219,9 @@ TEST_F(GraphFile, ATapMustNameAPortThatCanBeWritten) {
            {"{file: a.txt}", "g.yaml:11:5: taps[0]: must name a port"},
            {"sum", "taps[0]: must name a port"},
            {"{port: sum, file: a.txt, colour: red}", "g.yaml:11:30: taps[0].colour: unknown key"}}) {
-    expect_told(taps + tap + "\n", told);
+    expect_reported(taps + tap + "\n", told);
   }
-  expect_told(std::string(kGood) + "taps: {port: sum}\n", "g.yaml:10:7: taps: must be a list");
+  expect_reported(std::string(kGood) + "taps: {port: sum}\n", "g.yaml:10:7: taps: must be a list");
 }
 
 TEST_F(GraphFile, DotShowsStagesPortsAndTaps) {

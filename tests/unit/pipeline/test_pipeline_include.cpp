@@ -44,7 +44,7 @@ class Include : public testing::Test {
     write("own.yaml", text);
     return load_graph(folder_ / "own.yaml", registry_, folder_ / "shipped", overrides);
   }
-  void expect_told(const std::string& text, const std::string& told) {
+  void expect_reported(const std::string& text, const std::string& told) {
     const auto graph = load(text);
     ASSERT_FALSE(graph) << told;
     EXPECT_NE(graph.error().message.find(told), std::string::npos) << told << "\nnot in\n"
@@ -96,8 +96,8 @@ TEST_F(Include, TapsAddUp) {
   const auto graph = load("include: tapped.yaml\ntaps:\n  - {port: twice, file: b.txt}\n");
   ASSERT_TRUE(graph) << graph.error().message;
   EXPECT_EQ(graph->nodes.size(), 6U);
-  expect_told("include: tapped.yaml\ntaps:\n  - {port: twice, file: a.txt}\n",
-              "own.yaml:3:5: taps[1]: writes a.txt, which taps[0] writes as well");
+  expect_reported("include: tapped.yaml\ntaps:\n  - {port: twice, file: a.txt}\n",
+                  "own.yaml:3:5: taps[1]: writes a.txt, which taps[0] writes as well");
 }
 
 TEST_F(Include, LaterFilesAreOnTopOfEarlierOnes) {
@@ -111,7 +111,7 @@ TEST_F(Include, LaterFilesAreOnTopOfEarlierOnes) {
 TEST_F(Include, ShippedPipelinesAreFoundByName) {
   write("shipped/factory.yaml", kBase);
   EXPECT_TRUE(load("include: factory\n"));
-  expect_told(
+  expect_reported(
       "include: factry\n",
       "own.yaml:1:10: include: there is no 'factry' beside this file, and no shipped pipeline of that name; "
       "did you mean factory?");
@@ -148,26 +148,27 @@ TEST_F(Include, ProblemsNameTheFileTheyAreIn) {
 }
 
 TEST_F(Include, ChangesOfNothingAreTold) {
-  expect_told(
+  expect_reported(
       "include: base\nstages:\n  twcie: {by: 5}\n",
       "own.yaml:3:3: stages.twcie: there is no included stage 'twcie' to change, and a new one needs a type; "
       "did you mean twice?");
-  expect_told("include: base\nremove: [twcie]\n",
-              "own.yaml:2:10: remove: there is no included stage 'twcie'; did you mean twice?");
-  expect_told(std::string(kBase) + "remove: twice\n",
-              "remove: there is no include whose stages could be removed");
-  expect_told("include: {a: b}\n", "own.yaml:1:10: include: must be a name or a list of names");
-  expect_told("include: base\nremove: twice\n",
-              "base.yaml:9:37: stages.sum.inputs.number: there is no stage 'twice'");
+  expect_reported("include: base\nremove: [twcie]\n",
+                  "own.yaml:2:10: remove: there is no included stage 'twcie'; did you mean twice?");
+  expect_reported(std::string(kBase) + "remove: twice\n",
+                  "remove: there is no include whose stages could be removed");
+  expect_reported("include: {a: b}\n", "own.yaml:1:10: include: must be a name or a list of names");
+  expect_reported("include: base\nremove: twice\n",
+                  "base.yaml:9:37: stages.sum.inputs.number: there is no stage 'twice'");
 }
 
 TEST_F(Include, CirclesAreNamed) {
   write("a.yaml", "include: b.yaml\n");
   write("b.yaml", "include: own.yaml\n");
-  expect_told("include: a.yaml\n",
-              "b.yaml:1:10: include: the files include each other in a circle (own.yaml -> a.yaml -> b.yaml "
-              "-> own.yaml)");
-  expect_told("include: ./own.yaml\n", "in a circle (own.yaml -> own.yaml)");
+  expect_reported(
+      "include: a.yaml\n",
+      "b.yaml:1:10: include: the files include each other in a circle (own.yaml -> a.yaml -> b.yaml "
+      "-> own.yaml)");
+  expect_reported("include: ./own.yaml\n", "in a circle (own.yaml -> own.yaml)");
 }
 
 TEST_F(Include, ManyTimesManyFilesAreRefused) {
@@ -176,7 +177,7 @@ TEST_F(Include, ManyTimesManyFilesAreRefused) {
     const std::string below = "l" + std::to_string(i - 1) + ".yaml";
     write("l" + std::to_string(i) + ".yaml", "include: [" + below + ", " + below + "]\n");
   }
-  expect_told("include: l11.yaml\n", "includes more than 50 files");
+  expect_reported("include: l11.yaml\n", "includes more than 50 files");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "../../../src/pipeline/graph/option_levels.hpp"
 #include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/core/renamed_options.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
 #include "plumbline/sensor/camera.hpp"
@@ -130,19 +131,46 @@ TEST(Shipped, WhatIsWrittenOutReadsBackTheSame) {
   }
 }
 
+bool has_option(const StageRegistry& registry, const std::string& stage, const std::string& key) {
+  const StageType* type = registry.find(stage);
+  if (type == nullptr) return false;
+  const auto made = type->make();
+  core::OptionTable table;
+  made->declare(table);
+  return std::any_of(table.specs().begin(), table.specs().end(),
+                     [&](const core::OptionSpec& spec) { return spec.key == key; });
+}
+
+TEST(Shipped, EarlierNamesOfOptionsStillServe) {
+  StageRegistry registry;
+  register_stages(registry);
+  for (const core::RenamedOption& option : core::renamed_options()) {
+    EXPECT_TRUE(has_option(registry, option.stage, option.now)) << option.stage << "." << option.now;
+    EXPECT_FALSE(has_option(registry, option.stage, option.before)) << option.stage << "." << option.before;
+  }
+  const fs::path file = fs::path(testing::TempDir()) / "plumbline_earlier_names.yaml";
+  std::ofstream(file) << "description: x\ninclude: rgbd.yaml\nstages:\n  fuse: {settle: off}\n";
+  const auto graph =
+      load_graph(file, registry, kShipped,
+                 {"robots.merge.min_pairs=6", "robots.features.x=1", "features.method=edlines"});
+  ASSERT_FALSE(graph) << "there is no such option";
+  const auto good =
+      load_graph(file, registry, kShipped, {"robots.merge.min_pairs=6", "features.method=edlines"});
+  ASSERT_TRUE(good) << good.error().message;
+  ASSERT_EQ(good->warnings.size(), 3U);
+  EXPECT_EQ(good->warnings[0], file.string() + ":4: fuse.settle is called plane_projection now");
+  EXPECT_EQ(good->warnings[1], "--set robots.merge.min_pairs: is called merge.min_pairs now");
+  EXPECT_NE(to_yaml(*good).find("plane_projection: off"), std::string::npos);
+  EXPECT_NE(to_yaml(*good).find("line.detector: edlines"), std::string::npos);
+  fs::remove(file);
+}
+
 TEST(Shipped, LevelsNameOptionsThatAreThere) {
   StageRegistry registry;
   register_stages(registry);
   std::map<OptionLevel, std::size_t> count;
   for (const auto& [stage, key] : levelled_options()) {
-    const StageType* type = registry.find(stage);
-    ASSERT_NE(type, nullptr) << stage;
-    const auto made = type->make();
-    core::OptionTable table;
-    made->declare(table);
-    EXPECT_TRUE(std::any_of(table.specs().begin(), table.specs().end(),
-                            [key = key](const core::OptionSpec& spec) { return spec.key == key; }))
-        << stage << "." << key;
+    EXPECT_TRUE(has_option(registry, stage, key)) << stage << "." << key;
   }
   for (const StageType* type : registry.types()) {
     const auto made = type->make();

@@ -129,15 +129,15 @@ TEST(Recogniser, SeenInARowByGroups) {
   Recogniser recogniser(options);
   for (std::int32_t step = 0; step < 3; ++step) {
     const auto seen = picture(static_cast<std::uint32_t>(10 + step), 1);
-    const auto found = recogniser.look(database, {1, step}, *seen, {}, {}, neighbours);
+    const auto found = recogniser.recognise(database, {1, step}, *seen, {}, {}, neighbours);
     ASSERT_FALSE(found.empty());
     EXPECT_EQ(found[0].keyframe.index, 10 + step);
     EXPECT_EQ(found[0].in_a_row, step + 1);
   }
-  const auto elsewhere = recogniser.look(database, {1, 3}, *picture(30, 1), {}, {}, neighbours);
+  const auto elsewhere = recogniser.recognise(database, {1, 3}, *picture(30, 1), {}, {}, neighbours);
   ASSERT_FALSE(elsewhere.empty());
   EXPECT_EQ(elsewhere[0].in_a_row, 1);
-  EXPECT_TRUE(recogniser.look(database, {1, 4}, *picture(999, 0), {}, {}, neighbours).empty());
+  EXPECT_TRUE(recogniser.recognise(database, {1, 4}, *picture(999, 0), {}, {}, neighbours).empty());
 }
 
 TEST(Recogniser, AScoreIsGoodWhenTheNeighboursIsNotMuchBetter) {
@@ -150,9 +150,9 @@ TEST(Recogniser, AScoreIsGoodWhenTheNeighboursIsNotMuchBetter) {
   const auto asked = picture(5, 1, 2);
   const auto not_now = [](KeyframeId id) { return id.index < 40; };
   const Neighbours none = [](KeyframeId) { return std::vector<KeyframeId>{}; };
-  EXPECT_TRUE(Recogniser(options).look(database, {0, 41}, *asked, {0, 40}, not_now, none).empty());
+  EXPECT_TRUE(Recogniser(options).recognise(database, {0, 41}, *asked, {0, 40}, not_now, none).empty());
   options.min_score = 0.05;
-  const auto found = Recogniser(options).look(database, {0, 41}, *asked, {0, 40}, not_now, none);
+  const auto found = Recogniser(options).recognise(database, {0, 41}, *asked, {0, 40}, not_now, none);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].keyframe.index, 5);
   EXPECT_LT(found[0].relative, 0.9);

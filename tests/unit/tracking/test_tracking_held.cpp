@@ -2,7 +2,7 @@
 // What the motion model holds of a pose, and how much it believes of a step.
 #include <gtest/gtest.h>
 
-#include "../../../src/tracking/held_directions.hpp"
+#include "../../../src/tracking/observable_directions.hpp"
 
 namespace plumbline::tracking {
 namespace {
@@ -54,13 +54,13 @@ TEST(MotionPrior, BesideSurfacesAloneItIsStiff) {
 
 TEST(WeakPart, IsThePartOfAStepThatLiesInWeakDirections) {
   const Matrix6d held_in_five = sideways_to(0.1);
-  const Matrix6d part = weak_part(weigh_directions(held_in_five), weak_below(held_in_five, false));
+  const Matrix6d part = weak_projection(weigh_directions(held_in_five), weak_below(held_in_five, false));
   const Vector6d step = (Vector6d() << 0.02, 0.03, -0.01, 0.004, -0.002, 0.001).finished();
   const Vector6d weak = part * step;
   EXPECT_NEAR(weak(0), 0.02, 1e-9);
   EXPECT_NEAR(weak.tail<5>().norm(), 0.0, 1e-9);
   EXPECT_NEAR((part * part - part).norm(), 0.0, 1e-9);  // what is left of a part is the part
-  EXPECT_EQ(weak_part(weigh_directions(sideways_to(0.001)), 2500.0), Matrix6d::Zero());
+  EXPECT_EQ(weak_projection(weigh_directions(sideways_to(0.001)), 2500.0), Matrix6d::Zero());
 }
 
 TEST(WeakPart, KnowsMixedDirections) {
@@ -73,7 +73,7 @@ TEST(WeakPart, KnowsMixedDirections) {
   const Vector6d direction = confused.cwiseQuotient(scale).normalized();  // in the scaled space
   const Matrix6d scaled = 1e6 * (Matrix6d::Identity() - 0.9999 * direction * direction.transpose());
   information = scale.cwiseInverse().asDiagonal() * scaled * scale.cwiseInverse().asDiagonal();
-  const Matrix6d part = weak_part(weigh_directions(information), 2500.0);
+  const Matrix6d part = weak_projection(weigh_directions(information), 2500.0);
   EXPECT_NEAR((part * confused - confused).norm(), 0.0, 1e-6);
   EXPECT_EQ(part.fullPivLu().rank(), 1);
 }

@@ -170,14 +170,14 @@ TEST(Photometric, LooksToTheSideForTheBestFit) {
 }
 
 TEST(Photometric, AGuessThatNothingIsKnownOfGivesWayToAGoodOneOnly) {
-  using tracking::likeliest_guess;
-  EXPECT_EQ(likeliest_guess({std::nullopt, std::nullopt, 0.4}), 0U);  // where the camera was: a look-alike
-  EXPECT_EQ(likeliest_guess({std::nullopt, std::nullopt, 0.9}), 2U);
-  EXPECT_EQ(likeliest_guess({std::nullopt, 0.85, 0.95}), 2U);
-  EXPECT_EQ(likeliest_guess({0.5, 0.6, std::nullopt}), 1U);
-  EXPECT_EQ(likeliest_guess({0.5, 0.53, 0.52}), 0U);  // no better to speak of
-  EXPECT_EQ(likeliest_guess({-0.1, 0.0}), 1U);
-  EXPECT_EQ(likeliest_guess({std::nullopt}), 0U);
+  using tracking::best_hypothesis;
+  EXPECT_EQ(best_hypothesis({std::nullopt, std::nullopt, 0.4}), 0U);  // where the camera was: a look-alike
+  EXPECT_EQ(best_hypothesis({std::nullopt, std::nullopt, 0.9}), 2U);
+  EXPECT_EQ(best_hypothesis({std::nullopt, 0.85, 0.95}), 2U);
+  EXPECT_EQ(best_hypothesis({0.5, 0.6, std::nullopt}), 1U);
+  EXPECT_EQ(best_hypothesis({0.5, 0.53, 0.52}), 0U);  // no better to speak of
+  EXPECT_EQ(best_hypothesis({-0.1, 0.0}), 1U);
+  EXPECT_EQ(best_hypothesis({std::nullopt}), 0U);
 }
 
 TEST(Photometric, WhatStandsBeforeTheWallHidesIt) {

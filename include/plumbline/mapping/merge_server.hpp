@@ -15,11 +15,11 @@
 
 namespace plumbline::mapping {
 
-class FusionEnd {
+class MergeServer {
  public:
   /// `cameras`: of the robots, which are numbered 0, 1, ...
-  FusionEnd(const MapFusionOptions& options, const std::vector<Cameras>& cameras,
-            const core::Executor& executor);
+  MergeServer(const MapFusionOptions& options, const std::vector<Cameras>& cameras,
+              const core::Executor& executor);
 
   /// Looks up a keyframe that is new in `map`, its robot's. Overlaps that have become certain with it, each
   /// pair of robots once. Throws std::invalid_argument: no such robot or keyframe.

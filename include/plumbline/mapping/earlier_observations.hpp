@@ -19,9 +19,9 @@ namespace plumbline::mapping {
 /// exactly. The newest keyframe's corner and its patch's offset follow in `newest`, which must be the
 /// features of that keyframe. Corners found must lie off their landmarks' projections all alike, by how much
 /// does not matter much: the older pose is not known better. Returns how many landmarks were found.
-int add_earlier_sightings(maps::Map& map, const std::vector<core::PointId>& landmarks,
-                          core::KeyframeId keyframe, const std::vector<core::KeyframeId>& older,
-                          const std::vector<cv::Mat>& levels, const sensor::Pinhole& camera,
-                          const tracking::AssociationOptions& options, features::FrameFeatures& newest);
+int add_earlier_observations(maps::Map& map, const std::vector<core::PointId>& landmarks,
+                             core::KeyframeId keyframe, const std::vector<core::KeyframeId>& older,
+                             const std::vector<cv::Mat>& levels, const sensor::Pinhole& camera,
+                             const tracking::AssociationOptions& options, features::FrameFeatures& newest);
 
 }  // namespace plumbline::mapping

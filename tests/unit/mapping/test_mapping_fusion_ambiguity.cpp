@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "../../../src/mapping/merging/laid_over.hpp"
+#include "../../../src/mapping/merging/map_overlay.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "poster_view.hpp"
 
@@ -65,7 +65,7 @@ MergeEvidence decide(const maps::Map& a, const maps::Map& b, const Rigid3& shift
 
 maps::Map as_second(const maps::Map& map) { return renumbered(map, {{0, 1}}); }
 
-TEST(FusionDoubts, OneWallHasOneAnswer) {
+TEST(FusionAmbiguity, OneWallHasOneAnswer) {
   const maps::Map a = walk(tests::poster(1800, 5));
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_TRUE(merge.accepted) << merge.refused;
@@ -73,40 +73,40 @@ TEST(FusionDoubts, OneWallHasOneAnswer) {
   EXPECT_EQ(merge.laid.matched, merge.laid.expected);
   EXPECT_GT(merge.laid.share(), 0.5) << "the poster is crowded: chance matches some too";
   EXPECT_LT(merge.laid.seen_through(), 0.02);
-  EXPECT_EQ(merge.rival_m, 0.0);
+  EXPECT_EQ(merge.alternative_m, 0.0);
 }
 
-TEST(FusionDoubts, WhatRepeatsHasSeveral) {
+TEST(FusionAmbiguity, WhatRepeatsHasSeveral) {
   const maps::Map a = walk(repeating_wall());
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_FALSE(merge.accepted);
-  EXPECT_EQ(merge.rival, 0) << "no keyframe says so";
-  EXPECT_NEAR(merge.rival_m, 1.2, 0.1);
-  EXPECT_GT(merge.rival_laid.matched, 30);
+  EXPECT_EQ(merge.alternative, 0) << "no keyframe says so";
+  EXPECT_NEAR(merge.alternative_m, 1.2, 0.1);
+  EXPECT_GT(merge.alternative_fit.matched, 30);
   EXPECT_NE(merge.refused.find("look alike"), std::string::npos) << merge.refused;
 }
 
-TEST(FusionDoubts, WhatStandsBeforeItOnlyOnceTellsThatAStepIsWrong) {
+TEST(FusionAmbiguity, WhatStandsBeforeItOnlyOnceTellsThatAStepIsWrong) {
   cv::Mat wall;  // repeats along the way only
   cv::repeat(tests::poster(1440, 5).colRange(0, 360), 1, 6, wall);
   const maps::Map bare = walk(wall);
-  EXPECT_NEAR(decide(bare, as_second(bare), Rigid3{}).rival_m, 1.2, 0.1);
+  EXPECT_NEAR(decide(bare, as_second(bare), Rigid3{}).alternative_m, 1.2, 0.1);
   const maps::Map a = walk(wall, {{{0.25, 0.0, 1.5}, {0.0, 0.0, -1.0}, 0.5}});
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_TRUE(merge.accepted) << merge.refused;
-  EXPECT_EQ(merge.rival_m, 0.0);
+  EXPECT_EQ(merge.alternative_m, 0.0);
 }
 
 /// How many spots match when the wall is laid over itself, a repetition further.
 int spots_a_step_further(const cv::Mat& wall) {
   const maps::Map a = walk(wall);
   const maps::Map b = as_second(a);
-  const LaidMaps maps({&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}});
+  const MapOverlay maps({&a, {{0, kTestCamera}}}, {&b, {{1, kTestCamera}}});
   const Eigen::Vector3d step(1.2, 0.0, 0.0);
   return maps.matching_spots(Rigid3(Eigen::Matrix3d::Identity(), step), step);
 }
 
-TEST(FusionDoubts, AStripMatchesAtOneSpotAndAWallAtMany) {
+TEST(FusionAmbiguity, AStripMatchesAtOneSpotAndAWallAtMany) {
   cv::Mat wall = repeating_wall();
   EXPECT_GE(spots_a_step_further(wall), 3);
   const int middle = wall.rows / 2;
@@ -116,7 +116,7 @@ TEST(FusionDoubts, AStripMatchesAtOneSpotAndAWallAtMany) {
   EXPECT_EQ(spots_a_step_further(cv::Mat(wall.size(), wall.type(), cv::Scalar(128))), 0);
 }
 
-TEST(FusionDoubts, MapsThatContradictAreNotMerged) {
+TEST(FusionAmbiguity, MapsThatContradictAreNotMerged) {
   const maps::Map a = walk(tests::poster(1800, 5));
   const MergeEvidence merge = decide(a, as_second(a), Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.0, -0.8}));
   EXPECT_FALSE(merge.accepted);
@@ -124,7 +124,7 @@ TEST(FusionDoubts, MapsThatContradictAreNotMerged) {
   EXPECT_NE(merge.refused.find("seen through"), std::string::npos) << merge.refused;
 }
 
-TEST(FusionDoubts, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
+TEST(FusionAmbiguity, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
   const maps::Map a = walk(tests::poster(1800, 5));
   MapFusionOptions few;
   few.min_pairs = 50;  // more than there are
@@ -146,7 +146,7 @@ TEST(FusionDoubts, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
   EXPECT_FALSE(decide(a, as_second(a), Rigid3{}, other).accepted);
 }
 
-TEST(FusionDoubts, MapsWithoutLandmarksTellNothing) {
+TEST(FusionAmbiguity, MapsWithoutLandmarksTellNothing) {
   maps::Map a;
   for (int i = 0; i < 2 * kViews; ++i) {
     auto keyframe = std::make_shared<maps::Keyframe>();

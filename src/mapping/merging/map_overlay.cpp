@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "merging/laid_over.hpp"
+#include "merging/map_overlay.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ using geometry::Rigid3;
 
 constexpr double kReach_m = 0.12;  // landmarks that are one may lie so far apart
 constexpr double kCell_m = 2.0 * kReach_m;
-constexpr std::size_t kMostAsked = 6000;
+constexpr std::size_t kMostTried = 6000;
 constexpr double kNear_m = 0.4;  // what depth is believed
 constexpr double kFar_m = 5.0;
 
@@ -66,12 +66,12 @@ std::vector<PlacedView> views_of(const MapPart& part) {
 
 }  // namespace
 
-LaidMaps::Landmark LaidMaps::landmark(const maps::Map& map, core::PointId id) {
+MapOverlay::Landmark MapOverlay::landmark(const maps::Map& map, core::PointId id) {
   const maps::MapPoint& point = map.point(id);
   return {point.position, point.view_direction, point.reference_distance, point.descriptor};
 }
 
-LaidMaps::Side LaidMaps::side(const MapPart& part) {
+MapOverlay::Side MapOverlay::side(const MapPart& part) {
   Side side;
   side.part = part;
   std::vector<std::pair<std::uint64_t, core::PointId>> order;
@@ -87,7 +87,7 @@ LaidMaps::Side LaidMaps::side(const MapPart& part) {
   return side;
 }
 
-LaidMaps::LaidMaps(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)) {
+MapOverlay::MapOverlay(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)) {
   constexpr std::size_t kSample = 300;
   double pairs = 0.0;
   for (std::size_t i = 0; i < a_.landmarks.size(); i += stride(a_.landmarks.size(), kSample)) {
@@ -100,8 +100,8 @@ LaidMaps::LaidMaps(const MapPart& a, const MapPart& b) : a_(side(a)), b_(side(b)
 }
 
 /// Whether the side has a landmark there that looks alike, and how probable that was.
-bool LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
-                     LaidOver& sum) const {
+bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
+                       OverlayFit& sum) const {
   // Cells are twice the reach wide: eight of them hold all that is near.
   const Cell low = cell_of(at - Eigen::Vector3d::Constant(kReach_m), kCell_m);
   bool found = false;
@@ -121,12 +121,12 @@ bool LaidMaps::match(const Side& side, const Landmark& landmark, const Eigen::Ve
   return found;
 }
 
-void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved, LaidOver& sum,
-                   std::vector<Eigen::Vector3d>* matched) const {
+void MapOverlay::overlay(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
+                         OverlayFit& sum, std::vector<Eigen::Vector3d>* matched) const {
   constexpr double kLikeSide = 0.8;  // cosine between the directions from which a landmark was seen
   constexpr double kTimes = 1.8;     // nearer or farther: a corner does not look the same from everywhere
   const std::vector<PlacedView> views = views_of(fixed.part);
-  const std::size_t step = stride(moved.landmarks.size(), kMostAsked);
+  const std::size_t step = stride(moved.landmarks.size(), kMostTried);
   for (std::size_t i = 0; i < moved.landmarks.size(); i += step) {
     const Landmark& landmark = moved.landmarks[i];
     const Eigen::Vector3d at = fixed_from_moved * landmark.position;
@@ -157,14 +157,14 @@ void LaidMaps::lay(const Side& moved, const Side& fixed, const Rigid3& fixed_fro
 namespace {
 
 /// Surface samples of one map in the views of another.
-void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
-                  LaidMaps::Surfaces& sum) {
+void overlay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixed_from_moved,
+                      MapOverlay::Surfaces& sum) {
   constexpr double kFacing = 0.25;  // cosine
   const std::vector<PlacedView> views = views_of(fixed);
   const std::vector<KeyframeId> ids = moved.map->keyframe_ids();
   std::size_t count = 0;
   for (const KeyframeId id : ids) count += moved.map->keyframe(id).surface.size();
-  const std::size_t step = stride(count, kMostAsked);
+  const std::size_t step = stride(count, kMostTried);
   std::size_t next = 0;  // of all samples, one keyframe's after the other's
   for (const KeyframeId id : ids) {
     const Rigid3 fixed_from_camera = fixed_from_moved * moved.map->camera_from_world(id).inverse();
@@ -191,17 +191,17 @@ void lay_surfaces(const MapPart& moved, const MapPart& fixed, const Rigid3& fixe
 
 }  // namespace
 
-LaidMaps::Surfaces LaidMaps::surfaces(const Rigid3& a_from_b) const {
+MapOverlay::Surfaces MapOverlay::surfaces(const Rigid3& a_from_b) const {
   Surfaces sum;
-  lay_surfaces(b_.part, a_.part, a_from_b, sum);
-  lay_surfaces(a_.part, b_.part, a_from_b.inverse(), sum);
+  overlay_surfaces(b_.part, a_.part, a_from_b, sum);
+  overlay_surfaces(a_.part, b_.part, a_from_b.inverse(), sum);
   return sum;
 }
 
-LaidOver LaidMaps::fit(const Rigid3& a_from_b) const {
-  LaidOver sum;
-  lay(b_, a_, a_from_b, sum);
-  lay(a_, b_, a_from_b.inverse(), sum);
+OverlayFit MapOverlay::fit(const Rigid3& a_from_b) const {
+  OverlayFit sum;
+  overlay(b_, a_, a_from_b, sum);
+  overlay(a_, b_, a_from_b.inverse(), sum);
   return sum;
 }
 

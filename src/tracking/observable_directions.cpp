@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "held_directions.hpp"
+#include "observable_directions.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -30,7 +30,7 @@ double weak_below(const geometry::Matrix6d& information, bool surface_alone) {
   return surface_alone ? std::max(kWeak, kShareOfNormals * information.topLeftCorner<3, 3>().trace()) : kWeak;
 }
 
-geometry::Matrix6d weak_part(const Directions& directions, double below) {
+geometry::Matrix6d weak_projection(const Directions& directions, double below) {
   geometry::Matrix6d part = geometry::Matrix6d::Zero();
   for (int i = 0; i < 6 && directions.eigenvalues(i) < below; ++i) {
     part += directions.eigenvectors.col(i) * directions.eigenvectors.col(i).transpose();

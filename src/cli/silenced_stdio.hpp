@@ -4,12 +4,12 @@
 namespace plumbline::cli {
 
 /// While it lives, nothing reaches stdout or stderr: for libraries that print lines of their own.
-class Hush {
+class SilencedStdio {
  public:
-  Hush();
-  ~Hush();
-  Hush(const Hush&) = delete;
-  Hush& operator=(const Hush&) = delete;
+  SilencedStdio();
+  ~SilencedStdio();
+  SilencedStdio(const SilencedStdio&) = delete;
+  SilencedStdio& operator=(const SilencedStdio&) = delete;
 
  private:
   int out_;

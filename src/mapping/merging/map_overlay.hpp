@@ -13,12 +13,12 @@
 
 namespace plumbline::mapping {
 
-class LaidMaps {
+class MapOverlay {
  public:
-  LaidMaps(const MapPart& a, const MapPart& b);
+  MapOverlay(const MapPart& a, const MapPart& b);
 
   /// The fit of b laid over a.
-  [[nodiscard]] LaidOver fit(const geometry::Rigid3& a_from_b) const;
+  [[nodiscard]] OverlayFit fit(const geometry::Rigid3& a_from_b) const;
 
   /// Surface samples of each map, at their place in the other, of which its cameras saw anything and that
   /// face them: where they saw a surface too, and where they saw through.
@@ -36,8 +36,8 @@ class LaidMaps {
   /// world): what lies behind one another in that direction counts once.
   [[nodiscard]] int matching_spots(const geometry::Rigid3& a_from_b, const Eigen::Vector3d& step) const;
 
-  /// Other ways to lay b over a, a step of `least_m` or more away from `a_from_b`, that most landmarks seen
-  /// by the keyframes of `pairs` speak for.
+  /// Other ways to overlay b over a, a step of `least_m` or more away from `a_from_b`, that most landmarks
+  /// seen by the keyframes of `pairs` speak for.
   [[nodiscard]] std::vector<geometry::Rigid3> steps(const geometry::Rigid3& a_from_b,
                                                     const std::vector<VerifiedPair>& pairs,
                                                     double least_m) const;
@@ -56,10 +56,10 @@ class LaidMaps {
   };
   static Side side(const MapPart& part);
   static Landmark landmark(const maps::Map& map, core::PointId id);
-  bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, LaidOver& sum) const;
+  bool match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at, OverlayFit& sum) const;
   /// `matched`: where (in the fixed map's world) landmarks match, added to it; may be null.
-  void lay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved, LaidOver& sum,
-           std::vector<Eigen::Vector3d>* matched = nullptr) const;
+  void overlay(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
+               OverlayFit& sum, std::vector<Eigen::Vector3d>* matched = nullptr) const;
   static void vote(const Side& moved, const Side& fixed, const geometry::Rigid3& fixed_from_moved,
                    const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps);
 

@@ -9,7 +9,7 @@
 
 #include "plumbline/mapping/global_adjustment.hpp"
 #include "plumbline/mapping/local_bundle.hpp"
-#include "plumbline/mapping/tracked_way.hpp"
+#include "plumbline/mapping/tracked_path.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::mapping {
@@ -79,7 +79,7 @@ class Way {
   std::vector<int> used_;
 };
 
-TEST(TrackedWay, TheMapAsItWasTrackedContradictsNothing) {
+TEST(TrackedPath, TheMapAsItWasTrackedContradictsNothing) {
   const Way way(8);
   EXPECT_FALSE(contradiction(way.map, way.moved(0, 8, Rigid3{})));
   EXPECT_FALSE(
@@ -87,7 +87,7 @@ TEST(TrackedWay, TheMapAsItWasTrackedContradictsNothing) {
       << "all together may go anywhere";
 }
 
-TEST(TrackedWay, AGroupThatIsMovedAwayIsToldWithItsSeam) {
+TEST(TrackedPath, AGroupThatIsMovedAwayIsToldWithItsSeam) {
   const Way way(8);
   const auto torn =
       contradiction(way.map, way.moved(5, 8, Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.1, 0.0})));
@@ -102,7 +102,7 @@ TEST(TrackedWay, AGroupThatIsMovedAwayIsToldWithItsSeam) {
       contradiction(way.map, way.moved(5, 8, Rigid3(geometry::exp_so3({0.0, 0.06, 0.0}), {0.0, 0.0, 0.0}))));
 }
 
-TEST(TrackedWay, WhatTheTrackerHardlyKnewMayChange) {
+TEST(TrackedPath, WhatTheTrackerHardlyKnewMayChange) {
   const Way corridor(8, 0.3, 0.1);
   EXPECT_FALSE(contradiction(corridor.map,
                              corridor.moved(5, 8, Rigid3(Eigen::Matrix3d::Identity(), {0.2, 0.0, 0.0}))));
@@ -110,7 +110,7 @@ TEST(TrackedWay, WhatTheTrackerHardlyKnewMayChange) {
                             corridor.moved(5, 8, Rigid3(Eigen::Matrix3d::Identity(), {0.5, 0.0, 0.0}))));
 }
 
-TEST(TrackedWay, AMapThatIsTornMayBeMended) {
+TEST(TrackedPath, AMapThatIsTornMayBeMended) {
   Way way(8);
   const Rigid3 away(Eigen::Matrix3d::Identity(), {0.0, 0.2, 0.0});
   for (int k = 5; k < 8; ++k) way.map.set_pose({0, k}, way.map.camera_from_world({0, k}) * away);
@@ -119,7 +119,7 @@ TEST(TrackedWay, AMapThatIsTornMayBeMended) {
   EXPECT_TRUE(contradiction(way.map, way.moved(5, 8, Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.1, 0.0}))));
 }
 
-TEST(TrackedWay, ALoopOfTwentyCentimetresPasses) {
+TEST(TrackedPath, ALoopOfTwentyCentimetresPasses) {
   const Way way(24);
   // The last keyframe sees the place of the first, 20 cm from where the way has led to.
   PoseEdge loop{{0, 0},
@@ -134,7 +134,7 @@ TEST(TrackedWay, ALoopOfTwentyCentimetresPasses) {
   EXPECT_FALSE(contradiction(way.map, solved.poses));
 }
 
-TEST(TrackedWay, AForcedTearIsRefusedAndTheMapStays) {
+TEST(TrackedPath, AForcedTearIsRefusedAndTheMapStays) {
   Way way(8);
   LocalBundle bundle = take_local_bundle(way.map, {0, 7}, kWayCamera, {});
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
@@ -168,7 +168,7 @@ void expect_tied(const LocalBundle& bundle) {
   EXPECT_EQ(tied.size(), bundle.keyframes.size());
 }
 
-TEST(TrackedWay, EveryKeyframeOfAWindowIsTiedToOneThatIsHeld) {
+TEST(TrackedPath, EveryKeyframeOfAWindowIsTiedToOneThatIsHeld) {
   for (const int around : {3, 10, 19}) {
     const Way way(20);
     for (const int size : {1, 2, 5, 12}) {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "plumbline/mapping/fusion_end.hpp"
+#include "plumbline/mapping/merge_server.hpp"
 #include "poster_view.hpp"
 
 namespace plumbline::mapping {
@@ -26,12 +26,12 @@ maps::Map wall_with_poster(unsigned poster, int views, double from_m, const Rigi
   return map;
 }
 
-TEST(FusionEnd, TellsOnceThatTwoRobotsHaveMet) {
+TEST(MergeServer, TellsOnceThatTwoRobotsHaveMet) {
   const auto a = std::make_shared<maps::Map>(wall_with_poster(5, 8, -0.35, Rigid3{}));
   const auto b =
       std::make_shared<maps::Map>(renumbered(wall_with_poster(5, 8, -0.3, kWorldOfOthers), {{0, 1}}));
   const core::Executor executor(1);
-  FusionEnd end({}, {{{0, kTestCamera}}, {{1, kTestCamera}}}, executor);
+  MergeServer end({}, {{{0, kTestCamera}}, {{1, kTestCamera}}}, executor);
   std::vector<MergeEvidence> merges;
   for (int i = 0; i < 8; ++i) {
     for (const auto& map : {a, b}) {
@@ -45,12 +45,12 @@ TEST(FusionEnd, TellsOnceThatTwoRobotsHaveMet) {
   EXPECT_THROW(end.add(a, {5, 0}), std::invalid_argument);
 }
 
-TEST(FusionEnd, RobotsInDifferentPlacesStayApart) {
+TEST(MergeServer, RobotsInDifferentPlacesStayApart) {
   const auto a = std::make_shared<maps::Map>(wall_with_poster(5, 6, -0.3, Rigid3{}));
   const auto b =
       std::make_shared<maps::Map>(renumbered(wall_with_poster(99, 6, -0.3, kWorldOfOthers), {{0, 1}}));
   const core::Executor executor(1);
-  FusionEnd end({}, {{{0, kTestCamera}}, {{1, kTestCamera}}}, executor);
+  MergeServer end({}, {{{0, kTestCamera}}, {{1, kTestCamera}}}, executor);
   for (int i = 0; i < 6; ++i) {
     for (const auto& map : {a, b}) {
       const KeyframeId id{map->keyframe_ids().front().robot, i};

@@ -7,8 +7,8 @@
 namespace plumbline::cli {
 
 /// Never taken apart: the program ends, and the system takes all of it back at once.
-inline pipeline::Leftovers& leftovers() {
-  static auto* const kept = new pipeline::Leftovers;
+inline pipeline::DeferredDestruction& deferred_destruction() {
+  static auto* const kept = new pipeline::DeferredDestruction;
   return *kept;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Once there is an answer to how two maps lie, it says which other keyframes should see the same: those are
-// asked, too.
+// tried, too.
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -53,10 +53,10 @@ std::vector<VerifiedPair> verify_all(const std::vector<MapPart>& parts,
 
 }  // namespace
 
-void ask_neighbours(const std::vector<MapPart>& parts, const SortedPairs& all,
-                    const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                    const core::Executor& executor, const MergeEvidence& merge,
-                    std::vector<VerifiedPair>& pairs) {
+void expand_candidates(const std::vector<MapPart>& parts, const SortedPairs& all,
+                       const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
+                       const core::Executor& executor, const MergeEvidence& merge,
+                       std::vector<VerifiedPair>& pairs) {
   constexpr std::size_t kSets = 3;
   constexpr std::size_t kMost = 24;  // of each set
   const maps::Map& a = *parts[merge.a].map;
@@ -70,26 +70,28 @@ void ask_neighbours(const std::vector<MapPart>& parts, const SortedPairs& all,
     std::vector<PlacePair> places;
     for (const std::size_t k : sets[i].members) places.push_back(all.places[k]);
     const Rigid3 a_from_b = mean_transform(a, b, places).a_from_b;
-    std::size_t asked = 0;
-    const auto ask = [&](std::size_t query_part, KeyframeId query, std::size_t match_part, KeyframeId match) {
-      if (!match.valid() || asked >= kMost) return;
+    std::size_t tried = 0;
+    const auto attempt = [&](std::size_t query_part, KeyframeId query, std::size_t match_part,
+                             KeyframeId match) {
+      if (!match.valid() || tried >= kMost) return;
       if (!known.emplace(std::min(query, match), std::max(query, match)).second) return;
       open.push_back({query, match, query_part, match_part, 0.0});
-      ++asked;
+      ++tried;
     };
     for (const KeyframeId id : b.keyframe_ids()) {
-      ask(merge.b, id, merge.a, nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMay));
+      attempt(merge.b, id, merge.a, nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMay));
     }
     for (const KeyframeId id : a.keyframe_ids()) {
-      ask(merge.a, id, merge.b, nearest_view(b, a_from_b.inverse(), a.camera_from_world(id).inverse(), kMay));
+      attempt(merge.a, id, merge.b,
+              nearest_view(b, a_from_b.inverse(), a.camera_from_world(id).inverse(), kMay));
     }
   }
   const std::vector<VerifiedPair> verified = verify_all(parts, open, options, executor);
   pairs.insert(pairs.end(), verified.begin(), verified.end());
 }
 
-void ask_others(const std::vector<MapPart>& parts, const MapFusionOptions& options,
-                const core::Executor& executor, MergeEvidence& merge) {
+void cross_validate(const std::vector<MapPart>& parts, const MapFusionOptions& options,
+                    const core::Executor& executor, MergeEvidence& merge) {
   constexpr std::size_t kMost = 60;
   const maps::Map& a = *parts[merge.a].map;
   const maps::Map& b = *parts[merge.b].map;
@@ -107,11 +109,11 @@ void ask_others(const std::vector<MapPart>& parts, const MapFusionOptions& optio
       open.push_back({id, near, merge.b, merge.a, 0.0});
     }
   }
-  std::vector<OverlapFinder::Candidate> asked;
+  std::vector<OverlapFinder::Candidate> tried;
   const std::size_t step = (open.size() + kMost - 1) / std::max<std::size_t>(kMost, 1);
-  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(step, 1)) asked.push_back(open[i]);
-  merge.expected -= static_cast<int>(open.size() - asked.size());
-  const std::vector<VerifiedPair> verified = verify_all(parts, asked, options, executor);
+  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(step, 1)) tried.push_back(open[i]);
+  merge.expected -= static_cast<int>(open.size() - tried.size());
+  const std::vector<VerifiedPair> verified = verify_all(parts, tried, options, executor);
   const SortedPairs known = sort_pairs(a, b, merge.pairs);
   const SortedPairs fresh = sort_pairs(a, b, verified);
   for (std::size_t i = 0; i < fresh.places.size(); ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/cloud/sheets.hpp"
+#include "plumbline/cloud/surfels.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,14 +9,14 @@
 namespace plumbline::cloud {
 namespace {
 
-constexpr float kSameSheet = 0.7F;   // cosine between a point's normal and its sheet's
-constexpr float kAlike = 0.85F;      // cosine between sheets that may lie on one surface
+constexpr float kSameSurfel = 0.7F;  // cosine between a point's normal and its surfel's
+constexpr float kAlike = 0.85F;      // cosine between surfels that may lie on one surface
 constexpr float kExplained = 1.3F;   // residuals over noise, standard deviations
 constexpr float kModel_m = 0.0005F;  // no surface is flatter than that
 constexpr std::uint32_t kFewest = 3;
 
-/// Adds the sums of a sheet whose block lies `offset` metres away.
-void gather(const Sheet& from, const Eigen::Vector3f& offset, Sheet& sums) {
+/// Adds the sums of a surfel whose block lies `offset` metres away.
+void gather(const Surfel& from, const Eigen::Vector3f& offset, Surfel& sums) {
   sums.second += from.second + from.first * offset.transpose() + offset * from.first.transpose() +
                  from.weight * offset * offset.transpose();
   sums.first += from.first + from.weight * offset;
@@ -29,12 +29,12 @@ void gather(const Sheet& from, const Eigen::Vector3f& offset, Sheet& sums) {
 
 }  // namespace
 
-Sheets::Sheets(const std::vector<FusedPoint>& points, double block_m) : block_m_(block_m) {
-  sheet_of_.assign(points.size(), kNone);
-  for (std::size_t i = 0; i < points.size(); ++i) add(points[i], sheet_of_[i]);
+Surfels::Surfels(const std::vector<FusedPoint>& points, double block_m) : block_m_(block_m) {
+  surfel_of_.assign(points.size(), kNone);
+  for (std::size_t i = 0; i < points.size(); ++i) add(points[i], surfel_of_[i]);
 }
 
-void Sheets::add(const FusedPoint& point, std::uint32_t& sheet_of_point) {
+void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
   const Eigen::Vector3f normal = point.point.getNormalVector3fMap();
   if (!normal.allFinite()) return;
   const Eigen::Vector3d position = point.point.getVector3fMap().cast<double>();
@@ -43,107 +43,109 @@ void Sheets::add(const FusedPoint& point, std::uint32_t& sheet_of_point) {
   std::uint32_t at = first;
   std::uint32_t last = kNone;
   for (; at != kNone; last = at, at = next_[at]) {
-    const Eigen::Vector3f& sum = sheets_[at].normal_sum;
-    if (sum.dot(normal) > kSameSheet * sum.norm()) break;
+    const Eigen::Vector3f& sum = surfels_[at].normal_sum;
+    if (sum.dot(normal) > kSameSurfel * sum.norm()) break;
   }
   if (at == kNone) {
-    at = static_cast<std::uint32_t>(sheets_.size());
-    sheets_.emplace_back();
-    sheets_.back().block = block;
+    at = static_cast<std::uint32_t>(surfels_.size());
+    surfels_.emplace_back();
+    surfels_.back().block = block;
     next_.push_back(kNone);
     (last == kNone ? first : next_[last]) = at;
   }
-  Sheet& sheet = sheets_[at];
+  Surfel& surfel = surfels_[at];
   const Eigen::Vector3f offset = (position - centre(block)).cast<float>();
-  sheet.normal_sum += point.weight * normal;
-  sheet.first += point.weight * offset;
-  sheet.second += point.weight * offset * offset.transpose();
-  sheet.weight += point.weight;
-  sheet.variance += point.weight * point.noise_m * point.noise_m;
-  sheet.scatter += point.weight * point.spread_m * point.spread_m;
-  ++sheet.points;
-  sheet_of_point = at;
+  surfel.normal_sum += point.weight * normal;
+  surfel.first += point.weight * offset;
+  surfel.second += point.weight * offset * offset.transpose();
+  surfel.weight += point.weight;
+  surfel.variance += point.weight * point.noise_m * point.noise_m;
+  surfel.scatter += point.weight * point.spread_m * point.spread_m;
+  ++surfel.points;
+  surfel_of_point = at;
 }
 
-Eigen::Vector3d Sheets::position(const Sheet& sheet) const {
-  return centre(sheet.block) + (sheet.first / sheet.weight).cast<double>();
+Eigen::Vector3d Surfels::position(const Surfel& surfel) const {
+  return centre(surfel.block) + (surfel.first / surfel.weight).cast<double>();
 }
 
-std::uint32_t Sheets::first_of(const Eigen::Vector3i& block) const {
+std::uint32_t Surfels::first_of(const Eigen::Vector3i& block) const {
   const auto found = first_.find(pack_cell(block));
   return found == first_.end() ? kNone : found->second;
 }
 
 template <typename Visit>
-void Sheets::visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const {
+void Surfels::visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const {
   for (std::uint32_t at = first; at != kNone; at = next_[at]) {
-    const Sheet& sheet = sheets_[at];
-    if (sheet.normal_sum.dot(normal) > kAlike * sheet.normal_length) visit(sheet);
+    const Surfel& surfel = surfels_[at];
+    if (surfel.normal_sum.dot(normal) > kAlike * surfel.normal_length) visit(surfel);
   }
 }
 
-bool Sheets::set_plane(const Sheet& sums, Sheet& sheet) {
+bool Surfels::set_plane(const Surfel& sums, Surfel& surfel) {
   const float length = sums.normal_sum.norm();
   if (sums.points < kFewest || !(length > 0.0F)) return false;
   const Eigen::Vector3f mean = sums.first / sums.weight;
   const Eigen::Matrix3f covariance = sums.second / sums.weight - mean * mean.transpose();
-  sheet.origin = mean;
-  sheet.normal = sums.normal_sum / length;
-  sheet.residual2 = std::max(0.0F, sheet.normal.dot(covariance * sheet.normal)) + sums.scatter / sums.weight;
-  sheet.noise2 = sums.variance / sums.weight;
+  surfel.origin = mean;
+  surfel.normal = sums.normal_sum / length;
+  surfel.residual2 =
+      std::max(0.0F, surfel.normal.dot(covariance * surfel.normal)) + sums.scatter / sums.weight;
+  surfel.noise2 = sums.variance / sums.weight;
   return true;
 }
 
-bool Sheets::explained(const Sheet& sheet) const {
+bool Surfels::explained(const Surfel& surfel) const {
   const float share2 = noise_share_ * noise_share_;
-  return sheet.residual2 <= share2 * (kExplained * kExplained * sheet.noise2 + kModel_m * kModel_m);
+  return surfel.residual2 <= share2 * (kExplained * kExplained * surfel.noise2 + kModel_m * kModel_m);
 }
 
-void Sheets::measure_noise() {
-  constexpr std::size_t kFewSheets = 50;
+void Surfels::measure_noise() {
+  constexpr std::size_t kFewSurfels = 50;
   constexpr float kGenerous = 6.0F;
   std::vector<float> shares;
-  for (const Sheet& sheet : sheets_) {
-    if (sheet.flat && sheet.noise2 > 0.0F) shares.push_back(sheet.residual2 / sheet.noise2);
+  for (const Surfel& surfel : surfels_) {
+    if (surfel.flat && surfel.noise2 > 0.0F) shares.push_back(surfel.residual2 / surfel.noise2);
   }
   noise_share_ = 1.0F;
-  if (shares.size() < kFewSheets) return;
+  if (shares.size() < kFewSurfels) return;
   const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
   std::nth_element(shares.begin(), middle, shares.end());
   noise_share_ = std::min(1.0F, kGenerous * std::sqrt(*middle));
 }
 
-void Sheets::fit_plane(Sheet& sheet) const {
-  const Eigen::Vector3f own = sheet.normal_sum.normalized();
-  Sheet sums;
+void Surfels::fit_plane(Surfel& surfel) const {
+  const Eigen::Vector3f own = surfel.normal_sum.normalized();
+  Surfel sums;
   for (int k = 0; k < 27; ++k) {
     const Eigen::Vector3i step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
     const Eigen::Vector3f offset = step.cast<float>() * static_cast<float>(block_m_);
-    visit_alike(first_of(sheet.block + step), own, [&](const Sheet& other) { gather(other, offset, sums); });
+    visit_alike(first_of(surfel.block + step), own,
+                [&](const Surfel& other) { gather(other, offset, sums); });
   }
-  sheet.support = sums.points;
-  sheet.noise_m = std::sqrt(sheet.variance / sheet.weight);
-  sheet.flat = set_plane(sums, sheet);
+  surfel.support = sums.points;
+  surfel.noise_m = std::sqrt(surfel.variance / surfel.weight);
+  surfel.flat = set_plane(sums, surfel);
 }
 
-void Sheets::fit_planes() {
-  for (Sheet& sheet : sheets_) sheet.normal_length = sheet.normal_sum.norm();
-  for (Sheet& sheet : sheets_) fit_plane(sheet);
+void Surfels::fit_planes() {
+  for (Surfel& surfel : surfels_) surfel.normal_length = surfel.normal_sum.norm();
+  for (Surfel& surfel : surfels_) fit_plane(surfel);
   measure_noise();
-  for (Sheet& sheet : sheets_) {
-    sheet.flat = sheet.flat && explained(sheet);
-    if (!sheet.flat) sheet.flat = set_plane(Sheet(sheet), sheet) && explained(sheet);
+  for (Surfel& surfel : surfels_) {
+    surfel.flat = surfel.flat && explained(surfel);
+    if (!surfel.flat) surfel.flat = set_plane(Surfel(surfel), surfel) && explained(surfel);
   }
 }
 
-void Sheets::settle(std::vector<FusedPoint>& points) const {
+void Surfels::project(std::vector<FusedPoint>& points) const {
   constexpr float kMostSigmas = 3.0F;
   const auto step_of = [](int k) { return Eigen::Vector3i(k & 1, k >> 1 & 1, k >> 2); };
   std::array<std::uint32_t, 8> first{};  // of the blocks around `around`: neighbouring points share them
   Eigen::Vector3i around = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (sheet_of_[i] == kNone || !sheets_[sheet_of_[i]].flat) continue;
-    const Sheet& own = sheets_[sheet_of_[i]];
+    if (surfel_of_[i] == kNone || !surfels_[surfel_of_[i]].flat) continue;
+    const Surfel& own = surfels_[surfel_of_[i]];
     Point& p = points[i].point;
     const Eigen::Vector3d position = p.getVector3fMap().cast<double>();
     // The eight blocks whose centres surround the point, trilinear.
@@ -162,12 +164,12 @@ void Sheets::settle(std::vector<FusedPoint>& points) const {
       float share = 1.0F;
       for (int axis = 0; axis < 3; ++axis) share *= step[axis] == 1 ? part[axis] : 1.0F - part[axis];
       const Eigen::Vector3f from_centre = (position - centre(low + step)).cast<float>();
-      visit_alike(first[static_cast<std::size_t>(k)], own.normal, [&](const Sheet& sheet) {
-        if (!sheet.flat) return;
-        const float weight = share * sheet.weight;
-        const float along = sheet.normal.dot(own.normal);
-        shift += weight * sheet.normal.dot(sheet.origin - from_centre) / std::max(along, 0.5F);
-        normal += weight * sheet.normal;
+      visit_alike(first[static_cast<std::size_t>(k)], own.normal, [&](const Surfel& surfel) {
+        if (!surfel.flat) return;
+        const float weight = share * surfel.weight;
+        const float along = surfel.normal.dot(own.normal);
+        shift += weight * surfel.normal.dot(surfel.origin - from_centre) / std::max(along, 0.5F);
+        normal += weight * surfel.normal;
         total += weight;
       });
     }

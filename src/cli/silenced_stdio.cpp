@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "hush.hpp"
+#include "silenced_stdio.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -24,7 +24,7 @@ void restore(int saved, int stream) {
 
 }  // namespace
 
-Hush::Hush() {
+SilencedStdio::SilencedStdio() {
   flush_all();
   out_ = dup(STDOUT_FILENO);
   err_ = dup(STDERR_FILENO);
@@ -35,7 +35,7 @@ Hush::Hush() {
   close(nowhere);
 }
 
-Hush::~Hush() {
+SilencedStdio::~SilencedStdio() {
   flush_all();
   restore(out_, STDOUT_FILENO);
   restore(err_, STDERR_FILENO);

@@ -9,15 +9,15 @@ namespace plumbline::tracking {
 using geometry::Rigid3;
 
 /// Features as if all rows of the picture, and the depth image, had been taken at the colour image's stamp.
-Tracker::Features Tracker::at_one_moment(const sensor::RgbdFrame& frame, const Features& features,
-                                         const Eigen::Vector3d& turn_rate) const {
+Tracker::Features Tracker::synchronised(const sensor::RgbdFrame& frame, const Features& features,
+                                        const Eigen::Vector3d& turn_rate) const {
   const Rigid3 to_depth = depth_from_camera(frame);
-  const bool sheared = options_.readout_s != 0.0 && !turn_rate.isZero(0.0);
+  const bool distorted = options_.readout_s != 0.0 && !turn_rate.isZero(0.0);
   const bool delayed = !to_depth.translation.isZero(0.0) || !to_depth.rotation.isIdentity(0.0);
-  if (!sheared && !delayed) return features;
+  if (!distorted && !delayed) return features;
   auto still = std::make_shared<features::FrameFeatures>(*features);
   if (delayed) features::undo_point_depth_delay(*still, frame.depth, camera_, to_depth);
-  if (sheared) features::undo_rolling_shutter(*still, camera_, turn_rate, options_.readout_s);
+  if (distorted) features::undo_rolling_shutter(*still, camera_, turn_rate, options_.readout_s);
   return still;
 }
 

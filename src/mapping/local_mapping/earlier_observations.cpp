@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/earlier_sightings.hpp"
+#include "plumbline/mapping/earlier_observations.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -49,10 +49,10 @@ void keep_alike(const maps::Map& map, KeyframeId keyframe, const sensor::Pinhole
 
 }  // namespace
 
-int add_earlier_sightings(maps::Map& map, const std::vector<PointId>& landmarks, KeyframeId keyframe,
-                          const std::vector<KeyframeId>& older, const std::vector<cv::Mat>& levels,
-                          const sensor::Pinhole& camera, const tracking::AssociationOptions& options,
-                          features::FrameFeatures& newest) {
+int add_earlier_observations(maps::Map& map, const std::vector<PointId>& landmarks, KeyframeId keyframe,
+                             const std::vector<KeyframeId>& older, const std::vector<cv::Mat>& levels,
+                             const sensor::Pinhole& camera, const tracking::AssociationOptions& options,
+                             features::FrameFeatures& newest) {
   if (levels.empty() || newest.patches.size() != newest.points.size()) return 0;
   const geometry::Rigid3 pose = map.camera_from_world(keyframe);
   std::vector<PointId> wanted = landmarks;
@@ -69,8 +69,8 @@ int add_earlier_sightings(maps::Map& map, const std::vector<PointId>& landmarks,
       const auto corner = static_cast<std::size_t>(point.observations.front().feature);
       if (newest.patches[corner].empty()) continue;  // at a border: no surface that both could see
       const Eigen::Vector2f& middle = newest.patches[corner].middle;
-      const auto at = tracking::align_sighting(map, {other, m.feature}, point.position, levels, middle,
-                                               camera, pose, options.scale_factor);
+      const auto at = tracking::align_observation(map, {other, m.feature}, point.position, levels, middle,
+                                                  camera, pose, options.scale_factor);
       if (!at) continue;
       if (!map.observe(m.point, other, m.feature, true)) continue;
       newest.move_point(corner, *at - middle);

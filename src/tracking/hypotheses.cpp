@@ -9,9 +9,9 @@ namespace plumbline::tracking {
 
 using geometry::Rigid3;
 
-Tracker::Guesses Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                  const features::FrameFeatures& features) const {
-  Guesses result;
+Tracker::Hypotheses Tracker::hypotheses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                        const features::FrameFeatures& features) const {
+  Hypotheses result;
   const Rigid3 predicted = predict(frame.stamp);
   const ThumbnailAlignment alignment =
       align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
@@ -19,8 +19,7 @@ Tracker::Guesses Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame&
   if (alignment.better) result.poses.push_back(alignment.current_from_previous * last_.camera_from_world);
   result.poses.push_back(predicted);
   result.poses.push_back(last_.camera_from_world);
-  if (options_.photometric)
-    put_likeliest_first(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
+  if (options_.photometric) rank(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
   return result;
 }
 
@@ -41,17 +40,17 @@ bool Tracker::leaps(double stamp, const Rigid3& camera_from_world) const {
   return leap.translation.norm() > kMost_m || geometry::rotation_angle(leap.rotation) > kMost_rad;
 }
 
-std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                              const features::FrameFeatures& features) const {
+std::optional<TrackResult> Tracker::by_motion_model(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                                    const features::FrameFeatures& features) const {
   constexpr double kClearly = 1.15;  // more must bear a leap out than what is near the guess
   if (lost_frames_ >= 30) return std::nullopt;
-  const Guesses guesses = this->guesses(map, frame, features);
+  const Hypotheses hypotheses = this->hypotheses(map, frame, features);
   const auto tracked = [&](const TrackResult& attempt) {
-    return attempt.state == TrackState::kTracked && (!stale() || beyond_doubt(attempt));
+    return attempt.state == TrackState::kTracked && (!outdated() || strict(attempt));
   };
   std::optional<TrackResult> best;
-  for (std::size_t i = 0; i < guesses.poses.size(); ++i) {
-    const Rigid3& guess = guesses.poses[i];
+  for (std::size_t i = 0; i < hypotheses.poses.size(); ++i) {
+    const Rigid3& guess = hypotheses.poses[i];
     TrackResult attempt = estimate(map, frame, features, guess, 12.0 + 4.0 * std::min(lost_frames_, 5));
     // Among look-alikes, the keys of a keyboard, wrong matches of the wide search can pull the pose further
     // than the fine rounds look: the right ones around the guess would never be tried.
@@ -61,17 +60,17 @@ std::optional<TrackResult> Tracker::by_motion(const maps::Map& map, const sensor
         attempt = std::move(near);
     }
     if (tracked(attempt) && (!best || evidence(attempt) > evidence(*best))) best = std::move(attempt);
-    if (best && !guesses.sought) break;
+    if (best && !hypotheses.sought) break;
   }
   return best;
 }
 
-std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,
-                                                        const features::FrameFeatures& features) const {
+std::vector<Tracker::Hypothesis> Tracker::relocalisation_hypotheses(
+    const maps::Map& map, const features::FrameFeatures& features) const {
   constexpr int kLookAlikes = 24;
   constexpr std::size_t kAligned = 3;
   const std::vector<LookAlike> alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
-  std::vector<Guess> guesses;
+  std::vector<Hypothesis> hypotheses;
   if (options_.points) {
     std::vector<core::KeyframeId> candidates;
     const auto add = [&candidates](core::KeyframeId id) {
@@ -83,27 +82,27 @@ std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,
     }
     for (const LookAlike& a : alike) add(a.keyframe);
     const auto seen = relocalise(map, candidates, features, camera_, options_.min_inliers);
-    if (seen) guesses.push_back({seen->keyframe, seen->camera_from_world, false});
+    if (seen) hypotheses.push_back({seen->keyframe, seen->camera_from_world, false});
   }
   for (std::size_t i = 0; i < std::min(kAligned, alike.size()); ++i) {
     const core::KeyframeId id = alike[i].keyframe;
-    guesses.push_back({id, align_look_alike(map, id, features, camera_), true});
+    hypotheses.push_back({id, align_look_alike(map, id, features, camera_), true});
   }
-  return guesses;
+  return hypotheses;
 }
 
-std::optional<TrackResult> Tracker::by_picture(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                               const features::FrameFeatures& features) {
-  const std::vector<Guess> guesses = guesses_by_picture(map, features);
+std::optional<TrackResult> Tracker::by_relocalisation(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                                      const features::FrameFeatures& features) {
+  const std::vector<Hypothesis> hypotheses = relocalisation_hypotheses(map, features);
   LocalMap before = std::move(local_map_);
-  for (const Guess& guess : guesses) {
+  for (const Hypothesis& guess : hypotheses) {
     local_map_ = build_local_map(map, guess.keyframe, options_.local_map);
     TrackResult attempt = estimate(map, frame, features, guess.camera_from_world, guess.rough ? 24.0 : 10.0);
-    if (attempt.state != TrackState::kTracked || attempt.held_by_motion) continue;
-    if (guess.rough && !beyond_doubt(attempt)) continue;
+    if (attempt.state != TrackState::kTracked || attempt.constrained_by_motion) continue;
+    if (guess.rough && !strict(attempt)) continue;
     if (is_place_ && !is_place_(frame, features, guess.keyframe, attempt.camera_from_world)) continue;
     attempt.relocalised = true;
-    stand();
+    reset();
     last_.valid = false;
     return attempt;
   }

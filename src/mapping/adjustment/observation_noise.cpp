@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/sighting_noise.hpp"
+#include "plumbline/mapping/observation_noise.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace plumbline::mapping {
 
-void SightingNoise::declare(core::OptionTable& table, const std::string& prefix) {
+void ObservationNoise::declare(core::OptionTable& table, const std::string& prefix) {
   table.number(
       prefix + "aligned", aligned, {0.01, 1.0}, "",
       "Standard deviation of corners that were aligned with their landmark's patch, over that of others");
@@ -22,32 +22,34 @@ void SightingNoise::declare(core::OptionTable& table, const std::string& prefix)
                "What a picture says counts for half when the camera turned this fast");
 }
 
-double SightingNoise::unrest_of(double rate) const {
+double ObservationNoise::motion_factor_of(double rate) const {
   const double ratio = rate / turn_rate;
   return std::hypot(1.0, ratio * ratio);
 }
 
-double SightingNoise::octave_px(int octave) const { return std::pow(orb_scale_factor, octave); }
+double ObservationNoise::octave_px(int octave) const { return std::pow(orb_scale_factor, octave); }
 
-optimize::BundlePointObservation SightingNoise::of(const features::PointFeature& corner, bool is_aligned,
-                                                   double unrest, double corner_px) const {
+optimize::BundlePointObservation ObservationNoise::of(const features::PointFeature& corner, bool is_aligned,
+                                                      double motion_factor, double corner_px) const {
   optimize::BundlePointObservation seen;
   seen.pixel = corner.pixel.cast<double>();
-  seen.pixel_sigma = unrest * corner_px * (is_aligned ? aligned : 1.0);
+  seen.pixel_sigma = motion_factor * corner_px * (is_aligned ? aligned : 1.0);
   seen.depth = static_cast<double>(corner.depth);
-  seen.depth_sigma = corner.depth > 0.0F ? depth_factor * unrest * sensor::depth_sigma(seen.depth) : 1.0;
+  seen.depth_sigma =
+      corner.depth > 0.0F ? depth_factor * motion_factor * sensor::depth_sigma(seen.depth) : 1.0;
   return seen;
 }
 
-optimize::BundleLineObservation SightingNoise::of(const features::LineFeature& line, double unrest) const {
+optimize::BundleLineObservation ObservationNoise::of(const features::LineFeature& line,
+                                                     double motion_factor) const {
   constexpr double kLeast_m = 0.003;  // of an end's depth
   optimize::BundleLineObservation seen;
   seen.start = line.segment.start.cast<double>();
   seen.end = line.segment.end.cast<double>();
-  seen.pixel_sigma = line_sigma_px * unrest;
+  seen.pixel_sigma = line_sigma_px * motion_factor;
   if (!line.line3) return seen;
   const auto sigma = [&](const Eigen::Vector3d& end, const features::EndpointNoise& noise) {
-    return depth_factor * unrest * std::max(kLeast_m, features::endpoint_sigma(end, noise));
+    return depth_factor * motion_factor * std::max(kLeast_m, features::endpoint_sigma(end, noise));
   };
   seen.has_depth = true;
   seen.start_camera = line.line3->start;

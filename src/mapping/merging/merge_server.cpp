@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/mapping/fusion_end.hpp"
+#include "plumbline/mapping/merge_server.hpp"
 
 #include <algorithm>
 #include <stdexcept>
@@ -8,8 +8,8 @@ namespace plumbline::mapping {
 
 using core::KeyframeId;
 
-FusionEnd::FusionEnd(const MapFusionOptions& options, const std::vector<Cameras>& cameras,
-                     const core::Executor& executor)
+MergeServer::MergeServer(const MapFusionOptions& options, const std::vector<Cameras>& cameras,
+                         const core::Executor& executor)
     : options_(options), executor_(&executor), last_(cameras.size()), finder_(options) {
   for (const Cameras& own : cameras) {
     maps_.push_back(std::make_shared<maps::Map>());
@@ -17,14 +17,14 @@ FusionEnd::FusionEnd(const MapFusionOptions& options, const std::vector<Cameras>
   }
 }
 
-std::vector<MergeEvidence> FusionEnd::add(std::shared_ptr<const maps::Map> map, KeyframeId id) {
+std::vector<MergeEvidence> MergeServer::add(std::shared_ptr<const maps::Map> map, KeyframeId id) {
   const auto robot = static_cast<std::size_t>(id.robot);
   if (!id.valid() || robot >= parts_.size() || !map->has_keyframe(id)) {
     throw std::invalid_argument("a keyframe that no robot has");
   }
   maps_[robot] = std::move(map);
   parts_[robot].map = maps_[robot].get();
-  const auto candidates = finder_.look(parts_, robot, id, last_[robot]);
+  const auto candidates = finder_.recognise(parts_, robot, id, last_[robot]);
   finder_.add(*parts_[robot].map, id);
   last_[robot] = id;
 

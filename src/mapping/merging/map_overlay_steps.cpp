@@ -5,8 +5,8 @@
 #include <numeric>
 #include <set>
 
-#include "merging/laid_over.hpp"
 #include "merging/landmark_cells.hpp"
+#include "merging/map_overlay.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -85,14 +85,14 @@ class Peaks {
 
 }  // namespace
 
-int LaidMaps::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& step) const {
+int MapOverlay::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& step) const {
   constexpr double kWide_m = 0.25;
   constexpr std::size_t kFew = 3;  // chance finds
-  LaidOver sum;
+  OverlayFit sum;
   std::vector<Eigen::Vector3d> matched;
   std::vector<Eigen::Vector3d> in_b;
-  lay(b_, a_, a_from_b, sum, &matched);
-  lay(a_, b_, a_from_b.inverse(), sum, &in_b);
+  overlay(b_, a_, a_from_b, sum, &matched);
+  overlay(a_, b_, a_from_b.inverse(), sum, &in_b);
   for (const Eigen::Vector3d& at : in_b) matched.push_back(a_from_b * at);
   const Eigen::Vector3d along = step.normalized();
   for (Eigen::Vector3d& at : matched) at -= along.dot(at) * along;
@@ -116,8 +116,8 @@ int LaidMaps::matching_spots(const Rigid3& a_from_b, const Eigen::Vector3d& step
 }
 
 /// Steps, in the fixed map's world, between landmarks that look very much alike.
-void LaidMaps::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
-                    const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps) {
+void MapOverlay::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_from_moved,
+                      const std::vector<VerifiedPair>& pairs, std::vector<Eigen::Vector3d>& steps) {
   const maps::Map& map = *moved.part.map;
   std::set<core::PointId> ids;
   for (const VerifiedPair& pair : pairs) {
@@ -142,8 +142,8 @@ void LaidMaps::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_fr
   }
 }
 
-std::vector<Rigid3> LaidMaps::steps(const Rigid3& a_from_b, const std::vector<VerifiedPair>& pairs,
-                                    double least_m) const {
+std::vector<Rigid3> MapOverlay::steps(const Rigid3& a_from_b, const std::vector<VerifiedPair>& pairs,
+                                      double least_m) const {
   std::vector<Eigen::Vector3d> votes;
   vote(a_, b_, a_from_b.inverse(), pairs, votes);
   // A step of a in b's world is the opposite one of b in a's.

@@ -2,7 +2,7 @@
 // A wall whose corners an older keyframe saw without depth.
 #include <gtest/gtest.h>
 
-#include "plumbline/mapping/earlier_sightings.hpp"
+#include "plumbline/mapping/earlier_observations.hpp"
 #include "two_views_of_a_wall.hpp"
 
 namespace plumbline::mapping {
@@ -15,7 +15,7 @@ using tests::kTestCamera;
 
 const Rigid3 kMistaken(geometry::exp_so3({0.002, -0.005, 0.0}), Eigen::Vector3d(0.004, 0.0, 0.0));
 
-class EarlierSightings : public testing::Test {
+class EarlierObservations : public testing::Test {
  protected:
   /// The older keyframe, whose pose is a third of a degree off, and the newer one with landmarks.
   void make_map() {
@@ -40,7 +40,7 @@ class EarlierSightings : public testing::Test {
     }
   }
   int add(const std::vector<cv::Mat>& levels) {
-    return add_earlier_sightings(map_, made_, newer_, {older_}, levels, kTestCamera, {}, *views_.newer);
+    return add_earlier_observations(map_, made_, newer_, {older_}, levels, kTestCamera, {}, *views_.newer);
   }
 
   tests::TwoViewsOfAWall views_;
@@ -49,7 +49,7 @@ class EarlierSightings : public testing::Test {
   std::vector<PointId> made_;
 };
 
-TEST_F(EarlierSightings, AreFoundAndExactThoughThePoseIsNot) {
+TEST_F(EarlierObservations, AreFoundAndExactThoughThePoseIsNot) {
   make_map();
   EXPECT_GT(views_.mean_off(), 0.25);
   const int found = add(views_.newer->levels);
@@ -65,7 +65,7 @@ TEST_F(EarlierSightings, AreFoundAndExactThoughThePoseIsNot) {
   }
 }
 
-TEST_F(EarlierSightings, ACornerThatLiesOffUnlikeTheOthersIsNotBelieved) {
+TEST_F(EarlierObservations, ACornerThatLiesOffUnlikeTheOthersIsNotBelieved) {
   constexpr std::size_t kOther = 20;
   features::FrameFeatures& older = *views_.older;
   const Eigen::Vector2f aside = older.points[kOther].pixel + Eigen::Vector2f(5.0F, 0.0F);
@@ -77,7 +77,7 @@ TEST_F(EarlierSightings, ACornerThatLiesOffUnlikeTheOthersIsNotBelieved) {
   EXPECT_EQ(map_.point(made_[kOther]).observations.size(), 1U);
 }
 
-TEST_F(EarlierSightings, CornersThatSeeSomethingStayAsTheyAre) {
+TEST_F(EarlierObservations, CornersThatSeeSomethingStayAsTheyAre) {
   make_map();
   const PointId known = map_.add_point(0, {});
   map_.observe(known, older_, 7);
@@ -86,7 +86,7 @@ TEST_F(EarlierSightings, CornersThatSeeSomethingStayAsTheyAre) {
   EXPECT_EQ(map_.point(made_[7]).observations.size(), 1U);
 }
 
-TEST_F(EarlierSightings, NoneWithoutAPictureOrAtBorders) {
+TEST_F(EarlierObservations, NoneWithoutAPictureOrAtBorders) {
   make_map();
   EXPECT_EQ(add({}), 0);
   for (features::CornerPatch& p : views_.newer->patches) p.gray.fill(0);

@@ -25,7 +25,7 @@ double weak_below(const geometry::Matrix6d& information, bool surface_alone);
 
 /// The part of a motion (left perturbation of camera_from_world) that lies in the directions weaker than
 /// `below`, as a matrix to multiply it with.
-geometry::Matrix6d weak_part(const Directions& directions, double below);
+geometry::Matrix6d weak_projection(const Directions& directions, double below);
 
 /// What the motion model is worth.
 enum class Motion {

@@ -4,9 +4,9 @@
 // Pieces of surface of a fused cloud: what makes walls thin, and what free space is judged by.
 //
 // A voxel much smaller than the sensor's noise averages little: a wall seen from afar becomes a slab of
-// voxels. Points that face the same way within a small block form a sheet; sheets of neighbouring blocks are
-// taken together as long as one plane explains their points within the noise, and points come to lie on the
-// plane.
+// voxels. Points that face the same way within a small block form a surfel; surfels of neighbouring blocks
+// are taken together as long as one plane explains their points within the noise, and points come to lie on
+// the plane.
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace plumbline::cloud {
 
 /// Points of one block that face the same way (within 45 degrees of their mean). Plain sums, metres from
 /// the block's centre.
-struct Sheet {
+struct Surfel {
   Eigen::Vector3i block{0, 0, 0};
   Eigen::Vector3f normal_sum{0, 0, 0};
   float normal_length = 0.0F;      ///< of normal_sum; set by fit_planes()
@@ -29,7 +29,7 @@ struct Sheet {
   float scatter = 0.0F;   ///< weighted sum of squared spreads within voxels, m^2
   std::uint32_t points = 0;
 
-  // What fit_planes() finds: the plane normal . (p - origin) = 0 of this sheet and its surroundings.
+  // What fit_planes() finds: the plane normal . (p - origin) = 0 of this surfel and its surroundings.
   Eigen::Vector3f origin{0, 0, 0};  ///< metres from the block's centre
   Eigen::Vector3f normal{0, 0, 0};  ///< unit
   float noise_m = 0.0F;             ///< standard deviation of one measurement
@@ -38,54 +38,54 @@ struct Sheet {
   std::uint32_t support = 0;        ///< points of the surroundings that face the same way, its own included
   bool flat = false;                ///< the plane explains the points within the noise
 
-  Sheet() : second(Eigen::Matrix3f::Zero()) {}
+  Surfel() : second(Eigen::Matrix3f::Zero()) {}
 };
 
-/// The sheets of a cloud in blocks of `block_m`; points without normal belong to none.
-class Sheets {
+/// The surfels of a cloud in blocks of `block_m`; points without normal belong to none.
+class Surfels {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  Sheets(const std::vector<FusedPoint>& points, double block_m);
+  Surfels(const std::vector<FusedPoint>& points, double block_m);
 
-  [[nodiscard]] const std::vector<Sheet>& all() const { return sheets_; }
-  /// Sheet of point `i` of the cloud, or kNone.
-  [[nodiscard]] std::uint32_t of(std::size_t i) const { return sheet_of_[i]; }
+  [[nodiscard]] const std::vector<Surfel>& all() const { return surfels_; }
+  /// Surfel of point `i` of the cloud, or kNone.
+  [[nodiscard]] std::uint32_t of(std::size_t i) const { return surfel_of_[i]; }
   [[nodiscard]] double block_m() const { return block_m_; }
   [[nodiscard]] Eigen::Vector3d centre(const Eigen::Vector3i& block) const {
     return (block.cast<double>().array() + 0.5) * block_m_;
   }
-  /// Mean position of a sheet's points, metres.
-  [[nodiscard]] Eigen::Vector3d position(const Sheet& sheet) const;
+  /// Mean position of a surfel's points, metres.
+  [[nodiscard]] Eigen::Vector3d position(const Surfel& surfel) const;
 
-  /// Finds the planes: over all 27 blocks around if one plane explains them, else over the sheet alone.
+  /// Finds the planes: over all 27 blocks around if one plane explains them, else over the surfel alone.
   void fit_planes();
-  /// Moves the points of flat sheets along their normals to the planes, which are blended between blocks, and
-  /// gives them the planes' normals.
-  void settle(std::vector<FusedPoint>& points) const;
+  /// Moves the points of flat surfels along their normals to the planes, which are blended between blocks,
+  /// and gives them the planes' normals.
+  void project(std::vector<FusedPoint>& points) const;
 
  private:
-  void add(const FusedPoint& point, std::uint32_t& sheet_of_point);
-  /// First sheet of a block, or kNone.
+  void add(const FusedPoint& point, std::uint32_t& surfel_of_point);
+  /// First surfel of a block, or kNone.
   [[nodiscard]] std::uint32_t first_of(const Eigen::Vector3i& block) const;
-  /// Visits the sheets of a block, from its first one on, that face like `normal`.
+  /// Visits the surfels of a block, from its first one on, that face like `normal`.
   template <typename Visit>
   void visit_alike(std::uint32_t first, const Eigen::Vector3f& normal, const Visit& visit) const;
-  /// Over the sheet and what is around it.
-  void fit_plane(Sheet& sheet) const;
+  /// Over the surfel and what is around it.
+  void fit_plane(Surfel& surfel) const;
   /// Plane of a weighted set of points; false when there are too few.
-  static bool set_plane(const Sheet& sums, Sheet& sheet);
-  [[nodiscard]] bool explained(const Sheet& sheet) const;
+  static bool set_plane(const Surfel& sums, Surfel& surfel);
+  [[nodiscard]] bool explained(const Surfel& surfel) const;
   /// How noisy the points really are: residuals of the surroundings, the middle one, over what the sensor
   /// model lets expect; a generous upper limit, 0 to 1. Exact depth must not be flattened.
   void measure_noise();
 
   double block_m_;
   float noise_share_ = 1.0F;
-  std::vector<Sheet> sheets_;
-  std::vector<std::uint32_t> next_;      ///< next sheet of the same block
-  std::vector<std::uint32_t> sheet_of_;  ///< by point
-  CellMap<std::uint32_t> first_;         ///< first sheet of each block
+  std::vector<Surfel> surfels_;
+  std::vector<std::uint32_t> next_;       ///< next surfel of the same block
+  std::vector<std::uint32_t> surfel_of_;  ///< by point
+  CellMap<std::uint32_t> first_;          ///< first surfel of each block
 };
 
 }  // namespace plumbline::cloud

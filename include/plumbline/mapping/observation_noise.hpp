@@ -12,12 +12,12 @@
 
 namespace plumbline::mapping {
 
-struct SightingNoise {
+struct ObservationNoise {
   double orb_scale_factor = 1.2;  ///< from octave to octave; corners are good to a pixel of theirs
   double aligned = 0.3;           ///< to so much of it where they were aligned (maps::Observation)
   double line_sigma_px = 0.25;    ///< of a line's ends, across it
   double depth_factor = 2.0;      ///< of the depth noise, for the depth of corners and lines
-  /// rad/s. Pictures taken while turning are sheared by the rolling shutter of common sensors, and their
+  /// rad/s. Pictures taken while turning are distorted by the rolling shutter of common sensors, and their
   /// depth is stamped apart: what they say counts for half at this rate and fades with the fourth power of
   /// it.
   double turn_rate = 0.4;
@@ -26,20 +26,20 @@ struct SightingNoise {
   void declare(core::OptionTable& table, const std::string& prefix);
 
   /// As a bundle's camera of the same intrinsics saw it; which pose and which landmark is left to the caller.
-  /// `unrest`: all standard deviations are so many times as large.
+  /// `motion_factor`: all standard deviations are so many times as large.
   [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
-                                                    double unrest = 1.0) const {
-    return of(corner, is_aligned, unrest, octave_px(corner.octave));
+                                                    double motion_factor = 1.0) const {
+    return of(corner, is_aligned, motion_factor, octave_px(corner.octave));
   }
   /// The same for many: `corner_px` is octave_px() of its octave.
   [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
-                                                    double unrest, double corner_px) const;
-  /// `unrest` of a keyframe that was taken while the camera turned at this rate, rad/s.
-  [[nodiscard]] double unrest_of(double rate) const;
+                                                    double motion_factor, double corner_px) const;
+  /// `motion_factor` of a keyframe that was taken while the camera turned at this rate, rad/s.
+  [[nodiscard]] double motion_factor_of(double rate) const;
   /// Standard deviation of a corner of this octave.
   [[nodiscard]] double octave_px(int octave) const;
   [[nodiscard]] optimize::BundleLineObservation of(const features::LineFeature& line,
-                                                   double unrest = 1.0) const;
+                                                   double motion_factor = 1.0) const;
 };
 
 }  // namespace plumbline::mapping

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/core/renamed_options.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+namespace plumbline::core {
+namespace {
+
+const std::vector<RenamedOption> kRenamedOptions{
+    {"cloud", "looks", "free_space_every"},
+    {"cloud", "between", "intermediate_every"},
+    {"fuse", "settle", "plane_projection"},
+    {"fuse", "depth_field.partners", "depth_field.views_per_view"},
+    {"fuse", "depth_field.least_gain", "depth_field.min_gain"},
+    {"refine", "icp.floor", "icp.min_sigma"},
+    {"refine", "icp.min_hold", "icp.min_information"},
+    {"refine", "adjust.first_gate", "adjust.gate"},
+    {"track", "loops.agreeing", "loops.min_consistent"},
+    {"track", "loops.max_rival", "loops.max_alternative"},
+    {"track", "loops.max_apart", "loops.max_translation"},
+    {"track", "loops.max_turned", "loops.max_rotation"},
+    {"track", "places.hits", "places.candidates"},
+    {"track", "places.groups", "places.islands"},
+    {"track", "landmark.grace", "landmark.min_age"},
+    {"track", "keyframe.cone_patience", "keyframe.cone_max_wait"},
+    {"track", "fuse.earlier", "fuse.backward"},
+    {"merge", "max_apart", "max_translation"},
+    {"merge", "max_turned", "max_rotation"},
+    {"merge", "rival", "max_alternative"},
+    {"merge", "rival_fit", "alternative_share"},
+    {"merge", "places.hits", "places.candidates"},
+    {"merge", "places.groups", "places.islands"},
+    {"features", "method", "line.detector"},
+    {"features", "scale", "line.scale"},
+    {"features", "min_length", "line.min_length"},
+    {"features", "min_gradient", "line.min_gradient"},
+    {"features", "border", "line.border"},
+    {"features", "max_count", "line.max_count"},
+    {"features", "join", "line.join"},
+    {"features", "join_gap", "line.join_gap"},
+    {"features", "join_angle", "line.join_angle"},
+    {"features", "join_offset", "line.join_offset"},
+    {"features", "depth_max", "line.max_depth"},
+    {"features", "depth_samples", "line.depth_samples"},
+    {"features", "depth_side", "line.depth_side"},
+    {"features", "depth_inlier_sigmas", "line.depth_inlier_sigmas"},
+    {"features", "depth_min_inlier_share", "line.depth_min_inlier_share"},
+    {"features", "depth_min_coverage", "line.depth_min_coverage"},
+    {"features", "depth_min_inliers", "line.depth_min_inliers"},
+    {"features", "depth_ransac_rounds", "line.depth_ransac_rounds"},
+    {"features", "depth_pixel_sigma", "line.depth_pixel_sigma"}};
+
+/// Stages that went, and options of theirs that another one has.
+constexpr RenamedOption kGoneStages[] = {{"robots", "merge.", "merge."},
+                                         {"robots", "online", "merge.online"},
+                                         {"robots", "", "track."},
+                                         {"maps", "", "merge."},
+                                         {"keep", "", "store."}};
+
+}  // namespace
+
+const std::vector<RenamedOption>& renamed_options() { return kRenamedOptions; }
+
+std::string renamed_option(const std::string& stage, const std::string& key) {
+  for (const RenamedOption& option : kRenamedOptions) {
+    if (stage == option.stage && key == option.before) return option.now;
+  }
+  return key;
+}
+
+std::string renamed_setting(const std::string& stage, const std::string& key) {
+  for (const RenamedOption& gone : kGoneStages) {
+    const std::string before = gone.before;
+    if (stage != gone.stage || key.rfind(before, 0) != 0) continue;
+    const std::string now = gone.now;
+    const std::string moved = before == "online" ? "" : key.substr(before.size());
+    const std::string heir = now.substr(0, now.find('.'));
+    return moved.empty() ? now : heir + "." + renamed_option(heir, moved);
+  }
+  return stage + "." + renamed_option(stage, key);
+}
+
+}  // namespace plumbline::core
