@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The pictures of docs/reference/filters.md: one view of a generated room before and after the last filter of every
-// example chain.
+// The pictures of docs/reference/filters.md: one view of a generated room before and after the last filter of
+// every example chain.
 //   filter_pictures SOURCE-FOLDER [FILTER...]
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
