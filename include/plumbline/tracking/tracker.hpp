@@ -2,7 +2,7 @@
 #pragma once
 
 // Pose of every frame against the map: predict, guess, associate, estimate points, lines and depth together
-// (METHOD sections 1 and 2). Sees a const map; what changes the map is in mapping.
+// (docs/method/tracking.md). Sees a const map; what changes the map is in mapping.
 #include <algorithm>
 #include <cmath>
 #include <functional>
