@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a map consists of as bytes (docs/store.md), before packing. Decoders throw BadBytes.
+// What a map consists of as bytes (docs/reference/store.md), before packing. Decoders throw BadBytes.
 #include <memory>
 #include <vector>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Tables of the map store; docs/store.md describes them.
+// Tables of the map store; docs/reference/store.md describes them.
 #include <filesystem>
 
 #include "plumbline/maps/store.hpp"

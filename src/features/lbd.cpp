@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Line band descriptor (Zhang & Koch, JVCIR 24, 2013; METHOD section 1).
+// Line band descriptor (Zhang & Koch, JVCIR 24, 2013; docs/method/features.md).
 #include "plumbline/features/lbd.hpp"
 
 #include <algorithm>

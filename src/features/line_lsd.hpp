@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Line segment detector (Grompone von Gioi, Jakubowicz, Morel, Randall, PAMI 32, 2010; METHOD section 1).
+// Line segment detector (Grompone von Gioi, Jakubowicz, Morel, Randall, PAMI 32, 2010;
+// docs/method/features.md).
 #include <opencv2/core/mat.hpp>
 #include <vector>
 

@@ -120,7 +120,7 @@ void Slam::start_map(const sensor::RgbdFrame& frame, const Features& features, F
 void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
   const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels);  // section 3.3
   mapper_.add_surface_edges(map_, id, frame.depth, last_track_, tracker_.photometric(),
-                            tracker_.local_map().keyframes);  // METHOD section 6: edges with covariance
+                            tracker_.local_map().keyframes);  // relative poses with covariance
   tracker_.add_keyframe(id, frame, last_track_);
   mapper_.refine(map_, id);  // section 3.3: merges duplicates, culls
   set_reference(id);

@@ -2,8 +2,8 @@
 #pragma once
 
 // Residuals of bundle adjustment and their derivatives by the local coordinates: poses <- Exp(rho, phi) pose,
-// points by addition, lines U <- U Exp(theta), W <- W R(phi) (METHOD section 2). All in standard deviations.
-// Points: pose_terms.
+// points by addition, lines U <- U Exp(theta), W <- W R(phi) (docs/method/least_squares.md). All in standard
+// deviations. Points: pose_terms.
 #include <Eigen/Core>
 
 #include "plumbline/geometry/plucker.hpp"

@@ -111,7 +111,7 @@ void add_lines(const PoseProblem& problem, const Rigid3& pose, const PoseSolverO
   }
 }
 
-/// Point to plane: METHOD section 2, the third family.
+/// Point to plane (docs/method/least_squares.md).
 void add_planes(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
                 RowSums& sums, double& cost) {
   Row6 j;

@@ -107,7 +107,7 @@ TrackResult FrameAligner::run() {
 
 void FrameAligner::align(const AlignmentRound& round) {
   if (round.rematch) match_landmarks(round);  // points and lines, by projection: e_p and e_l of section 3.2
-  associate_surface(round);                   // point to plane: METHOD section 2, third residual family
+  associate_surface(round);                   // point to plane
   associate_intensity(round);                 // direct alignment
   solve();                                    // Levenberg-Marquardt over all of them
   constrain_degenerate_directions();          // by the motion prior

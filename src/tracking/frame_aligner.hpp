@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The pose of one frame from one hypothesis, coarse to fine (METHOD section 2; the paper's section 3.2).
+// The pose of one frame from one hypothesis, coarse to fine (docs/method/tracking.md; the paper's
+// section 3.2).
 #include <optional>
 
 #include "plumbline/tracking/tracker.hpp"

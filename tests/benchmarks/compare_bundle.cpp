@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Bundle adjustment by our own solver, by Ceres, and by Ceres with derivatives that it finds by itself, the
 // same problems and the same ends of iterations: keyframes on a path of laps that see points and lines around
-// them. Prints a table; numbers of docs/benchmarks.md.
+// them. Prints a table; numbers of docs/notes.
 //   compare_bundle [KEYFRAMES...]
 #include <cmath>
 #include <cstdio>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The pictures of docs/filters.md: one view of a generated room before and after the last filter of every
-// example chain.
+// The pictures of docs/reference/filters.md: one view of a generated room before and after the last filter of
+// every example chain.
 //   filter_pictures SOURCE-FOLDER [FILTER...]
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
@@ -112,7 +112,7 @@ void run(const fs::path& source, const std::vector<std::string>& wanted) {
     const auto after = must(load_part(example, 0).apply(cloud, context));
     const viz::ColorMode color = color_for(type);
     save(draw(before, color, scratch / "before.png"), draw(after, color, scratch / "after.png"),
-         source / "docs/images/filters" / (type + ".png"));
+         source / "docs/reference/pictures" / (type + ".png"));
     fmt::print("{:<24}{:>8} -> {:>8}\n", type, before->size(), after->size());
   }
   fs::remove_all(scratch);

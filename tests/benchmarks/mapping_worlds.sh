@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: BSD-3-Clause
-# The table of docs/mapping.md: ten generated worlds through compare_mapping. Arguments go on to it, e.g.
+# The table of docs/notes: ten generated worlds through compare_mapping. Arguments go on to it, e.g.
 #   tests/benchmarks/mapping_worlds.sh build/release/tests/benchmarks/compare_mapping --threads 2
 # One world takes some minutes of processor time.
 set -e

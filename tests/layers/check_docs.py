@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the pages: check_docs.py ROOT PROGRAM
 
-Links to files of the tree must lead somewhere, every page of docs/ is in its index, and every `plumbline` command in
-a page is one that the program has, with the flags it is shown with.
+Links to files and headings of the tree must lead somewhere, as must names of pages in sources; every page of
+docs/ is in an index; every `plumbline` command in a page is one that the program has, with the flags it is shown
+with (but for the notes, which keep the commands of their day); and the guide's pages together are not too long.
 """
 import functools
 import re
@@ -11,7 +12,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
+LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
+PAGE = re.compile(r"docs/[\w/.-]+\.md")
+GUIDE_LINES = 1200
 BLOCK = re.compile(r"^```[a-z]*\n(.*?)^```", re.S | re.M)
 
 
@@ -19,21 +22,54 @@ def pages(root):
     return sorted(root.glob("*.md")) + sorted((root / "docs").rglob("*.md"))
 
 
+def anchors(page):
+    """The headings of a page as GitHub names them in links."""
+    text = BLOCK.sub("", page.read_text())
+    headings = re.findall(r"^#+ (.+)$", text, re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 def check_links(root):
     problems = []
     for page in pages(root):
         for number, line in enumerate(page.read_text().splitlines(), 1):
-            for target in LINK.findall(line):
-                if not re.match(r"[a-z]+:", target) and not (page.parent / target).exists():
-                    problems.append(f"{page.relative_to(root)}:{number}: {target} is not there")
+            for target, anchor in LINK.findall(line):
+                if re.match(r"[a-z]+:", target):
+                    continue
+                where = f"{page.relative_to(root)}:{number}"
+                file = page.parent / target if target else page
+                if not file.exists():
+                    problems.append(f"{where}: {target} is not there")
+                elif anchor and file.suffix == ".md" and anchor not in anchors(file):
+                    problems.append(f"{where}: {target} has no heading #{anchor}")
     return problems
 
 
 def check_index(root):
-    index = root / "docs" / "README.md"
-    listed = set(LINK.findall(index.read_text())) if index.is_file() else set()
-    return [f"docs/README.md:1: does not list {page.name}" for page in pages(root)
-            if page.parent == root / "docs" and page != index and page.name not in listed]
+    """Every page is listed by docs/README.md or by a README.md of its own folder that is."""
+    docs = root / "docs"
+    listed = set()
+    for index in docs.rglob("README.md"):
+        listed |= {(index.parent / target).resolve() for target, _ in LINK.findall(index.read_text())}
+    return [f"docs/README.md:1: does not list {page.relative_to(docs)}" for page in pages(root)
+            if docs in page.parents and page != docs / "README.md" and page.resolve() not in listed]
+
+
+def check_citations(root):
+    """Pages that sources and messages name are there."""
+    problems = []
+    for folder in ("src", "include", "maps", "viz", "pipelines", "examples", "scripts"):
+        for file in sorted((root / folder).rglob("*")):
+            if file.suffix in (".hpp", ".cpp", ".idl", ".yaml", ".sh", ".txt"):
+                for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+                    gone = [page for page in PAGE.findall(line) if not (root / page).exists()]
+                    problems += [f"{file.relative_to(root)}:{number}: {page} is not there" for page in gone]
+    return problems
+
+
+def check_length(root):
+    lines = sum(len(page.read_text().splitlines()) for page in (root / "docs" / "guide").glob("*.md"))
+    return [f"docs/guide: {lines} lines; {GUIDE_LINES} at most"] if lines > GUIDE_LINES else []
 
 
 def commands(text):
@@ -64,6 +100,8 @@ def check_commands(root, help_of):
     """`help_of(words)` gives the help of a command, None when there is no such command."""
     problems = []
     for page in pages(root):
+        if root / "docs" / "notes" in page.parents:
+            continue
         for number, words in commands(page.read_text()):
             where = f"{page.relative_to(root)}:{number}"
             command, text = find_command(words, help_of)
@@ -77,7 +115,8 @@ def check_commands(root, help_of):
 
 
 def check(root, help_of):
-    return check_links(root) + check_index(root) + check_commands(root, help_of)
+    return (check_links(root) + check_index(root) + check_citations(root) + check_length(root) +
+            check_commands(root, help_of))
 
 
 def main(root, program):

@@ -21,10 +21,15 @@ class CheckDocs(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.root = Path(folder.name)
-        (self.root / "docs").mkdir()
-        self.write("docs/README.md", "[a](a.md) [up](../README.md#place) [web](https://example.org/x)\n")
+        (self.root / "docs" / "notes").mkdir(parents=True)
+        (self.root / "docs" / "guide").mkdir()
+        self.write("docs/README.md", "[a](a.md) [up](../README.md#a-place-here) [notes](notes/README.md) "
+                   "[web](https://example.org/x)\n")
         self.write("docs/a.md", "words\n")
-        self.write("README.md", "[docs](docs/README.md)\n\n```\nplumbline map IN -o OUT --every 2  # --nonsense\n"
+        self.write("docs/notes/README.md", "[old](old.md)\n")
+        self.write("docs/notes/old.md", "```\nplumbline gone\n```\n")
+        self.write("README.md", "[docs](docs/README.md)\n\n## A place, here\n\n"
+                   "```\nplumbline map IN -o OUT --every 2  # --nonsense\n"
                    "build/release/bin/plumbline evaluate cloud C --align se3\nplumb x\n```\n")
 
     def write(self, path, text):
@@ -40,6 +45,21 @@ class CheckDocs(unittest.TestCase):
     def test_dead_link(self):
         self.write("docs/a.md", "words\n[b](b.png)\n")
         self.assertEqual(self.problems(), ["docs/a.md:2: b.png is not there"])
+
+    def test_dead_heading(self):
+        self.write("docs/a.md", "# Words\n\n[b](#words) [c](#wards) [d](../README.md#a-place)\n")
+        self.assertEqual(self.problems(), ["docs/a.md:3:  has no heading #wards",
+                                           "docs/a.md:3: ../README.md has no heading #a-place"])
+
+    def test_source_that_names_a_page_that_is_gone(self):
+        (self.root / "src").mkdir()
+        self.write("src/a.cpp", "// docs/a.md\n// docs/old/b.md\n")
+        self.assertEqual(self.problems(), ["src/a.cpp:2: docs/old/b.md is not there"])
+
+    def test_guide_that_is_too_long(self):
+        self.write("docs/README.md", "[a](a.md) [notes](notes/README.md) [b](guide/b.md)\n")
+        self.write("docs/guide/b.md", "words\n" * 1201)
+        self.assertEqual(self.problems(), ["docs/guide: 1201 lines; 1200 at most"])
 
     def test_page_that_is_not_listed(self):
         self.write("docs/b.md", "words\n")

@@ -2,7 +2,8 @@
 #pragma once
 
 // What a cloud filter is, and the list of those that exist. A filter is a class with declared options, one
-// registration (a FilterInfo) and its words for the reference page docs/filters.md, which is made from these.
+// registration (a FilterInfo) and its words for the reference page docs/reference/filters.md, which is made
+// from these.
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
@@ -81,7 +82,7 @@ class FilterRegistry {
 /// All filters of this library.
 FilterRegistry builtin_filters();
 
-/// The reference page of a registry's filters as Markdown (docs/filters.md).
+/// The reference page of a registry's filters as Markdown (docs/reference/filters.md).
 std::string filters_reference(const FilterRegistry& registry);
 
 }  // namespace plumbline::cloud

@@ -3,7 +3,7 @@
 
 // Cloud against surface: accuracy, completeness, precision, recall, F-score (Knapitsch et al., Tanks and
 // Temples, SIGGRAPH 2017), normal consistency, wall thickness, density. Definitions and formulas:
-// docs/evaluate.md.
+// docs/guide/evaluate.md.
 #include <optional>
 #include <string>
 #include <vector>
@@ -86,8 +86,8 @@ struct CloudReport {
   std::optional<double> normal_consistency;
   WallThickness wall;
   std::vector<WallPlane> planes;  ///< the largest, largest first
-  double density_per_m2 = 0.0;  ///< median of 16 / (pi r16^2), r16 the distance to the 16th neighbour
-  double spacing_mm = 0.0;      ///< median distance to the nearest neighbour
+  double density_per_m2 = 0.0;    ///< median of 16 / (pi r16^2), r16 the distance to the 16th neighbour
+  double spacing_mm = 0.0;        ///< median distance to the nearest neighbour
   CloudAlignmentReport alignment;
   std::vector<float>
       error_m;  ///< per point of the cloud as given, NaN where dropped; empty without reference

@@ -2,7 +2,7 @@
 #pragma once
 
 // Trajectory error against truth: ATE and RPE (Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM
-// Systems, IROS 2012). Definitions and formulas: docs/evaluate.md.
+// Systems, IROS 2012). Definitions and formulas: docs/guide/evaluate.md.
 #include <array>
 #include <filesystem>
 #include <optional>

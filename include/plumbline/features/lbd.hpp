@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Line band descriptor (Zhang & Koch 2013; METHOD section 1), 256 bits, matched by Hamming distance.
+// Line band descriptor (Zhang & Koch 2013; docs/method/features.md), 256 bits, matched by Hamming distance.
 #include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>

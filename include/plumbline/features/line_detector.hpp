@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Line segments of an image (METHOD section 1): LSD, EDLines or FLD behind one interface, then joined,
+// Line segments of an image (docs/method/features.md): LSD, EDLines or FLD behind one interface, then joined,
 // cleaned and put in a fixed order.
 #include <opencv2/core/mat.hpp>
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// ORB points spread evenly over the picture (METHOD section 1).
+// ORB points spread evenly over the picture (docs/method/features.md).
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A 3D line from its images alone (METHOD section 3: where depth is missing, landmarks are triangulated).
+// A 3D line from its images alone (the paper's section 3.3: where depth is missing, landmarks are
+// triangulated).
 #include <vector>
 
 #include "plumbline/geometry/plucker.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// 3D lines in Pluecker and orthonormal form (METHOD section 2).
+// 3D lines in Pluecker and orthonormal form (docs/method/least_squares.md).
 #include <Eigen/Core>
 
 #include "plumbline/geometry/rigid3.hpp"

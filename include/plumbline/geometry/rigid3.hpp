@@ -33,7 +33,7 @@ Rigid3 from_isometry(const Eigen::Isometry3d& transform);
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);  ///< [v]x, so that skew(v) * u == v.cross(u)
 
-/// Exponential map, xi = (rho, phi): metres, radians. METHOD: left perturbation T <- Exp(xi) T.
+/// Exponential map, xi = (rho, phi): metres, radians. Left perturbation T <- Exp(xi) T.
 Rigid3 exp_se3(const Vector6d& xi);
 Vector6d log_se3(const Rigid3& transform);
 Eigen::Matrix3d exp_so3(const Eigen::Vector3d& phi);

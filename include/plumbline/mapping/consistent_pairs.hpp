@@ -4,8 +4,8 @@
 // Which of many relative poses between images are consistent. Each says how a keyframe of one map lies
 // to a keyframe of another (or of the same map, much later). Two agree when going round through both ends
 // nowhere near; the largest set of which every two agree is taken for true (pairwise consistency
-// maximisation: Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018; METHOD section 6). Places that repeat give
-// several such sets: a set is worth believing when no other one comes near its size.
+// maximisation: Mangelson, Dominic, Eustice, Vasudevan, ICRA 2018; docs/method/places.md). Places that repeat
+// give several such sets: a set is worth believing when no other one comes near its size.
 #include <cstddef>
 #include <cstdint>
 #include <vector>

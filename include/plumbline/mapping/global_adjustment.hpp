@@ -3,7 +3,8 @@
 
 // The whole map in one optimisation: all keyframes, points and lines, the surface edges of the map, and edges
 // from elsewhere (aligned local maps, closed loops, overlaps of robots). First a pose graph, which takes out
-// drift and tells wrong edges; then bundle adjustment with the edges that are left (METHOD sections 3 and 6).
+// drift and tells wrong edges; then bundle adjustment with the edges that are left
+// (docs/method/refinement.md).
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -59,7 +60,7 @@ void move_keyframes(maps::Map& map, const KeyframePoses& poses);
 
 /// By how much the standard deviations of one kind of observation are taken larger for covariances: residuals
 /// of neighbours are alike, and so many of them say less than as many independent ones would
-/// (docs/refinement.md tells where the numbers come from).
+/// (docs/method/refinement.md tells where the numbers come from).
 struct SigmaFactors {
   double points = 1.0;
   double lines = 1.0;

@@ -2,7 +2,7 @@
 #pragma once
 
 // When does a frame become a keyframe? Two rules: by what moved and what is lost (plain), or by the sides
-// from which landmarks are seen (cone, METHOD section 4).
+// from which landmarks are seen (cone, docs/method/mapping.md).
 #include <cstdint>
 
 #include "plumbline/core/options.hpp"
@@ -31,7 +31,7 @@ struct KeyframeRuleOptions {
   void declare(core::OptionTable& table);
 };
 
-/// What the cone rule saw (METHOD section 4); the counts are against the reference keyframe.
+/// What the cone rule saw (docs/method/mapping.md); the counts are against the reference keyframe.
 struct ConeTerms {
   double shared = 1.0;  ///< landmarks of the keyframe matched, as a share of those right after it
   ConeCounts now;

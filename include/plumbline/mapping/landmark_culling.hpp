@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Landmarks that deserve to stay (METHOD section 3): seen by enough keyframes, and found in at least 30 % of
-// the frames that should see them.
+// Landmarks that deserve to stay (docs/method/mapping.md): seen by enough keyframes, and found in at least 30
+// % of the frames that should see them.
 #include <vector>
 
 #include "plumbline/core/options.hpp"

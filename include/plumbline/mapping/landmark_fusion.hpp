@@ -2,7 +2,7 @@
 #pragma once
 
 // One thing in the world, one landmark: landmarks are looked for in the pictures of keyframes that should see
-// them and did not (METHOD section 3).
+// them and did not (docs/method/mapping.md).
 #include <cstdint>
 #include <map>
 #include <vector>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which way the surface under a landmark faces, from the depth image of the keyframe that made it (METHOD
-// section 4 wants it from the local cloud, not from neighbouring sparse points).
+// Which way the surface under a landmark faces, from the depth image of the keyframe that made it:
+// the local cloud, not neighbouring sparse points (docs/method/mapping.md).
 #include <Eigen/Core>
 #include <vector>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 // Landmarks where depth is missing or out of range: rays and interpretation planes of covisible keyframes
-// meet (METHOD section 3).
+// meet (docs/method/mapping.md).
 #include <vector>
 
 #include "plumbline/core/options.hpp"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Local bundle adjustment (METHOD section 3): a keyframe, what it shares landmarks or surfaces with, and what
-// they see. Three steps, so that the middle one can run beside the tracker: take from the map, adjust, put
-// back. The map may grow and lose keyframes and landmarks between the first step and the last.
+// Local bundle adjustment (docs/method/mapping.md): a keyframe, what it shares landmarks or surfaces with,
+// and what they see. Three steps, so that the middle one can run beside the tracker: take from the map,
+// adjust, put back. The map may grow and lose keyframes and landmarks between the first step and the last.
 #include <map>
 #include <optional>
 #include <vector>

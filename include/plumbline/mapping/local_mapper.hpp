@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Turns frames into keyframes and keeps the landmarks worth having (METHOD section 3).
+// Turns frames into keyframes and keeps the landmarks worth having (docs/method/mapping.md).
 #include <memory>
 #include <vector>
 

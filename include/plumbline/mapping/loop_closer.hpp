@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Closes loops (METHOD sections 5 and 6): every keyframe asks whether its place was seen before; what is
+// Closes loops (docs/method/places.md): every keyframe asks whether its place was seen before; what is
 // verified, several times in a row and consistently, becomes an edge of a robust pose graph; what that does
 // not take for wrong moves the map, doubles are merged, and everything is adjusted together.
 #include <cstdint>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps of several robots become one (METHOD section 6, Algorithm 2). Each map has a world frame of its own.
-// Places that two maps share are looked for by what keyframes look like, verified one by one, and believed
-// only when enough of them say the same of how the two worlds lie, the maps laid over each other fit, and no
-// other way to lay them is as good.
+// Maps of several robots become one (docs/method/merging.md; Algorithm 2). Each map has a world frame of its
+// own. Places that two maps share are looked for by what keyframes look like, verified one by one, and
+// believed only when enough of them say the same of how the two worlds lie, the maps laid over each other
+// fit, and no other way to lay them is as good.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finds while robots map where their maps overlap (METHOD section 6, Algorithm 2): looks up every new
+// Finds while robots map where their maps overlap (docs/method/merging.md; Algorithm 2): looks up every new
 // keyframe among those of the other robots, verifies what is similar, and tells when two maps certainly
 // overlap.
 #include <cstddef>

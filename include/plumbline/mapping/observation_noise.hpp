@@ -2,7 +2,8 @@
 #pragma once
 
 // What a keyframe's features say of landmarks in bundles, of a few keyframes or of the whole map, and how
-// much they are believed: standard deviations as they were found at true poses (docs/mapping.md).
+// much they are believed: standard deviations as they were found at true poses
+// (docs/notes/2026-11-24-mapping.md).
 #include <string>
 
 #include "plumbline/core/options.hpp"

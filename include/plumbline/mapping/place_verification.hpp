@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Do two keyframes show the same place, and how do they lie to each other? (METHOD sections 5 and 6.) Points
+// Do two keyframes show the same place, and how do they lie to each other? (docs/method/places.md.) Points
 // and lines are matched by descriptor, P3P in RANSAC gives a pose, more matches are found around it among the
 // landmarks of the surroundings, the surfaces are aligned; then everything that speaks against it is asked.
 #include <cstdint>

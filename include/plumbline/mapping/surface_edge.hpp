@@ -2,8 +2,8 @@
 #pragma once
 
 // How two keyframes lie to each other as their surfaces say: samples of one are aligned, point to plane, with
-// the depth image of the other (METHOD section 2), and its grey values with the other's picture, for local
-// bundle adjustment.
+// the depth image of the other (docs/method/mapping.md), and its grey values with the other's picture, for
+// local bundle adjustment.
 #include <opencv2/core/mat.hpp>
 #include <optional>
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The terms of the photogrammetric keyframe rule (METHOD section 4; after Azimi, Ahmadabadian, Remondino,
-// ISPRS J. 191, 2022): how many landmarks are seen from another side than at the last keyframe, and whether
-// these are spread over the picture. Plain functions of counts; keyframe_rule.hpp puts them together.
+// The terms of the photogrammetric keyframe rule (docs/method/mapping.md; after Azimi, Ahmadabadian,
+// Remondino, ISPRS J. 191, 2022): how many landmarks are seen from another side than at the last keyframe,
+// and whether these are spread over the picture. Plain functions of counts; keyframe_rule.hpp puts them
+// together.
 #include <array>
 
 #include "plumbline/geometry/rigid3.hpp"

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The map store, map.db: an SQLite file that holds a map exactly, written as the run goes (docs/store.md).
-// A process that is killed leaves a file that opens and holds every keyframe that was added.
+// The map store, map.db: an SQLite file that holds a map exactly, written as the run goes
+// (docs/reference/store.md). A process that is killed leaves a file that opens and holds every keyframe that
+// was added.
 #include <cstdint>
 #include <filesystem>
 #include <memory>

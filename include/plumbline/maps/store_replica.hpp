@@ -4,7 +4,7 @@
 // A copy of a growing map store on another machine. Transactions of a store are numbered from 1 on; every row
 // knows the one that last wrote it, and a row that was removed leaves a note with the number. So a copy that
 // has all rows up to a number asks for those above, whatever it missed, and holds the same rows as the store
-// in the end (docs/store.md, docs/network.md).
+// in the end (docs/reference/store.md, docs/method/network.md).
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>

@@ -2,7 +2,7 @@
 #pragma once
 
 // `plumbline hub` as a call: robots' maps come in over a network, one result folder comes out
-// (docs/network.md).
+// (docs/method/network.md).
 #include <cstdint>
 #include <functional>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Keys for --security: one authority, a folder for the hub and one for each robot (docs/network.md).
+// Keys for --security: one authority, a folder for the hub and one for each robot (docs/guide/network.md).
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How robots and hub find each other (docs/network.md).
+// How robots and hub find each other (docs/guide/network.md).
 #include <filesystem>
 #include <string>
 #include <vector>

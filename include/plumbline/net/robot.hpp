@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// `plumbline robot` as a call: a recording is mapped, and the map sent to a hub beside it (docs/network.md).
+// `plumbline robot` as a call: a recording is mapped, and the map sent to a hub beside it
+// (docs/method/network.md).
 #include <filesystem>
 #include <functional>
 #include <optional>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Bundle adjustment over poses, points and lines, with relative-pose edges from dense alignment (METHOD
-// sections 2 and 3). Plain structs in, plain structs out. Every sum runs in a fixed order: the same bytes
-// each time.
+// Bundle adjustment over poses, points and lines, with relative-pose edges from dense alignment
+// (docs/method/least_squares.md). Plain structs in, plain structs out. Every sum runs in a fixed order: the
+// same bytes each time.
 #include <Eigen/Core>
 #include <cstddef>
 #include <string>

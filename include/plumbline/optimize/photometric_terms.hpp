@@ -2,7 +2,7 @@
 #pragma once
 
 // Direct alignment of one camera with what another one saw: grey values of thousands of surface samples
-// (METHOD section 2 knows points, lines and depth; this is a fourth family beside them). The derivative is
+// (docs/method/least_squares.md; the paper has no such family). The derivative is
 // taken in the other camera's picture, where it does not change with the pose.
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>

@@ -2,8 +2,8 @@
 #pragma once
 
 // Pose of one camera from points, lines, surfaces and grey values of the map together: Levenberg-Marquardt
-// with robust losses over 6 unknowns (METHOD section 2). Small and allocation-free; many poses together are
-// the work of bundle_adjustment.
+// with robust losses over 6 unknowns (docs/method/least_squares.md). Small and allocation-free; many poses
+// together are the work of bundle_adjustment.
 #include <cstddef>
 #include <optional>
 #include <string>

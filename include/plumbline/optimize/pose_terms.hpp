@@ -2,8 +2,8 @@
 #pragma once
 
 // Residuals of one camera pose and their Jacobians under the left perturbation
-// camera_from_world <- Exp(rho, phi) camera_from_world (METHOD section 2). All residuals are in units of
-// their own standard deviation.
+// camera_from_world <- Exp(rho, phi) camera_from_world (docs/method/least_squares.md). All residuals are in
+// units of their own standard deviation.
 #include <Eigen/Core>
 
 #include "plumbline/geometry/plucker.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A pipeline file as a checked graph of stages. docs/pipelines.md tells users what may stand in one.
+// A pipeline file as a checked graph of stages. docs/guide/pipelines.md tells users what may stand in one.
 //
 //   description: what this pipeline is for
 //   include: rgbd.yaml                   # begin with the stages of another file

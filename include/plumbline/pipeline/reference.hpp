@@ -23,7 +23,7 @@ std::vector<core::OptionSpec> shown_options(const StageType& type, bool all = fa
 /// Ports and options of one stage as Markdown, a section of stages_reference.
 std::string stage_reference(const StageType& type, bool all = false);
 
-/// docs/stages.md: every stage, port type and tap.
+/// docs/reference/stages.md: every stage, port type and tap.
 std::string stages_reference(const StageRegistry& registry, bool all = false);
 
 }  // namespace plumbline::pipeline

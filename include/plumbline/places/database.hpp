@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Keyframes by what they look like (METHOD section 5): image vectors over the words of a vocabulary, an
+// Keyframes by what they look like (docs/method/places.md): image vectors over the words of a vocabulary, an
 // inverted index that votes, and a vocabulary that goes on learning from what is added.
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,7 @@ namespace plumbline::places {
 /// One keyframe and how much it looks like what was asked for.
 struct Hit {
   core::KeyframeId keyframe;
-  double score = 0.0;  ///< s of METHOD section 5: 0 nothing in common, 1 the same
+  double score = 0.0;  ///< s of docs/method/places.md: 0 nothing in common, 1 the same
 };
 
 /// Keyframes of any number of robots. The vocabulary is divided while keyframes are added: a fixed

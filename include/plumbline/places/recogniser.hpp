@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// From scores to candidates worth verifying (METHOD section 5): scores relative to that of a neighbouring
-// keyframe, grouped by covisibility, seen several times in a row.
+// From scores to candidates worth verifying (docs/method/places.md): scores relative to that of a
+// neighbouring keyframe, grouped by covisibility, seen several times in a row.
 #include <cstddef>
 #include <functional>
 #include <map>

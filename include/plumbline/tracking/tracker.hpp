@@ -2,7 +2,7 @@
 #pragma once
 
 // Pose of every frame against the map: predict, hypothesise, associate, estimate from points, lines, surfaces
-// and intensity together. METHOD sections 1 and 2; sections 3.1 and 3.2 of Xia, Wu, Ma, Zhu, Cheng, Zhu,
+// and intensity together. docs/method/tracking.md; sections 3.1 and 3.2 of Xia, Wu, Ma, Zhu, Cheng, Zhu,
 // "Multi-Robot Collaborative Mapping with Integrated Point-Line Features for Visual SLAM", Sensors 2024,
 // 24(17), 5743. Sees a const map; what changes the map is in mapping.
 #include <algorithm>

@@ -18,7 +18,7 @@ const char* const kTwoTerminals =
     "--interface lo &\n"
     "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 "
     "--interface lo\n"
-    "Hub and robots may start in any order; docs/network.md has more.";
+    "Hub and robots may start in any order; docs/guide/network.md has more.";
 
 int hub(Session& session, net::HubRequest request, double quota_gb) {
   const auto pipelines = session.pipelines_folder();

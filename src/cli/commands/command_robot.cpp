@@ -70,7 +70,7 @@ void add_robot(CLI::App& app, Session& session) {
       "Beside a hub:       plumbline hub -o building --robots 1 --interface lo\n"
       "a robot:            plumbline robot 'synth:room?frames=300&seed=1' --name r0 --interface lo\n"
       "and once more:      plumbline robot r0 --name r0 --interface lo   (hands in what is in folder r0)\n"
-      "Exit code 4: the hub was there, but has not got everything. docs/network.md has more.");
+      "Exit code 4: the hub was there, but has not got everything. docs/guide/network.md has more.");
   command
       ->add_option(
           "INPUT", request->map.input,

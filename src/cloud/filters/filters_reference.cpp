@@ -13,7 +13,7 @@ constexpr const char* kIntroduction =
     "# Filters\n\n"
     "A filter chain is a YAML file: a name and a list of filters, applied from top to bottom. Lengths and "
     "angles may\n"
-    "carry a unit (`5 mm`, `75 deg`). Every problem of a file is told at once, with line and column.\n\n"
+    "carry a unit (`5 mm`, `75 deg`). All problems of a file are reported at once, with line and column.\n\n"
     "```yaml\nchain: keyframe\nfilters:\n  - type: pass_through\n    max: 3.5\n  - type: voxel_grid\n    "
     "leaf: 1 "
     "cm\n```\n\n"
@@ -28,9 +28,7 @@ constexpr const char* kIntroduction =
     "IN OUT`. In the pictures the cloud before the example's last filter is on the left, after it on the "
     "right.\n"
     "Filters of your own are loaded with `--plugin`; see "
-    "[examples/plugin_filter](../examples/plugin_filter). "
-    "Speed and\n"
-    "memory are measured in [benchmarks.md](benchmarks.md#filters).\n\n"
+    "[examples/plugin_filter](../../examples/plugin_filter).\n\n"
     "Filters that only choose points keep an organised cloud (one that still has the rows and columns of the "
     "depth\n"
     "picture) organised: rejected points become NaN. The others give a list of points without NaN.\n\n"
@@ -59,8 +57,8 @@ std::string allowed(const core::OptionSpec& option) {
 
 std::string entry(const FilterInfo& info) {
   std::string text = fmt::format(
-      "\n## {0}\n\n{1}\n\n![{0}: before and after](images/filters/{0}.png)\n\n{2} "
-      "([example](../pipelines/filters/examples/{0}.yaml))\n\n",
+      "\n## {0}\n\n{1}\n\n![{0}: before and after](pictures/{0}.png)\n\n{2} "
+      "([example](../../pipelines/filters/examples/{0}.yaml))\n\n",
       info.type, info.summary, info.details);
   text += fmt::format("```yaml\n{}```\n\n| option | default | allowed | unit | |\n|---|---|---|---|---|\n",
                       info.example);

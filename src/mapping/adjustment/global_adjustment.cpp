@@ -313,11 +313,11 @@ GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
   // How the rooms of several robots lie to each other is what moves last: from a region of 1e4 it is short of
-  // the minimum when the iterations end (docs/fusion.md).
+  // the minimum when the iterations end (docs/notes/2026-11-24-merging.md).
   bundle_options.first_radius = 1e7;
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;
-  sigma_factors = {0.71, 0.71, 2.0};  // docs/refinement.md
+  sigma_factors = {0.71, 0.71, 2.0};  // docs/notes/2026-11-24-refinement.md
 }
 
 void GlobalAdjustmentOptions::declare(core::OptionTable& table) {

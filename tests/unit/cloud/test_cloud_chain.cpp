@@ -128,8 +128,8 @@ TEST(FilterRegistry, ReferencePageIsUpToDate) {
   const std::string made = filters_reference(builtin_filters());
   const auto page = std::filesystem::path(testing::TempDir()) / "filters.md";
   std::ofstream(page) << made;
-  EXPECT_TRUE(made == worlds::slurp(source("docs/filters.md")))
-      << "docs/filters.md is not what the filters declare; replace it by " << page;
+  EXPECT_TRUE(made == worlds::slurp(source("docs/reference/filters.md")))
+      << "docs/reference/filters.md is not what the filters declare; replace it by " << page;
 }
 
 }  // namespace

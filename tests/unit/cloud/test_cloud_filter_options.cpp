@@ -160,7 +160,7 @@ TEST(FilterOptions, EveryFilterHasAnExampleChainThatRunsAndAPicture) {
     EXPECT_NE(chain->to_yaml().find("- type: " + info.type + "\n"), std::string::npos) << info.type;
     const auto output = chain->apply(cloud);
     EXPECT_TRUE(output) << output.error().message;
-    EXPECT_TRUE(fs::is_regular_file(source / "docs/images/filters" / (info.type + ".png"))) << info.type;
+    EXPECT_TRUE(fs::is_regular_file(source / "docs/reference/pictures" / (info.type + ".png"))) << info.type;
   }
   fs::current_path(before);
 }
@@ -168,7 +168,7 @@ TEST(FilterOptions, EveryFilterHasAnExampleChainThatRunsAndAPicture) {
 TEST(FilterOptions, EveryExampleChainBelongsToAFilter) {
   const fs::path source = PLUMBLINE_SOURCE_DIR;
   const FilterRegistry registry = builtin_filters();
-  for (const std::string folder : {"pipelines/filters/examples", "docs/images/filters"}) {
+  for (const std::string folder : {"pipelines/filters/examples", "docs/reference/pictures"}) {
     for (const auto& entry : fs::directory_iterator(source / folder)) {
       EXPECT_NE(registry.find(entry.path().stem().string()), nullptr) << entry.path();
     }

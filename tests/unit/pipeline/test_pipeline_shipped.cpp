@@ -78,25 +78,25 @@ TEST(Shipped, StagesPageIsUpToDate) {
   StageRegistry registry;
   register_stages(registry);
   const std::string made = stages_reference(registry);
-  EXPECT_EQ(text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs" / "stages.md"), made)
-      << "make it anew: plumbline pipelines describe > docs/stages.md";
+  EXPECT_EQ(text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs/reference/stages.md"), made)
+      << "make it anew: plumbline pipelines describe > docs/reference/stages.md";
   for (const std::string& name : registry.names()) {
     EXPECT_NE(made.find("\n## " + name + "\n"), std::string::npos) << name;
   }
 }
 
 TEST(Shipped, PipelinesPageKnowsEveryPipeline) {
-  const std::string page = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs" / "pipelines.md");
+  const std::string page = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs/guide/pipelines.md");
   for (const std::string& name : pipeline_names(kShipped)) {
     EXPECT_NE(page.find("| `" + name + "` |"), std::string::npos)
-        << "docs/pipelines.md does not tell of " << name;
+        << "docs/guide/pipelines.md does not tell of " << name;
   }
 }
 
 TEST(Shipped, EveryStageIsUsedByAPipelineOrAnExampleOfThePage) {
   StageRegistry registry;
   register_stages(registry);
-  std::string texts = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs" / "pipelines.md");
+  std::string texts = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs/guide/pipelines.md");
   for (const std::string& name : pipeline_names(kShipped)) {
     const auto graph = load_graph(kShipped / (name + ".yaml"), registry, kShipped);
     ASSERT_TRUE(graph) << graph.error().message;

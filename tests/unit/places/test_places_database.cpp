@@ -35,8 +35,8 @@ TEST(Database, FindsThePlaceAmongMany) {
 }
 
 TEST(Database, ScoreIsOneMinusHalfTheDifferenceOfTheVectors) {
-  // Recomputed from the words and weights of the vocabulary, as METHOD section 5 has it. They are fresh, for
-  // the database has just begun.
+  // Recomputed from the words and weights of the vocabulary, as docs/method/places.md has it. They are fresh,
+  // for the database has just begun.
   VocabularyOptions options;
   options.branching = 5;
   options.split = 10;
