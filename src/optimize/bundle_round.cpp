@@ -31,64 +31,59 @@ UsedObservations::UsedObservations(const BundleProblem& problem) {
   }
 }
 
+PoseSlots::PoseSlots(const BundleProblem& problem) : of_pose(problem.poses.size()) {
+  for (const bool fixed : {false, true}) {
+    for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+      if (problem.poses[i].fixed != fixed) continue;
+      of_pose[i] = static_cast<int>(pose.size());
+      pose.push_back(static_cast<int>(i));
+    }
+    if (!fixed) free = static_cast<int>(pose.size());
+  }
+}
+
 BundleRound::BundleRound(const BundleProblem& problem, const BundleOptions& options)
     : problem_(problem),
       options_(options),
       projection_(geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx,
                                             problem.camera.cy)),
-      point_loss_{options.point_loss},
-      line_loss_{options.line_loss},
-      edge_loss_{options.edge_loss} {
-  choose_slots();
+      slots_(problem),
+      reduced_(slots_.free) {
   add_observations();
   for (const BundleEdge& edge : problem.edges)
-    edges_.push_back({slot_of_[at(edge.a)], slot_of_[at(edge.b)], EdgeView(edge), true});
-  normal_.resize(at(free_));
-  gradient_.resize(at(free_));
-  damping_.resize(at(free_));
-  pose_steps_.resize(6 * free_);
-  matrix_.resize(6 * free_, 6 * free_);
-}
-
-/// Free poses first.
-void BundleRound::choose_slots() {
-  slot_of_.resize(problem_.poses.size());
-  for (const bool fixed : {false, true}) {
-    for (std::size_t i = 0; i < problem_.poses.size(); ++i) {
-      if (problem_.poses[i].fixed != fixed) continue;
-      slot_of_[i] = static_cast<int>(slot_pose_.size());
-      slot_pose_.push_back(static_cast<int>(i));
-    }
-    if (!fixed) free_ = static_cast<int>(slot_pose_.size());
-  }
+    equations_.edges.push_back(
+        {slots_.of_pose[at(edge.a)], slots_.of_pose[at(edge.b)], EdgeView(edge), true});
+  equations_.hessian.resize(at(slots_.free));
+  equations_.gradient.resize(at(slots_.free));
+  equations_.damping.resize(at(slots_.free));
 }
 
 void BundleRound::add_observations() {
   UsedObservations used(problem_);
   const auto by_slot = [&](std::vector<int>& numbers, const auto& observations) {
     std::stable_sort(numbers.begin(), numbers.end(), [&](int a, int b) {
-      return slot_of_[at(observations[at(a)].pose)] < slot_of_[at(observations[at(b)].pose)];
+      return slots_.of_pose[at(observations[at(a)].pose)] < slots_.of_pose[at(observations[at(b)].pose)];
     });
   };
   by_slot(used.points, problem_.point_observations);
   for (const int i : used.points) {
     const BundlePointObservation& o = problem_.point_observations[at(i)];
-    points_.observations.push_back({slot_of_[at(o.pose)], o.point});
+    equations_.points.observations.push_back({slots_.of_pose[at(o.pose)], o.point});
     point_terms_.push_back(to_term(o));
   }
-  points_.prepare(slot_pose_.size(), problem_.points.size());
+  equations_.points.prepare(slots_.pose.size(), problem_.points.size());
   by_slot(used.lines, problem_.line_observations);
   for (const int i : used.lines) {
     const BundleLineObservation& o = problem_.line_observations[at(i)];
-    lines_.observations.push_back({slot_of_[at(o.pose)], o.line});
+    equations_.lines.observations.push_back({slots_.of_pose[at(o.pose)], o.line});
     line_views_.emplace_back(o, problem_.camera);
   }
-  lines_.prepare(slot_pose_.size(), problem_.lines.size());
+  equations_.lines.prepare(slots_.pose.size(), problem_.lines.size());
 }
 
 void BundleRound::hold(const BundleState& state) {
   for (const BundleEdge& stay : holding_edges(problem_, state))
-    edges_.push_back({-1, slot_of_[at(stay.b)], EdgeView(stay), false});
+    equations_.edges.push_back({-1, slots_.of_pose[at(stay.b)], EdgeView(stay), false});
 }
 
 std::vector<BundleEdge> holding_edges(const BundleProblem& problem, const BundleState& state) {

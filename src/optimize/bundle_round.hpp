@@ -2,7 +2,7 @@
 #pragma once
 
 // The inside of bundle_solver: what is seen by whom (bundle_round.cpp), the normal equations
-// (bundle_normal.cpp), steps (bundle_solver.cpp).
+// (bundle_normal.cpp), elimination of landmarks (bundle_schur.cpp), steps (bundle_solver.cpp).
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -34,7 +34,82 @@ struct Target {
   const double* w;
 };
 
-/// Normal equations of one round, and what it steps through.
+/// How far the linearised problem is believed: grows with steps that bring what they promised (Madsen,
+/// Nielsen, Tingleff, 2004; as in Ceres).
+class TrustRegion {
+ public:
+  explicit TrustRegion(double radius) : radius_(radius) {}
+  [[nodiscard]] double radius() const { return radius_; }
+  [[nodiscard]] bool exhausted() const { return radius_ < 1e-32; }
+  /// `gain`: of the cost, as a share of what was promised.
+  void accept(double gain);
+  void reject();
+
+ private:
+  double radius_;
+  double shrink_ = 2.0;
+};
+
+/// Poses in the order in which they are eliminated: free ones first.
+struct PoseSlots {
+  explicit PoseSlots(const BundleProblem& problem);
+  std::vector<int> of_pose;  ///< slot of each pose
+  std::vector<int> pose;     ///< pose of each slot
+  int free = 0;
+};
+
+/// An edge, linearised.
+struct RoundEdge {
+  int a;  ///< slot; -1: the world
+  int b;
+  EdgeView view;
+  bool robust;
+  EdgeDerivatives j{};
+  geometry::Vector6d r = geometry::Vector6d::Zero();
+};
+
+/// The normal equations of a round: J^T J and J^T r of free poses, and of landmarks with what couples them to
+/// poses.
+struct NormalEquations {
+  std::vector<geometry::Matrix6d> hessian;  ///< of each free slot
+  std::vector<geometry::Vector6d> gradient;
+  std::vector<Damping<6>> damping;
+  LandmarkFamily<3> points;
+  LandmarkFamily<4> lines;
+  std::vector<RoundEdge> edges;
+
+  void set_scales();
+  void set_damping();
+  [[nodiscard]] double largest_gradient() const;
+};
+
+/// What is left of the normal equations when landmarks are eliminated.
+class SchurComplement {
+ public:
+  explicit SchurComplement(int free_poses);
+  /// The step of all unknowns at this radius of the trust region (of landmarks: in their families); false
+  /// when the equations cannot be solved.
+  bool solve(NormalEquations& equations, double radius);
+  [[nodiscard]] Eigen::Matrix<double, 6, 1> pose_step(std::size_t slot) const {
+    return pose_steps_.segment<6>(static_cast<Eigen::Index>(6 * slot));
+  }
+  [[nodiscard]] double squared_pose_steps() const { return pose_steps_.squaredNorm(); }
+  /// Diagonal blocks of the inverse, without damping: the covariances of free poses. Empty: singular.
+  std::vector<geometry::Matrix6d> inverse_blocks(NormalEquations& equations);
+
+ private:
+  template <typename Family>
+  void eliminate(const Family& family, std::size_t slot);
+  void assemble(NormalEquations& equations, double radius);
+  [[nodiscard]] double* block(int row, int column) { return &matrix_(6 * row, 6 * column); }
+
+  int free_;
+  Eigen::VectorXd pose_steps_;  ///< 6 a free slot
+  Eigen::MatrixXd matrix_;      ///< its lower triangle
+  std::vector<Target> targets_;
+};
+
+/// One round: linearises, steps, keeps what lowers the cost.
 class BundleRound {
  public:
   BundleRound(const BundleProblem& problem, const BundleOptions& options);
@@ -45,60 +120,24 @@ class BundleRound {
   [[nodiscard]] std::vector<geometry::Matrix6d> covariances(const BundleState& state);
 
  private:
-  using Matrix6d = geometry::Matrix6d;
-  using Vector6d = geometry::Vector6d;
-  using Rigid3 = geometry::Rigid3;
-  using Points = LandmarkFamily<3>;
-  using Lines = LandmarkFamily<4>;
-  struct Edge {
-    int a;  ///< slot; -1: the world
-    int b;
-    EdgeView view;
-    bool robust;
-    EdgeDerivatives j{};
-    Vector6d r = Vector6d::Zero();
-  };
-
-  void choose_slots();
   void add_observations();
   [[nodiscard]] double cost(const BundleState& state);
   double linearise(const BundleState& state);
   double linearise_slot(std::size_t slot, const BundleState& state);
-  double linearise_edge(Edge& edge, const BundleState& state);
-  void set_scales();
-  void set_damping();
-  [[nodiscard]] double largest_gradient() const;
-  bool solve(double radius);
-  template <typename Family>
-  void eliminate(const Family& family, std::size_t slot);
-  void assemble(double radius);
-  [[nodiscard]] double* block(int row, int column) { return &matrix_(6 * row, 6 * column); }
+  double linearise_edge(RoundEdge& edge, const BundleState& state);
   [[nodiscard]] double model_decrease(double radius) const;
   void step(const BundleState& from, BundleState& to) const;
   [[nodiscard]] bool tiny_step(const BundleState& state) const;
+  const char* iterate(TrustRegion& region, BundleState& state, BundleState& next, RoundSummary& summary);
 
   const BundleProblem& problem_;
   const BundleOptions& options_;
   Eigen::Matrix3d projection_;
-  Huber point_loss_;
-  Huber line_loss_;
-  Huber edge_loss_;
-
-  std::vector<int> slot_of_;    ///< of each pose
-  std::vector<int> slot_pose_;  ///< pose of each slot
-  int free_ = 0;
-  Points points_;
-  Lines lines_;
+  PoseSlots slots_;
   std::vector<PointTerm> point_terms_;  ///< of each observation
   std::vector<LineView> line_views_;
-  std::vector<Edge> edges_;
-
-  std::vector<Matrix6d> normal_;  ///< of each free slot: J^T J
-  std::vector<Vector6d> gradient_;
-  std::vector<Damping<6>> damping_;
-  Eigen::VectorXd pose_steps_;  ///< 6 a free slot
-  Eigen::MatrixXd matrix_;      ///< of the reduced equations: its lower triangle
-  std::vector<Target> targets_;
+  NormalEquations equations_;
+  SchurComplement reduced_;
 };
 
 }  // namespace plumbline::optimize

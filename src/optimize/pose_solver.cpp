@@ -69,56 +69,66 @@ struct RowSums {
   }
 };
 
-template <bool kDerivatives>
-NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options) {
-  NormalEquations n;
-  RowSums sums;
-  Eigen::Matrix<double, 3, 6> j3;
-  Eigen::Matrix<double, 2, 6> j2;
-  Row6 j1;
+/// Reprojection and depth: e_p of the paper's section 3.2.
+void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
+                RowSums& sums, double& cost) {
+  Eigen::Vector3d r;
+  Eigen::Matrix<double, 3, 6> j;
   for (const PointTerm& term : problem.points) {
-    Eigen::Vector3d r;
-    const int rows = point_residual(term, pose, problem.camera, r, kDerivatives ? &j3 : nullptr);
+    const int rows = point_residual(term, pose, problem.camera, r, &j);
     if (rows == 0) {
-      n.cost += options.point_weight * huber(kUnseen * kUnseen, options.point_loss).cost;
+      cost += options.point_weight * huber(kUnseen * kUnseen, options.point_loss).cost;
       continue;
     }
     const Robust pixel = huber(r.head<2>().squaredNorm(), options.point_loss);
-    n.cost += options.point_weight * pixel.cost;
-    double depth_weight = 0.0;
-    if (rows == 3) {
-      const Robust depth = huber(r(2) * r(2), options.plane_loss);
-      // A corner whose picture does not fit has no say about depth either.
-      depth_weight = options.point_weight * depth.weight * pixel.weight;
-      n.cost += options.point_weight * depth.cost;
-    }
-    if constexpr (kDerivatives) {
-      sums.add(j3.row(0), r(0), options.point_weight * pixel.weight);
-      sums.add(j3.row(1), r(1), options.point_weight * pixel.weight);
-      if (rows == 3) sums.add(j3.row(2), r(2), depth_weight);
-    }
+    cost += options.point_weight * pixel.cost;
+    sums.add(j.row(0), r(0), options.point_weight * pixel.weight);
+    sums.add(j.row(1), r(1), options.point_weight * pixel.weight);
+    if (rows < 3) continue;
+    const Robust depth = huber(r(2) * r(2), options.plane_loss);
+    cost += options.point_weight * depth.cost;
+    // A corner whose picture does not fit has no say about depth either.
+    sums.add(j.row(2), r(2), options.point_weight * depth.weight * pixel.weight);
   }
+}
+
+/// Measured ends from the projected line: e_l of section 3.2.
+void add_lines(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
+               RowSums& sums, double& cost) {
   const Eigen::Matrix3d projection =
       geometry::line_projection(problem.camera.fx, problem.camera.fy, problem.camera.cx, problem.camera.cy);
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 6> j;
   for (const LineTerm& term : problem.lines) {
-    Eigen::Vector2d r;
-    if (!line_residual(term, pose, projection, r, kDerivatives ? &j2 : nullptr)) {
-      n.cost += options.line_weight * huber(kUnseen * kUnseen, options.line_loss).cost;
+    if (!line_residual(term, pose, projection, r, &j)) {
+      cost += options.line_weight * huber(kUnseen * kUnseen, options.line_loss).cost;
       continue;
     }
     const Robust robust = huber(r.squaredNorm(), options.line_loss);
-    n.cost += options.line_weight * robust.cost;
-    if constexpr (kDerivatives) {
-      sums.add(j2.row(0), r(0), options.line_weight * robust.weight);
-      sums.add(j2.row(1), r(1), options.line_weight * robust.weight);
-    }
+    cost += options.line_weight * robust.cost;
+    sums.add(j.row(0), r(0), options.line_weight * robust.weight);
+    sums.add(j.row(1), r(1), options.line_weight * robust.weight);
   }
+}
+
+/// Point to plane (docs/method/least_squares.md).
+void add_planes(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options,
+                RowSums& sums, double& cost) {
+  Row6 j;
   for (const PlaneTerm& term : problem.planes) {
-    const double r = plane_residual(term, pose, kDerivatives ? &j1 : nullptr);
+    const double r = plane_residual(term, pose, &j);
     const Robust robust = huber(r * r, options.plane_loss);
-    n.cost += options.plane_weight * robust.cost;
-    if constexpr (kDerivatives) sums.add(j1, r, options.plane_weight * robust.weight);
+    cost += options.plane_weight * robust.cost;
+    sums.add(j, r, options.plane_weight * robust.weight);
   }
+}
+
+NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const PoseSolverOptions& options) {
+  NormalEquations n;
+  RowSums sums;
+  add_points(problem, pose, options, sums, n.cost);
+  add_lines(problem, pose, options, sums, n.cost);
+  add_planes(problem, pose, options, sums, n.cost);
   sums.move_to(n);
   if (problem.photometric) {
     const PhotometricSums seen = sum_photometric(*problem.photometric, pose, options.photometric_loss);
@@ -139,12 +149,31 @@ void add_prior(const PoseProblem& problem, const Rigid3& pose, NormalEquations& 
   n.h += problem.prior->information;
 }
 
-FamilySummary summarise(const std::vector<double>& squared, double gate_sq) {
+std::vector<double> plane_errors(const PoseProblem& problem, const Rigid3& pose) {
+  std::vector<double> errors;
+  errors.reserve(problem.planes.size());
+  for (const PlaneTerm& term : problem.planes) {
+    const double r = plane_residual(term, pose, nullptr);
+    errors.push_back(r * r);
+  }
+  return errors;
+}
+
+std::vector<double> photometric_errors(const PoseProblem& problem, const Rigid3& pose) {
+  std::vector<double> errors;
+  if (!problem.photometric) return errors;
+  for (const float r : photometric_residuals(*problem.photometric, pose))
+    errors.push_back(static_cast<double>(r) * static_cast<double>(r));
+  return errors;
+}
+
+FamilySummary summarise(const std::vector<double>& squared) {
+  constexpr double kGateSq = 9.0;
   FamilySummary s;
   s.terms = static_cast<int>(squared.size());
   double sum = 0.0;
   for (double e : squared) {
-    if (!(e <= gate_sq)) continue;
+    if (!(e <= kGateSq)) continue;
     ++s.inliers;
     sum += e;
   }
@@ -155,8 +184,6 @@ FamilySummary summarise(const std::vector<double>& squared, double gate_sq) {
 }  // namespace
 
 void PoseSolverOptions::declare(core::OptionTable& table) {
-  table.integer("solver.max_iterations", max_iterations, {1, 100}, "",
-                "Levenberg-Marquardt iterations at most");
   table.number("solver.point_loss", point_loss, {0.1, 100.0}, "",
                "Huber threshold of points, standard deviations");
   table.number("solver.line_loss", line_loss, {0.1, 100.0}, "",
@@ -176,57 +203,38 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
                        const PoseSolverOptions& options) {
   PoseSummary summary;
   Rigid3 pose = camera_from_world;
-  NormalEquations n = evaluate<true>(problem, pose, options);
-  const Matrix6d information_at_start = n.h;
-  summary.information = information_at_start;
+  NormalEquations n = evaluate(problem, pose, options);
+  summary.information = n.h;
   add_prior(problem, pose, n);
   summary.initial_cost = n.cost;
   double lambda = 1e-5;
-  for (; summary.iterations < options.max_iterations; ++summary.iterations) {
+  for (; summary.iterations < options.max_iterations && !summary.converged; ++summary.iterations) {
     Matrix6d damped = n.h.selfadjointView<Eigen::Lower>();
     damped.diagonal() += damping(n.h, lambda);
     const Vector6d step = -damped.ldlt().solve(n.g);
     if (!step.allFinite()) break;
     const Rigid3 trial = geometry::exp_se3(step) * pose;
-    NormalEquations at_trial = evaluate<true>(problem, trial, options);
+    NormalEquations at_trial = evaluate(problem, trial, options);
     const Matrix6d information = at_trial.h;
     add_prior(problem, trial, at_trial);
+    summary.converged = step.cwiseAbs().maxCoeff() < options.min_step;
     if (at_trial.cost <= n.cost) {
       pose = trial;
       n = at_trial;
       summary.information = information;
       lambda = std::max(1e-9, lambda * 0.1);
-      if (step.cwiseAbs().maxCoeff() < options.min_step) {
-        summary.converged = true;
-        break;
-      }
     } else {
       lambda *= 10.0;
-      if (lambda > 1e6 || step.cwiseAbs().maxCoeff() < options.min_step) {
-        summary.converged = true;
-        break;
-      }
+      summary.converged = summary.converged || lambda > 1e6;
     }
   }
   summary.information = summary.information.selfadjointView<Eigen::Lower>();
   summary.camera_from_world = pose;
   summary.final_cost = n.cost;
-  constexpr double kGateSq = 9.0;
-  summary.points = summarise(point_errors(problem, pose), kGateSq);
-  summary.lines = summarise(line_errors(problem, pose), kGateSq);
-  std::vector<double> planes;
-  planes.reserve(problem.planes.size());
-  for (const PlaneTerm& term : problem.planes) {
-    const double r = plane_residual(term, pose, nullptr);
-    planes.push_back(r * r);
-  }
-  summary.planes = summarise(planes, kGateSq);
-  std::vector<double> grey;
-  if (problem.photometric) {
-    for (const float r : photometric_residuals(*problem.photometric, pose))
-      grey.push_back(static_cast<double>(r) * static_cast<double>(r));
-  }
-  summary.photometric = summarise(grey, kGateSq);
+  summary.points = summarise(point_errors(problem, pose));
+  summary.lines = summarise(line_errors(problem, pose));
+  summary.planes = summarise(plane_errors(problem, pose));
+  summary.photometric = summarise(photometric_errors(problem, pose));
   return summary;
 }
 

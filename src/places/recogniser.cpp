@@ -50,50 +50,49 @@ std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, Key
   const double threshold = std::max(options_.min_absolute, options_.min_score * usual);
   std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed);
   while (!hits.empty() && hits.back().score < threshold) hits.pop_back();
+  return seen_in_a_row(query.robot, islands(hits, usual, neighbours));
+}
 
-  struct Found {
-    Candidate candidate;
-    Group group;
-  };
-  std::vector<Found> found;
+/// Hits come best first: what lies in the surroundings of a better one belongs to that.
+std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits, double usual,
+                                                    const Neighbours& neighbours) const {
+  std::vector<Island> result;
   for (const Hit& hit : hits) {
-    // Hits come best first: what lies in the surroundings of a better one belongs to that.
-    const auto known = std::find_if(found.begin(), found.end(), [&](const Found& f) {
-      return std::binary_search(f.group.members.begin(), f.group.members.end(), hit.keyframe);
+    const auto known = std::find_if(result.begin(), result.end(), [&](const Island& island) {
+      return std::binary_search(island.members.begin(), island.members.end(), hit.keyframe);
     });
-    if (known != found.end()) {
+    if (known != result.end()) {
       known->candidate.group_score += hit.score;
       continue;
     }
-    Found f;
-    f.candidate.keyframe = hit.keyframe;
-    f.candidate.score = f.candidate.group_score = hit.score;
-    f.candidate.relative = usual > 0.0 ? hit.score / usual : 1.0;
-    f.group.members = neighbours(hit.keyframe);
-    f.group.members.push_back(hit.keyframe);
-    std::sort(f.group.members.begin(), f.group.members.end());
-    found.push_back(std::move(f));
+    Island& island = result.emplace_back();
+    island.candidate.keyframe = hit.keyframe;
+    island.candidate.score = island.candidate.group_score = hit.score;
+    island.candidate.relative = usual > 0.0 ? hit.score / usual : 1.0;
+    island.members = neighbours(hit.keyframe);
+    island.members.push_back(hit.keyframe);
+    std::sort(island.members.begin(), island.members.end());
   }
-  std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+  std::stable_sort(result.begin(), result.end(), [](const Island& a, const Island& b) {
     return a.candidate.group_score > b.candidate.group_score;
   });
-  if (found.size() > static_cast<std::size_t>(options_.groups)) {
-    found.resize(static_cast<std::size_t>(options_.groups));
-  }
-  std::vector<Group>& last = last_[query.robot];
-  std::vector<Group> now;
+  if (result.size() > static_cast<std::size_t>(options_.groups))
+    result.resize(static_cast<std::size_t>(options_.groups));
+  return result;
+}
+
+/// Counts for how many queries of the robot these surroundings have been found.
+std::vector<Candidate> Recogniser::seen_in_a_row(std::int32_t robot, std::vector<Island> islands) {
+  std::vector<Island>& last = last_[robot];
   std::vector<Candidate> candidates;
-  for (Found& f : found) {
-    for (const Group& before : last) {
-      if (meet(before.members, f.group.members)) {
-        f.group.in_a_row = std::max(f.group.in_a_row, before.in_a_row + 1);
-      }
+  for (Island& island : islands) {
+    int& in_a_row = island.candidate.in_a_row;
+    for (const Island& before : last) {
+      if (meet(before.members, island.members)) in_a_row = std::max(in_a_row, before.candidate.in_a_row + 1);
     }
-    f.candidate.in_a_row = f.group.in_a_row;
-    candidates.push_back(f.candidate);
-    now.push_back(std::move(f.group));
+    candidates.push_back(island.candidate);
   }
-  last = std::move(now);
+  last = std::move(islands);
   return candidates;
 }
 

@@ -59,6 +59,33 @@ float angle_between(float a, float b) {
   return std::min(d, 360.0F - d);
 }
 
+/// The most similar of some corners, and the next best somewhere else: two corners of neighbouring octaves at
+/// one place are the same corner.
+struct BestTwo {
+  int feature = -1;
+  int distance = 257;
+  int second = 257;
+};
+BestTwo best_two(const std::vector<features::PointFeature>& corners, const std::vector<int>& near,
+                 const std::vector<int>& distances) {
+  constexpr float kSamePlace_px = 3.0F;
+  BestTwo best;
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    if (distances[i] >= best.second) continue;
+    const bool elsewhere = best.feature < 0 || (corners[static_cast<std::size_t>(best.feature)].pixel -
+                                                corners[static_cast<std::size_t>(near[i])].pixel)
+                                                       .norm() >= kSamePlace_px;
+    if (distances[i] < best.distance) {
+      if (elsewhere) best.second = best.distance;
+      best.distance = distances[i];
+      best.feature = near[i];
+    } else if (elsewhere) {
+      best.second = distances[i];
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 void AssociationOptions::declare(core::OptionTable& table) {
@@ -107,28 +134,10 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     distances.resize(near.size());
     features::hamming_distances(point->descriptor, frame.descriptors.data(), near.data(), near.size(),
                                 distances.data());
-    int best = 257;
-    int second = 257;
-    int best_feature = -1;
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      if (distances[i] < best) {
-        // Two corners of neighbouring octaves at one place are the same corner, not an alternative.
-        const bool same_place =
-            best_feature >= 0 && (frame.points[static_cast<std::size_t>(best_feature)].pixel -
-                                  frame.points[static_cast<std::size_t>(near[i])].pixel)
-                                         .norm() < 3.0F;
-        if (!same_place) second = best;
-        best = distances[i];
-        best_feature = near[i];
-      } else if (distances[i] < second && (frame.points[static_cast<std::size_t>(best_feature)].pixel -
-                                           frame.points[static_cast<std::size_t>(near[i])].pixel)
-                                                  .norm() >= 3.0F) {
-        second = distances[i];
-      }
-    }
-    if (best > options.max_hamming || best > options.ratio * second) continue;
-    PointMatch& slot = by_feature[static_cast<std::size_t>(best_feature)];
-    if (best < slot.distance) slot = {id, best_feature, best};
+    const BestTwo best = best_two(frame.points, near, distances);
+    if (best.distance > options.max_hamming || best.distance > options.ratio * best.second) continue;
+    PointMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];
+    if (best.distance < slot.distance) slot = {id, best.feature, best.distance};
   }
   std::vector<PointMatch> matches;
   for (const PointMatch& m : by_feature) {

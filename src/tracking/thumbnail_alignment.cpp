@@ -81,6 +81,30 @@ Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current
   return step;
 }
 
+sensor::Pinhole scaled(const sensor::Pinhole& camera, const cv::Mat& image) {
+  const double sx = static_cast<double>(image.cols) / camera.width;
+  const double sy = static_cast<double>(image.rows) / camera.height;
+  return {image.cols,
+          image.rows,
+          camera.fx * sx,
+          camera.fy * sy,
+          (camera.cx + 0.5) * sx - 0.5,
+          (camera.cy + 0.5) * sy - 0.5};
+}
+
+std::vector<ThumbnailPixel> gather_pixels(const cv::Mat& image, const cv::Mat& depth,
+                                          const sensor::Pinhole& camera) {
+  std::vector<ThumbnailPixel> pixels;
+  pixels.reserve(static_cast<std::size_t>(image.total()));
+  for (int y = 1; y + 1 < image.rows; ++y) {
+    for (int x = 1; x + 1 < image.cols; ++x) {
+      const float z = depth.at<float>(y, x);
+      if (z > 0.0F) pixels.push_back({camera.unproject(x, y, static_cast<double>(z)), image.at<float>(y, x)});
+    }
+  }
+  return pixels;
+}
+
 }  // namespace
 
 ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& previous_depth,
@@ -91,25 +115,8 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
   if (previous.empty() || current.empty() || previous_depth.empty() || previous.size() != current.size()) {
     return result;
   }
-  sensor::Pinhole small = camera;
-  const double sx = static_cast<double>(previous.cols) / camera.width;
-  const double sy = static_cast<double>(previous.rows) / camera.height;
-  small.width = previous.cols;
-  small.height = previous.rows;
-  small.fx *= sx;
-  small.fy *= sy;
-  small.cx = (camera.cx + 0.5) * sx - 0.5;
-  small.cy = (camera.cy + 0.5) * sy - 0.5;
-
-  std::vector<ThumbnailPixel> pixels;
-  pixels.reserve(static_cast<std::size_t>(previous.total()));
-  for (int y = 1; y + 1 < previous.rows; ++y) {
-    for (int x = 1; x + 1 < previous.cols; ++x) {
-      const float z = previous_depth.at<float>(y, x);
-      if (z > 0.0F)
-        pixels.push_back({small.unproject(x, y, static_cast<double>(z)), previous.at<float>(y, x)});
-    }
-  }
+  const sensor::Pinhole small = scaled(camera, previous);
+  const std::vector<ThumbnailPixel> pixels = gather_pixels(previous, previous_depth, small);
   if (pixels.size() < 200) return result;
 
   constexpr double kLoss = 8.0;            // grey values

@@ -13,6 +13,7 @@ namespace plumbline::tests {
 
 struct LandmarkWorld {
   sensor::Pinhole camera{640, 480, 525.0, 525.0, 319.5, 239.5};
+  std::int32_t robot = 0;  ///< whose keyframes are added
   std::vector<Eigen::Vector3d> points;
   std::vector<features::Descriptor256> point_descriptors;
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> lines;
@@ -68,7 +69,7 @@ struct LandmarkWorld {
       features->lines.push_back(f);
     }
     auto keyframe = std::make_shared<maps::Keyframe>();
-    keyframe->id = map.next_keyframe_id(0);
+    keyframe->id = map.next_keyframe_id(robot);
     keyframe->turn_rate = turn_rate;
     keyframe->features = features;
     for (const maps::SurfaceSample& s : surface) {

@@ -69,8 +69,8 @@ struct DepthFieldReport {
 /// The field of the camera that took all `views`, from their disagreement at fixed poses. The run is cut into
 /// parts; a field found from the others must take away `least_gain` of the disagreement with each part's
 /// views, all in all; else the field corrects nothing, as it does where too little overlaps. `read`: as for
-/// fuse_views; depth views are passed over. `views`: indices for `read` and `world_from_camera`, in the order of
-/// time. The same for any number of threads. Errors are those of `read`. `report` may be null.
+/// fuse_views; depth views are passed over. `views`: indices for `read` and `world_from_camera`, in the order
+/// of time. The same for any number of threads. Errors are those of `read`. `report` may be null.
 core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
                                           const std::vector<geometry::Rigid3>& world_from_camera,
                                           const ReadView& read, const sensor::Pinhole& camera,

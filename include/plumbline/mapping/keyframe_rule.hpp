@@ -51,14 +51,8 @@ struct KeyframeDecision {
   bool mapper_idle = true;
   ConeTerms cone;
   bool wanted = false;
-  bool urgent = false;  ///< tracking is about to be lost
-};
-
-/// What the rule knows besides the track.
-struct KeyframeCircumstances {
-  int frame_points = 0;     ///< corners in the picture
-  bool mapper_idle = true;  ///< no bundle waits to be put back
-  int depth_points = 0;     ///< corners with depth
+  bool urgent = false;     ///< tracking is about to be lost
+  core::KeyframeId reuse;  ///< instead of a new keyframe this one becomes the reference again; invalid: none
 };
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
@@ -67,27 +61,25 @@ struct KeyframeCircumstances {
 /// depth is back after a keyframe that had none.
 class KeyframeRule {
  public:
-  explicit KeyframeRule(const KeyframeRuleOptions& options) : options_(options) {}
-  KeyframeDecision decide(const maps::Map& map, core::KeyframeId reference,
-                          const tracking::TrackResult& track, const sensor::Pinhole& camera,
-                          const KeyframeCircumstances& circumstances);
+  KeyframeRule(const KeyframeRuleOptions& options, const sensor::Pinhole& camera)
+      : options_(options), camera_(camera) {}
+  /// `track`: with its features and reference keyframe; `mapper_idle`: no bundle waits to be put back.
+  KeyframeDecision decide(const maps::Map& map, const tracking::TrackResult& track, bool mapper_idle);
   /// A new keyframe was made, or another one became the reference.
   void keyframe_made();
-  /// A keyframe other than `reference` that makes a new one needless, as far as the plain rule goes: it saw
+  /// A keyframe other than the reference that makes a new one needless, as far as the plain rule goes: it saw
   /// `min_shared` of the landmarks that the frame has matched, and the frame is well within the plain rule's
   /// limits for movement and for its surface. Of several the one that saw most; invalid: none. Without it a
   /// map would grow as long as the camera moves, however often it has been there.
-  [[nodiscard]] core::KeyframeId earlier_reference(const maps::Map& map, core::KeyframeId reference,
-                                                   const tracking::TrackResult& track,
-                                                   const sensor::Pinhole& camera) const;
+  [[nodiscard]] core::KeyframeId reusable_keyframe(const maps::Map& map,
+                                                   const tracking::TrackResult& track) const;
 
  private:
   [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;
-  ConeTerms look_at_cones(const maps::Map& map, core::KeyframeId reference,
-                          const tracking::TrackResult& track, const sensor::Pinhole& camera,
-                          const KeyframeCircumstances& circumstances);
+  ConeTerms cone_terms(const maps::Map& map, const tracking::TrackResult& track, bool mapper_idle);
 
   KeyframeRuleOptions options_;
+  sensor::Pinhole camera_;
   int frames_since_ = 0;
   int features_after_keyframe_ = 0;
   /// The first frame after the keyframe that cones are counted against.

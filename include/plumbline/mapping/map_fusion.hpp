@@ -82,35 +82,61 @@ struct OverlayFit {
   }
 };
 
-/// All that was found out about two parts.
+/// The largest set of verified pairs of keyframes that say the same of how two worlds lie.
+struct Consistency {
+  int verified = 0;                 ///< pairs in all
+  int agreeing = 0;                 ///< keyframes of the set, on the side that has fewer
+  double span_m = 0.0;              ///< how far apart b's keyframes of the set lie
+  double span_rad = 0.0;            ///< how far turned
+  std::vector<VerifiedPair> pairs;  ///< of the set
+};
+
+/// How two worlds lie, as a set of pairs says.
+struct Alignment {
+  geometry::Rigid3 a_from_b;
+  /// Of log(a_from_b_true * a_from_b^-1), at the middle of b's keyframes.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
+  double spread_m = 0.0;  ///< RMS of where the pairs put b's cameras, about the mean
+};
+
+/// Would another alignment do as well?
+struct Ambiguity {
+  OverlayFit overlap;   ///< the maps, as aligned
+  int alternative = 0;  ///< keyframes that speak for another one that the maps do not refute, at most
+  OverlayFit alternative_overlap;  ///< as the best other one has it that they do not refute, and
+  double alternative_m = 0.0;      ///< how far off it puts b's cameras; 0: there is none
+};
+
+/// Do other keyframes see what they should, if the alignment is right?
+struct CrossValidation {
+  int expected = 0;                 ///< keyframes of b that should see what a saw
+  int confirmed = 0;                ///< of these, that do
+  std::vector<VerifiedPair> pairs;  ///< more that agree
+};
+
+struct PairTotals {
+  int matches = 0;       ///< sums: by descriptor,
+  int inliers = 0;       ///< points and lines that fit in the end
+  double rms_px = 0.0;   ///< mean, standard deviations
+  double overlap = 0.0;  ///< of the surfaces, mean
+};
+
+/// All that was found out about two parts. What is refused at one step has no later ones.
 struct MergeEvidence {
   std::size_t a = 0;  ///< parts, a < b
   std::size_t b = 0;
   int candidates = 0;  ///< pairs of keyframes that look alike
   int tried = 0;       ///< of these, verified or refused
-  int verified = 0;
-  int agreeing = 0;            ///< of the verified, in the largest set that says the same
-  int alternative = 0;         ///< in the largest set that says something else and is not refuted by the maps
-  int expected = 0;            ///< keyframes of b that should see what a saw, if the set is right
-  int confirmed = 0;           ///< of these, that do
-  int matches = 0;             ///< of the agreeing pairs, sums: by descriptor,
-  int inliers = 0;             ///< points and lines that fit in the end
-  double rms_px = 0.0;         ///< mean over the agreeing pairs, standard deviations
-  double overlap = 0.0;        ///< of the surfaces, mean
-  OverlayFit laid;             ///< the maps, as the set has it
-  OverlayFit alternative_fit;  ///< as the best other answer has it that the maps do not refute, and
-  double alternative_m = 0.0;  ///< how far from the set's it puts b's cameras; 0: there is none
-  double span_m = 0.0;         ///< how far apart the agreeing keyframes lie
-  double span_rad = 0.0;
-  double spread_m = 0.0;      ///< RMS of what the agreeing pairs say of b's cameras, about the mean
-  geometry::Rigid3 a_from_b;  ///< worlds
-  /// Of log(a_from_b_true * a_from_b^-1), at the middle of the agreeing keyframes.
-  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
-  std::vector<VerifiedPair> pairs;           ///< that agree
+  Consistency consistency;
+  Alignment alignment;
+  Ambiguity ambiguity;
+  CrossValidation validation;
+  std::vector<VerifiedPair> pairs;           ///< all that agree
   int rejected = 0;                          ///< of these, taken for wrong by the pose graph of the whole
   std::map<std::string, int> refused_pairs;  ///< why pairs were refused, and how many
   bool accepted = false;
   std::string refused;  ///< why not; empty when accepted
+  [[nodiscard]] PairTotals totals() const;
 };
 
 /// Looks for shared places among the keyframes of several parts.

@@ -56,12 +56,17 @@ class Recogniser {
   [[nodiscard]] const RecogniserOptions& options() const { return options_; }
 
  private:
-  struct Group {
+  /// Keyframes that see much the same.
+  struct Island {
+    Candidate candidate;
     std::vector<core::KeyframeId> members;  ///< sorted
-    int in_a_row = 1;
   };
+  [[nodiscard]] std::vector<Island> islands(const std::vector<Hit>& hits, double usual,
+                                            const Neighbours& neighbours) const;
+  std::vector<Candidate> seen_in_a_row(std::int32_t robot, std::vector<Island> islands);
+
   RecogniserOptions options_;
-  std::map<std::int32_t, std::vector<Group>> last_;  ///< by robot
+  std::map<std::int32_t, std::vector<Island>> last_;  ///< by robot
 };
 
 }  // namespace plumbline::places

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "plumbline/cloud/free_space.hpp"
@@ -214,6 +215,68 @@ std::vector<std::pair<std::size_t, std::size_t>> partners(const std::vector<geom
   return pairs;
 }
 
+/// Views spread evenly over the run; depth-only views have no samples.
+core::Result<std::vector<View>> sample_views(const std::vector<std::size_t>& views, std::size_t count,
+                                             const std::vector<geometry::Rigid3>& world_from_camera,
+                                             const ReadView& read, const sensor::Pinhole& camera,
+                                             const core::Executor& executor,
+                                             std::vector<geometry::Rigid3>& poses) {
+  std::vector<View> result(count);
+  std::vector<core::Result<void>> done(count);
+  poses.resize(count);
+  executor.parallel_for(count, [&](std::size_t i) {
+    const std::size_t view = views[i * views.size() / count];
+    const auto cloud = read(view);
+    if (!cloud) {
+      done[i] = tl::unexpected<core::Error>(cloud.error());
+      return;
+    }
+    poses[i] = world_from_camera[view] * sensor_pose(**cloud);
+    if (!is_depth_view(**cloud, camera)) result[i] = sampled(**cloud, camera);
+  });
+  for (const auto& one : done) {
+    if (!one) return tl::unexpected<core::Error>(one.error());
+  }
+  return result;
+}
+
+/// Two views that were compared, and what that gave.
+struct Comparison {
+  std::size_t a;
+  std::size_t b;
+  Rows rows;
+};
+
+/// Disagreement between views, with a field that those of other parts of the run gave and without; none: a
+/// part is left with too few samples.
+struct Disagreement {
+  std::vector<double> before, after;
+};
+std::optional<Disagreement> cross_validate(const std::vector<Comparison>& comparisons, std::size_t views,
+                                           const sensor::Pinhole& camera, const core::Executor& executor) {
+  const auto part = [&](std::size_t view) { return view * kBlocks / views % kParts; };
+  std::vector<std::optional<Disagreement>> parts(kParts);
+  executor.parallel_for(kParts, [&](std::size_t k) {
+    std::vector<const Rows*> own;
+    std::vector<const Rows*> others;
+    for (const Comparison& c : comparisons) {
+      if (part(c.a) == k) own.push_back(&c.rows);
+      if (part(c.a) != k && part(c.b) != k) others.push_back(&c.rows);
+    }
+    if (count_of(others) < kLeastSamples) return;
+    parts[k].emplace();
+    add_disagreement(own, DepthField(), parts[k]->before);
+    add_disagreement(own, fitted(others, camera, executor), parts[k]->after);
+  });
+  Disagreement all;
+  for (const auto& one : parts) {
+    if (!one) return std::nullopt;
+    all.before.insert(all.before.end(), one->before.begin(), one->before.end());
+    all.after.insert(all.after.end(), one->after.begin(), one->after.end());
+  }
+  return all;
+}
+
 }  // namespace
 
 DepthField::Terms DepthField::monomials(double x, double y) {
@@ -281,65 +344,26 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
   DepthFieldReport& found = report == nullptr ? unused : *report;
   found = {};
   const std::size_t count = std::min(views.size(), static_cast<std::size_t>(options.views));
-  std::vector<View> sampled_views(count);
-  std::vector<geometry::Rigid3> poses(count);
-  std::vector<core::Result<void>> done(count);
-  executor.parallel_for(count, [&](std::size_t i) {
-    const std::size_t view = views[i * views.size() / count];
-    const auto cloud = read(view);
-    if (!cloud) {
-      done[i] = tl::unexpected<core::Error>(cloud.error());
-      return;
-    }
-    poses[i] = world_from_camera[view] * sensor_pose(**cloud);
-    if (!is_depth_view(**cloud, camera)) sampled_views[i] = sampled(**cloud, camera);
-  });
-  for (const auto& result : done) {
-    if (!result) return tl::unexpected<core::Error>(result.error());
-  }
+  std::vector<geometry::Rigid3> poses;
+  const auto samples = sample_views(views, count, world_from_camera, read, camera, executor, poses);
+  if (!samples) return tl::unexpected<core::Error>(samples.error());
   if (count < kLeastViews) return DepthField();
 
-  const auto pairs = partners(poses, options.partners);
-  std::vector<Rows> rows(pairs.size());
-  executor.parallel_for(pairs.size(), [&](std::size_t k) {
-    const auto [a, b] = pairs[k];
-    rows[k] = compared(sampled_views[a], sampled_views[b], poses[b].inverse() * poses[a], camera);
+  std::vector<Comparison> comparisons;
+  for (const auto& [a, b] : partners(poses, options.partners)) comparisons.push_back({a, b, {}});
+  executor.parallel_for(comparisons.size(), [&](std::size_t k) {
+    Comparison& c = comparisons[k];
+    c.rows = compared((*samples)[c.a], (*samples)[c.b], poses[c.b].inverse() * poses[c.a], camera);
   });
   std::vector<const Rows*> all;
-  for (const Rows& some : rows) all.push_back(&some);
+  for (const Comparison& c : comparisons) all.push_back(&c.rows);
   found.samples = count_of(all);
   if (found.samples < kLeastSamples) return DepthField();
 
-  // Each part of the run is asked what it makes of a field in which it had no say.
-  struct Answer {
-    bool enough = false;
-    std::vector<double> before, after;
-  };
-  std::vector<Answer> answers(kParts);
-  const auto part = [&](std::size_t view) { return view * kBlocks / count % kParts; };
-  executor.parallel_for(kParts, [&](std::size_t k) {
-    std::vector<const Rows*> own;
-    std::vector<const Rows*> others;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const auto [a, b] = pairs[i];
-      if (part(a) == k) own.push_back(&rows[i]);
-      if (part(a) != k && part(b) != k) others.push_back(&rows[i]);
-    }
-    Answer& answer = answers[k];
-    answer.enough = count_of(others) >= kLeastSamples;
-    if (!answer.enough) return;
-    add_disagreement(own, DepthField(), answer.before);
-    add_disagreement(own, fitted(others, camera, executor), answer.after);
-  });
-  std::vector<double> before;
-  std::vector<double> after;
-  for (const Answer& answer : answers) {
-    if (!answer.enough) return DepthField();
-    before.insert(before.end(), answer.before.begin(), answer.before.end());
-    after.insert(after.end(), answer.after.begin(), answer.after.end());
-  }
-  found.before = median(before);
-  found.after = median(after);
+  auto disagreement = cross_validate(comparisons, count, camera, executor);
+  if (!disagreement) return DepthField();
+  found.before = median(disagreement->before);
+  found.after = median(disagreement->after);
   found.used = found.after <= (1.0 - options.least_gain) * found.before;
   if (!found.used) return DepthField();
   const DepthField field = fitted(all, camera, executor);

@@ -120,6 +120,49 @@ double drift_factor(const std::vector<Discrepancy>& discrepancies) {
   return *middle;
 }
 
+/// Which edges from elsewhere stay out of the graph: what no drift explains would tear it before the others
+/// could tell that it is wrong.
+struct Gating {
+  double drift_factor = 1.0;
+  std::vector<double> chi2;   ///< of each; 0: nothing to hold it against
+  std::vector<bool> refused;  ///< of each
+};
+
+Gating gate_edges(const maps::Map& map, const std::vector<KeyframeId>& ids,
+                  const std::vector<PoseEdge>& extra, const optimize::PoseGraphOptions& options) {
+  std::vector<Discrepancy> discrepancies;
+  for (const PoseEdge& e : extra) {
+    if (!map.has_keyframe(e.a) || !map.has_keyframe(e.b))
+      throw std::out_of_range("solve_map_graph: no such keyframe");
+    discrepancies.push_back(discrepancy(map, ids, e));
+  }
+  Gating result;
+  result.drift_factor = drift_factor(discrepancies);
+  const double gate = optimize::chi_square_gate(6, options.false_alarm);
+  const bool robust = options.robust != optimize::EdgeRobustness::kNone;
+  for (const Discrepancy& d : discrepancies) {
+    result.chi2.push_back(d.known ? d.chi2(result.drift_factor) : 0.0);
+    result.refused.push_back(robust && result.chi2.back() > gate);
+  }
+  return result;
+}
+
+/// The summary has verdicts on the edges in the graph, those from elsewhere first: it gets them on all from
+/// elsewhere.
+void add_verdicts(const Gating& gating, optimize::PoseGraphSummary& summary) {
+  std::vector<optimize::EdgeVerdict> verdicts(gating.refused.size());
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    if (gating.refused[i]) {
+      verdicts[i] = {gating.chi2[i], 6, 0.0, true};
+      ++summary.rejected;
+    } else if (!summary.edges.empty()) {
+      verdicts[i] = summary.edges[next++];
+    }
+  }
+  summary.edges = std::move(verdicts);
+}
+
 /// Mean of the places where a landmark's keyframes would take it.
 Eigen::Vector3d carried(const Eigen::Vector3d& p, const std::vector<maps::Observation>& seen,
                         const std::map<KeyframeId, Rigid3>& new_from_old) {
@@ -182,40 +225,18 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
     index[id] = static_cast<int>(graph.poses.size());
     graph.poses.push_back({map.camera_from_world(id), id == anchor});
   }
-  std::vector<Discrepancy> discrepancies;
-  for (const PoseEdge& e : extra) {
-    if (index.count(e.a) == 0 || index.count(e.b) == 0)
-      throw std::out_of_range("solve_map_graph: no such keyframe");
-    discrepancies.push_back(discrepancy(map, ids, e));
-  }
-  // What no drift explains would tear the graph before the others could tell that it is wrong: it stays out.
-  const double factor = drift_factor(discrepancies);
-  const double gate = optimize::chi_square_gate(6, options.false_alarm);
-  std::vector<int> place(extra.size(), -1);  // in the graph
+  const auto add = [&](const PoseEdge& e, const Matrix6d& information) {
+    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, information, e.trusted});
+  };
+  const Gating gating = gate_edges(map, ids, extra, options);
   for (std::size_t i = 0; i < extra.size(); ++i) {
-    const PoseEdge& e = extra[i];
-    const bool robust = options.robust != optimize::EdgeRobustness::kNone;
-    if (robust && discrepancies[i].known && discrepancies[i].chi2(factor) > gate) continue;
-    place[i] = static_cast<int>(graph.edges.size());
-    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information, e.trusted});
+    if (!gating.refused[i]) add(extra[i], extra[i].information);
   }
-  for (const PoseEdge& e : map_edges(map)) {
-    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, e.information / factor, true});
-  }
+  for (const PoseEdge& e : map_edges(map)) add(e, e.information / gating.drift_factor);
   result.summary = optimize::solve_pose_graph(graph, options);
-  std::vector<optimize::EdgeVerdict> verdicts(extra.size());
-  for (std::size_t i = 0; i < extra.size(); ++i) {
-    if (place[i] >= 0 && !result.summary.edges.empty()) {
-      verdicts[i] = result.summary.edges[static_cast<std::size_t>(place[i])];
-    } else if (place[i] < 0) {
-      verdicts[i] = {discrepancies[i].chi2(factor), 6, 0.0, true};
-      ++result.summary.rejected;
-    }
-  }
-  result.summary.edges = std::move(verdicts);
-  for (std::size_t i = 0; i < ids.size(); ++i) {
+  add_verdicts(gating, result.summary);
+  for (std::size_t i = 0; i < ids.size(); ++i)
     result.poses.emplace_back(ids[i], graph.poses[i].camera_from_world);
-  }
   return result;
 }
 

@@ -64,11 +64,11 @@ bool fits(const maps::MapLine& line, const features::LineFeature& f,
 /// Does the landmark lie where each of the other's keyframes saw it? Two edges may meet in one picture by
 /// chance.
 bool fits_all(const maps::Map& map, const maps::MapLine& line, const maps::MapLine& other,
-              const sensor::Pinhole& camera) {
+              const std::map<std::int32_t, sensor::Pinhole>& cameras) {
   return std::all_of(other.observations.begin(), other.observations.end(), [&](const maps::Observation& o) {
     const features::LineFeature& f =
         map.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)];
-    return fits(line, f, map.camera_from_world(o.keyframe), camera);
+    return fits(line, f, map.camera_from_world(o.keyframe), cameras.at(o.keyframe.robot));
   });
 }
 
@@ -116,7 +116,9 @@ void merge(maps::Map& map, LineId a, LineId b) {
 }
 
 void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyframe,
-               const sensor::Pinhole& camera, const FusionOptions& options, FusionSummary& summary) {
+               const std::map<std::int32_t, sensor::Pinhole>& cameras, const FusionOptions& options,
+               FusionSummary& summary) {
+  const sensor::Pinhole& camera = cameras.at(keyframe.robot);
   const geometry::Rigid3& pose = map.camera_from_world(keyframe);
   const features::FrameFeatures& features = *map.keyframe(keyframe).features;
   const auto matches = tracking::match_lines(map, lines, features, camera, pose, options.radius_px,
@@ -131,8 +133,8 @@ void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyf
     if (!other.valid()) {
       map.observe(m.line, keyframe, m.feature);
       ++summary.observed;
-    } else if (may_be_one(*line, map.line(other), pose) && fits_all(map, *line, map.line(other), camera) &&
-               fits_all(map, map.line(other), *line, camera)) {
+    } else if (may_be_one(*line, map.line(other), pose) && fits_all(map, *line, map.line(other), cameras) &&
+               fits_all(map, map.line(other), *line, cameras)) {
       merge(map, m.line, other);
       ++summary.merged;
     }
@@ -145,11 +147,9 @@ FusionSummary fuse_lines(maps::Map& map, KeyframeId keyframe, const std::vector<
                          const std::map<std::int32_t, sensor::Pinhole>& cameras,
                          const FusionOptions& options) {
   FusionSummary summary;
-  for (KeyframeId other : neighbours) {
-    fuse_into(map, unseen_lines(map, {keyframe}, other), other, cameras.at(other.robot), options, summary);
-  }
-  fuse_into(map, unseen_lines(map, neighbours, keyframe), keyframe, cameras.at(keyframe.robot), options,
-            summary);
+  for (KeyframeId other : neighbours)
+    fuse_into(map, unseen_lines(map, {keyframe}, other), other, cameras, options, summary);
+  fuse_into(map, unseen_lines(map, neighbours, keyframe), keyframe, cameras, options, summary);
   return summary;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Once there is an answer to how two maps lie, it says which other keyframes should see the same: those are
-// tried, too.
+// verified, too.
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -41,89 +41,80 @@ KeyframeId nearest_view(const maps::Map& a, const Rigid3& a_from_b, const Rigid3
   return best;
 }
 
-std::vector<VerifiedPair> verify_all(const std::vector<MapPart>& parts,
-                                     const std::vector<OverlapFinder::Candidate>& candidates,
-                                     const MapFusionOptions& options, const core::Executor& executor) {
+std::vector<VerifiedPair> verify_all(const PartPair& maps,
+                                     const std::vector<OverlapFinder::Candidate>& candidates) {
   std::vector<VerifiedPair> verified(candidates.size());
-  executor.parallel_for(candidates.size(), [&](std::size_t i) {
-    verified[i] = verify_candidate(parts, candidates[i], options);
+  maps.executor.parallel_for(candidates.size(), [&](std::size_t i) {
+    verified[i] = verify_candidate(maps.parts, candidates[i], maps.options);
   });
   return verified;
 }
 
 }  // namespace
 
-void expand_candidates(const std::vector<MapPart>& parts, const SortedPairs& all,
-                       const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                       const core::Executor& executor, const MergeEvidence& merge,
-                       std::vector<VerifiedPair>& pairs) {
+std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets& sets,
+                                            const std::vector<VerifiedPair>& known) {
   constexpr std::size_t kSets = 3;
   constexpr std::size_t kMost = 24;  // of each set
-  const maps::Map& a = *parts[merge.a].map;
-  const maps::Map& b = *parts[merge.b].map;
-  std::set<std::pair<KeyframeId, KeyframeId>> known;
-  for (const VerifiedPair& pair : pairs) {
-    known.emplace(std::min(pair.query, pair.match), std::max(pair.query, pair.match));
-  }
-  std::vector<OverlapFinder::Candidate> open;
-  for (std::size_t i = 0; i < std::min(kSets, sets.size()); ++i) {
-    std::vector<PlacePair> places;
-    for (const std::size_t k : sets[i].members) places.push_back(all.places[k]);
-    const Rigid3 a_from_b = mean_transform(a, b, places).a_from_b;
-    std::size_t tried = 0;
-    const auto attempt = [&](std::size_t query_part, KeyframeId query, std::size_t match_part,
-                             KeyframeId match) {
-      if (!match.valid() || tried >= kMost) return;
-      if (!known.emplace(std::min(query, match), std::max(query, match)).second) return;
-      open.push_back({query, match, query_part, match_part, 0.0});
-      ++tried;
+  const maps::Map& a = maps.map_a();
+  const maps::Map& b = maps.map_b();
+  std::set<std::pair<KeyframeId, KeyframeId>> seen;
+  for (const VerifiedPair& pair : known)
+    seen.emplace(std::min(pair.query, pair.match), std::max(pair.query, pair.match));
+  std::vector<OverlapFinder::Candidate> candidates;
+  for (std::size_t i = 0; i < std::min(kSets, sets.sets.size()); ++i) {
+    const Rigid3 a_from_b = mean_alignment(maps, sets.places_of(i)).a_from_b;
+    std::size_t added = 0;
+    const auto add = [&](std::size_t query_part, KeyframeId query, std::size_t match_part, KeyframeId match) {
+      if (!match.valid() || added >= kMost) return;
+      if (!seen.emplace(std::min(query, match), std::max(query, match)).second) return;
+      candidates.push_back({query, match, query_part, match_part, 0.0});
+      ++added;
     };
     for (const KeyframeId id : b.keyframe_ids()) {
-      attempt(merge.b, id, merge.a, nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMay));
+      add(maps.b, id, maps.a, nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMay));
     }
     for (const KeyframeId id : a.keyframe_ids()) {
-      attempt(merge.a, id, merge.b,
-              nearest_view(b, a_from_b.inverse(), a.camera_from_world(id).inverse(), kMay));
+      add(maps.a, id, maps.b, nearest_view(b, a_from_b.inverse(), a.camera_from_world(id).inverse(), kMay));
     }
   }
-  const std::vector<VerifiedPair> verified = verify_all(parts, open, options, executor);
-  pairs.insert(pairs.end(), verified.begin(), verified.end());
+  return verify_all(maps, candidates);
 }
 
-void cross_validate(const std::vector<MapPart>& parts, const MapFusionOptions& options,
-                    const core::Executor& executor, MergeEvidence& merge) {
+CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedPair>& agreeing,
+                               const Rigid3& a_from_b) {
   constexpr std::size_t kMost = 60;
-  const maps::Map& a = *parts[merge.a].map;
-  const maps::Map& b = *parts[merge.b].map;
+  const maps::Map& a = maps.map_a();
+  const maps::Map& b = maps.map_b();
+  CrossValidation result;
   std::set<KeyframeId> agreed;
-  for (const VerifiedPair& pair : merge.pairs)
+  for (const VerifiedPair& pair : agreeing)
     agreed.insert(b.has_keyframe(pair.query) ? pair.query : pair.match);
   std::vector<OverlapFinder::Candidate> open;
   for (const KeyframeId id : b.keyframe_ids()) {
-    const KeyframeId near = nearest_view(a, merge.a_from_b, b.camera_from_world(id).inverse(), kMust);
+    const KeyframeId near = nearest_view(a, a_from_b, b.camera_from_world(id).inverse(), kMust);
     if (!near.valid()) continue;
-    ++merge.expected;
     if (agreed.count(id) != 0) {
-      ++merge.confirmed;
+      ++result.confirmed;
     } else {
-      open.push_back({id, near, merge.b, merge.a, 0.0});
+      open.push_back({id, near, maps.b, maps.a, 0.0});
     }
   }
   std::vector<OverlapFinder::Candidate> tried;
-  const std::size_t step = (open.size() + kMost - 1) / std::max<std::size_t>(kMost, 1);
-  for (std::size_t i = 0; i < open.size(); i += std::max<std::size_t>(step, 1)) tried.push_back(open[i]);
-  merge.expected -= static_cast<int>(open.size() - tried.size());
-  const std::vector<VerifiedPair> verified = verify_all(parts, tried, options, executor);
-  const SortedPairs known = sort_pairs(a, b, merge.pairs);
-  const SortedPairs fresh = sort_pairs(a, b, verified);
+  const std::size_t step = std::max<std::size_t>((open.size() + kMost - 1) / kMost, 1);
+  for (std::size_t i = 0; i < open.size(); i += step) tried.push_back(open[i]);
+  result.expected = result.confirmed + static_cast<int>(tried.size());
+  const PairSets known = accepted_pairs(maps, agreeing);
+  const PairSets fresh = accepted_pairs(maps, verify_all(maps, tried));
   for (std::size_t i = 0; i < fresh.places.size(); ++i) {
     const auto agrees = [&](const PlacePair& other) {
-      return agree(a, b, fresh.places[i], other, options.consistency);
+      return agree(a, b, fresh.places[i], other, maps.options.consistency);
     };
     if (!std::all_of(known.places.begin(), known.places.end(), agrees)) continue;
-    ++merge.confirmed;
-    merge.pairs.push_back(verified[fresh.indices[i]]);
+    ++result.confirmed;
+    result.pairs.push_back(fresh.pairs[i]);
   }
+  return result;
 }
 
 }  // namespace plumbline::mapping

@@ -32,9 +32,9 @@ std::map<std::size_t, Rigid3> lay_out(const std::vector<MergeEvidence>& merges, 
       const bool has_b = anchor_from_part.count(merge->b) != 0;
       if (has_a == has_b) continue;
       if (has_a) {
-        anchor_from_part[merge->b] = anchor_from_part[merge->a] * merge->a_from_b;
+        anchor_from_part[merge->b] = anchor_from_part[merge->a] * merge->alignment.a_from_b;
       } else {
-        anchor_from_part[merge->a] = anchor_from_part[merge->b] * merge->a_from_b.inverse();
+        anchor_from_part[merge->a] = anchor_from_part[merge->b] * merge->alignment.a_from_b.inverse();
       }
       grown = true;
       break;  // the best merge that is left, again

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Would another answer do as well?
+// Would another alignment do as well?
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ constexpr double kApart_m = 1.0;     // another place: more than maps drift with
 constexpr double kTurned_rad = 0.3;  // ... or so far turned
 constexpr int kFewLandmarks = 30;    // tell nothing
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
-// What rules an answer out that no landmark speaks against: so many surfaces seen through ...
+// What rules an alignment out that no landmark speaks against: so many surfaces seen through ...
 constexpr double kNoAlternative = 0.2;
 constexpr int kSurfaces = 500;
 // ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.
@@ -25,7 +25,7 @@ constexpr int kSpots = 3;
 constexpr double kNoAlternativeOfFewSpots = 0.1;
 constexpr int kFewSurfaces = 100;
 
-/// How far apart two answers put the camera of b's keyframes that agree, and how far they turn it.
+/// How far apart two alignments put the camera of b's keyframes that agree, and how far they turn it.
 struct Difference {
   double metres = 0.0;
   double radians = 0.0;
@@ -44,43 +44,54 @@ bool refuted(const OverlayFit& fit, const MapFusionOptions& options) {
 
 /// Landmarks match beyond chance and nothing speaks against it. Not many can: what repeats was seen from
 /// nearer at one end of the step and from afar at the other, and looks little alike then.
-bool fits_as_well(const OverlayFit& fit, const OverlayFit& answer, const MapFusionOptions& options) {
+bool fits_as_well(const OverlayFit& fit, const OverlayFit& best, const MapFusionOptions& options) {
   constexpr double kSigmas = 2.5;
   constexpr double kLeast = 8.0;
   const double beyond_chance = fit.matched - fit.chance;
   return fit.expected >= kFewLandmarks && !refuted(fit, options) && beyond_chance >= kLeast &&
          beyond_chance >= kSigmas * std::sqrt(fit.chance) &&
-         fit.share() >= options.alternative_share * answer.share();
+         fit.share() >= options.alternative_share * best.share();
 }
 
-/// Another way to overlay b over a.
 struct Alternative {
   Rigid3 a_from_b;
   Difference apart;
-  int support = 0;  ///< keyframes that stand for it; 0: landmarks alone
+  int support = 0;  ///< keyframes that speak for it; 0: landmarks alone
   OverlayFit fit;
   bool refuted = false;
 };
 
-/// Held against the maps, side by side. Surfaces are tried where landmarks leave it open; what landmarks
-/// alone stand for must show at several spots.
-void test_alternatives(const MapOverlay& maps, const Rigid3& a_from_b, const OverlayFit& answer,
-                       const MapFusionOptions& options, const core::Executor& executor,
-                       std::vector<Alternative>& alternatives) {
-  executor.parallel_for(alternatives.size(), [&](std::size_t i) {
-    Alternative& alternative = alternatives[i];
-    alternative.fit = maps.fit(alternative.a_from_b);
-    alternative.refuted = alternative.support > 0 ? refuted(alternative.fit, options)
-                                                  : !fits_as_well(alternative.fit, answer, options);
-    if (alternative.refuted) return;
-    const MapOverlay::Surfaces surfaces = maps.surfaces(alternative.a_from_b);
-    alternative.refuted = surfaces.contradict(kNoAlternative, kSurfaces);
-    if (alternative.refuted || alternative.support > 0 ||
-        !surfaces.contradict(kNoAlternativeOfFewSpots, kFewSurfaces))
-      return;
-    const Eigen::Vector3d step = alternative.a_from_b.translation - a_from_b.translation;
-    alternative.refuted = maps.matching_spots(alternative.a_from_b, step) < kSpots;
-  });
+std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b,
+                                      const MapOverlay& laid) {
+  std::vector<Alternative> result;
+  for (std::size_t i = 1; i < sets.sets.size(); ++i) {
+    const std::vector<PlacePair> places = sets.places_of(i);
+    const Rigid3 other = mean_alignment(maps, places).a_from_b;
+    const Difference apart = between(maps.map_b(), places.front().b, a_from_b, other);
+    if (apart.elsewhere()) result.push_back({other, apart, support(sets.sets[i]), {}, false});
+  }
+  std::vector<VerifiedPair> agreeing;
+  for (const std::size_t i : sets.sets.front().members) agreeing.push_back(sets.pairs[i]);
+  const core::KeyframeId at = sets.places_of(0).front().b;
+  for (const Rigid3& other : laid.steps(a_from_b, agreeing, kApart_m)) {
+    result.push_back({other, between(maps.map_b(), at, a_from_b, other), 0, {}, false});
+  }
+  return result;
+}
+
+/// Held against the maps. Surfaces are asked where landmarks leave it open; what landmarks alone speak for
+/// must show at several spots.
+void check_against_maps(const MapOverlay& laid, const Rigid3& a_from_b, const OverlayFit& best,
+                        const MapFusionOptions& options, Alternative& other) {
+  other.fit = laid.fit(other.a_from_b);
+  other.refuted = other.support > 0 ? refuted(other.fit, options) : !fits_as_well(other.fit, best, options);
+  if (other.refuted) return;
+  const MapOverlay::Surfaces surfaces = laid.surfaces(other.a_from_b);
+  other.refuted = surfaces.contradict(kNoAlternative, kSurfaces);
+  if (other.refuted || other.support > 0 || !surfaces.contradict(kNoAlternativeOfFewSpots, kFewSurfaces))
+    return;
+  const Eigen::Vector3d step = other.a_from_b.translation - a_from_b.translation;
+  other.refuted = laid.matching_spots(other.a_from_b, step) < kSpots;
 }
 
 std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
@@ -89,60 +100,53 @@ std::string percent(double share) { return fmt::format("{:.0f} %", 100.0 * share
 
 int support(const ConsistentSet& set) { return static_cast<int>(std::min(set.keyframes_a, set.keyframes_b)); }
 
-std::string ambiguity(const std::vector<MapPart>& parts, const SortedPairs& all,
-                      const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                      const core::Executor& executor, MergeEvidence& merge) {
-  const maps::Map& a = *parts[merge.a].map;
-  const maps::Map& b = *parts[merge.b].map;
-  const MapOverlay maps(parts[merge.a], parts[merge.b]);
-  merge.laid = maps.fit(merge.a_from_b);
-  std::vector<Alternative> alternatives;
-  for (std::size_t i = 1; i < sets.size(); ++i) {
-    std::vector<PlacePair> pairs;
-    for (const std::size_t k : sets[i].members) pairs.push_back(all.places[k]);
-    const Rigid3 other = mean_transform(a, b, pairs).a_from_b;
-    const Difference apart = between(b, pairs.front().b, merge.a_from_b, other);
-    if (apart.elsewhere()) alternatives.push_back({other, apart, support(sets[i]), {}, false});
-  }
-  const core::KeyframeId at = all.places[sets.front().members.front()].b;
-  for (const Rigid3& other : maps.steps(merge.a_from_b, merge.pairs, kApart_m)) {
-    alternatives.push_back({other, between(b, at, merge.a_from_b, other), 0, {}, false});
-  }
-  test_alternatives(maps, merge.a_from_b, merge.laid, options, executor, alternatives);
-  for (const Alternative& alternative : alternatives) {
-    if (alternative.refuted) continue;
-    merge.alternative = std::max(merge.alternative, alternative.support);
-    if (!fits_as_well(alternative.fit, merge.laid, options) ||
-        alternative.fit.share() <= merge.alternative_fit.share())
+Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3& a_from_b) {
+  const MapOverlay laid(maps.parts[maps.a], maps.parts[maps.b]);
+  Ambiguity result;
+  result.overlap = laid.fit(a_from_b);
+  std::vector<Alternative> others = alternatives(maps, sets, a_from_b, laid);
+  maps.executor.parallel_for(others.size(), [&](std::size_t i) {
+    check_against_maps(laid, a_from_b, result.overlap, maps.options, others[i]);
+  });
+  for (const Alternative& other : others) {
+    if (other.refuted) continue;
+    result.alternative = std::max(result.alternative, other.support);
+    if (!fits_as_well(other.fit, result.overlap, maps.options) ||
+        other.fit.share() <= result.alternative_overlap.share()) {
       continue;
-    merge.alternative_fit = alternative.fit;
-    merge.alternative_m = alternative.apart.metres;
+    }
+    result.alternative_overlap = other.fit;
+    result.alternative_m = other.apart.metres;
   }
-  if (merge.laid.expected + merge.laid.contradicted >= kFewLandmarks && merge.laid.seen_through() > kWrong) {
+  return result;
+}
+
+std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options) {
+  const OverlayFit& overlap = ambiguity.overlap;
+  if (overlap.expected + overlap.contradicted >= kFewLandmarks && overlap.seen_through() > kWrong) {
     return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",
-                       percent(merge.laid.seen_through()));
+                       percent(overlap.seen_through()));
   }
-  const bool few = merge.agreeing < options.min_pairs;
-  if (few && !fits_as_well(merge.laid, merge.laid, options)) {
+  const bool few = agreeing < options.min_pairs;
+  if (few && !fits_as_well(overlap, overlap, options)) {
     return fmt::format(
         "only {} keyframes agree on how the maps lie, and laid over each other the maps have too little in "
         "common: of {} landmarks {} match, {} were seen through",
-        merge.agreeing, merge.laid.expected, merge.laid.matched, merge.laid.contradicted);
+        agreeing, overlap.expected, overlap.matched, overlap.contradicted);
   }
-  // One keyframe may be mistaken; two that agree are an answer. Few have no such alternatives at all.
-  if (merge.alternative >= (few ? 1 : 2) && merge.alternative >= options.alternative * merge.agreeing) {
+  // One keyframe may be mistaken; two that agree are an alternative. Few have no such alternatives at all.
+  if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.alternative * agreeing) {
     return fmt::format(
-        "two answers exclude each other: {} keyframes say one thing, {} another; places look "
-        "alike here",
-        merge.agreeing, merge.alternative);
+        "two answers exclude each other: {} keyframes say one thing, {} another; places look alike here",
+        agreeing, ambiguity.alternative);
   }
-  if (merge.alternative_m > 0.0) {
+  if (ambiguity.alternative_m > 0.0) {
     return fmt::format(
         "places look alike here: {:.1f} m away the maps fit too ({} of the landmarks are found instead of "
         "{}, "
         "and {} seen through)",
-        merge.alternative_m, percent(merge.alternative_fit.share()), percent(merge.laid.share()),
-        percent(merge.alternative_fit.seen_through()));
+        ambiguity.alternative_m, percent(ambiguity.alternative_overlap.share()), percent(overlap.share()),
+        percent(ambiguity.alternative_overlap.seen_through()));
   }
   return {};
 }

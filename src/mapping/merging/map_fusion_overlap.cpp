@@ -36,17 +36,6 @@ double turn_between(const maps::Map& map, const std::vector<PlacePair>& pairs) {
   return most;
 }
 
-void sum_up(MergeEvidence& merge) {
-  const auto n = static_cast<double>(merge.pairs.size());
-  for (const VerifiedPair& pair : merge.pairs) {
-    const PlaceVerification& e = pair.evidence;
-    merge.matches += e.matched_points + e.matched_lines;
-    merge.inliers += e.points + e.lines;
-    merge.rms_px += e.rms_px / n;
-    merge.overlap += e.overlap / n;
-  }
-}
-
 /// How far apart the cameras of a map lie: the diagonal of the box around them, metres.
 double extent(const maps::Map& map) {
   Eigen::AlignedBox3d box;
@@ -56,12 +45,14 @@ double extent(const maps::Map& map) {
 
 /// Few keyframes will do where each shows a whole picture of the same: not by chance, and what merely looks
 /// alike has less in common. That things repeat is seen by maps that reach farther than the place itself.
-bool few_suffice(const maps::Map& a, const maps::Map& b, const MergeEvidence& merge,
-                 const MapFusionOptions& options) {
+bool few_suffice(const PartPair& maps, const Consistency& consistency) {
+  const maps::Map& a = maps.map_a();
+  const maps::Map& b = maps.map_b();
+  const MapFusionOptions& options = maps.options;
   if (extent(a) < options.few_extent_m || extent(b) < options.few_extent_m) return false;
   std::set<KeyframeId> of_a;
   std::set<KeyframeId> of_b;
-  for (const VerifiedPair& pair : merge.pairs) {
+  for (const VerifiedPair& pair : consistency.pairs) {
     if (pair.evidence.points + 2 * pair.evidence.lines < options.few_inliers) continue;
     const bool query_of_a = a.has_keyframe(pair.query);
     of_a.insert(query_of_a ? pair.query : pair.match);
@@ -70,24 +61,42 @@ bool few_suffice(const maps::Map& a, const maps::Map& b, const MergeEvidence& me
   return static_cast<int>(std::min(of_a.size(), of_b.size())) >= options.few_pairs;
 }
 
-std::string judge(const maps::Map& a, const maps::Map& b, const MergeEvidence& merge,
-                  const MapFusionOptions& options) {
-  if (merge.verified == 0) return "no two keyframes were verified to show the same place";
-  if (merge.agreeing < options.min_pairs) {
-    if (few_suffice(a, b, merge, options)) return {};
+std::string objection(const PartPair& maps, const Consistency& consistency) {
+  const MapFusionOptions& options = maps.options;
+  if (consistency.verified == 0) return "no two keyframes were verified to show the same place";
+  if (consistency.agreeing < options.min_pairs) {
+    if (few_suffice(maps, consistency)) return {};
     return fmt::format(
         "only {} keyframes agree on how the maps lie ({} are needed, or {} with {} points and lines in "
         "common "
         "in maps of {} m and more)",
-        merge.agreeing, options.min_pairs, options.few_pairs, options.few_inliers, options.few_extent_m);
+        consistency.agreeing, options.min_pairs, options.few_pairs, options.few_inliers,
+        options.few_extent_m);
   }
-  if (merge.span_m < options.min_span_m && merge.span_rad < options.min_span_rad) {
+  if (consistency.span_m < options.min_span_m && consistency.span_rad < options.min_span_rad) {
     return fmt::format(
-        "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike "
-        "is not enough",
-        merge.span_m, merge.span_rad);
+        "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike is not "
+        "enough",
+        consistency.span_m, consistency.span_rad);
   }
   return {};
+}
+
+std::string objection(const CrossValidation& validation, const MapFusionOptions& options) {
+  if (validation.confirmed >= options.min_confirmed * validation.expected) return {};
+  return fmt::format("of {} keyframes that should see what the other map holds, only {} do",
+                     validation.expected, validation.confirmed);
+}
+
+Consistency consistency_of(const PartPair& maps, const PairSets& sets) {
+  Consistency result;
+  result.verified = static_cast<int>(sets.places.size());
+  if (sets.sets.empty()) return result;
+  result.agreeing = support(sets.sets.front());
+  result.span_m = sets.sets.front().span_m;
+  result.span_rad = turn_between(maps.map_b(), sets.places_of(0));
+  for (const std::size_t i : sets.sets.front().members) result.pairs.push_back(sets.pairs[i]);
+  return result;
 }
 
 }  // namespace
@@ -180,46 +189,44 @@ VerifiedPair verify_candidate(const std::vector<MapPart>& parts, const OverlapFi
 MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, std::size_t b,
                              const std::vector<VerifiedPair>& found, const MapFusionOptions& options,
                              const core::Executor& executor) {
+  const PartPair maps{parts, a, b, options, executor};
   MergeEvidence merge;
   merge.a = a;
   merge.b = b;
-  const maps::Map& map_a = *parts[a].map;
-  const maps::Map& map_b = *parts[b].map;
-  std::vector<VerifiedPair> pairs = found;
-  SortedPairs all = sort_pairs(map_a, map_b, pairs);
-  std::vector<ConsistentSet> sets = consistent_sets(map_a, map_b, all.places, options.consistency);
-  if (!sets.empty() && support(sets.front()) < options.min_pairs) {
-    expand_candidates(parts, all, sets, options, executor, merge, pairs);
-    all = sort_pairs(map_a, map_b, pairs);
-    sets = consistent_sets(map_a, map_b, all.places, options.consistency);
+  PairSets sets = pair_sets(maps, found);
+  if (!sets.sets.empty() && support(sets.sets.front()) < options.min_pairs) {
+    std::vector<VerifiedPair> more = verify_neighbours(maps, sets, found);
+    more.insert(more.begin(), found.begin(), found.end());
+    sets = pair_sets(maps, more);
   }
-  merge.verified = static_cast<int>(all.places.size());
-  if (!sets.empty()) {
-    merge.agreeing = support(sets.front());
-    merge.span_m = sets.front().span_m;
-    std::vector<PlacePair> best;
-    for (const std::size_t i : sets.front().members) {
-      best.push_back(all.places[i]);
-      merge.pairs.push_back(pairs[all.indices[i]]);
-    }
-    merge.span_rad = turn_between(map_b, best);
-    const MeanTransform mean = mean_transform(map_a, map_b, best);
-    merge.a_from_b = mean.a_from_b;
-    merge.covariance = mean.covariance;
-    merge.spread_m = mean.spread_m;
-  }
-  merge.refused = judge(map_a, map_b, merge, options);
-  if (merge.refused.empty()) merge.refused = ambiguity(parts, all, sets, options, executor, merge);
+  merge.consistency = consistency_of(maps, sets);
+  if (!sets.sets.empty()) merge.alignment = mean_alignment(maps, sets.places_of(0));
+  merge.pairs = merge.consistency.pairs;
+  merge.refused = objection(maps, merge.consistency);
   if (merge.refused.empty()) {
-    cross_validate(parts, options, executor, merge);
-    if (merge.confirmed < options.min_confirmed * merge.expected) {
-      merge.refused = fmt::format("of {} keyframes that should see what the other map holds, only {} do",
-                                  merge.expected, merge.confirmed);
-    }
+    merge.ambiguity = ambiguity_of(maps, sets, merge.alignment.a_from_b);
+    merge.refused = objection(merge.ambiguity, merge.consistency.agreeing, options);
   }
-  sum_up(merge);
+  if (merge.refused.empty()) {
+    merge.validation = cross_validate(maps, merge.pairs, merge.alignment.a_from_b);
+    merge.pairs.insert(merge.pairs.end(), merge.validation.pairs.begin(), merge.validation.pairs.end());
+    merge.refused = objection(merge.validation, options);
+  }
   merge.accepted = merge.refused.empty();
   return merge;
+}
+
+PairTotals MergeEvidence::totals() const {
+  PairTotals totals;
+  const auto n = static_cast<double>(pairs.size());
+  for (const VerifiedPair& pair : pairs) {
+    const PlaceVerification& e = pair.evidence;
+    totals.matches += e.matched_points + e.matched_lines;
+    totals.inliers += e.points + e.lines;
+    totals.rms_px += e.rms_px / n;
+    totals.overlap += e.overlap / n;
+  }
+  return totals;
 }
 
 namespace {

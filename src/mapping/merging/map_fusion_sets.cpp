@@ -10,33 +10,46 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-SortedPairs sort_pairs(const maps::Map& a, const maps::Map& b, const std::vector<VerifiedPair>& pairs) {
-  SortedPairs sorted;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const VerifiedPair& pair = pairs[i];
+std::vector<PlacePair> PairSets::places_of(std::size_t set) const {
+  std::vector<PlacePair> result;
+  for (const std::size_t i : sets[set].members) result.push_back(places[i]);
+  return result;
+}
+
+PairSets accepted_pairs(const PartPair& maps, const std::vector<VerifiedPair>& pairs) {
+  PairSets result;
+  for (const VerifiedPair& pair : pairs) {
     if (!pair.evidence.accepted) continue;
-    if (a.has_keyframe(pair.query) && b.has_keyframe(pair.match)) {
-      sorted.places.push_back({pair.query, pair.match, pair.evidence.query_from_match.inverse()});
+    result.pairs.push_back(pair);
+    if (maps.map_a().has_keyframe(pair.query) && maps.map_b().has_keyframe(pair.match)) {
+      result.places.push_back({pair.query, pair.match, pair.evidence.query_from_match.inverse()});
     } else {
-      sorted.places.push_back({pair.match, pair.query, pair.evidence.query_from_match});
+      result.places.push_back({pair.match, pair.query, pair.evidence.query_from_match});
     }
-    sorted.indices.push_back(i);
   }
-  return sorted;
+  return result;
+}
+
+PairSets pair_sets(const PartPair& maps, const std::vector<VerifiedPair>& pairs) {
+  PairSets result = accepted_pairs(maps, pairs);
+  result.sets = consistent_sets(maps.map_a(), maps.map_b(), result.places, maps.options.consistency);
+  return result;
 }
 
 Rigid3 worlds(const maps::Map& a, const maps::Map& b, const PlacePair& pair) {
   return a.camera_from_world(pair.a).inverse() * pair.b_from_a.inverse() * b.camera_from_world(pair.b);
 }
 
-MeanTransform mean_transform(const maps::Map& a, const maps::Map& b, const std::vector<PlacePair>& pairs) {
+Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pairs) {
   constexpr int kRounds = 20;
   constexpr double kHuber_m = 0.03;
   constexpr double kArm_m = 1.0;      // radians count as what they move at this distance
   constexpr double kFloor_m = 0.002;  // pairs of one place share their errors
   constexpr double kFloor_rad = 0.001;
-  MeanTransform mean;
+  Alignment mean;
   if (pairs.empty()) return mean;
+  const maps::Map& a = maps.map_a();
+  const maps::Map& b = maps.map_b();
   const auto n = static_cast<double>(pairs.size());
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const PlacePair& pair : pairs) middle += b.camera_from_world(pair.b).inverse().translation / n;

@@ -1,55 +1,61 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What verified pairs of keyframes say of how the worlds of two maps lie, and what speaks against it.
+// The steps by which it is decided whether two maps overlap, and how they lie to each other.
 #include <cstddef>
 #include <string>
 #include <vector>
 
+#include "plumbline/core/executor.hpp"
 #include "plumbline/mapping/consistent_pairs.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 
 namespace plumbline::mapping {
 
-/// The accepted ones of `pairs`, ends sorted by part; indices[i] is where places[i] stands in `pairs`.
-struct SortedPairs {
-  std::vector<PlacePair> places;
-  std::vector<std::size_t> indices;
+/// Parts a and b, a < b.
+struct PartPair {
+  const std::vector<MapPart>& parts;
+  std::size_t a;
+  std::size_t b;
+  const MapFusionOptions& options;
+  const core::Executor& executor;
+  [[nodiscard]] const maps::Map& map_a() const { return *parts[a].map; }
+  [[nodiscard]] const maps::Map& map_b() const { return *parts[b].map; }
 };
-SortedPairs sort_pairs(const maps::Map& a, const maps::Map& b, const std::vector<VerifiedPair>& pairs);
+
+/// Accepted pairs, and sets of these that say the same, the largest first.
+struct PairSets {
+  std::vector<VerifiedPair> pairs;
+  std::vector<PlacePair> places;  ///< of these, ends sorted by part
+  std::vector<ConsistentSet> sets;
+  [[nodiscard]] std::vector<PlacePair> places_of(std::size_t set) const;
+};
+/// Without the sets.
+PairSets accepted_pairs(const PartPair& maps, const std::vector<VerifiedPair>& pairs);
+PairSets pair_sets(const PartPair& maps, const std::vector<VerifiedPair>& pairs);
 
 /// a's world from b's, as one pair says.
 geometry::Rigid3 worlds(const maps::Map& a, const maps::Map& b, const PlacePair& pair);
 
-/// Robust mean of what the pairs say, its covariance about the middle of b's cameras, and how far from the
-/// mean they put b's cameras (RMS, metres).
-struct MeanTransform {
-  geometry::Rigid3 a_from_b;
-  geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
-  double spread_m = 0.0;
-};
-MeanTransform mean_transform(const maps::Map& a, const maps::Map& b, const std::vector<PlacePair>& pairs);
+/// Robust mean of what the pairs say.
+Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pairs);
 
-/// Different keyframes on the side that has fewer: one keyframe seen from ten others is one witness.
+/// Different keyframes on the side that has fewer: one keyframe seen from ten others counts once.
 int support(const ConsistentSet& set);
 
-/// What speaks against the answer of sets[0], of which `merge` has the transform and the pairs: the maps do
-/// not fit where it lays them, or another set of pairs, or a step by which things repeat, would fit as well.
-/// Fills laid, alternative, alternative_fit and alternative_m; empty: nothing.
-std::string ambiguity(const std::vector<MapPart>& parts, const SortedPairs& all,
-                      const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                      const core::Executor& executor, MergeEvidence& merge);
-
 /// More pairs of keyframes that should see the same if one of the first sets is right, verified; nothing that
-/// is in `pairs` already. Uses a and b of `merge`.
-void expand_candidates(const std::vector<MapPart>& parts, const SortedPairs& all,
-                       const std::vector<ConsistentSet>& sets, const MapFusionOptions& options,
-                       const core::Executor& executor, const MergeEvidence& merge,
-                       std::vector<VerifiedPair>& pairs);
+/// is in `known` already.
+std::vector<VerifiedPair> verify_neighbours(const PartPair& maps, const PairSets& sets,
+                                            const std::vector<VerifiedPair>& known);
 
-/// Keyframes of b with a view of a, as a_from_b of `merge` has it: those that do not agree yet are verified.
-/// Fills expected, confirmed and more pairs.
-void cross_validate(const std::vector<MapPart>& parts, const MapFusionOptions& options,
-                    const core::Executor& executor, MergeEvidence& merge);
+/// Holds the alignment, and others that the remaining sets or a step by which things repeat speak for,
+/// against the maps.
+Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const geometry::Rigid3& a_from_b);
+/// Why it forbids to merge maps of which so many keyframes agree; empty: it does not.
+std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options);
+
+/// Keyframes of b with a view of a: those that do not agree yet are verified.
+CrossValidation cross_validate(const PartPair& maps, const std::vector<VerifiedPair>& agreeing,
+                               const geometry::Rigid3& a_from_b);
 
 }  // namespace plumbline::mapping

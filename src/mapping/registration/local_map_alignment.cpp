@@ -121,24 +121,22 @@ class Aligner {
     icp.setMaximumIterations(options_.max_iterations);
     icp.setTransformationEpsilon(still * still);
     icp.setTransformationRotationEpsilon(std::cos(still));
-    icp.align(moved_, result_.b_from_a.isometry().matrix());
+    SurfaceCloud moved;
+    icp.align(moved, result_.b_from_a.isometry().matrix());
     result_.b_from_a = rigid_of(icp.getFinalTransformation());
-    if (!meet(distance)) return false;
-    step_ = estimation_->step(moved_, *b_.cloud(), found_);
+    pcl::transformPointCloudWithNormals(*a_.cloud(), moved,
+                                        result_.b_from_a.isometry().matrix().cast<float>().eval());
+    pcl::Correspondences found;
+    correspondences_->setInputSource(std::make_shared<SurfaceCloud>(moved));
+    correspondences_->determineCorrespondences(found, distance);
+    if (found.size() < kFewest) {
+      refuse("the surfaces do not meet");
+      return false;
+    }
+    step_ = estimation_->step(moved, *b_.cloud(), found);
     if (icp.getConvergeCriteria()->getConvergenceState() != Criteria::CONVERGENCE_CRITERIA_ITERATIONS)
       return true;
     refuse("it did not converge");
-    return false;
-  }
-  /// Correspondences where the surfaces lie now; false: refused, too few.
-  bool meet(double distance) {
-    const Rigid3& b_from_a = result_.b_from_a;
-    pcl::transformPointCloudWithNormals(*a_.cloud(), moved_,
-                                        b_from_a.isometry().matrix().cast<float>().eval());
-    correspondences_->setInputSource(std::make_shared<SurfaceCloud>(moved_));
-    correspondences_->determineCorrespondences(found_, distance);
-    if (found_.size() >= kFewest) return true;
-    refuse("the surfaces do not meet");
     return false;
   }
   /// How far the middle of the matched samples has moved.
@@ -206,8 +204,6 @@ class Aligner {
   std::shared_ptr<cloud::TwoWayCorrespondences> correspondences_;
   std::shared_ptr<cloud::ConstrainedPointToPlane> estimation_;
   SurfaceAlignment result_;
-  SurfaceCloud moved_;  ///< a, in b's frame
-  pcl::Correspondences found_;
   PlaneStep step_;
   double tried_ = 1.0;   ///< samples that look for a partner
   double shared_ = 0.0;  ///< of the smaller surface, near the other one at the start

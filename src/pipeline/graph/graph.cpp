@@ -65,7 +65,7 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
   const auto root = with_includes(std::move(*own), file, pipelines_folder, problems, graph.warnings);
   if (!root) return refuse();
   read_description(*root, graph, problems);
-  StageSpecs specs = read_stages(*root, registry, problems);
+  StageSpecs specs = read_stages(*root, registry, problems, graph.warnings);
   connect(specs, problems);
   add_taps(*root, registry, specs, problems);
   apply_overrides(overrides, specs, problems, graph.warnings);

@@ -42,7 +42,9 @@ std::optional<core::ConfigNode> with_includes(core::ConfigNode own, const std::f
 
 /// graph_stages.cpp: the stages of a tree, made and their options read. `root` must outlive the specs.
 StageSpecs read_stages(const core::ConfigNode& root, const StageRegistry& registry,
-                       core::ConfigProblems& problems);
+                       core::ConfigProblems& problems, std::vector<std::string>& warnings);
+/// Whether an option of earlier versions is read and has no effect.
+bool is_retired(const std::string& key);
 
 /// graph_connect.cpp: resolves the inputs of every stage.
 void connect(StageSpecs& specs, core::ConfigProblems& problems);

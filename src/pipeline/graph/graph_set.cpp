@@ -35,7 +35,8 @@ std::string renamed(const std::string& text, std::vector<std::string>& warnings)
   return now + text.substr(equals);
 }
 
-void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems) {
+void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems,
+           std::vector<std::string>& warnings) {
   const auto refuse = [&](const std::string& path, std::string what) {
     problems.push_back({kCommandLine, path, std::move(what)});
   };
@@ -59,6 +60,7 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems)
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }
   if (specs[target].node.type == nullptr) return;  // told already
+  if (is_retired(key)) return warnings.push_back(fmt::format("--set {}: has no effect", path));
   specs[target].node.options.set(key, *value, stage, problems);
   specs[target].set.push_back(key);
 }
@@ -67,7 +69,7 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems)
 
 void apply_overrides(const std::vector<std::string>& texts, StageSpecs& specs, ConfigProblems& problems,
                      std::vector<std::string>& warnings) {
-  for (const std::string& text : texts) apply(renamed(text, warnings), specs, problems);
+  for (const std::string& text : texts) apply(renamed(text, warnings), specs, problems, warnings);
 }
 
 }  // namespace plumbline::pipeline

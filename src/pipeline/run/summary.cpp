@@ -141,51 +141,55 @@ nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
   return list;
 }
 
+/// Standard deviations, the whole matrix, and where the maps lie.
+void add_alignment(const mapping::Alignment& alignment, nlohmann::ordered_json& entry) {
+  nlohmann::ordered_json sigma = nlohmann::ordered_json::array();
+  nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
+  for (int row = 0; row < 6; ++row) {
+    sigma.push_back(rounded(std::sqrt(alignment.covariance(row, row))));
+    nlohmann::ordered_json line = nlohmann::ordered_json::array();
+    for (int column = 0; column < 6; ++column) line.push_back(alignment.covariance(row, column));
+    covariance.push_back(line);
+  }
+  entry["sigma"] = sigma;
+  entry["covariance"] = covariance;
+  entry["a_from_b"] = rows(alignment.a_from_b);
+}
+
 nlohmann::ordered_json merges_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::Merge& merge : summary.merges) {
     const mapping::MergeEvidence& e = merge.evidence;
+    const mapping::PairTotals totals = e.totals();
     nlohmann::ordered_json refused = nlohmann::ordered_json::object();
     for (const auto& [why, count] : e.refused_pairs) refused[why] = count;
-    nlohmann::ordered_json sigma = nlohmann::ordered_json::array();
-    nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
-    for (int row = 0; row < 6; ++row) {
-      sigma.push_back(rounded(std::sqrt(e.covariance(row, row))));
-      nlohmann::ordered_json line = nlohmann::ordered_json::array();
-      for (int column = 0; column < 6; ++column) line.push_back(e.covariance(row, column));
-      covariance.push_back(line);
-    }
     nlohmann::ordered_json entry = {{"a", merge.a},
                                     {"b", merge.b},
                                     {"accepted", e.accepted},
                                     {"reason", e.refused},
                                     {"candidates", e.candidates},
                                     {"tried", e.tried},
-                                    {"verified", e.verified},
+                                    {"verified", e.consistency.verified},
                                     {"refused", refused},
-                                    {"agreeing", e.agreeing},
-                                    {"alternative", e.alternative},
-                                    {"laid_over", laid(e.laid)},
-                                    {"expected", e.expected},
-                                    {"confirmed", e.confirmed},
+                                    {"agreeing", e.consistency.agreeing},
+                                    {"alternative", e.ambiguity.alternative},
+                                    {"laid_over", laid(e.ambiguity.overlap)},
+                                    {"expected", e.validation.expected},
+                                    {"confirmed", e.validation.confirmed},
                                     {"pairs", e.pairs.size()},
                                     {"rejected", e.rejected},
-                                    {"matches", e.matches},
-                                    {"inliers", e.inliers},
-                                    {"rms", rounded(e.rms_px)},
-                                    {"overlap", rounded(e.overlap)},
-                                    {"span_m", rounded(e.span_m)},
-                                    {"span_rad", rounded(e.span_rad)},
-                                    {"spread_m", rounded(e.spread_m)}};
-    if (e.alternative_m > 0.0) {
-      entry["alternative_m"] = rounded(e.alternative_m);
-      entry["alternative_overlay"] = laid(e.alternative_fit);
+                                    {"matches", totals.matches},
+                                    {"inliers", totals.inliers},
+                                    {"rms", rounded(totals.rms_px)},
+                                    {"overlap", rounded(totals.overlap)},
+                                    {"span_m", rounded(e.consistency.span_m)},
+                                    {"span_rad", rounded(e.consistency.span_rad)},
+                                    {"spread_m", rounded(e.alignment.spread_m)}};
+    if (e.ambiguity.alternative_m > 0.0) {
+      entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
+      entry["alternative_overlay"] = laid(e.ambiguity.alternative_overlap);
     }
-    if (e.accepted) {
-      entry["sigma"] = sigma;
-      entry["covariance"] = covariance;
-      entry["a_from_b"] = rows(e.a_from_b);
-    }
+    if (e.accepted) add_alignment(e.alignment, entry);
     if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
     list.push_back(entry);
   }
@@ -206,6 +210,61 @@ nlohmann::ordered_json path_of(const RunSummary& summary) {
           {"largest_step_rad", rounded(summary.path.check.largest_rad)},
           {"refused_adjustments", summary.path.refused},
           {"tears", tears}};
+}
+
+nlohmann::ordered_json frames_of(const RunSummary::Frames& frames) {
+  return {{"available", frames.available},       {"read", frames.read},
+          {"resumed", frames.resumed},           {"unreadable", frames.unreadable},
+          {"tracked", frames.tracked},           {"lost", frames.lost},
+          {"longest_loss", frames.longest_loss}, {"tracked_percent", rounded(frames.tracked_percent())}};
+}
+
+nlohmann::ordered_json loops_of(const RunSummary& summary) {
+  return {{"candidates", summary.loops.candidates},
+          {"verified", summary.loops.verified},
+          {"accepted", summary.loops.accepted},
+          {"rejected", summary.loops.rejected},
+          {"list", trials_of(summary)}};
+}
+
+nlohmann::ordered_json refine_of(const RunSummary::Refine& refine) {
+  return {{"local_maps", refine.local_maps},
+          {"tried", refine.tried},
+          {"accepted", refine.accepted},
+          {"rejected", refine.rejected},
+          {"mean_rms", rounded(refine.mean_rms)},
+          {"mean_shift_m", rounded(refine.mean_shift_m)},
+          {"max_shift_m", rounded(refine.max_shift_m)},
+          {"sigma_position_m", sigma_json(refine.sigma_position_m)},
+          {"sigma_rotation_rad", sigma_json(refine.sigma_rotation_rad)},
+          {"before", fits_of(refine.before)},
+          {"after", fits_of(refine.after)}};
+}
+
+nlohmann::ordered_json timing_of(const RunSummary& summary) {
+  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
+  for (const RunSummary::StageTime& stage : summary.stages) {
+    stages[stage.name] = {{"median", rounded(stage.median_ms)},
+                          {"p95", rounded(stage.p95_ms)},
+                          {"finish", rounded(stage.finish_ms)}};
+  }
+  nlohmann::ordered_json parts = nlohmann::ordered_json::object();
+  for (const StageTiming& part : summary.parts) {
+    const auto times =
+        std::count_if(part.frame_ms.begin(), part.frame_ms.end(), [](float ms) { return !std::isnan(ms); });
+    parts[part.name] = {{"times", times},
+                        {"median", rounded(part.quantile_ms(0.5))},
+                        {"p95", rounded(part.quantile_ms(0.95))}};
+  }
+  return {{"wall_s", rounded(summary.wall_s)},
+          {"pace_hz", rounded(summary.pace_hz)},
+          {"behind_s", rounded(summary.behind_s)},
+          {"map_s", rounded(summary.map_s)},
+          {"fps", rounded(summary.fps())},
+          {"export_s", rounded(summary.export_s)},
+          {"stages_ms", stages},
+          {"parts_ms", parts},
+          {"threads", summary.threads}};
 }
 
 /// The worst place where the path is torn, and how many there are.
@@ -268,71 +327,24 @@ void judge(RunSummary& summary) {
 }
 
 core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& s) {
-  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
-  for (const RunSummary::StageTime& stage : s.stages) {
-    stages[stage.name] = {{"median", rounded(stage.median_ms)},
-                          {"p95", rounded(stage.p95_ms)},
-                          {"finish", rounded(stage.finish_ms)}};
-  }
-  nlohmann::ordered_json parts = nlohmann::ordered_json::object();
-  for (const StageTiming& part : s.parts) {
-    const auto times =
-        std::count_if(part.frame_ms.begin(), part.frame_ms.end(), [](float ms) { return !std::isnan(ms); });
-    parts[part.name] = {{"times", times},
-                        {"median", rounded(part.quantile_ms(0.5))},
-                        {"p95", rounded(part.quantile_ms(0.95))}};
-  }
   const nlohmann::ordered_json json = {
       {"input", s.input},
       {"pipeline", s.pipeline},
       {"trustworthy", s.reason.empty()},
       {"reason", s.reason},
       {"stopped", s.stopped},
-      {"frames",
-       {{"available", s.frames.available},
-        {"read", s.frames.read},
-        {"resumed", s.frames.resumed},
-        {"unreadable", s.frames.unreadable},
-        {"tracked", s.frames.tracked},
-        {"lost", s.frames.lost},
-        {"longest_loss", s.frames.longest_loss},
-        {"tracked_percent", rounded(s.frames.tracked_percent())}}},
+      {"frames", frames_of(s.frames)},
       {"keyframes", s.keyframes},
       {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
-      {"loops",
-       {{"candidates", s.loops.candidates},
-        {"verified", s.loops.verified},
-        {"accepted", s.loops.accepted},
-        {"rejected", s.loops.rejected},
-        {"list", trials_of(s)}}},
-      {"refine",
-       {{"local_maps", s.refine.local_maps},
-        {"tried", s.refine.tried},
-        {"accepted", s.refine.accepted},
-        {"rejected", s.refine.rejected},
-        {"mean_rms", rounded(s.refine.mean_rms)},
-        {"mean_shift_m", rounded(s.refine.mean_shift_m)},
-        {"max_shift_m", rounded(s.refine.max_shift_m)},
-        {"sigma_position_m", sigma_json(s.refine.sigma_position_m)},
-        {"sigma_rotation_rad", sigma_json(s.refine.sigma_rotation_rad)},
-        {"before", fits_of(s.refine.before)},
-        {"after", fits_of(s.refine.after)}}},
+      {"loops", loops_of(s)},
+      {"refine", refine_of(s.refine)},
       {"path", path_of(s)},
       {"merges", merges_of(s)},
       {"robots", robots_of(s)},
       {"cloud", cloud_of(s)},
       {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
       {"depth_fields", depth_fields_of(s)},
-      {"timing",
-       {{"wall_s", rounded(s.wall_s)},
-        {"pace_hz", rounded(s.pace_hz)},
-        {"behind_s", rounded(s.behind_s)},
-        {"map_s", rounded(s.map_s)},
-        {"fps", rounded(s.fps())},
-        {"export_s", rounded(s.export_s)},
-        {"stages_ms", stages},
-        {"parts_ms", parts},
-        {"threads", s.threads}}},
+      {"timing", timing_of(s)},
       {"memory", {{"peak_rss_mb", rounded(s.peak_rss_mb)}}},
       {"version", core::version()},
       {"seed", s.seed}};

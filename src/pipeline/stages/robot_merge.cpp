@@ -30,10 +30,11 @@ void report(const RunSummary::Merge& merge, core::Log& log) {
   const mapping::MergeEvidence& e = merge.evidence;
   const std::string tried =
       fmt::format("{} pairs of keyframes look alike, {} were tried, {} show the same place", e.candidates,
-                  e.tried, e.verified);
+                  e.tried, e.consistency.verified);
   if (e.accepted) {
     log.info(fmt::format("{} and {} overlap: {}; {} keyframes agree to {:.0f} mm ({} points and lines)",
-                         merge.a, merge.b, tried, e.agreeing, 1e3 * e.spread_m, e.inliers));
+                         merge.a, merge.b, tried, e.consistency.agreeing, 1e3 * e.alignment.spread_m,
+                         e.totals().inliers));
   } else {
     log.info(fmt::format("{} and {} are not merged: {}: {}", merge.a, merge.b, e.refused, tried));
   }
@@ -53,7 +54,7 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
     const mapping::MergeEvidence& e = merge.evidence;
     if (e.accepted) continue;
     text += fmt::format("; {} with {}: {} ({} look-alikes, {} tried, {} verified)", merge.b, merge.a,
-                        e.refused, e.candidates, e.tried, e.verified);
+                        e.refused, e.candidates, e.tried, e.consistency.verified);
   }
   return text;
 }

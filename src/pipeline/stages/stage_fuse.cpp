@@ -149,91 +149,98 @@ class FuseStage : public Stage {
                                             : context_->recordings->robot(robot).camera.color;
   }
 
-  core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
-    std::vector<geometry::Rigid3> poses;
-    std::vector<std::size_t> places;
-    std::vector<std::int32_t> robots;
-    std::vector<double> stamps;
+  /// A cloud of a keyframe or frame that was tracked.
+  struct View {
+    std::size_t place;  ///< among the clouds
+    std::int32_t robot;
+    double stamp;
+    geometry::Rigid3 world_from_camera;
+  };
+
+  /// Keyframes in the map's order, then frames between them.
+  [[nodiscard]] std::vector<View> views_at(const MapResult& map) const {
+    std::vector<View> views;
     for (const KeyframePose& keyframe : map.keyframes) {
       const auto found = places_.find(keyframe.id);
       if (found == places_.end()) continue;
-      poses.push_back(keyframe.world_from_camera);
-      places.push_back(found->second);
-      robots.push_back(keyframe.id.robot);
-      stamps.push_back(keyframe.stamp);
+      views.push_back({found->second, keyframe.id.robot, keyframe.stamp, keyframe.world_from_camera});
     }
-    std::map<std::int32_t, geometry::Trajectory> ways;
-    for (const IntermediateFrame& intermediate : intermediate_) {
-      const auto way = ways.find(intermediate.robot);
-      const geometry::Trajectory& poses_of_robot =
-          way != ways.end()
-              ? way->second
-              : ways.emplace(intermediate.robot, trajectory_of(map, intermediate.robot)).first->second;
+    std::map<std::int32_t, geometry::Trajectory> trajectories;
+    for (const IntermediateFrame& between : intermediate_) {
+      const auto known = trajectories.find(between.robot);
+      const geometry::Trajectory& poses =
+          known != trajectories.end()
+              ? known->second
+              : trajectories.emplace(between.robot, trajectory_of(map, between.robot)).first->second;
       const auto found =
-          std::lower_bound(poses_of_robot.begin(), poses_of_robot.end(), intermediate.stamp,
+          std::lower_bound(poses.begin(), poses.end(), between.stamp,
                            [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
-      if (found == poses_of_robot.end() || found->stamp != intermediate.stamp)
-        continue;  // a frame that was lost
-      poses.push_back(found->world_from_camera);
-      places.push_back(intermediate.place);
-      robots.push_back(intermediate.robot);
-      stamps.push_back(intermediate.stamp);
+      if (found == poses.end() || found->stamp != between.stamp) continue;  // a frame that was lost
+      views.push_back({between.place, between.robot, between.stamp, found->world_from_camera});
     }
-    std::vector<sensor::Pinhole> cameras;
-    for (const std::int32_t robot : robots) cameras.push_back(camera_of(robot));
-    cloud::FusionReport report;
-    const cloud::ReadView read_raw = [&](std::size_t i) { return clouds_->read(places[i]); };
-    if (auto found = find_fields(map, poses, stamps, robots, cameras, read_raw); !found) {
-      return tl::unexpected<core::Error>(found.error());
+    return views;
+  }
+
+  core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
+    const std::vector<View> views = views_at(map);
+    if (find_depth_field_) {
+      if (auto found = find_fields(map, views); !found) return tl::unexpected<core::Error>(found.error());
     }
-    cloud::FusionViews views;
-    views.world_from_camera = poses;
-    views.cameras = cameras;
-    if (map.robots.size() > 1) {
+    read_covariances(map);
+    cloud::FusionViews laid;
+    std::vector<std::int32_t> robots;
+    std::vector<double> stamps;
+    for (const View& view : views) {
       constexpr std::int32_t kMostRobots = 254;
-      for (const std::int32_t robot : robots)
-        views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
+      laid.world_from_camera.push_back(view.world_from_camera);
+      laid.cameras.push_back(camera_of(view.robot));
+      if (map.robots.size() > 1)
+        laid.robots.push_back(static_cast<std::uint8_t>(std::clamp(view.robot, 0, kMostRobots)));
+      robots.push_back(view.robot);
+      stamps.push_back(view.stamp);
     }
-    for (const KeyframePose& keyframe : map.keyframes) {
-      if (!keyframe.accuracy) {
-        state_->covariances.clear();
-        break;
-      }
-      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
-    }
-    views.covariances = state_->covariances_of(robots, stamps);
-    views.read = [&](std::size_t i) { return read_corrected(places[i], robots[i]); };
-    auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
+    laid.covariances = state_->covariances_of(robots, stamps);
+    laid.read = [&](std::size_t i) { return read_corrected(views[i].place, views[i].robot); };
+    cloud::FusionReport report;
+    auto fused = cloud::fuse_views(laid, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
         "{} clouds{}, fused in {} tiles; {} points seen through, {} isolated; colour gains {:.2f} "
         "to {:.2f}",
-        poses.size(),
+        views.size(),
         clouds_->bytes() > 0 ? fmt::format(", {:.1f} MB", static_cast<double>(clouds_->bytes()) / 1e6)
                              : std::string(),
         report.tiles, report.seen_through, report.isolated, report.least_gain, report.most_gain));
     return fused;
   }
 
-  /// One depth field for each robot's camera.
-  core::Result<void> find_fields(const MapResult& map, const std::vector<geometry::Rigid3>& poses,
-                                 const std::vector<double>& stamps, const std::vector<std::int32_t>& robots,
-                                 const std::vector<sensor::Pinhole>& cameras, const cloud::ReadView& read) {
-    if (!find_depth_field_) return {};
-    std::map<std::int32_t, std::vector<std::size_t>> views;
-    for (std::size_t i = 0; i < poses.size(); ++i) views[robots[i]].push_back(i);
-    for (auto& [robot, own] : views) {
+  /// Of all keyframes or none.
+  void read_covariances(const MapResult& map) {
+    for (const KeyframePose& keyframe : map.keyframes) {
+      if (!keyframe.accuracy) return state_->covariances.clear();
+      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
+    }
+  }
+
+  /// One depth field for each robot's camera, from its views in order of time.
+  core::Result<void> find_fields(const MapResult& map, const std::vector<View>& views) {
+    std::vector<geometry::Rigid3> poses;
+    std::map<std::int32_t, std::vector<std::size_t>> by_robot;
+    for (const View& view : views) {
+      by_robot[view.robot].push_back(poses.size());
+      poses.push_back(view.world_from_camera);
+    }
+    const cloud::ReadView read = [&](std::size_t i) { return clouds_->read(views[i].place); };
+    for (auto& [robot, own] : by_robot) {
       std::stable_sort(own.begin(), own.end(),
-                       [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
-      const sensor::Pinhole& camera = cameras[own.front()];
+                       [&](std::size_t a, std::size_t b) { return views[a].stamp < views[b].stamp; });
       cloud::DepthFieldReport report;
-      const auto field =
-          cloud::find_depth_field(own, poses, read, camera, depth_field_, *context_->executor, &report);
+      const auto field = cloud::find_depth_field(own, poses, read, camera_of(robot), depth_field_,
+                                                 *context_->executor, &report);
       if (!field) return tl::unexpected<core::Error>(field.error());
       state_->depth_fields[robot] = *field;
-      std::string name;
-      for (const RobotInfo& info : map.robots) {
-        if (info.number == robot) name = info.name;
-      }
+      const auto info = std::find_if(map.robots.begin(), map.robots.end(),
+                                     [number = robot](const RobotInfo& r) { return r.number == number; });
+      const std::string name = info != map.robots.end() ? info->name : std::string();
       reported_fields_.push_back({name, report, *field});
       context_->log->debug(fmt::format(
           "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "

@@ -43,8 +43,8 @@ class MergeStage : public Stage {
       const double time = context_->recordings->time_of(io.frame());
       times_[{merge.a, merge.b}] = time;
       context_->log->info(fmt::format("{} and {} have met after {:.1f} s: {} keyframes agree to {:.0f} mm",
-                                      robots[merge.a].name, robots[merge.b].name, time, merge.agreeing,
-                                      1e3 * merge.spread_m));
+                                      robots[merge.a].name, robots[merge.b].name, time,
+                                      merge.consistency.agreeing, 1e3 * merge.alignment.spread_m));
     }
     return {};
   }

@@ -36,10 +36,10 @@ TEST(MapFusion, TwoMapsOfOneWallBecomeOne) {
   std::vector<MergeEvidence> merges = find_overlaps(parts, {}, executor);
   ASSERT_EQ(merges.size(), 1U);
   ASSERT_TRUE(merges[0].accepted) << merges[0].refused;
-  EXPECT_GE(merges[0].agreeing, 5);
-  EXPECT_LT(tests::distance(merges[0].a_from_b, kOtherWorld.inverse()), 0.03);
-  EXPECT_LT(tests::angle(merges[0].a_from_b, kOtherWorld.inverse()), 0.015);
-  EXPECT_GT(merges[0].covariance(0, 0), 0.0);
+  EXPECT_GE(merges[0].consistency.agreeing, 5);
+  EXPECT_LT(tests::distance(merges[0].alignment.a_from_b, kOtherWorld.inverse()), 0.03);
+  EXPECT_LT(tests::angle(merges[0].alignment.a_from_b, kOtherWorld.inverse()), 0.015);
+  EXPECT_GT(merges[0].alignment.covariance(0, 0), 0.0);
   const FusedMap fused = fuse_maps(parts, merges, 0, {});
   EXPECT_EQ(fused.map.keyframe_count(), 14U);
   EXPECT_EQ(fused.parts, (std::vector<std::size_t>{0, 1}));
@@ -58,7 +58,7 @@ TEST(MapFusion, ThreadsChangeNothing) {
   const core::Executor two(2);
   std::vector<MergeEvidence> x = find_overlaps(parts, {}, one);
   std::vector<MergeEvidence> y = find_overlaps(parts, {}, two);
-  EXPECT_EQ(x[0].a_from_b.translation, y[0].a_from_b.translation);
+  EXPECT_EQ(x[0].alignment.a_from_b.translation, y[0].alignment.a_from_b.translation);
   EXPECT_EQ(content_hash(fuse_maps(parts, x, 0, {}).map), content_hash(fuse_maps(parts, y, 0, {}).map));
 }
 
@@ -96,10 +96,11 @@ TEST(MapFusion, OnePairLeadsToItsNeighbours) {
   ASSERT_TRUE(one[0].evidence.accepted) << one[0].evidence.refused;
   const MergeEvidence merge = decide_overlap(parts, 0, 1, one, {}, executor);
   EXPECT_TRUE(merge.accepted) << merge.refused;
-  EXPECT_GE(merge.agreeing, 5);
+  EXPECT_GE(merge.consistency.agreeing, 5);
   std::vector<VerifiedPair> wrong = one;
   wrong[0].evidence.query_from_match.translation.x() += 5.0;
-  EXPECT_EQ(decide_overlap(parts, 0, 1, wrong, {}, executor).agreeing, 1) << "nothing to be seen there";
+  EXPECT_EQ(decide_overlap(parts, 0, 1, wrong, {}, executor).consistency.agreeing, 1)
+      << "nothing to be seen there";
 }
 
 /// Keyframes without features in a row, `step` apart, and pairs of two such maps.
@@ -139,8 +140,8 @@ TEST(MapFusion, TwoAnswersAreNone) {
   for (int i = 1; i < 8; ++i) pairs.push_back(pair_of(i, i + 6, Rigid3{}));
   const MergeEvidence doubtful = decide_overlap(parts, 0, 1, pairs, options, executor);
   EXPECT_FALSE(doubtful.accepted);
-  EXPECT_EQ(doubtful.agreeing, 14);
-  EXPECT_EQ(doubtful.alternative, 8);
+  EXPECT_EQ(doubtful.consistency.agreeing, 14);
+  EXPECT_EQ(doubtful.ambiguity.alternative, 8);
   EXPECT_NE(doubtful.refused.find("exclude each other"), std::string::npos) << doubtful.refused;
 }
 
@@ -153,8 +154,8 @@ TEST(MapFusion, KeyframesThatShouldSeeTheSameMustDoSo) {
   for (int i = 0; i < 6; ++i) pairs.push_back(pair_of(i, i, Rigid3{}));
   const MergeEvidence merge = decide_overlap(parts, 0, 1, pairs, {}, executor);
   EXPECT_FALSE(merge.accepted);
-  EXPECT_EQ(merge.expected, 20);
-  EXPECT_EQ(merge.confirmed, 6);
+  EXPECT_EQ(merge.validation.expected, 20);
+  EXPECT_EQ(merge.validation.confirmed, 6);
 }
 
 TEST(MapFusion, ThreeMapsInARow) {
@@ -167,8 +168,8 @@ TEST(MapFusion, ThreeMapsInARow) {
   merges[1].a = 0, merges[1].b = 2;
   merges[2].a = 1, merges[2].b = 2;
   merges[0].accepted = merges[2].accepted = true;
-  merges[0].a_from_b = Rigid3(Eigen::Matrix3d::Identity(), {1.0, 0.0, 0.0});
-  merges[2].a_from_b = Rigid3(Eigen::Matrix3d::Identity(), {0.0, 1.0, 0.0});
+  merges[0].alignment.a_from_b = Rigid3(Eigen::Matrix3d::Identity(), {1.0, 0.0, 0.0});
+  merges[2].alignment.a_from_b = Rigid3(Eigen::Matrix3d::Identity(), {0.0, 1.0, 0.0});
   EXPECT_EQ(connected_parts(3, merges), (std::vector<std::size_t>{0, 0, 0}));
   const FusedMap fused = fuse_maps(parts, merges, 0, {});
   ASSERT_EQ(fused.parts.size(), 3U);

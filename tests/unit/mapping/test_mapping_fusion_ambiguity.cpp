@@ -69,20 +69,20 @@ TEST(FusionAmbiguity, OneWallHasOneAnswer) {
   const maps::Map a = walk(tests::poster(1800, 5));
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_TRUE(merge.accepted) << merge.refused;
-  EXPECT_GT(merge.laid.expected, 200);
-  EXPECT_EQ(merge.laid.matched, merge.laid.expected);
-  EXPECT_GT(merge.laid.share(), 0.5) << "the poster is crowded: chance matches some too";
-  EXPECT_LT(merge.laid.seen_through(), 0.02);
-  EXPECT_EQ(merge.alternative_m, 0.0);
+  EXPECT_GT(merge.ambiguity.overlap.expected, 200);
+  EXPECT_EQ(merge.ambiguity.overlap.matched, merge.ambiguity.overlap.expected);
+  EXPECT_GT(merge.ambiguity.overlap.share(), 0.5) << "the poster is crowded: chance matches some too";
+  EXPECT_LT(merge.ambiguity.overlap.seen_through(), 0.02);
+  EXPECT_EQ(merge.ambiguity.alternative_m, 0.0);
 }
 
 TEST(FusionAmbiguity, WhatRepeatsHasSeveral) {
   const maps::Map a = walk(repeating_wall());
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_FALSE(merge.accepted);
-  EXPECT_EQ(merge.alternative, 0) << "no keyframe says so";
-  EXPECT_NEAR(merge.alternative_m, 1.2, 0.1);
-  EXPECT_GT(merge.alternative_fit.matched, 30);
+  EXPECT_EQ(merge.ambiguity.alternative, 0) << "no keyframe says so";
+  EXPECT_NEAR(merge.ambiguity.alternative_m, 1.2, 0.1);
+  EXPECT_GT(merge.ambiguity.alternative_overlap.matched, 30);
   EXPECT_NE(merge.refused.find("look alike"), std::string::npos) << merge.refused;
 }
 
@@ -90,11 +90,11 @@ TEST(FusionAmbiguity, WhatStandsBeforeItOnlyOnceTellsThatAStepIsWrong) {
   cv::Mat wall;  // repeats along the way only
   cv::repeat(tests::poster(1440, 5).colRange(0, 360), 1, 6, wall);
   const maps::Map bare = walk(wall);
-  EXPECT_NEAR(decide(bare, as_second(bare), Rigid3{}).alternative_m, 1.2, 0.1);
+  EXPECT_NEAR(decide(bare, as_second(bare), Rigid3{}).ambiguity.alternative_m, 1.2, 0.1);
   const maps::Map a = walk(wall, {{{0.25, 0.0, 1.5}, {0.0, 0.0, -1.0}, 0.5}});
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_TRUE(merge.accepted) << merge.refused;
-  EXPECT_EQ(merge.alternative_m, 0.0);
+  EXPECT_EQ(merge.ambiguity.alternative_m, 0.0);
 }
 
 /// How many spots match when the wall is laid over itself, a repetition further.
@@ -120,7 +120,7 @@ TEST(FusionAmbiguity, MapsThatContradictAreNotMerged) {
   const maps::Map a = walk(tests::poster(1800, 5));
   const MergeEvidence merge = decide(a, as_second(a), Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.0, -0.8}));
   EXPECT_FALSE(merge.accepted);
-  EXPECT_GT(merge.laid.seen_through(), 0.3);
+  EXPECT_GT(merge.ambiguity.overlap.seen_through(), 0.3);
   EXPECT_NE(merge.refused.find("seen through"), std::string::npos) << merge.refused;
 }
 
@@ -131,7 +131,7 @@ TEST(FusionAmbiguity, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
   few.few_extent_m = 0.3;
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{}, few);
   EXPECT_TRUE(merge.accepted) << merge.refused;
-  EXPECT_LT(merge.agreeing, few.min_pairs);
+  EXPECT_LT(merge.consistency.agreeing, few.min_pairs);
   const maps::Map repeats = walk(repeating_wall());
   EXPECT_FALSE(decide(repeats, as_second(repeats), Rigid3{}, few).accepted);
 
@@ -156,8 +156,8 @@ TEST(FusionAmbiguity, MapsWithoutLandmarksTellNothing) {
   }
   const MergeEvidence merge = decide(a, as_second(a), Rigid3{});
   EXPECT_TRUE(merge.accepted) << merge.refused;
-  EXPECT_EQ(merge.laid.expected, 0);
-  EXPECT_EQ(merge.laid.seen_through(), 0.0);
+  EXPECT_EQ(merge.ambiguity.overlap.expected, 0);
+  EXPECT_EQ(merge.ambiguity.overlap.seen_through(), 0.0);
   MapFusionOptions few;
   few.min_pairs = 50;
   few.few_extent_m = 0.3;

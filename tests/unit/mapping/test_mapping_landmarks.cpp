@@ -247,6 +247,19 @@ TEST(Fusion, ACornerTwoPixelsOffIsAnother) {
   }
 }
 
+TEST(Fusion, LinesAreProjectedWithTheCameraOfTheRobotThatSawThem) {
+  LandmarkWorld world(13, 0, 12);
+  const std::map<std::int32_t, sensor::Pinhole> cameras{{0, world.camera},
+                                                        {1, {640, 480, 420.0, 415.0, 330.0, 230.0}}};
+  const KeyframeId of_0 = world.add_keyframe(looking_from(0.0));
+  world.robot = 1;
+  world.camera = cameras.at(1);
+  const KeyframeId of_1 = world.add_keyframe(looking_from(0.1));
+  for (std::size_t i = 0; i < 12; ++i) world.add_line(i, {of_0});
+  for (std::size_t i = 0; i < 12; ++i) world.add_line(i, {of_1});
+  EXPECT_GT(fuse_lines(world.map, of_1, {of_0}, cameras, {}).merged, 8);
+}
+
 TEST(Fusion, EdgesThatMeetInOnePictureStayTwo) {
   for (const double behind_m : {0.0, 0.025}) {
     LandmarkWorld world(12, 0, 1);

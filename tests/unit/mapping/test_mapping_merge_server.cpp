@@ -41,7 +41,7 @@ TEST(MergeServer, TellsOnceThatTwoRobotsHaveMet) {
     }
   }
   ASSERT_EQ(merges.size(), 1U);
-  EXPECT_LT(tests::distance(merges[0].a_from_b, kWorldOfOthers.inverse()), 0.04);
+  EXPECT_LT(tests::distance(merges[0].alignment.a_from_b, kWorldOfOthers.inverse()), 0.04);
   EXPECT_THROW(end.add(a, {5, 0}), std::invalid_argument);
 }
 

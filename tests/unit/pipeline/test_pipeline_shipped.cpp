@@ -183,5 +183,17 @@ TEST(Shipped, LevelsNameOptionsThatAreThere) {
   RecordProperty("basic", static_cast<int>(count[OptionLevel::kBasic]));
 }
 
+TEST(Shipped, AnOptionThatWentIsReadAndHasNoEffect) {
+  StageRegistry registry;
+  register_stages(registry);
+  const std::string own = "include: rgbd.yaml\nstages:\n  track: {solver.max_iterations: 7}\n";
+  const auto graph = parse_graph(own, "own.yaml", registry, kShipped, {"track.solver.max_iterations=9"});
+  ASSERT_TRUE(graph) << graph.error().message;
+  ASSERT_EQ(graph->warnings.size(), 2U);
+  EXPECT_EQ(graph->warnings[0], "stages.track.solver.max_iterations: has no effect");
+  EXPECT_EQ(graph->warnings[1], "--set track.solver.max_iterations: has no effect");
+  EXPECT_EQ(to_yaml(*graph).find("solver.max_iterations"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace plumbline::pipeline
