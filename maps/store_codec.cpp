@@ -56,6 +56,32 @@ void read(ByteReader& from, sensor::Pinhole& pinhole) {
   for (double* value : {&pinhole.fx, &pinhole.fy, &pinhole.cx, &pinhole.cy}) from.get(*value);
 }
 
+void write(const sensor::Camera& camera, ByteWriter& to) {
+  to.put(std::string_view(camera.name));
+  write(camera.color, to);
+  for (const double k : camera.distortion) to.put(k);
+  to.put(camera.depth_scale);
+  to.put(camera.fps);
+  to.flag(camera.color_from_depth.has_value());
+  if (camera.color_from_depth) to.put(*camera.color_from_depth);
+  to.flag(camera.depth.has_value());
+  if (camera.depth) write(*camera.depth, to);
+  to.flag(camera.readout_s.has_value());
+  if (camera.readout_s) to.put(*camera.readout_s);
+  for (const double slope : camera.depth_slope) to.put(slope);
+}
+void read(ByteReader& from, sensor::Camera& camera) {
+  from.get(camera.name);
+  read(from, camera.color);
+  for (double& k : camera.distortion) from.get(k);
+  from.get(camera.depth_scale);
+  from.get(camera.fps);
+  if (from.flag()) from.get(camera.color_from_depth.emplace());
+  if (from.flag()) read(from, camera.depth.emplace());
+  if (from.flag()) from.get(camera.readout_s.emplace());
+  for (double& slope : camera.depth_slope) from.get(slope);
+}
+
 }  // namespace
 
 void encode(const KeyframeState& state, ByteWriter& to) {
@@ -146,26 +172,6 @@ SurfaceEdge decode_edge(const Bytes& bytes, std::uint64_t number) {
   return edge;
 }
 
-void encode(const std::vector<LoopEdge>& loops, ByteWriter& to) {
-  for (const LoopEdge& loop : loops) {
-    to.put(loop.a);
-    to.put(loop.b);
-    to.put(loop.b_from_a);
-    to.put(loop.information);
-  }
-}
-std::vector<LoopEdge> decode_loops(const Bytes& bytes) {
-  std::vector<LoopEdge> loops;
-  for (ByteReader from(bytes); !from.at_end();) {
-    LoopEdge& loop = loops.emplace_back();
-    from.get(loop.a);
-    from.get(loop.b);
-    from.get(loop.b_from_a);
-    from.get(loop.information);
-  }
-  return loops;
-}
-
 void encode(const FramePose& frame, ByteWriter& to) {
   to.put(frame.stamp);
   to.put(frame.reference);
@@ -188,57 +194,62 @@ void decode_page(const Bytes& bytes, std::vector<FramePose>& frames) {
   }
 }
 
-void encode(const sensor::Camera& camera, ByteWriter& to) {
-  to.put(std::string_view(camera.name));
-  write(camera.color, to);
-  for (const double k : camera.distortion) to.put(k);
-  to.put(camera.depth_scale);
-  to.put(camera.fps);
-  to.flag(camera.color_from_depth.has_value());
-  if (camera.color_from_depth) to.put(*camera.color_from_depth);
-  to.flag(camera.depth.has_value());
-  if (camera.depth) write(*camera.depth, to);
-  to.flag(camera.readout_s.has_value());
-  if (camera.readout_s) to.put(*camera.readout_s);
-  for (const double slope : camera.depth_slope) to.put(slope);
-}
-sensor::Camera decode_camera(const Bytes& bytes) {
-  ByteReader from(bytes);
-  sensor::Camera camera;
-  from.get(camera.name);
-  read(from, camera.color);
-  for (double& k : camera.distortion) from.get(k);
-  from.get(camera.depth_scale);
-  from.get(camera.fps);
-  if (from.flag()) from.get(camera.color_from_depth.emplace());
-  if (from.flag()) read(from, camera.depth.emplace());
-  if (from.flag()) from.get(camera.readout_s.emplace());
-  for (double& slope : camera.depth_slope) from.get(slope);
-  from.expect_end();
-  return camera;
+void encode(const std::string& line, ByteWriter& to) { to.put(std::string_view(line)); }
+void decode_page(const Bytes& bytes, std::vector<std::string>& log) {
+  for (ByteReader from(bytes); !from.at_end();) from.get(log.emplace_back());
 }
 
-void encode(const Totals& totals, ByteWriter& to) {
-  for (const std::uint64_t value : {totals.keyframes, totals.points, totals.lines, totals.edges,
-                                    totals.frames, totals.log, totals.next.edge}) {
+void encode(const std::vector<RobotInfo>& robots, ByteWriter& to) {
+  for (const RobotInfo& robot : robots) {
+    to.put(robot.number);
+    to.put(std::string_view(robot.name));
+    write(robot.camera, to);
+  }
+}
+std::vector<RobotInfo> decode_robots(const Bytes& bytes) {
+  std::vector<RobotInfo> robots;
+  for (ByteReader from(bytes); !from.at_end();) {
+    RobotInfo& robot = robots.emplace_back();
+    from.get(robot.number);
+    from.get(robot.name);
+    read(from, robot.camera);
+  }
+  return robots;
+}
+
+void encode(const MapRow& row, ByteWriter& to) {
+  for (const std::uint64_t value :
+       {row.keyframes, row.points, row.lines, row.edges, row.frames, row.log, row.next.edge}) {
     to.put(value);
   }
-  write(totals.next.keyframes, to);
-  write(totals.next.points, to);
-  write(totals.next.lines, to);
+  write(row.next.keyframes, to);
+  write(row.next.points, to);
+  write(row.next.lines, to);
+  for (const LoopEdge& loop : row.loops) {
+    to.put(loop.a);
+    to.put(loop.b);
+    to.put(loop.b_from_a);
+    to.put(loop.information);
+  }
 }
-Totals decode_totals(const Bytes& bytes) {
+MapRow decode_map(const Bytes& bytes) {
   ByteReader from(bytes);
-  Totals totals;
-  for (std::uint64_t* value : {&totals.keyframes, &totals.points, &totals.lines, &totals.edges,
-                               &totals.frames, &totals.log, &totals.next.edge}) {
+  MapRow row;
+  for (std::uint64_t* value :
+       {&row.keyframes, &row.points, &row.lines, &row.edges, &row.frames, &row.log, &row.next.edge}) {
     from.get(*value);
   }
-  read(from, totals.next.keyframes);
-  read(from, totals.next.points);
-  read(from, totals.next.lines);
-  from.expect_end();
-  return totals;
+  read(from, row.next.keyframes);
+  read(from, row.next.points);
+  read(from, row.next.lines);
+  while (!from.at_end()) {
+    LoopEdge& loop = row.loops.emplace_back();
+    from.get(loop.a);
+    from.get(loop.b);
+    from.get(loop.b_from_a);
+    from.get(loop.information);
+  }
+  return row;
 }
 
 }  // namespace plumbline::maps

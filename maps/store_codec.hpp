@@ -43,17 +43,15 @@ void decode_page(const Bytes& bytes, std::vector<MapLine>& lines);
 /// With its number, which tells a row that holds another's bytes.
 void encode(const SurfaceEdge& edge, std::uint64_t number, ByteWriter& to);
 SurfaceEdge decode_edge(const Bytes& bytes, std::uint64_t number);
-void encode(const std::vector<LoopEdge>& loops, ByteWriter& to);
-std::vector<LoopEdge> decode_loops(const Bytes& bytes);
 
 void encode(const FramePose& frame, ByteWriter& to);
 void decode_page(const Bytes& bytes, std::vector<FramePose>& frames);
 
-void encode(const sensor::Camera& camera, ByteWriter& to);
-sensor::Camera decode_camera(const Bytes& bytes);
+void encode(const std::vector<RobotInfo>& robots, ByteWriter& to);
+std::vector<RobotInfo> decode_robots(const Bytes& bytes);
 
-/// How much of everything there must be: tells when rows were lost.
-struct Totals {
+/// What belongs to a map as a whole, and how much of everything there must be: tells when rows were lost.
+struct MapRow {
   std::uint64_t keyframes = 0;
   std::uint64_t points = 0;
   std::uint64_t lines = 0;
@@ -61,8 +59,12 @@ struct Totals {
   std::uint64_t frames = 0;
   std::uint64_t log = 0;
   NextIds next;
+  std::vector<LoopEdge> loops;
 };
-void encode(const Totals& totals, ByteWriter& to);
-Totals decode_totals(const Bytes& bytes);
+void encode(const MapRow& row, ByteWriter& to);
+MapRow decode_map(const Bytes& bytes);
+/// A line of frames.csv; of a page, they are appended.
+void encode(const std::string& line, ByteWriter& to);
+void decode_page(const Bytes& bytes, std::vector<std::string>& log);
 
 }  // namespace plumbline::maps

@@ -70,9 +70,10 @@ class Mirror {
     put_.bind(1, key.first).bind(2, key.second).bind(3, transaction_).bind(4, packed).run();
     if (is_new) bring_back_.bind(1, key.first).bind(2, key.second).run();
   }
-  void end() {
+  /// `robot`: rows of others stay whatever was named; -1: they do not.
+  void end(std::int32_t robot = -1) {
     for (auto row = rows_.begin(); row != rows_.end();) {
-      if (row->second.round == round_) {
+      if (row->second.round == round_ || (robot >= 0 && row->first.first != robot)) {
         ++row;
         continue;
       }

@@ -13,16 +13,15 @@ namespace {
 
 using core::ErrorKind;
 
-std::optional<sensor::Camera> read_camera(Database& database) {
-  Statement camera(database, "SELECT data FROM header WHERE key = 'camera'");
-  if (!camera.step()) return std::nullopt;
-  return decode_camera(camera.unpacked(0));
+std::vector<RobotInfo> read_robots(Database& database) {
+  Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
+  return robots.step() ? decode_robots(robots.unpacked(0)) : std::vector<RobotInfo>();
 }
 
 int type_of(const RowTable& table, const std::string& key) {
   if (std::string(table.name) != "header") return SQLITE_BLOB;
   if (key == "complete") return SQLITE_INTEGER;
-  const bool text = key == "robot" || key == "input" || key == "program" || key == "configuration";
+  const bool text = key == "input" || key == "program" || key == "configuration";
   return text ? SQLITE_TEXT : SQLITE_BLOB;
 }
 
@@ -54,7 +53,7 @@ struct StoreReplica::Impl {
   }
   void learn() {
     heads = read_heads(*database);
-    camera = read_camera(*database);
+    robots = read_robots(*database);
     keyframes = static_cast<std::size_t>(database->number("SELECT count(*) FROM keyframe"));
     complete = database->number("SELECT data FROM header WHERE key = 'complete'") == 1;
   }
@@ -77,7 +76,7 @@ struct StoreReplica::Impl {
   std::filesystem::path file;
   std::unique_ptr<Database> database;
   StoreHeads heads;
-  std::optional<sensor::Camera> camera;
+  std::vector<RobotInfo> robots;
   std::size_t keyframes = 0;
   bool complete = false;
   ReplicaBytes bytes;
@@ -131,7 +130,7 @@ void StoreReplica::Impl::take_row(const StoreRow& row) {
       check_name(row.name);
     } else {
       if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
-      check_row(row.name, row.data, camera);
+      check_row(row.name, row.data, robots);
     }
   } catch (const BadBytes& bad) {
     throw BadBytes(where + ": " + bad.what());

@@ -55,13 +55,21 @@ void create_tables(Database& database) {
 
 void put_header(Database& database, const StoreHeader& header) {
   constexpr std::int64_t kFirst = 1;
-  put_header(database, kFirst, "robot", header.robot);
   put_header(database, kFirst, "input", header.input);
   put_header(database, kFirst, "program", header.program_version);
   put_header(database, kFirst, "configuration", header.configuration);
-  ByteWriter camera;
-  encode(header.camera, camera);
-  put_header(database, kFirst, "camera", pack(camera.bytes()));
+  put_robots(database, kFirst, header.robots);
+  put_complete(database, kFirst, false);
+}
+
+void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots) {
+  ByteWriter bytes;
+  encode(robots, bytes);
+  put_header(database, transaction, "robots", pack(bytes.bytes()));
+}
+
+void put_complete(Database& database, std::int64_t transaction, bool complete) {
+  put_header(database, transaction, "complete", std::int64_t{complete ? 1 : 0});
 }
 
 StoreHeads read_heads(Database& database) {
@@ -109,22 +117,14 @@ void check_store(Database& database) {
 
 StoreHeader read_header(Database& database) {
   StoreHeader header;
-  header.robot = get_text(database, "robot");
   header.input = get_text(database, "input");
   header.program_version = get_text(database, "program");
   header.configuration = get_text(database, "configuration");
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
-  Statement camera(database, "SELECT data FROM header WHERE key = 'camera'");
-  if (!camera.step()) throw BadBytes("its header has no camera");
-  header.camera = decode_camera(camera.unpacked(0));
+  Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
+  if (!robots.step()) throw BadBytes("its header has no robots");
+  header.robots = decode_robots(robots.unpacked(0));
   return header;
-}
-
-void put_totals(Database& database, std::int64_t transaction, const Totals& totals, bool complete) {
-  ByteWriter bytes;
-  encode(totals, bytes);
-  put_header(database, transaction, "totals", pack(bytes.bytes()));
-  put_header(database, transaction, "complete", std::int64_t{complete ? 1 : 0});
 }
 
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame) {
@@ -144,25 +144,6 @@ ResultFrame read_result_frame(Database& database) {
   frame.upright = from.flag();
   from.expect_end();
   return frame;
-}
-
-Bytes read_loops(Database& database) {
-  Statement statement(database, "SELECT data FROM header WHERE key = 'loops'");
-  return statement.step() ? statement.unpacked(0) : Bytes{};
-}
-
-void put_loops(Database& database, std::int64_t transaction, const Bytes& loops) {
-  put_header(database, transaction, "loops", pack(loops));
-}
-
-std::vector<std::string> read_log(Database& database) {
-  std::vector<std::string> lines;
-  Statement rows(database, "SELECT data FROM log ORDER BY robot, number");
-  while (rows.step()) {
-    const Bytes bytes = rows.unpacked(0);
-    for (ByteReader from(bytes); !from.at_end();) from.get(lines.emplace_back());
-  }
-  return lines;
 }
 
 void check_file(const std::filesystem::path& file) {

@@ -22,7 +22,9 @@ sqlite3* open(const std::filesystem::path& file, Database::Access access) {
   sqlite3* database = nullptr;
   // An absolute path is never taken for a URI or for an option.
   const std::string path = std::filesystem::absolute(file).string();
-  const int code = sqlite3_open_v2(path.c_str(), &database, flags_of(access) | SQLITE_OPEN_NOMUTEX, nullptr);
+  // With a mutex: clouds are read by several threads.
+  const int code =
+      sqlite3_open_v2(path.c_str(), &database, flags_of(access) | SQLITE_OPEN_FULLMUTEX, nullptr);
   if (code == SQLITE_OK) return database;
   const std::string why = sqlite3_errstr(code);
   sqlite3_close_v2(database);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A keyframe's cloud as few bytes, for spools, stores and networks: 5 to 7 bytes a point instead of 48.
+// A keyframe's cloud as few bytes, for stores and networks: 5 to 7 bytes a point instead of 48.
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -74,7 +74,7 @@ class Nonsense : public testing::Test {
     for (Told told : all_) {
       for (StoreRow& row : told.rows) {
         if (changed || kRowTables[row.name.place].name != table) continue;
-        if (table == "header" && row.name.key != "camera") continue;
+        if (table == "header" && row.name.key != "robots") continue;
         change(row);
         changed = true;
       }
@@ -102,11 +102,11 @@ TEST_F(Nonsense, IsNamed) {
   const auto unpacked = [](const StoreRow& row) { return unpack(row.data.data(), row.data.size()); };
   contains(refusal("header",
                    [&](StoreRow& row) {
-                     sensor::Camera camera = world_.camera;
-                     camera.color.fx = nan;
-                     put(row, [&](ByteWriter& to) { encode(camera, to); });
+                     std::vector<RobotInfo> robots = header_of(world_.camera).robots;
+                     robots.front().camera.color.fx = nan;
+                     put(row, [&](ByteWriter& to) { encode(robots, to); });
                    }),
-           "header camera: a camera's focal length is none");
+           "header robots: a camera's focal length is none");
   contains(refusal("state",
                    [&](StoreRow& row) {
                      KeyframeState state = decode_state(unpacked(row));
