@@ -121,7 +121,7 @@ void check(const sensor::Camera& camera) {
 }
 
 void check_map(const Bytes& bytes) {
-  const MapRow row = decode_map(bytes);
+  const MapRow row = decode<MapRow>(bytes);
   check_next(row.next.keyframes);
   check_next(row.next.points);
   check_next(row.next.lines);
@@ -131,15 +131,14 @@ void check_map(const Bytes& bytes) {
 void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotInfo>& robots) {
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
   if (key == "robots") {
-    robots = decode_robots(plain(kMostSmall));
+    robots = decode<std::vector<RobotInfo>>(plain(kMostSmall));
     demand(!robots.empty(), "there is no robot");
     for (const RobotInfo& robot : robots) {
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
     }
   } else if (key == "result") {
-    const Bytes frame = plain(kMostSmall);
-    demand(frame.size() == 12 * sizeof(double) + 1, "it ends too early");
+    check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
   } else {
     const bool known = key == "input" || key == "program" || key == "configuration" || key == "complete";
     demand(known, "nothing has this name");
@@ -180,14 +179,16 @@ void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& 
   if (table == "map") return check_map(plain(kMostPlain));
   if (table == "keyframe") return check_keyframe(plain(kMostPlain), name, robots);
   if (table == "state") {
-    const KeyframeState state = decode_state(plain(kMostSmall));
+    const KeyframeState state = decode<KeyframeState>(plain(kMostSmall));
     check(state.camera_from_world);
     return check_id(state.parent);
   }
   if (table == "point") return check_landmarks<MapPoint>(plain(kMostPage), name);
   if (table == "line") return check_landmarks<MapLine>(plain(kMostPage), name);
   if (table == "edge") {
-    return check_edge(decode_edge(plain(kMostSmall), static_cast<std::uint64_t>(name.number)));
+    const auto row = decode<EdgeRow>(plain(kMostSmall));
+    demand(row.number == static_cast<std::uint64_t>(name.number), "it holds what belongs to another row");
+    return check_edge(row.edge);
   }
   if (table == "frame") return check_frame_page(plain(kMostPage));
   if (table == "log") return check_log(plain(kMostPage));

@@ -43,7 +43,7 @@ class Pieces {
   };
   explicit Pieces(Database& database) {
     read_table(database, "map", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
-      pieces_[key.robot].row = decode_map(bytes);
+      pieces_[key.robot].row = decode<MapRow>(bytes);
     });
     if (pieces_.empty()) pieces_[0];  // nothing was added yet
   }
@@ -93,7 +93,7 @@ void read_keyframes(Database& database, const std::vector<RobotInfo>& robots, Pi
     if (piece.states == keyframes.size() || keyframes[piece.states].data->id != id) {
       throw BadBytes("its keyframe is missing");
     }
-    const KeyframeState state = decode_state(bytes);
+    const KeyframeState state = decode<KeyframeState>(bytes);
     keyframes[piece.states].camera_from_world = state.camera_from_world;
     keyframes[piece.states++].parent = state.parent;
   });
@@ -146,8 +146,10 @@ std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) 
   read_landmarks(database, "point", pieces, &MapParts::points);
   read_landmarks(database, "line", pieces, &MapParts::lines);
   read_table(database, "edge", [&](KeyframeId key, std::int64_t number, const Bytes& bytes) {
-    const auto name = static_cast<std::uint64_t>(number);
-    pieces.of(key.robot).parts.edges.emplace_back(name, decode_edge(bytes, name));
+    const auto row = decode<EdgeRow>(bytes);
+    if (row.number != static_cast<std::uint64_t>(number))
+      throw BadBytes("it holds what belongs to another row");
+    pieces.of(key.robot).parts.edges.emplace_back(row.number, row.edge);
   });
   read_table(database, "frame", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
     decode_page(bytes, pieces.of(key.robot).stored.frames);
@@ -166,7 +168,9 @@ std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) 
 }
 
 template <typename IdType>
-std::string name_of(IdType id) { return std::to_string(id.robot) + "/" + std::to_string(id.index); }
+std::string name_of(IdType id) {
+  return std::to_string(id.robot) + "/" + std::to_string(id.index);
+}
 
 }  // namespace
 

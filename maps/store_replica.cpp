@@ -15,7 +15,7 @@ using core::ErrorKind;
 
 std::vector<RobotInfo> read_robots(Database& database) {
   Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
-  return robots.step() ? decode_robots(robots.unpacked(0)) : std::vector<RobotInfo>();
+  return robots.step() ? decode<std::vector<RobotInfo>>(robots.unpacked(0)) : std::vector<RobotInfo>();
 }
 
 int type_of(const RowTable& table, const std::string& key) {
@@ -68,7 +68,7 @@ struct StoreReplica::Impl {
   /// `action`; when it fails the transaction is over.
   template <typename Action>
   core::Result<void> guard(const Action& action) {
-    core::Result<void> done = guarded(file, ErrorKind::kInput, action);
+    core::Result<void> done = guarded(file, ErrorKind::kOutput, action);
     if (!done) forget();
     return done;
   }
@@ -168,7 +168,7 @@ StoreReplica::~StoreReplica() {
 }
 
 core::Result<StoreReplica> StoreReplica::open(const std::filesystem::path& file) {
-  return guarded(file, ErrorKind::kInput,
+  return guarded(file, ErrorKind::kOutput,
                  [&] { return StoreReplica(std::make_unique<Impl>(file, open_database(file))); });
 }
 
@@ -195,9 +195,9 @@ core::Result<void> StoreReplica::take(const std::uint8_t* bytes, std::size_t siz
     waiting.insert(waiting.end(), bytes, bytes + size);
     std::size_t at = 0;
     while (waiting.size() - at >= kRowLength) {
-      const Bytes head(waiting.begin() + static_cast<std::ptrdiff_t>(at),
-                       waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength));
-      const std::size_t length = ByteReader(head).get<std::uint32_t>();
+      const auto length =
+          decode<std::uint32_t>(Bytes(waiting.begin() + static_cast<std::ptrdiff_t>(at),
+                                      waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength)));
       if (length > kMostRowBytes) throw BadBytes("a row is too large");
       if (waiting.size() - at - kRowLength < length) break;
       const auto begin = waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength);
@@ -229,7 +229,7 @@ core::Result<void> StoreReplica::clear() {
   return impl_->guard([&] {
     Transaction whole(*impl_->database, true);
     for (const RowTable& table : kRowTables) {
-      impl_->database->run(("DELETE FROM " + std::string(table.name)).c_str());
+      impl_->database->run("DELETE FROM " + std::string(table.name));
     }
     impl_->database->run("DELETE FROM removed");
     whole.commit();

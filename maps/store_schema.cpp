@@ -18,7 +18,7 @@ void create_table(Database& database, const RowTable& table) {
                                           : " (robot INTEGER NOT NULL, number INTEGER NOT NULL, changed "
                                             "INTEGER NOT NULL, data BLOB NOT NULL,"
                                             " PRIMARY KEY (robot, number))";
-  database.run(("CREATE TABLE " + name + columns).c_str());
+  database.run("CREATE TABLE " + name + columns);
 }
 
 template <typename Value>
@@ -45,12 +45,12 @@ std::string place_of(const std::string& table) {
 }
 
 void create_tables(Database& database) {
-  database.run(("PRAGMA application_id = " + std::to_string(kStoreApplication)).c_str());
+  database.run("PRAGMA application_id = " + std::to_string(kStoreApplication));
   for (const RowTable& table : kRowTables) create_table(database, table);
   database.run(
       "CREATE TABLE removed (place INTEGER NOT NULL, robot INTEGER NOT NULL, number INTEGER NOT NULL,"
       " changed INTEGER NOT NULL, PRIMARY KEY (place, robot, number))");
-  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
+  database.run("PRAGMA user_version = " + std::to_string(kStoreFormat));
 }
 
 void put_header(Database& database, const StoreHeader& header) {
@@ -123,27 +123,19 @@ StoreHeader read_header(Database& database) {
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
   Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
   if (!robots.step()) throw BadBytes("its header has no robots");
-  header.robots = decode_robots(robots.unpacked(0));
+  header.robots = decode<std::vector<RobotInfo>>(robots.unpacked(0));
   return header;
 }
 
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame) {
   ByteWriter bytes;
-  bytes.put(frame.output_from_map);
-  bytes.flag(frame.upright);
+  encode(frame, bytes);
   put_header(database, transaction, "result", pack(bytes.bytes()));
 }
 
 ResultFrame read_result_frame(Database& database) {
-  ResultFrame frame;
   Statement statement(database, "SELECT data FROM header WHERE key = 'result'");
-  if (!statement.step()) return frame;
-  const Bytes bytes = statement.unpacked(0);
-  ByteReader from(bytes);
-  from.get(frame.output_from_map);
-  frame.upright = from.flag();
-  from.expect_end();
-  return frame;
+  return statement.step() ? decode<ResultFrame>(statement.unpacked(0)) : ResultFrame();
 }
 
 void check_file(const std::filesystem::path& file) {

@@ -21,13 +21,19 @@ struct RowTable {
 };
 /// Messages name a table by its place here, and hold rows in this order.
 constexpr RowTable kRowTables[] = {
-    {"header", StoreShare::kMap, true},     {"map", StoreShare::kMap, false},
+    {"header", StoreShare::kMap, true},
+    {"map", StoreShare::kMap, false},
     {"keyframe", StoreShare::kMap, false},
-    {"state", StoreShare::kMap, false},     {"point", StoreShare::kMap, false},
-    {"line", StoreShare::kMap, false},      {"edge", StoreShare::kMap, false},
-    {"frame", StoreShare::kMap, false},     {"log", StoreShare::kMap, false},
-    {"attachment", StoreShare::kMap, true}, {"surface", StoreShare::kClouds, false},
-    {"cloud", StoreShare::kClouds, false},  {"frame_cloud", StoreShare::kClouds, false},
+    {"state", StoreShare::kMap, false},
+    {"point", StoreShare::kMap, false},
+    {"line", StoreShare::kMap, false},
+    {"edge", StoreShare::kMap, false},
+    {"frame", StoreShare::kMap, false},
+    {"log", StoreShare::kMap, false},
+    {"attachment", StoreShare::kMap, true},
+    {"surface", StoreShare::kClouds, false},
+    {"cloud", StoreShare::kClouds, false},
+    {"frame_cloud", StoreShare::kClouds, false},
 };
 
 /// The place of a table in kRowTables, as the table `removed` names it.

@@ -40,7 +40,7 @@ void leave_one_file(Database& database) {
     try {
       database.run("PRAGMA journal_mode = DELETE");
       return;
-    } catch (const StoreFailure&) {
+    } catch (const SQLite::Exception&) {
       std::this_thread::sleep_for(kBetween);
     }
   }
@@ -176,7 +176,7 @@ void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) 
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
     if (edges.keep(key)) continue;
     bytes.clear();
-    encode(edge, number, bytes);
+    encode(EdgeRow{number, edge}, bytes);
     edges.put(key, bytes.bytes());
   }
   for (const auto& [number, owner] : map.edge_names) edges.stay({owner, static_cast<std::int64_t>(number)});
@@ -287,7 +287,7 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
 }
 
 core::Result<StoreWriter> StoreWriter::resume(const std::filesystem::path& file) {
-  return guarded(file, ErrorKind::kInput, [&] {
+  return guarded(file, ErrorKind::kOutput, [&] {
     check_file(file);
     auto database = std::make_unique<Database>(file, Database::Access::kWrite);
     check_store(*database);

@@ -322,7 +322,8 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   print_row(name, "replayed, ms a keyframe", 100.0, maps::trajectory(stored->frames, map), *truth, map,
             closer.trials(), closer.counts(), ms, settings.tell);
   if (!(settings.wrong > 0.0)) return {};
-  mapping::LoopCloser watcher(options->loops, maps::camera_of(stored->header.robots, 0).color);  // all that could be closed
+  mapping::LoopCloser watcher(options->loops,
+                              maps::camera_of(stored->header.robots, 0).color);  // all that could be closed
   std::vector<mapping::PoseEdge> edges;
   for (const core::KeyframeId id : stored->map.keyframe_ids()) {
     for (const mapping::Loop& loop : watcher.look(stored->map, id)) {

@@ -226,7 +226,8 @@ TEST_F(MapCommand, KnownPosesOfSeveralRobots) {
       std::string("map wall other -p known_poses -q --force --set fuse.voxel=20mm") + kNoPictures;
   const Outcome o = run(map + " -o two");
   ASSERT_EQ(o.code, 0) << o;
-  ASSERT_EQ(run("map wall -p known_poses -q -o one --set fuse.voxel=20mm" + std::string(kNoPictures)).code, 0);
+  ASSERT_EQ(run("map wall -p known_poses -q -o one --set fuse.voxel=20mm" + std::string(kNoPictures)).code,
+            0);
   for (const char* robot : {"wall", "other"}) {
     EXPECT_EQ(slurp(path("two/robots") / robot / "trajectory.txt"), slurp(path("one/trajectory.txt")));
     EXPECT_EQ(slurp(path("two/robots") / robot / "keyframes.txt"), slurp(path("one/keyframes.txt")));

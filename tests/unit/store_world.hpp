@@ -66,17 +66,16 @@ struct StoreWorld {
   /// As a store gives them back.
   [[nodiscard]] std::vector<maps::FramePose> frames_by_robot() const {
     std::vector<maps::FramePose> sorted = frames;
-    std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
-      return a.reference.robot < b.reference.robot;
-    });
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const auto& a, const auto& b) { return a.reference.robot < b.reference.robot; });
     return sorted;
   }
   /// Of a frame, by its place among `frames`.
   [[nodiscard]] maps::FrameId frame_id(std::size_t place) const {
     const std::int32_t robot = frames[place].reference.robot;
-    const auto before = std::count_if(
-        frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(place),
-        [&](const maps::FramePose& frame) { return frame.reference.robot == robot; });
+    const auto before =
+        std::count_if(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(place),
+                      [&](const maps::FramePose& frame) { return frame.reference.robot == robot; });
     return {robot, static_cast<std::int32_t>(before)};
   }
 
@@ -289,8 +288,8 @@ inline bool same_lookup(const features::FrameFeatures& a, const features::FrameF
 inline bool same(const maps::Keyframe& a, const maps::Keyframe& b) {
   if (a.id != b.id || a.frame_index != b.frame_index || a.stamp != b.stamp || a.turn_rate != b.turn_rate ||
       a.reference != b.reference || !same(a.camera_from_reference, b.camera_from_reference) ||
-      a.reference_sigma_m != b.reference_sigma_m ||
-      !same_all(a.surface, b.surface) || (a.features == nullptr) != (b.features == nullptr)) {
+      a.reference_sigma_m != b.reference_sigma_m || !same_all(a.surface, b.surface) ||
+      (a.features == nullptr) != (b.features == nullptr)) {
     return false;
   }
   if (a.features == nullptr) return true;

@@ -34,9 +34,9 @@ struct RobotInfo {
 struct StoreHeader {
   std::vector<RobotInfo> robots;  ///< by number
   std::string configuration;      ///< the effective one, YAML
-  std::string input;              ///< what was mapped, text: tells whether a run that goes on is given the same
-  std::string program_version;    ///< core::version() of the program that made the file
-  int format = kStoreFormat;      ///< set by the reader; the writer always writes kStoreFormat
+  std::string input;            ///< what was mapped, text: tells whether a run that goes on is given the same
+  std::string program_version;  ///< core::version() of the program that made the file
+  int format = kStoreFormat;    ///< set by the reader; the writer always writes kStoreFormat
 };
 
 /// The camera of a robot; of one that is not there the first one's, or none.
@@ -55,7 +55,7 @@ struct StoredMap {
   Map map;
   std::vector<FramePose> frames;  ///< by robot, in order
   std::vector<std::string> log;   ///< a line a frame of the run, as frames.csv has it, by robot
-  ResultFrame result;            ///< of a store that is not complete: the map's own frame
+  ResultFrame result;             ///< of a store that is not complete: the map's own frame
 };
 
 /// What a store holds, without reading it all.

@@ -73,11 +73,11 @@ struct RobotMaps {
 
 /// The finished map but for its dense cloud; poses after all optimisation.
 struct MapResult {
-  std::shared_ptr<const maps::Map> map;      ///< null when the poses come from a file
-  std::vector<maps::FramePose> frame_poses;  ///< empty when `map` is null
-  geometry::Trajectory trajectory;           ///< tracked frames only
+  std::shared_ptr<const maps::Map> map;       ///< null when the poses come from a file
+  std::vector<maps::FramePose> frame_poses;   ///< empty when `map` is null
+  geometry::Trajectory trajectory;            ///< tracked frames only
   std::vector<maps::FrameId> trajectory_ids;  ///< whose poses these are
-  std::vector<KeyframePose> keyframes;       ///< by id
+  std::vector<KeyframePose> keyframes;        ///< by id
   std::vector<maps::LineSegment3> lines;
   std::vector<RobotInfo> robots;  ///< by number; empty: one robot with the recording's camera
   std::string frame_columns;      ///< header of FrameRow::columns
@@ -88,9 +88,9 @@ struct MapResult {
 /// sees through (cloud::depth_look). Its points are those of the depth camera at the moment of the depth
 /// image: cloud::sensor_pose() leads from there to the camera of the poses.
 struct KeyframeCloud {
-  core::KeyframeId id;  ///< not valid: a frame between keyframes
-  maps::FrameId frame;  ///< as TrackedFrame
-  double stamp = 0.0;   ///< seconds
+  core::KeyframeId id;                                       ///< not valid: a frame between keyframes
+  maps::FrameId frame;                                       ///< as TrackedFrame
+  double stamp = 0.0;                                        ///< seconds
   cloud::CloudPtr cloud;                                     ///< null: what `compact` holds, not decoded
   std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it;
                                                              ///< null: it waits in a store

@@ -114,10 +114,10 @@ class StageIo {
 /// What a run lends to its stages; outlives them.
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
-  const StoredMaps* stored_maps = nullptr;      ///< what a maps stage reads; null: there is none
-  const RobotRecordings* recordings = nullptr;  ///< `source`, when recordings are mapped; else null
+  const StoredMaps* stored_maps = nullptr;               ///< what a maps stage reads; null: there is none
+  const RobotRecordings* recordings = nullptr;           ///< `source`, when recordings are mapped; else null
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
-  std::string anchor;                           ///< robot whose frame finished maps are laid into; empty: any
+  std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;
   core::StopToken stop;

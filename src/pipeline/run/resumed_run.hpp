@@ -20,7 +20,7 @@ namespace plumbline::pipeline {
 constexpr const char* kStoreFile = "map.db";  ///< in the result folder
 
 struct ResumedRun {
-  std::filesystem::path store;  ///< its file; clouds are read from there
+  std::filesystem::path store;                   ///< its file; clouds are read from there
   std::map<std::int32_t, maps::StoredMap> maps;  ///< each robot's own
   std::optional<RobotMap> merged;  ///< or the map of all, when the run had done all but write its results
   std::vector<FrameRow> rows;      ///< of the frames that are done and could be read

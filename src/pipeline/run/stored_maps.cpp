@@ -182,9 +182,8 @@ core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t in
 }
 
 core::Error StoredMaps::damaged(KeyframeId id, maps::FrameId frame, const core::Error& how) const {
-  const auto cloud = std::find_if(clouds_.begin(), clouds_.end(), [&](const StoredCloud& c) {
-    return c.id == id && c.frame == frame;
-  });
+  const auto cloud = std::find_if(clouds_.begin(), clouds_.end(),
+                                  [&](const StoredCloud& c) { return c.id == id && c.frame == frame; });
   const std::string file = cloud == clouds_.end() ? name_ : parts_[cloud->part].file.string();
   return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, how.message)).value();
 }

@@ -195,8 +195,8 @@ core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& fo
     if (!id.valid()) continue;
     const auto cloud = stored->read(i);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    cloud::transform(**cloud, map_.result.output_from_map * stored->world_from_camera[i] *
-                                  cloud::sensor_pose(**cloud));
+    cloud::transform(
+        **cloud, map_.result.output_from_map * stored->world_from_camera[i] * cloud::sensor_pose(**cloud));
     const std::string name =
         id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
     if (auto done = cloud::write_ply(folder / name, **cloud); !done) {

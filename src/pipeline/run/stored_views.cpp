@@ -39,8 +39,11 @@ core::Result<StoredViews> views_of(const maps::StoreReader& reader, const MapRes
     views.stamps.push_back(stamp);
   };
   const std::set<core::KeyframeId> there(keyframes->begin(), keyframes->end());
+  std::set<std::pair<std::int32_t, double>> seen;  // a run that went on may make a keyframe of what was none
   for (const KeyframePose& keyframe : map.keyframes) {
-    if (there.count(keyframe.id) != 0) add(keyframe.id, {}, keyframe.stamp, keyframe.world_from_camera);
+    if (there.count(keyframe.id) == 0) continue;
+    add(keyframe.id, {}, keyframe.stamp, keyframe.world_from_camera);
+    seen.emplace(keyframe.id.robot, keyframe.stamp);
   }
   std::map<maps::FrameId, std::size_t> places;
   for (std::size_t i = 0; i < map.trajectory_ids.size(); ++i) places[map.trajectory_ids[i]] = i;
@@ -48,7 +51,7 @@ core::Result<StoredViews> views_of(const maps::StoreReader& reader, const MapRes
     const auto found = places.find(frame);
     if (found == places.end()) continue;  // it was lost, or its map is left out
     const geometry::StampedPose& pose = map.trajectory[found->second];
-    add({}, frame, pose.stamp, pose.world_from_camera);
+    if (seen.count({frame.robot, pose.stamp}) == 0) add({}, frame, pose.stamp, pose.world_from_camera);
   }
   return views;
 }

@@ -31,8 +31,8 @@ struct StoredViews {
 /// When clouds of frames came; those that are not there came before.
 using Arrivals = std::map<maps::FrameId, std::size_t>;
 
-/// `reader` must outlive the views. Frames stand in the order of their arrival, else by robot and order: sums of
-/// a dense cloud are rounded as they come. Errors (kInput): damaged.
+/// `reader` must outlive the views. Frames stand in the order of their arrival, else by robot and order: sums
+/// of a dense cloud are rounded as they come. Errors (kInput): damaged.
 core::Result<StoredViews> views_of(const maps::StoreReader& reader, const MapResult& map,
                                    const Arrivals& arrivals = {});
 

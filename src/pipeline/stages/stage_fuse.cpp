@@ -159,8 +159,7 @@ class FuseStage : public Stage {
                        [&](std::size_t a, std::size_t b) { return stored.stamps[a] < stored.stamps[b]; });
       const sensor::Pinhole camera = maps::camera_of(*context_->robots, robot).color;
       cloud::DepthFieldReport report;
-      const auto field =
-          cloud::find_depth_field(own, stored.world_from_camera, read, camera, depth_field_,
+      const auto field = cloud::find_depth_field(own, stored.world_from_camera, read, camera, depth_field_,
                                                  *context_->executor, &report);
       if (!field) return tl::unexpected<core::Error>(field.error());
       state_->depth_fields[robot] = *field;

@@ -32,9 +32,10 @@ class PosesStage : public Stage {
     recordings_ = context.recordings;
     ways_.resize(recordings_->robots().size());
     if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
-      return core::usage_error(fmt::format("{}: are poses of one recording; write {} where the file's name "
-                                           "has the robot's: poses/{}.txt",
-                                           file_, kRobot, kRobot));
+      return core::usage_error(
+          fmt::format("{}: are poses of one recording; write {} where the file's name "
+                      "has the robot's: poses/{}.txt",
+                      file_, kRobot, kRobot));
     }
     for (const RobotInfo& robot : recordings_->robots()) {
       auto poses = poses_of(robot);
@@ -110,9 +111,8 @@ class PosesStage : public Stage {
     }
     const auto truth = recordings_->truth_of(robot.number);
     if (truth && !truth->empty()) return *truth;
-    return core::input_error(
-        fmt::format("{}: the recording has no poses of its own; name a file with --set poses.file=FILE",
-                    robot.name));
+    return core::input_error(fmt::format(
+        "{}: the recording has no poses of its own; name a file with --set poses.file=FILE", robot.name));
   }
   /// Between the moments of both images; identity where no pose is near that of the depth image.
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const geometry::Trajectory& poses,

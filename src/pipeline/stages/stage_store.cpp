@@ -37,12 +37,11 @@ class StoreStage : public Stage {
     header.input = context.input;
     header.program_version = core::version();
     // What is fused of finished maps is begun again, whatever ends it.
-    const auto use =
-        context.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
+    const auto use = context.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
     return take(maps::StoreWriter::create(context.output_folder / kStoreFile, header, use));
   }
 
-  /// One transaction a keyframe, with what came of its robot since the last one; others clouds have their
+  /// One transaction a keyframe, with what came of its robot since the last one; other clouds have their
   /// own, for stages at the end read them from the file.
   core::Result<void> process(StageIo& io) override {
     if (!writer_) return {};

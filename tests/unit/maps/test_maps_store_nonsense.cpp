@@ -38,7 +38,7 @@ std::vector<Told> told_by(const std::filesystem::path& file) {
     for (std::size_t at = 0; at < next->rows.size();) {
       const Bytes head(next->rows.begin() + static_cast<std::ptrdiff_t>(at),
                        next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength));
-      const std::size_t length = ByteReader(head).get<std::uint32_t>();
+      const std::size_t length = decode<std::uint32_t>(head);
       const auto begin = next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength);
       told.rows.push_back(parse_row(Bytes(begin, begin + static_cast<std::ptrdiff_t>(length))));
       at += kRowLength + length;
@@ -109,7 +109,7 @@ TEST_F(Nonsense, IsNamed) {
            "header robots: a camera's focal length is none");
   contains(refusal("state",
                    [&](StoreRow& row) {
-                     KeyframeState state = decode_state(unpacked(row));
+                     KeyframeState state = decode<KeyframeState>(unpacked(row));
                      state.camera_from_world.translation.x() = nan;
                      put(row, [&](ByteWriter& to) { encode(state, to); });
                    }),
