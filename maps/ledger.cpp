@@ -52,7 +52,7 @@ core::Result<void> Ledger::put(const std::vector<std::pair<std::string, std::str
     database.run("PRAGMA synchronous = FULL");
     Transaction whole(database, true);
     if (database.number("SELECT count(*) FROM sqlite_master") == 0) {
-      database.run(("PRAGMA application_id = " + std::to_string(kLedgerApplication)).c_str());
+      database.run("PRAGMA application_id = " + std::to_string(kLedgerApplication));
       database.run("CREATE TABLE text (name TEXT PRIMARY KEY, value TEXT NOT NULL)");
     }
     check_ledger(database);

@@ -68,7 +68,7 @@ void read_rows(Database& database, std::size_t place, std::int64_t number, ByteW
       row.name.robot = rows.integer(1);
       row.name.number = rows.integer(2);
     }
-    row.type = rows.type(0);
+    row.type = rows.getColumn(0).getType();
     row.data = row.type == SQLITE_BLOB ? rows.blob(0) : Bytes();
     if (row.type == SQLITE_INTEGER) row.integer = rows.integer(0);
     if (row.type == SQLITE_TEXT) row.text = rows.text(0);

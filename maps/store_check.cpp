@@ -5,6 +5,7 @@
 #include <pcl/point_types.h>
 
 #include <cmath>
+#include <limits>
 
 #include "plumbline/cloud/compact_cloud.hpp"
 
@@ -54,9 +55,10 @@ void check_next(const Ids& ids) {
   }
 }
 
-void check_keyframe(const Bytes& bytes, const RowName& name, const std::optional<sensor::Camera>& camera) {
-  demand(camera.has_value(), "there is no camera");
-  const auto keyframe = decode_keyframe(bytes, camera->color);
+void check_keyframe(const Bytes& bytes, const RowName& name, const std::vector<RobotInfo>& robots) {
+  demand(!robots.empty(), "there is no camera");
+  const auto keyframe =
+      decode_keyframe(bytes, camera_of(robots, static_cast<std::int32_t>(name.robot)).color);
   demand(keyframe->id.robot == name.robot && keyframe->id.index == name.number,
          "it holds what belongs to another row");
   demand(std::isfinite(keyframe->stamp) && std::isfinite(keyframe->turn_rate), "its stamp is not finite");
@@ -110,35 +112,42 @@ void check_edge(const Edge& edge) {
   demand(all_finite(edge.information), "an edge is not finite");
 }
 
-void check_header(const std::string& key, const Bytes& bytes, std::optional<sensor::Camera>& camera) {
+void check(const sensor::Camera& camera) {
+  check(camera.color);
+  if (camera.depth) check(*camera.depth);
+  if (camera.color_from_depth) check(*camera.color_from_depth);
+  for (const double k : camera.distortion) demand(std::isfinite(k), "the camera is not finite");
+  for (const double k : camera.depth_slope) demand(std::isfinite(k), "the camera is not finite");
+}
+
+void check_map(const Bytes& bytes) {
+  const MapRow row = decode<MapRow>(bytes);
+  check_next(row.next.keyframes);
+  check_next(row.next.points);
+  check_next(row.next.lines);
+  for (const LoopEdge& loop : row.loops) check_edge(loop);
+}
+
+void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotInfo>& robots) {
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
-  if (key == "camera") {
-    camera = decode_camera(plain(kMostSmall));
-    check(camera->color);
-    if (camera->depth) check(*camera->depth);
-    if (camera->color_from_depth) check(*camera->color_from_depth);
-    for (const double k : camera->distortion) demand(std::isfinite(k), "the camera is not finite");
-    for (const double k : camera->depth_slope) demand(std::isfinite(k), "the camera is not finite");
-  } else if (key == "totals") {
-    const Totals totals = decode_totals(plain(kMostPage));
-    check_next(totals.next.keyframes);
-    check_next(totals.next.points);
-    check_next(totals.next.lines);
+  if (key == "robots") {
+    robots = decode<std::vector<RobotInfo>>(plain(kMostSmall));
+    demand(!robots.empty(), "there is no robot");
+    for (const RobotInfo& robot : robots) {
+      demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
+      check(robot.camera);
+    }
   } else if (key == "result") {
-    const Bytes frame = plain(kMostSmall);
-    demand(frame.size() == 12 * sizeof(double) + 1, "it ends too early");
-  } else if (key == "loops") {
-    for (const LoopEdge& loop : decode_loops(plain(kMostPlain))) check_edge(loop);
+    check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
   } else {
-    const bool known =
-        key == "robot" || key == "input" || key == "program" || key == "configuration" || key == "complete";
+    const bool known = key == "input" || key == "program" || key == "configuration" || key == "complete";
     demand(known, "nothing has this name");
   }
 }
 
 void check_log(const Bytes& plain) {
-  std::string line;
-  for (ByteReader from(plain); !from.at_end();) from.get(line);
+  std::vector<std::string> lines;
+  decode_page(plain, lines);
 }
 
 void check_cloud(const Bytes& bytes) {
@@ -154,27 +163,32 @@ void check_name(const RowName& name) {
     demand(!name.key.empty() && name.key.size() <= 64, "its name is out of range");
   } else {
     const std::string text = table.name;
-    const std::int64_t most = text == "edge" || text == "frame_cloud" ? 1LL << 40U : kMostNumbers;
+    const std::int64_t most = text == "edge"          ? 1LL << 40U
+                              : text == "frame_cloud" ? std::numeric_limits<std::int32_t>::max()
+                                                      : kMostNumbers;
     demand(name.robot >= 0 && name.robot <= kMostRobots && name.number >= 0 && name.number < most,
            "its number is out of range");
   }
 }
 
-void check_row(const RowName& name, const Bytes& bytes, std::optional<sensor::Camera>& camera) {
+void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
   check_name(name);
   const std::string table = kRowTables[name.place].name;
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
-  if (table == "header") return check_header(name.key, bytes, camera);
-  if (table == "keyframe") return check_keyframe(plain(kMostPlain), name, camera);
+  if (table == "header") return check_header(name.key, bytes, robots);
+  if (table == "map") return check_map(plain(kMostPlain));
+  if (table == "keyframe") return check_keyframe(plain(kMostPlain), name, robots);
   if (table == "state") {
-    const KeyframeState state = decode_state(plain(kMostSmall));
+    const KeyframeState state = decode<KeyframeState>(plain(kMostSmall));
     check(state.camera_from_world);
     return check_id(state.parent);
   }
   if (table == "point") return check_landmarks<MapPoint>(plain(kMostPage), name);
   if (table == "line") return check_landmarks<MapLine>(plain(kMostPage), name);
   if (table == "edge") {
-    return check_edge(decode_edge(plain(kMostSmall), static_cast<std::uint64_t>(name.number)));
+    const auto row = decode<EdgeRow>(plain(kMostSmall));
+    demand(row.number == static_cast<std::uint64_t>(name.number), "it holds what belongs to another row");
+    return check_edge(row.edge);
   }
   if (table == "frame") return check_frame_page(plain(kMostPage));
   if (table == "log") return check_log(plain(kMostPage));

@@ -2,7 +2,7 @@
 #pragma once
 
 // Rows from a stranger, looked at before they are stored.
-#include <optional>
+#include <vector>
 
 #include "store_schema.hpp"
 
@@ -20,8 +20,8 @@ struct RowName {
 constexpr std::size_t kMostRowBytes = 16U << 20U;
 
 /// Throws BadBytes with the reason: a key out of range, bytes that do not decode or that belong to another
-/// row, numbers that are not finite. `camera` is learned from the header's row.
-void check_row(const RowName& name, const Bytes& bytes, std::optional<sensor::Camera>& camera);
+/// row, numbers that are not finite. `robots` are learned from the header's row.
+void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots);
 /// The same of a row that goes.
 void check_name(const RowName& name);
 

@@ -2,8 +2,10 @@
 #pragma once
 
 // A table that is kept equal to what the program holds, at the cost of what changed.
+#include <functional>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "store_schema.hpp"
@@ -58,7 +60,8 @@ class Mirror {
     if (rows_.erase(key) != 0) remove(key);
   }
   void put(Key key, const Bytes& bytes) {
-    const std::uint64_t print = fingerprint(bytes);
+    const std::size_t print = std::hash<std::string_view>()(
+        {static_cast<const char*>(static_cast<const void*>(bytes.data())), bytes.size()});
     const auto [row, is_new] = rows_.try_emplace(key);
     row->second.round = round_;
     if (!is_new && row->second.known && row->second.print == print) return;
@@ -70,9 +73,10 @@ class Mirror {
     put_.bind(1, key.first).bind(2, key.second).bind(3, transaction_).bind(4, packed).run();
     if (is_new) bring_back_.bind(1, key.first).bind(2, key.second).run();
   }
-  void end() {
+  /// `robot`: rows of others stay whatever was named; -1: they do not.
+  void end(std::int32_t robot = -1) {
     for (auto row = rows_.begin(); row != rows_.end();) {
-      if (row->second.round == round_) {
+      if (row->second.round == round_ || (robot >= 0 && row->first.first != robot)) {
         ++row;
         continue;
       }
@@ -83,7 +87,7 @@ class Mirror {
 
  private:
   struct Row {
-    std::uint64_t print = 0;
+    std::size_t print = 0;
     bool known = false;  ///< whether `print` is that of the row in the file
     std::uint64_t round = 0;
   };
@@ -95,7 +99,7 @@ class Mirror {
   bool holds(Key key, const Bytes& packed) {
     const bool found = get_.bind(1, key.first).bind(2, key.second).step();
     const bool equal = found && get_.blob(0) == packed;
-    get_.rewind();
+    get_.reset();
     return equal;
   }
 

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "plumbline/cloud/compact_cloud.hpp"
@@ -31,9 +32,39 @@ void read_table(Database& database, const std::string& table, const Row& row) {
   }
 }
 
+/// The maps of a store while they are read.
+class Pieces {
+ public:
+  struct Piece {
+    MapRow row;
+    MapParts parts;
+    StoredMap stored;
+    std::size_t states = 0;  ///< read so far
+  };
+  explicit Pieces(Database& database) {
+    read_table(database, "map", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
+      pieces_[key.robot].row = decode<MapRow>(bytes);
+    });
+    if (pieces_.empty()) pieces_[0];  // nothing was added yet
+  }
+  /// That of a robot: the only one, or its own.
+  Piece& of(std::int32_t robot) {
+    if (pieces_.size() == 1) return pieces_.begin()->second;
+    const auto found = pieces_.find(robot);
+    if (found == pieces_.end()) throw BadBytes("it belongs to no map");
+    return found->second;
+  }
+  [[nodiscard]] std::map<std::int32_t, Piece>& all() { return pieces_; }
+
+ private:
+  std::map<std::int32_t, Piece> pieces_;
+};
+
 template <typename Landmark>
-void read_landmarks(Database& database, const std::string& table, std::vector<Landmark>& landmarks) {
+void read_landmarks(Database& database, const std::string& table, Pieces& pieces,
+                    std::vector<Landmark> MapParts::*member) {
   read_table(database, table, [&](KeyframeId key, std::int64_t page, const Bytes& bytes) {
+    std::vector<Landmark>& landmarks = pieces.of(key.robot).parts.*member;
     const std::size_t before = landmarks.size();
     decode_page(bytes, landmarks);
     for (std::size_t i = before; i < landmarks.size(); ++i) {
@@ -44,45 +75,45 @@ void read_landmarks(Database& database, const std::string& table, std::vector<La
   });
 }
 
-Totals read_totals(Database& database) {
-  Statement statement(database, "SELECT data FROM header WHERE key = 'totals'");
-  if (!statement.step()) throw BadBytes("its header has no totals");
-  return decode_totals(statement.unpacked(0));
-}
-
 bool is_complete(Database& database) {
   return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
 }
 
-void read_keyframes(Database& database, const sensor::Pinhole& picture, MapParts& parts) {
+void read_keyframes(Database& database, const std::vector<RobotInfo>& robots, Pieces& pieces) {
+  std::map<std::int32_t, sensor::Camera> cameras;
   read_table(database, "keyframe", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
-    parts.keyframes.push_back({decode_keyframe(bytes, picture), {}, {}});
+    const auto camera = cameras.try_emplace(id.robot, camera_of(robots, id.robot)).first;
+    MapParts& parts = pieces.of(id.robot).parts;
+    parts.keyframes.push_back({decode_keyframe(bytes, camera->second.color), {}, {}});
     if (parts.keyframes.back().data->id != id) throw BadBytes("it holds what belongs to another row");
   });
-  std::size_t next = 0;
   read_table(database, "state", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
-    if (next == parts.keyframes.size() || parts.keyframes[next].data->id != id) {
+    Pieces::Piece& piece = pieces.of(id.robot);
+    std::vector<MapParts::KeyframePart>& keyframes = piece.parts.keyframes;
+    if (piece.states == keyframes.size() || keyframes[piece.states].data->id != id) {
       throw BadBytes("its keyframe is missing");
     }
-    const KeyframeState state = decode_state(bytes);
-    parts.keyframes[next].camera_from_world = state.camera_from_world;
-    parts.keyframes[next++].parent = state.parent;
+    const KeyframeState state = decode<KeyframeState>(bytes);
+    keyframes[piece.states].camera_from_world = state.camera_from_world;
+    keyframes[piece.states++].parent = state.parent;
   });
-  if (next != parts.keyframes.size()) throw BadBytes("a keyframe has no pose");
+  for (const auto& [robot, piece] : pieces.all()) {
+    if (piece.states != piece.parts.keyframes.size()) throw BadBytes("a keyframe has no pose");
+  }
 }
 
 /// Rows that were lost with a page of the file leave no other trace.
-void check_totals(const Totals& totals, const MapParts& parts, const StoredMap& stored) {
+void check_totals(const Pieces::Piece& piece) {
   const auto expect = [](std::uint64_t expected, std::size_t found, const char* what) {
     if (expected == found) return;
     throw BadBytes("it holds " + std::to_string(found) + " of " + std::to_string(expected) + " " + what);
   };
-  expect(totals.keyframes, parts.keyframes.size(), "keyframes");
-  expect(totals.points, parts.points.size(), "points");
-  expect(totals.lines, parts.lines.size(), "lines");
-  expect(totals.edges, parts.edges.size(), "edges");
-  expect(totals.frames, stored.frames.size(), "frames");
-  expect(totals.log, stored.log.size(), "lines of its log");
+  expect(piece.row.keyframes, piece.parts.keyframes.size(), "keyframes");
+  expect(piece.row.points, piece.parts.points.size(), "points");
+  expect(piece.row.lines, piece.parts.lines.size(), "lines");
+  expect(piece.row.edges, piece.parts.edges.size(), "edges");
+  expect(piece.row.frames, piece.stored.frames.size(), "frames");
+  expect(piece.row.log, piece.stored.log.size(), "lines of its log");
 }
 
 void check_frames(const std::vector<FramePose>& frames, const Map& map) {
@@ -93,43 +124,53 @@ void check_frames(const std::vector<FramePose>& frames, const Map& map) {
   }
 }
 
-Map map_of(MapParts parts) {
+StoredMap whole(Pieces::Piece& piece) {
+  check_totals(piece);
+  std::sort(piece.parts.edges.begin(), piece.parts.edges.end(),  // the table is by robot first
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  piece.parts.next = std::move(piece.row.next);
+  piece.parts.loops = std::move(piece.row.loops);
   try {
-    return Map(std::move(parts));
+    piece.stored.map = Map(std::move(piece.parts));
   } catch (const std::invalid_argument& contradiction) {
     throw BadBytes(contradiction.what());
   }
+  check_frames(piece.stored.frames, piece.stored.map);
+  return std::move(piece.stored);
 }
 
-StoredMap read_map(Database& database, const StoreHeader& header) {
+std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) {
   const Transaction moment(database, false);  // one moment of a store that is being written
-  MapParts parts;
-  StoredMap stored;
-  stored.header = header;
-  const Totals totals = read_totals(database);
-  stored.complete = is_complete(database);
-  read_keyframes(database, header.camera.color, parts);
-  read_landmarks(database, "point", parts.points);
-  read_landmarks(database, "line", parts.lines);
-  read_table(database, "edge", [&](KeyframeId, std::int64_t number, const Bytes& bytes) {
-    parts.edges.emplace_back(static_cast<std::uint64_t>(number),
-                             decode_edge(bytes, static_cast<std::uint64_t>(number)));
+  Pieces pieces(database);
+  read_keyframes(database, header.robots, pieces);
+  read_landmarks(database, "point", pieces, &MapParts::points);
+  read_landmarks(database, "line", pieces, &MapParts::lines);
+  read_table(database, "edge", [&](KeyframeId key, std::int64_t number, const Bytes& bytes) {
+    const auto row = decode<EdgeRow>(bytes);
+    if (row.number != static_cast<std::uint64_t>(number))
+      throw BadBytes("it holds what belongs to another row");
+    pieces.of(key.robot).parts.edges.emplace_back(row.number, row.edge);
   });
-  std::sort(parts.edges.begin(), parts.edges.end(),  // the table is by robot first
-            [](const auto& a, const auto& b) { return a.first < b.first; });
-  parts.loops = decode_loops(read_loops(database));
-  read_table(database, "frame",
-             [&](KeyframeId, std::int64_t, const Bytes& bytes) { decode_page(bytes, stored.frames); });
-  stored.log = read_log(database);
-  check_totals(totals, parts, stored);
-  if (stored.complete) stored.result = read_result_frame(database);
-  parts.next = totals.next;
-  stored.map = map_of(std::move(parts));
-  check_frames(stored.frames, stored.map);
-  return stored;
+  read_table(database, "frame", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
+    decode_page(bytes, pieces.of(key.robot).stored.frames);
+  });
+  read_table(database, "log", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
+    decode_page(bytes, pieces.of(key.robot).stored.log);
+  });
+  std::vector<StoredMap> maps;
+  for (auto& [robot, piece] : pieces.all()) {
+    maps.push_back(whole(piece));
+    maps.back().header = header;
+    maps.back().complete = is_complete(database);
+    if (maps.back().complete) maps.back().result = read_result_frame(database);
+  }
+  return maps;
 }
 
-std::string name_of(KeyframeId id) { return std::to_string(id.robot) + "/" + std::to_string(id.index); }
+template <typename IdType>
+std::string name_of(IdType id) {
+  return std::to_string(id.robot) + "/" + std::to_string(id.index);
+}
 
 }  // namespace
 
@@ -138,13 +179,12 @@ struct StoreReader::Impl {
   std::unique_ptr<Database> database;
   StoreHeader header;
 
+  template <typename IdType>
+  [[nodiscard]] core::Result<std::vector<IdType>> ids(const char* sql) const;
   /// A cloud's bytes; `what` names it.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> blob(const char* sql, std::int64_t robot,
-                                                             std::int64_t number,
+  template <typename IdType>
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> blob(const char* sql, IdType id,
                                                              const std::string& what) const;
-  /// What a store may keep of a cloud beside it; empty: this one does not.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> extra(const char* sql, std::int64_t robot,
-                                                              std::int64_t number) const;
   [[nodiscard]] core::Result<cloud::CloudPtr> decode(const core::Result<std::vector<std::uint8_t>>& bytes,
                                                      const std::string& what) const;
 };
@@ -179,14 +219,23 @@ void StoreReader::read_ahead() const {
 #endif
 }
 
-core::Result<StoredMap> StoreReader::load() const {
-  return guarded(impl_->file, ErrorKind::kInput, [&] { return read_map(*impl_->database, impl_->header); });
+core::Result<std::vector<StoredMap>> StoreReader::load_each() const {
+  return guarded(impl_->file, ErrorKind::kInput, [&] { return read_maps(*impl_->database, impl_->header); });
 }
 
-core::Result<std::vector<KeyframeId>> StoreReader::cloud_ids() const {
-  return guarded(impl_->file, ErrorKind::kInput, [&] {
-    std::vector<KeyframeId> ids;
-    Statement rows(*impl_->database, "SELECT robot, number FROM cloud ORDER BY robot, number");
+core::Result<StoredMap> StoreReader::load() const {
+  auto maps = load_each();
+  if (!maps) return tl::unexpected<core::Error>(maps.error());
+  if (maps->size() == 1) return std::move(maps->front());
+  return core::input_error(impl_->file.string() + ": the maps of its " + std::to_string(maps->size()) +
+                           " robots are not one yet; go on with plumbline map --resume");
+}
+
+template <typename IdType>
+core::Result<std::vector<IdType>> StoreReader::Impl::ids(const char* sql) const {
+  return guarded(file, ErrorKind::kInput, [&] {
+    std::vector<IdType> ids;
+    Statement rows(*database, sql);
     while (rows.step()) {
       ids.push_back({static_cast<std::int32_t>(rows.integer(0)), static_cast<std::int32_t>(rows.integer(1))});
     }
@@ -194,24 +243,22 @@ core::Result<std::vector<KeyframeId>> StoreReader::cloud_ids() const {
   });
 }
 
-core::Result<std::vector<std::size_t>> StoreReader::frame_cloud_ids() const {
-  return guarded(impl_->file, ErrorKind::kInput, [&] {
-    std::vector<std::size_t> ids;
-    Statement rows(*impl_->database, "SELECT number FROM frame_cloud ORDER BY robot, number");
-    while (rows.step()) ids.push_back(static_cast<std::size_t>(rows.integer(0)));
-    return ids;
-  });
+core::Result<std::vector<KeyframeId>> StoreReader::cloud_ids() const {
+  return impl_->ids<KeyframeId>("SELECT robot, number FROM cloud ORDER BY robot, number");
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::Impl::blob(const char* sql, std::int64_t robot,
-                                                                std::int64_t number,
+core::Result<std::vector<FrameId>> StoreReader::frame_cloud_ids() const {
+  return impl_->ids<FrameId>("SELECT robot, number FROM frame_cloud ORDER BY robot, number");
+}
+
+template <typename IdType>
+core::Result<std::vector<std::uint8_t>> StoreReader::Impl::blob(const char* sql, IdType id,
                                                                 const std::string& what) const {
-  return guarded(file, ErrorKind::kInput, [&] {
+  return guarded(file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
     Statement row(*database, sql);
-    if (!row.bind(1, robot).bind(2, number).step()) {
-      throw StoreFailure(ErrorKind::kInput, "has no cloud of " + what);
-    }
-    return row.blob(0);
+    if (row.bind(1, id.robot).bind(2, id.index).step()) return row.blob(0);
+    if (what.empty()) return {};
+    throw StoreFailure(ErrorKind::kInput, "has no cloud of " + what);
   });
 }
 
@@ -224,7 +271,7 @@ core::Result<cloud::CloudPtr> StoreReader::Impl::decode(const core::Result<std::
 }
 
 core::Result<std::vector<std::uint8_t>> StoreReader::cloud_bytes(KeyframeId keyframe) const {
-  return impl_->blob("SELECT data FROM cloud WHERE robot = ? AND number = ?", keyframe.robot, keyframe.index,
+  return impl_->blob("SELECT data FROM cloud WHERE robot = ? AND number = ?", keyframe,
                      "keyframe " + name_of(keyframe));
 }
 
@@ -232,18 +279,17 @@ core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
   return impl_->decode(cloud_bytes(keyframe), "keyframe " + name_of(keyframe));
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::Impl::extra(const char* sql, std::int64_t robot,
-                                                                 std::int64_t number) const {
-  return guarded(file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
-    Statement row(*database, sql);
-    if (!row.bind(1, robot).bind(2, number).step()) return {};
-    return row.blob(0);
-  });
+core::Result<std::vector<std::uint8_t>> StoreReader::cloud_bytes(FrameId frame) const {
+  return impl_->blob("SELECT data FROM frame_cloud WHERE robot = ? AND number = ?", frame,
+                     "frame " + name_of(frame));
+}
+
+core::Result<cloud::CloudPtr> StoreReader::cloud(FrameId frame) const {
+  return impl_->decode(cloud_bytes(frame), "frame " + name_of(frame));
 }
 
 core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId keyframe) const {
-  return impl_->extra("SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe.robot,
-                      keyframe.index);
+  return impl_->blob("SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe, "");
 }
 
 core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes) {
@@ -254,29 +300,22 @@ core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& byte
   }
 }
 
-core::Result<std::vector<std::uint8_t>> StoreReader::frame_cloud_bytes(std::size_t frame) const {
-  return impl_->blob("SELECT data FROM frame_cloud WHERE robot = ? AND number = ?", 0,
-                     static_cast<std::int64_t>(frame), "frame " + std::to_string(frame));
-}
-
-core::Result<cloud::CloudPtr> StoreReader::frame_cloud(std::size_t frame) const {
-  return impl_->decode(frame_cloud_bytes(frame), "frame " + std::to_string(frame));
-}
-
 core::Result<StoreContents> StoreReader::contents() const {
   return guarded(impl_->file, ErrorKind::kInput, [&] {
     Database& database = *impl_->database;
     const Transaction moment(database, false);
-    const Totals totals = read_totals(database);
     const auto count = [&](const char* sql) { return static_cast<std::size_t>(database.number(sql)); };
     StoreContents contents;
     contents.complete = is_complete(database);
-    contents.keyframes = totals.keyframes;
-    contents.points = totals.points;
-    contents.lines = totals.lines;
-    contents.edges = totals.edges;
-    contents.loops = decode_loops(read_loops(database)).size();
-    contents.frames = totals.frames;
+    Pieces pieces(database);
+    for (const auto& [robot, piece] : pieces.all()) {
+      contents.keyframes += piece.row.keyframes;
+      contents.points += piece.row.points;
+      contents.lines += piece.row.lines;
+      contents.edges += piece.row.edges;
+      contents.loops += piece.row.loops.size();
+      contents.frames += piece.row.frames;
+    }
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
     contents.cloud_bytes = count(
@@ -295,6 +334,13 @@ core::Result<std::optional<std::vector<std::uint8_t>>> StoreReader::attachment(
     if (!row.bind(1, name).step()) return std::nullopt;
     return row.unpacked(0);
   });
+}
+
+sensor::Camera camera_of(const std::vector<RobotInfo>& robots, std::int32_t robot) {
+  for (const RobotInfo& info : robots) {
+    if (info.number == robot) return info.camera;
+  }
+  return robots.empty() ? sensor::Camera() : robots.front().camera;
 }
 
 core::Result<bool> is_blank_store(const std::filesystem::path& file) {

@@ -13,16 +13,15 @@ namespace {
 
 using core::ErrorKind;
 
-std::optional<sensor::Camera> read_camera(Database& database) {
-  Statement camera(database, "SELECT data FROM header WHERE key = 'camera'");
-  if (!camera.step()) return std::nullopt;
-  return decode_camera(camera.unpacked(0));
+std::vector<RobotInfo> read_robots(Database& database) {
+  Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
+  return robots.step() ? decode<std::vector<RobotInfo>>(robots.unpacked(0)) : std::vector<RobotInfo>();
 }
 
 int type_of(const RowTable& table, const std::string& key) {
   if (std::string(table.name) != "header") return SQLITE_BLOB;
   if (key == "complete") return SQLITE_INTEGER;
-  const bool text = key == "robot" || key == "input" || key == "program" || key == "configuration";
+  const bool text = key == "input" || key == "program" || key == "configuration";
   return text ? SQLITE_TEXT : SQLITE_BLOB;
 }
 
@@ -54,7 +53,7 @@ struct StoreReplica::Impl {
   }
   void learn() {
     heads = read_heads(*database);
-    camera = read_camera(*database);
+    robots = read_robots(*database);
     keyframes = static_cast<std::size_t>(database->number("SELECT count(*) FROM keyframe"));
     complete = database->number("SELECT data FROM header WHERE key = 'complete'") == 1;
   }
@@ -69,7 +68,7 @@ struct StoreReplica::Impl {
   /// `action`; when it fails the transaction is over.
   template <typename Action>
   core::Result<void> guard(const Action& action) {
-    core::Result<void> done = guarded(file, ErrorKind::kInput, action);
+    core::Result<void> done = guarded(file, ErrorKind::kOutput, action);
     if (!done) forget();
     return done;
   }
@@ -77,7 +76,7 @@ struct StoreReplica::Impl {
   std::filesystem::path file;
   std::unique_ptr<Database> database;
   StoreHeads heads;
-  std::optional<sensor::Camera> camera;
+  std::vector<RobotInfo> robots;
   std::size_t keyframes = 0;
   bool complete = false;
   ReplicaBytes bytes;
@@ -131,7 +130,7 @@ void StoreReplica::Impl::take_row(const StoreRow& row) {
       check_name(row.name);
     } else {
       if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
-      check_row(row.name, row.data, camera);
+      check_row(row.name, row.data, robots);
     }
   } catch (const BadBytes& bad) {
     throw BadBytes(where + ": " + bad.what());
@@ -169,7 +168,7 @@ StoreReplica::~StoreReplica() {
 }
 
 core::Result<StoreReplica> StoreReplica::open(const std::filesystem::path& file) {
-  return guarded(file, ErrorKind::kInput,
+  return guarded(file, ErrorKind::kOutput,
                  [&] { return StoreReplica(std::make_unique<Impl>(file, open_database(file))); });
 }
 
@@ -196,9 +195,9 @@ core::Result<void> StoreReplica::take(const std::uint8_t* bytes, std::size_t siz
     waiting.insert(waiting.end(), bytes, bytes + size);
     std::size_t at = 0;
     while (waiting.size() - at >= kRowLength) {
-      const Bytes head(waiting.begin() + static_cast<std::ptrdiff_t>(at),
-                       waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength));
-      const std::size_t length = ByteReader(head).get<std::uint32_t>();
+      const auto length =
+          decode<std::uint32_t>(Bytes(waiting.begin() + static_cast<std::ptrdiff_t>(at),
+                                      waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength)));
       if (length > kMostRowBytes) throw BadBytes("a row is too large");
       if (waiting.size() - at - kRowLength < length) break;
       const auto begin = waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength);
@@ -230,7 +229,7 @@ core::Result<void> StoreReplica::clear() {
   return impl_->guard([&] {
     Transaction whole(*impl_->database, true);
     for (const RowTable& table : kRowTables) {
-      impl_->database->run(("DELETE FROM " + std::string(table.name)).c_str());
+      impl_->database->run("DELETE FROM " + std::string(table.name));
     }
     impl_->database->run("DELETE FROM removed");
     whole.commit();

@@ -20,7 +20,7 @@ struct StoreRow {
 
 constexpr std::size_t kRowLength = sizeof(std::uint32_t);  ///< bytes of the length in front
 
-void append(const StoreRow& row, ByteWriter& to);
+void append(StoreRow row, ByteWriter& to);
 /// What follows the length. Throws BadBytes.
 StoreRow parse_row(const Bytes& bytes);
 

@@ -18,7 +18,7 @@ void create_table(Database& database, const RowTable& table) {
                                           : " (robot INTEGER NOT NULL, number INTEGER NOT NULL, changed "
                                             "INTEGER NOT NULL, data BLOB NOT NULL,"
                                             " PRIMARY KEY (robot, number))";
-  database.run(("CREATE TABLE " + name + columns).c_str());
+  database.run("CREATE TABLE " + name + columns);
 }
 
 template <typename Value>
@@ -45,23 +45,31 @@ std::string place_of(const std::string& table) {
 }
 
 void create_tables(Database& database) {
-  database.run(("PRAGMA application_id = " + std::to_string(kStoreApplication)).c_str());
+  database.run("PRAGMA application_id = " + std::to_string(kStoreApplication));
   for (const RowTable& table : kRowTables) create_table(database, table);
   database.run(
       "CREATE TABLE removed (place INTEGER NOT NULL, robot INTEGER NOT NULL, number INTEGER NOT NULL,"
       " changed INTEGER NOT NULL, PRIMARY KEY (place, robot, number))");
-  database.run(("PRAGMA user_version = " + std::to_string(kStoreFormat)).c_str());
+  database.run("PRAGMA user_version = " + std::to_string(kStoreFormat));
 }
 
 void put_header(Database& database, const StoreHeader& header) {
   constexpr std::int64_t kFirst = 1;
-  put_header(database, kFirst, "robot", header.robot);
   put_header(database, kFirst, "input", header.input);
   put_header(database, kFirst, "program", header.program_version);
   put_header(database, kFirst, "configuration", header.configuration);
-  ByteWriter camera;
-  encode(header.camera, camera);
-  put_header(database, kFirst, "camera", pack(camera.bytes()));
+  put_robots(database, kFirst, header.robots);
+  put_complete(database, kFirst, false);
+}
+
+void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots) {
+  ByteWriter bytes;
+  encode(robots, bytes);
+  put_header(database, transaction, "robots", pack(bytes.bytes()));
+}
+
+void put_complete(Database& database, std::int64_t transaction, bool complete) {
+  put_header(database, transaction, "complete", std::int64_t{complete ? 1 : 0});
 }
 
 StoreHeads read_heads(Database& database) {
@@ -109,60 +117,25 @@ void check_store(Database& database) {
 
 StoreHeader read_header(Database& database) {
   StoreHeader header;
-  header.robot = get_text(database, "robot");
   header.input = get_text(database, "input");
   header.program_version = get_text(database, "program");
   header.configuration = get_text(database, "configuration");
   header.format = static_cast<int>(database.number("PRAGMA user_version"));
-  Statement camera(database, "SELECT data FROM header WHERE key = 'camera'");
-  if (!camera.step()) throw BadBytes("its header has no camera");
-  header.camera = decode_camera(camera.unpacked(0));
+  Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
+  if (!robots.step()) throw BadBytes("its header has no robots");
+  header.robots = decode<std::vector<RobotInfo>>(robots.unpacked(0));
   return header;
-}
-
-void put_totals(Database& database, std::int64_t transaction, const Totals& totals, bool complete) {
-  ByteWriter bytes;
-  encode(totals, bytes);
-  put_header(database, transaction, "totals", pack(bytes.bytes()));
-  put_header(database, transaction, "complete", std::int64_t{complete ? 1 : 0});
 }
 
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame) {
   ByteWriter bytes;
-  bytes.put(frame.output_from_map);
-  bytes.flag(frame.upright);
+  encode(frame, bytes);
   put_header(database, transaction, "result", pack(bytes.bytes()));
 }
 
 ResultFrame read_result_frame(Database& database) {
-  ResultFrame frame;
   Statement statement(database, "SELECT data FROM header WHERE key = 'result'");
-  if (!statement.step()) return frame;
-  const Bytes bytes = statement.unpacked(0);
-  ByteReader from(bytes);
-  from.get(frame.output_from_map);
-  frame.upright = from.flag();
-  from.expect_end();
-  return frame;
-}
-
-Bytes read_loops(Database& database) {
-  Statement statement(database, "SELECT data FROM header WHERE key = 'loops'");
-  return statement.step() ? statement.unpacked(0) : Bytes{};
-}
-
-void put_loops(Database& database, std::int64_t transaction, const Bytes& loops) {
-  put_header(database, transaction, "loops", pack(loops));
-}
-
-std::vector<std::string> read_log(Database& database) {
-  std::vector<std::string> lines;
-  Statement rows(database, "SELECT data FROM log ORDER BY robot, number");
-  while (rows.step()) {
-    const Bytes bytes = rows.unpacked(0);
-    for (ByteReader from(bytes); !from.at_end();) from.get(lines.emplace_back());
-  }
-  return lines;
+  return statement.step() ? decode<ResultFrame>(statement.unpacked(0)) : ResultFrame();
 }
 
 void check_file(const std::filesystem::path& file) {

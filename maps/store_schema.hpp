@@ -21,12 +21,19 @@ struct RowTable {
 };
 /// Messages name a table by its place here, and hold rows in this order.
 constexpr RowTable kRowTables[] = {
-    {"header", StoreShare::kMap, true},     {"keyframe", StoreShare::kMap, false},
-    {"state", StoreShare::kMap, false},     {"point", StoreShare::kMap, false},
-    {"line", StoreShare::kMap, false},      {"edge", StoreShare::kMap, false},
-    {"frame", StoreShare::kMap, false},     {"log", StoreShare::kMap, false},
-    {"attachment", StoreShare::kMap, true}, {"surface", StoreShare::kClouds, false},
-    {"cloud", StoreShare::kClouds, false},  {"frame_cloud", StoreShare::kClouds, false},
+    {"header", StoreShare::kMap, true},
+    {"map", StoreShare::kMap, false},
+    {"keyframe", StoreShare::kMap, false},
+    {"state", StoreShare::kMap, false},
+    {"point", StoreShare::kMap, false},
+    {"line", StoreShare::kMap, false},
+    {"edge", StoreShare::kMap, false},
+    {"frame", StoreShare::kMap, false},
+    {"log", StoreShare::kMap, false},
+    {"attachment", StoreShare::kMap, true},
+    {"surface", StoreShare::kClouds, false},
+    {"cloud", StoreShare::kClouds, false},
+    {"frame_cloud", StoreShare::kClouds, false},
 };
 
 /// The place of a table in kRowTables, as the table `removed` names it.
@@ -42,15 +49,11 @@ bool is_blank(Database& database);
 /// Throws a StoreFailure for a foreign, unfinished, older or newer file.
 void check_store(Database& database);
 StoreHeader read_header(Database& database);
-void put_totals(Database& database, std::int64_t transaction, const Totals& totals, bool complete);
+void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
+void put_complete(Database& database, std::int64_t transaction, bool complete);
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame);
 /// The map's own frame when none was put.
 ResultFrame read_result_frame(Database& database);
-/// Loops that were closed, encoded; a store that was made before they were kept has none.
-Bytes read_loops(Database& database);
-void put_loops(Database& database, std::int64_t transaction, const Bytes& loops);
-/// The lines of the table log.
-std::vector<std::string> read_log(Database& database);
 /// Refuses what is no file before SQLite does with fewer words.
 void check_file(const std::filesystem::path& file);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -39,7 +40,7 @@ void leave_one_file(Database& database) {
     try {
       database.run("PRAGMA journal_mode = DELETE");
       return;
-    } catch (const StoreFailure&) {
+    } catch (const SQLite::Exception&) {
       std::this_thread::sleep_for(kBetween);
     }
   }
@@ -50,9 +51,10 @@ Mirror::Key key_of(IdType id) {
   return {id.robot, id.index};
 }
 
-/// Pages of landmarks; `whole`: there are no others.
+/// Pages of landmarks of a map of `robot` (-1: of all); `whole`: there are no others.
 template <typename Landmark>
-void mirror_landmarks(const std::vector<LandmarkPage<Landmark>>& pages, bool whole, Mirror& mirror) {
+void mirror_landmarks(const std::vector<LandmarkPage<Landmark>>& pages, bool whole, std::int32_t robot,
+                      Mirror& mirror) {
   ByteWriter bytes;
   mirror.begin();
   for (const LandmarkPage<Landmark>& page : pages) {
@@ -65,34 +67,40 @@ void mirror_landmarks(const std::vector<LandmarkPage<Landmark>>& pages, bool who
     for (const Landmark& landmark : page.landmarks) encode(landmark, bytes);
     mirror.put(key, bytes.bytes());
   }
-  if (whole) mirror.end();
+  if (whole) mirror.end(robot);
 }
 
-/// Rows of kFramesPerPage things each; those before `from` are in the file.
-template <typename Thing, typename Encode>
-void mirror_list(const std::vector<Thing>& things, std::size_t from, const Encode& encode_one,
-                 Mirror& mirror) {
+/// Things of a robot in rows of kFramesPerPage each; those before `from` are in the file.
+template <typename Thing>
+void mirror_list(std::int32_t robot, const std::vector<Thing>& things, std::size_t from, Mirror& mirror) {
   ByteWriter page;
-  mirror.begin();
   for (std::size_t begin = from / kFramesPerPage * kFramesPerPage; begin < things.size();
        begin += kFramesPerPage) {
     page.clear();
     for (std::size_t i = begin; i < std::min(things.size(), begin + kFramesPerPage); ++i) {
-      encode_one(things[i], page);
+      encode(things[i], page);
     }
-    mirror.put({0, static_cast<std::int64_t>(begin / kFramesPerPage)}, page.bytes());
+    mirror.put({robot, static_cast<std::int64_t>(begin / kFramesPerPage)}, page.bytes());
   }
-  if (from == 0) mirror.end();
 }
 
-void encode_frame(const FramePose& frame, ByteWriter& to) { encode(frame, to); }
-void encode_line(const std::string& line, ByteWriter& to) { to.put(std::string_view(line)); }
+template <typename Thing>
+using ByRobot = std::map<std::int32_t, std::vector<Thing>>;
 
-std::vector<FramePose> read_frames(Database& database) {
-  std::vector<FramePose> frames;
-  Statement rows(database, "SELECT data FROM frame ORDER BY robot, number");
-  while (rows.step()) decode_page(rows.unpacked(0), frames);
-  return frames;
+template <typename Thing>
+ByRobot<Thing> read_lists(Database& database, const std::string& table) {
+  ByRobot<Thing> lists;
+  Statement rows(database, ("SELECT robot, data FROM " + table + " ORDER BY robot, number").c_str());
+  while (rows.step()) decode_page(rows.unpacked(1), lists[static_cast<std::int32_t>(rows.integer(0))]);
+  return lists;
+}
+
+/// How many there are of one robot, or (-1) of all.
+template <typename Thing>
+std::size_t count(const ByRobot<Thing>& lists, std::int32_t robot) {
+  std::size_t sum = 0;
+  for (const auto& [owner, list] : lists) sum += robot < 0 || owner == robot ? list.size() : 0;
+  return sum;
 }
 
 }  // namespace
@@ -102,6 +110,7 @@ struct StoreWriter::Impl {
       : file(std::move(path)),
         database(std::move(opened)),
         transaction(read_heads(*database).last()),
+        maps(*database, "map", transaction),
         keyframes(*database, "keyframe", transaction),
         states(*database, "state", transaction),
         points(*database, "point", transaction),
@@ -109,17 +118,18 @@ struct StoreWriter::Impl {
         edges(*database, "edge", transaction),
         frames(*database, "frame", transaction),
         log(*database, "log", transaction),
-        loops(read_loops(*database)),
-        frame_list(read_frames(*database)),
-        log_lines(read_log(*database)) {}
+        frame_lists(read_lists<FramePose>(*database, "frame")),
+        log_lines(read_lists<std::string>(*database, "log")) {}
 
-  void mirror_keyframes(const MapChanges& map);
-  void mirror_rest(const MapChanges& map);
+  /// The map of a robot beside those of others, or (-1) the only one.
+  void put_map(const MapChanges& map, std::int32_t robot);
+  void mirror_keyframes(const MapChanges& map, std::int32_t robot);
+  void mirror_edges(const MapChanges& map, std::int32_t robot);
+  void put_map_row(const MapChanges& map, std::int32_t robot);
   void put_cloud(const StoreCloud& cloud);
   void put_log_and_clouds(const StoreStep& step);
-  void put_totals(const MapChanges& map, bool complete);
-  /// All there is of the map and its frames.
-  void write(const Map& map, const std::vector<FramePose>& poses, bool complete);
+  /// All there is of the only map and its frames.
+  void write(const Map& map, const std::vector<FramePose>& poses);
   /// `change` in a transaction; when it fails the mirrors learn what the file holds.
   template <typename Change>
   core::Result<void> transact(const Change& change);
@@ -127,13 +137,20 @@ struct StoreWriter::Impl {
   std::filesystem::path file;
   std::unique_ptr<Database> database;
   std::int64_t transaction;  ///< the number of the last one, or of the one that is going on
-  Mirror keyframes, states, points, lines, edges, frames, log;
-  Bytes loops;                         ///< as in the file
-  std::vector<FramePose> frame_list;   ///< as in the file
-  std::vector<std::string> log_lines;  ///< as in the file
+  Mirror maps, keyframes, states, points, lines, edges, frames, log;
+  ByRobot<FramePose> frame_lists;  ///< as in the file
+  ByRobot<std::string> log_lines;  ///< as in the file
 };
 
-void StoreWriter::Impl::mirror_keyframes(const MapChanges& map) {
+void StoreWriter::Impl::put_map(const MapChanges& map, std::int32_t robot) {
+  mirror_keyframes(map, robot);
+  mirror_landmarks(map.points, map.whole, robot, points);
+  mirror_landmarks(map.lines, map.whole, robot, lines);
+  mirror_edges(map, robot);
+  put_map_row(map, robot);
+}
+
+void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t robot) {
   ByteWriter bytes;
   keyframes.begin();
   states.begin();
@@ -148,75 +165,77 @@ void StoreWriter::Impl::mirror_keyframes(const MapChanges& map) {
     encode(KeyframeState{part.camera_from_world, part.parent}, bytes);
     states.put(key, bytes.bytes());
   }
-  keyframes.end();
-  states.end();
+  keyframes.end(robot);
+  states.end(robot);
 }
 
-void StoreWriter::Impl::mirror_rest(const MapChanges& map) {
+void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) {
   ByteWriter bytes;
-  mirror_landmarks(map.points, map.whole, points);
-  mirror_landmarks(map.lines, map.whole, lines);
   edges.begin();
   for (const auto& [number, edge] : map.edges) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
     if (edges.keep(key)) continue;
     bytes.clear();
-    encode(edge, number, bytes);
+    encode(EdgeRow{number, edge}, bytes);
     edges.put(key, bytes.bytes());
   }
-  for (const auto& [number, robot] : map.edge_names) edges.stay({robot, static_cast<std::int64_t>(number)});
-  edges.end();
-  bytes.clear();
-  encode(map.loops, bytes);
-  if (bytes.bytes() == loops) return;
-  put_loops(*database, transaction, bytes.bytes());
-  loops = bytes.bytes();
+  for (const auto& [number, owner] : map.edge_names) edges.stay({owner, static_cast<std::int64_t>(number)});
+  edges.end(robot);
+}
+
+void StoreWriter::Impl::put_map_row(const MapChanges& map, std::int32_t robot) {
+  MapRow row;
+  row.keyframes = map.keyframes.size();
+  row.points = map.point_count;
+  row.lines = map.line_count;
+  row.edges = map.edge_names.size();
+  row.frames = count(frame_lists, robot);
+  row.log = count(log_lines, robot);
+  row.next = map.next;
+  row.loops = map.loops;
+  ByteWriter bytes;
+  encode(row, bytes);
+  maps.begin();
+  maps.put({std::max(robot, 0), 0}, bytes.bytes());
+  if (robot < 0) maps.end();
 }
 
 void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
   const bool of_keyframe = cloud.keyframe.valid();
-  const auto put = [&](const char* of_keyframes, const char* of_frames, const Bytes& bytes) {
-    Statement(*database, of_keyframe ? of_keyframes : of_frames)
-        .bind(1, of_keyframe ? cloud.keyframe.robot : 0)
-        .bind(2, of_keyframe ? cloud.keyframe.index : static_cast<std::int64_t>(cloud.frame))
+  const auto put = [&](const char* sql, const Bytes& bytes) {
+    Statement(*database, sql)
+        .bind(1, of_keyframe ? cloud.keyframe.robot : cloud.frame.robot)
+        .bind(2, of_keyframe ? cloud.keyframe.index : cloud.frame.index)
         .bind(3, transaction)
         .bind(4, bytes)
         .run();
   };
-  put("REPLACE INTO cloud VALUES (?, ?, ?, ?)", "REPLACE INTO frame_cloud VALUES (?, ?, ?, ?)", *cloud.bytes);
+  put(of_keyframe ? "REPLACE INTO cloud VALUES (?, ?, ?, ?)" : "REPLACE INTO frame_cloud VALUES (?, ?, ?, ?)",
+      *cloud.bytes);
   if (!of_keyframe || cloud.surface == nullptr) return;
   ByteWriter bytes;
   encode(*cloud.surface, bytes);
   const Bytes packed = pack(bytes.bytes());
-  put("REPLACE INTO surface VALUES (?, ?, ?, ?)", nullptr, packed);
+  put("REPLACE INTO surface VALUES (?, ?, ?, ?)", packed);
 }
 
 void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
   for (const StoreCloud& cloud : step.clouds) put_cloud(cloud);
-  const std::size_t before = log_lines.size();
-  log_lines.insert(log_lines.end(), step.log.begin(), step.log.end());
-  if (!step.log.empty()) mirror_list(log_lines, before, encode_line, log);
+  if (step.log.empty()) return;
+  const std::int32_t robot = std::max(step.robot, 0);
+  std::vector<std::string>& list = log_lines[robot];
+  const std::size_t before = list.size();
+  list.insert(list.end(), step.log.begin(), step.log.end());
+  mirror_list(robot, list, before, log);
 }
 
-void StoreWriter::Impl::put_totals(const MapChanges& map, bool complete) {
-  Totals totals;
-  totals.keyframes = map.keyframes.size();
-  totals.points = map.point_count;
-  totals.lines = map.line_count;
-  totals.edges = map.edge_names.size();
-  totals.frames = frame_list.size();
-  totals.log = log_lines.size();
-  totals.next = map.next;
-  maps::put_totals(*database, transaction, totals, complete);
-}
-
-void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses, bool complete) {
-  const MapChanges all = map.changes_since({});
-  mirror_keyframes(all);
-  mirror_rest(all);
-  frame_list = poses;
-  mirror_list(frame_list, 0, encode_frame, frames);
-  put_totals(all, complete);
+void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses) {
+  frame_lists.clear();
+  for (const FramePose& pose : poses) frame_lists[pose.reference.robot].push_back(pose);
+  frames.begin();
+  for (const auto& [robot, list] : frame_lists) mirror_list(robot, list, 0, frames);
+  frames.end();
+  put_map(map.changes_since({}), -1);
 }
 
 template <typename Change>
@@ -229,11 +248,12 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
   });
   if (done) return done;
   const core::Result<void> reread = guarded(file, ErrorKind::kOutput, [&] {
-    for (Mirror* mirror : {&keyframes, &states, &points, &lines, &edges, &frames, &log}) mirror->reread();
+    for (Mirror* mirror : {&maps, &keyframes, &states, &points, &lines, &edges, &frames, &log}) {
+      mirror->reread();
+    }
     transaction = read_heads(*database).last();
-    loops = read_loops(*database);
-    frame_list = read_frames(*database);
-    log_lines = read_log(*database);
+    frame_lists = read_lists<FramePose>(*database, "frame");
+    log_lines = read_lists<std::string>(*database, "log");
   });
   return reread ? done : reread;
 }
@@ -258,7 +278,6 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
       Transaction transaction(*database, true);
       create_tables(*database);
       put_header(*database, header);
-      put_totals(*database, 1, {}, false);
       transaction.commit();
     }
     return StoreWriter(std::make_unique<Impl>(file, std::move(database)));
@@ -268,7 +287,7 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
 }
 
 core::Result<StoreWriter> StoreWriter::resume(const std::filesystem::path& file) {
-  return guarded(file, ErrorKind::kInput, [&] {
+  return guarded(file, ErrorKind::kOutput, [&] {
     check_file(file);
     auto database = std::make_unique<Database>(file, Database::Access::kWrite);
     check_store(*database);
@@ -282,25 +301,31 @@ core::Result<void> StoreWriter::add_keyframe(const Map& map, KeyframeId keyframe
                                              const std::vector<FramePose>& frames) {
   if (!map.has_keyframe(keyframe)) throw std::invalid_argument("add_keyframe: it is not in the map");
   return impl_->transact([&] {
-    if (!cloud.empty()) impl_->put_cloud({keyframe, 0, std::make_shared<Bytes>(cloud)});
-    impl_->write(map, frames, false);
+    if (!cloud.empty()) impl_->put_cloud({keyframe, {}, std::make_shared<Bytes>(cloud)});
+    impl_->write(map, frames);
+    put_complete(*impl_->database, impl_->transaction, false);
   });
 }
 
 core::Result<void> StoreWriter::add(const StoreStep& step) {
   return impl_->transact([&] {
-    impl_->mirror_keyframes(*step.map);
-    impl_->mirror_rest(*step.map);
-    const std::size_t frames = impl_->frame_list.size();
-    impl_->frame_list.insert(impl_->frame_list.end(), step.frames.begin(), step.frames.end());
-    mirror_list(impl_->frame_list, frames, encode_frame, impl_->frames);
+    std::map<std::int32_t, std::size_t> before;
+    for (const FramePose& pose : step.frames) {
+      std::vector<FramePose>& list = impl_->frame_lists[pose.reference.robot];
+      before.try_emplace(pose.reference.robot, list.size());
+      list.push_back(pose);
+    }
+    for (const auto& [robot, size] : before) {
+      mirror_list(robot, impl_->frame_lists[robot], size, impl_->frames);
+    }
     impl_->put_log_and_clouds(step);
-    impl_->put_totals(*step.map, false);
+    impl_->put_map(*step.map, step.robot);
+    put_complete(*impl_->database, impl_->transaction, false);
   });
 }
 
-core::Result<void> StoreWriter::add_cloud(KeyframeId keyframe, const std::vector<std::uint8_t>& cloud) {
-  return impl_->transact([&] { impl_->put_cloud({keyframe, 0, std::make_shared<Bytes>(cloud)}); });
+core::Result<void> StoreWriter::add_cloud(const StoreCloud& cloud) {
+  return impl_->transact([&] { impl_->put_cloud(cloud); });
 }
 
 core::Result<void> StoreWriter::attach(const std::string& name, const std::vector<std::uint8_t>& bytes) {
@@ -315,14 +340,17 @@ core::Result<void> StoreWriter::attach(const std::string& name, const std::vecto
 }
 
 core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<FramePose>& frames,
-                                           const ResultFrame& result, const StoreStep& rest) {
+                                           const ResultFrame& result, const std::vector<StoreStep>& rest,
+                                           const std::vector<RobotInfo>& robots) {
   // Of a store that is written in one go, this is the first moment that it is whole.
   auto synced =
       guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA synchronous = NORMAL"); });
   if (!synced) return synced;
   core::Result<void> done = impl_->transact([&] {
-    impl_->put_log_and_clouds(rest);
-    impl_->write(map, frames, true);
+    for (const StoreStep& step : rest) impl_->put_log_and_clouds(step);
+    impl_->write(map, frames);
+    if (!robots.empty()) put_robots(*impl_->database, impl_->transaction, robots);
+    put_complete(*impl_->database, impl_->transaction, true);
     put_result_frame(*impl_->database, impl_->transaction, result);
   });
   if (done) leave_one_file(*impl_->database);

@@ -187,7 +187,7 @@ std::string short_name(const std::string& input) { return input.substr(input.fin
 core::Result<void> save(const mapping::Slam& slam, const std::string& input, const sensor::Camera& camera,
                         const std::string& file) {
   maps::StoreHeader header;
-  header.camera = camera;
+  header.robots = {{0, "robot", camera}};
   header.input = input;
   auto writer = maps::StoreWriter::create(file, header);
   if (!writer) return tl::unexpected<core::Error>(writer.error());
@@ -264,7 +264,7 @@ void force_wrong(const maps::StoredMap& stored, const geometry::Trajectory& trut
     maps::Map map = stored.map;
     mapping::LoopOptions chosen = options;
     chosen.robust = robust;
-    mapping::LoopCloser closer(chosen, stored.header.camera.color);
+    mapping::LoopCloser closer(chosen, maps::camera_of(stored.header.robots, 0).color);
     closer.close(map, *edges);
     print_row(name, std::string(label) + " (" + std::to_string(edges->size()) + ")", 0.0,
               maps::trajectory(stored.frames, map), truth, map, {}, closer.counts(), 0.0, false);
@@ -309,7 +309,7 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   const std::string name = short_name(file);
   if (settings.tell) describe_way(stored->frames, maps::trajectory(stored->frames, map), *truth);
   print_row(name, "off", 100.0, maps::trajectory(stored->frames, map), *truth, map, {}, {}, 0.0, false);
-  mapping::LoopCloser closer(options->loops, stored->header.camera.color);
+  mapping::LoopCloser closer(options->loops, maps::camera_of(stored->header.robots, 0).color);
   const double start = thread_ms();
   for (const core::KeyframeId id : map.keyframe_ids()) {
     std::vector<mapping::PoseEdge> edges;
@@ -322,7 +322,8 @@ core::Result<void> replay(const std::string& file, const Settings& settings, con
   print_row(name, "replayed, ms a keyframe", 100.0, maps::trajectory(stored->frames, map), *truth, map,
             closer.trials(), closer.counts(), ms, settings.tell);
   if (!(settings.wrong > 0.0)) return {};
-  mapping::LoopCloser watcher(options->loops, stored->header.camera.color);  // all that could be closed
+  mapping::LoopCloser watcher(options->loops,
+                              maps::camera_of(stored->header.robots, 0).color);  // all that could be closed
   std::vector<mapping::PoseEdge> edges;
   for (const core::KeyframeId id : stored->map.keyframe_ids()) {
     for (const mapping::Loop& loop : watcher.detect(stored->map, id)) {

@@ -219,6 +219,39 @@ TEST_F(MapCommand, OutputThatCannotBeWrittenIsToldBeforeTheRun) {
   EXPECT_FALSE(o.told("frames")) << o;
 }
 
+TEST_F(MapCommand, KnownPosesOfSeveralRobots) {
+  write_wall(path("wall"));
+  write_wall(path("other"));
+  const std::string map =
+      std::string("map wall other -p known_poses -q --force --set fuse.voxel=20mm") + kNoPictures;
+  const Outcome o = run(map + " -o two");
+  ASSERT_EQ(o.code, 0) << o;
+  ASSERT_EQ(run("map wall -p known_poses -q -o one --set fuse.voxel=20mm" + std::string(kNoPictures)).code,
+            0);
+  for (const char* robot : {"wall", "other"}) {
+    EXPECT_EQ(slurp(path("two/robots") / robot / "trajectory.txt"), slurp(path("one/trajectory.txt")));
+    EXPECT_EQ(slurp(path("two/robots") / robot / "keyframes.txt"), slurp(path("one/keyframes.txt")));
+  }
+  const auto cloud = cloud::read_cloud(path("two/map.ply"));
+  ASSERT_TRUE(cloud);
+  EXPECT_EQ(cloud->columns.robot.size(), cloud->cloud->size());
+  EXPECT_EQ(slurp(path("two/frames.csv")).substr(0, 27), "frame,state,robot,stamp,key");
+  EXPECT_FALSE(fs::exists(path("two/map.db")));
+  for (const auto& left : fs::directory_iterator(path("two"))) {
+    EXPECT_EQ(left.path().string().find(".db"), std::string::npos) << left.path();
+  }
+
+  fs::create_directory(path("ways"));
+  fs::copy_file(path("one/trajectory.txt"), path("ways/wall.txt"));
+  EXPECT_EQ(run(map + " -o x --set 'poses.file=ways/{robot}.txt'").code, 3) << "other.txt is missing";
+  fs::copy_file(path("one/trajectory.txt"), path("ways/other.txt"));
+  const Outcome files = run(map + " -o x --set 'poses.file=ways/{robot}.txt'");
+  EXPECT_EQ(files.code, 0) << files;
+  const Outcome same = run(map + " -o y --set poses.file=ways/wall.txt");
+  EXPECT_EQ(same.code, 2) << same;
+  EXPECT_TRUE(same.told("{robot}")) << same;
+}
+
 TEST_F(MapCommand, AFullDiskIsAnErrorAndLeavesNothing) {
   // The shell's file size limit stands in for the disk's end, in blocks of 1024 bytes (512 in some shells).
   // The clouds that wait for their poses take less than 50 kB, map.ply more than 1 MB.

@@ -24,15 +24,14 @@ class ResumeCommand : public ProgramTest {
     write_wall(path("wall"), recording);
   }
 
-  /// Starts `map wall -o OUT` and kills it as soon as its store holds so many keyframes.
-  void map_and_kill(const std::string& out, std::size_t keyframes) const {
+  /// Starts `map RECORDINGS -o OUT` and kills it as soon as its store holds so many keyframes.
+  void map_and_kill(const std::string& out, std::size_t keyframes,
+                    const std::string& recordings = "wall") const {
     const pid_t child = fork();
     if (child == 0) {
-      const std::string folder = path("").string();
-      if (chdir(folder.c_str()) == 0 && std::freopen("err.txt", "w", stderr) != nullptr) {
-        execl(PLUMBLINE_PROGRAM, "plumbline", "map", "wall", "-o", out.c_str(), "-q", "--set",
-              "output.views=", "--set", "fuse.voxel=20mm", static_cast<char*>(nullptr));
-      }
+      const std::string command = "cd '" + path("").string() + "' && exec " + PLUMBLINE_PROGRAM + " map " +
+                                  recordings + " -o " + out + kCheap + " 2>err.txt";
+      execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
       _exit(127);
     }
     ASSERT_GT(child, 0);
@@ -104,6 +103,60 @@ TEST_F(ResumeCommand, KilledAtAnyMomentNothingCommittedIsLost) {
     EXPECT_LT(ate_m(out), std::max(1.05 * ate_m("whole"), ate_m("whole") + 0.001));
     EXPECT_TRUE(maps::load_map(path(out + "/map.db"))->complete);
   }
+}
+
+TEST_F(ResumeCommand, SeveralRobotsGoOnAsWell) {
+  constexpr int kOthers = 40;
+  WallRecording shorter;
+  shorter.frames = kOthers;
+  write_wall(path("other"), shorter);
+  const std::string two = "other wall";
+  const std::string cheap = std::string(kCheap) + " --set merge.min_pairs=3";
+  ASSERT_EQ(run("map " + two + " -o whole" + cheap).code, 0);
+  const std::vector<std::string> rows = lines_of(path("whole/frames.csv"));
+  ASSERT_EQ(rows.size(), kFrames + kOthers + 1U);
+  const double whole_points = read_json(path("whole/summary.json"))["cloud"]["points"];
+  for (const std::size_t keyframes : {1U, 3U, 6U}) {
+    const std::string out = "out" + std::to_string(keyframes);
+    map_and_kill(out, keyframes, two + " --set merge.min_pairs=3");
+    if (HasFatalFailure()) return;
+    const auto left = maps::StoreReader::open(path(out + ".partial/map.db"))->load_each();
+    ASSERT_TRUE(left) << left.error().message;
+    std::size_t stored_rows = 0;
+    for (const maps::StoredMap& map : *left) stored_rows += map.log.size();
+    ASSERT_GT(stored_rows, 0U);
+    EXPECT_EQ(run("info " + out).code, 0);
+    if (left->size() > 1) EXPECT_EQ(run("export " + out + " -o left.ply").code, 3) << "they are not one yet";
+
+    const Outcome resumed = run("map " + two + " --resume -o " + out + cheap);
+    ASSERT_EQ(resumed.code, 0) << resumed;
+    const std::vector<std::string> again = lines_of(path(out + "/frames.csv"));
+    ASSERT_EQ(again.size(), rows.size());
+    for (const maps::StoredMap& map : *left) {
+      for (const std::string& line : map.log) {
+        EXPECT_EQ(again[std::stoul(line) + 1], line) << "what was done stays";
+      }
+    }
+    const nlohmann::json summary = read_json(path(out + "/summary.json"));
+    EXPECT_EQ(summary["frames"]["tracked"], kFrames + kOthers);
+    EXPECT_EQ(summary["frames"]["resumed"], stored_rows);
+    EXPECT_TRUE(summary["merges"][0]["accepted"]);
+    const double points = summary["cloud"]["points"];
+    EXPECT_NEAR(points / whole_points, 1.0, 0.05);
+    for (const std::string robot : {"other", "wall"}) {
+      const std::string own = "/robots/" + robot + "/trajectory.txt";
+      EXPECT_LT(ate_m(out + own), std::max(1.05 * ate_m("whole" + own), ate_m("whole" + own) + 0.001));
+    }
+    EXPECT_TRUE(maps::load_map(path(out + "/map.db"))->complete);
+  }
+  // Killed when only results were missing: the maps are one already.
+  fs::rename(path("whole"), path("end.partial"));
+  fs::remove(path("end.partial/summary.json"));
+  write("end.partial/.plumbline-unfinished", "");
+  const Outcome end = run("map " + two + " --resume -o end" + cheap);
+  ASSERT_EQ(end.code, 0) << end;
+  EXPECT_EQ(lines_of(path("end/frames.csv")), rows);
+  EXPECT_TRUE(fs::exists(path("end/robots/other/trajectory.txt")));
 }
 
 TEST_F(ResumeCommand, AFullDiskKeepsWhatWasStored) {

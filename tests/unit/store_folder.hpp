@@ -31,9 +31,8 @@ struct StoreFolder {
 
 inline maps::StoreHeader header_of(const sensor::Camera& camera) {
   maps::StoreHeader header;
-  header.camera = camera;
+  header.robots = {{0, "robot 'a'; DROP TABLE point", camera}};
   header.configuration = "stages:\n  - {name: read, robot: \"ä\"}\n";
-  header.robot = "robot 'a'; DROP TABLE point";
   header.program_version = "1.2.3";
   return header;
 }

@@ -5,12 +5,14 @@
 // maps bit by bit.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <vector>
 
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/map.hpp"
+#include "plumbline/maps/store.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "random_world.hpp"
 
@@ -23,6 +25,8 @@ struct StoreWorld {
   int features = 60;    ///< points of a keyframe
   int lines = 12;       ///< lines of a keyframe
   bool deletes = true;  ///< keyframes and landmarks leave now and then
+  int first_robot = 0;
+  int other_robot = 3;  ///< every fifth keyframe is this one's
 
   explicit StoreWorld(std::uint32_t seed) : random_(seed) {
     camera.name = "hand-made";
@@ -31,7 +35,7 @@ struct StoreWorld {
 
   /// One more keyframe: it sees landmarks of earlier ones and makes new ones, then what a run does to a map.
   core::KeyframeId step() {
-    const int robot = ++steps_ % 5 == 0 ? 3 : 0;
+    const int robot = ++steps_ % 5 == 0 ? other_robot : first_robot;
     const core::KeyframeId id = map.next_keyframe_id(robot);
     map.add_keyframe(make_keyframe(id), random_.pose(3.0, 5.0));
     for (const core::PointId p : map.point_ids()) {
@@ -57,6 +61,22 @@ struct StoreWorld {
     refine(id);
     if (deletes) thin_out();
     return id;
+  }
+
+  /// As a store gives them back.
+  [[nodiscard]] std::vector<maps::FramePose> frames_by_robot() const {
+    std::vector<maps::FramePose> sorted = frames;
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const auto& a, const auto& b) { return a.reference.robot < b.reference.robot; });
+    return sorted;
+  }
+  /// Of a frame, by its place among `frames`.
+  [[nodiscard]] maps::FrameId frame_id(std::size_t place) const {
+    const std::int32_t robot = frames[place].reference.robot;
+    const auto before =
+        std::count_if(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(place),
+                      [&](const maps::FramePose& frame) { return frame.reference.robot == robot; });
+    return {robot, static_cast<std::int32_t>(before)};
   }
 
  private:
@@ -268,8 +288,8 @@ inline bool same_lookup(const features::FrameFeatures& a, const features::FrameF
 inline bool same(const maps::Keyframe& a, const maps::Keyframe& b) {
   if (a.id != b.id || a.frame_index != b.frame_index || a.stamp != b.stamp || a.turn_rate != b.turn_rate ||
       a.reference != b.reference || !same(a.camera_from_reference, b.camera_from_reference) ||
-      a.reference_sigma_m != b.reference_sigma_m ||
-      !same_all(a.surface, b.surface) || (a.features == nullptr) != (b.features == nullptr)) {
+      a.reference_sigma_m != b.reference_sigma_m || !same_all(a.surface, b.surface) ||
+      (a.features == nullptr) != (b.features == nullptr)) {
     return false;
   }
   if (a.features == nullptr) return true;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A keyframe's cloud as few bytes, for spools, stores and networks: 5 to 7 bytes a point instead of 48.
+// A keyframe's cloud as few bytes, for stores and networks: 5 to 7 bytes a point instead of 48.
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -19,9 +19,9 @@ struct CompactCloudOptions {
 /// Versioned bytes that decode_cloud() reads on any machine of the same byte order. Kept: positions (to half
 /// a step a coordinate, up to 2^30 steps from the origin), colours exactly, normals to about half a degree
 /// (octahedral map, 2 bytes; Meyer et al. 2010), unknown normals as unknown. The sensor pose is kept,
-/// curvature is not. An organised cloud whose columns and rows lie on rays (any depth camera without distortion) stays
-/// organised, and only its depth is rounded: points stay on their rays. Any other cloud becomes a list of its
-/// finite points, in order. Same cloud and options, same bytes.
+/// curvature is not. An organised cloud whose columns and rows lie on rays (any depth camera without
+/// distortion) stays organised, and only its depth is rounded: points stay on their rays. Any other cloud
+/// becomes a list of its finite points, in order. Same cloud and options, same bytes.
 std::vector<std::uint8_t> encode_cloud(const Cloud& cloud, const CompactCloudOptions& options = {});
 
 /// Errors (kInput): not such bytes, a version this program does not know, truncated, damaged (checksum).

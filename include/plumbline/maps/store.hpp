@@ -20,17 +20,28 @@
 namespace plumbline::maps {
 
 /// Stores of other formats are refused.
-constexpr int kStoreFormat = 6;
+constexpr int kStoreFormat = 7;
+
+using FrameId = core::Id<struct FrameTag>;  ///< a robot's frame: its place among the robot's FramePoses
+
+/// A robot of a map.
+struct RobotInfo {
+  std::int32_t number = 0;  ///< in the map's ids
+  std::string name;
+  sensor::Camera camera;
+};
 
 /// What is written once, when a store is made.
 struct StoreHeader {
-  sensor::Camera camera;
-  std::string configuration;    ///< the effective one, YAML
+  std::vector<RobotInfo> robots;  ///< by number
+  std::string configuration;      ///< the effective one, YAML
   std::string input;            ///< what was mapped, text: tells whether a run that goes on is given the same
-  std::string robot;            ///< its name
   std::string program_version;  ///< core::version() of the program that made the file
   int format = kStoreFormat;    ///< set by the reader; the writer always writes kStoreFormat
 };
+
+/// The camera of a robot; of one that is not there the first one's, or none.
+sensor::Camera camera_of(const std::vector<RobotInfo>& robots, std::int32_t robot);
 
 /// The frame that results are written in, as far as it is known.
 struct ResultFrame {
@@ -38,14 +49,14 @@ struct ResultFrame {
   bool upright = false;  ///< z is up in it
 };
 
-/// Everything of a store but clouds.
+/// Everything of a store but clouds; of robots whose maps are not one yet, of one robot.
 struct StoredMap {
   StoreHeader header;
   bool complete = false;  ///< save_final was the last thing that happened
   Map map;
-  std::vector<FramePose> frames;
-  std::vector<std::string> log;  ///< a line a frame of the run, as frames.csv has it
-  ResultFrame result;            ///< of a store that is not complete: the map's own frame
+  std::vector<FramePose> frames;  ///< by robot, in order
+  std::vector<std::string> log;   ///< a line a frame of the run, as frames.csv has it, by robot
+  ResultFrame result;             ///< of a store that is not complete: the map's own frame
 };
 
 /// What a store holds, without reading it all.
@@ -72,16 +83,18 @@ struct StoredSurface {
 
 /// A cloud on its way into a store: bytes of cloud::encode_cloud.
 struct StoreCloud {
-  KeyframeId keyframe;    ///< whose cloud it is; invalid: a frame's
-  std::size_t frame = 0;  ///< of a frame between keyframes: its place among the store's frames
+  KeyframeId keyframe;  ///< whose cloud it is; invalid: a frame's
+  FrameId frame;        ///< of a frame between keyframes
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
 };
 
 /// What a run adds in one go.
 struct StoreStep {
-  std::shared_ptr<const MapChanges> map;  ///< since the last step's
-  std::vector<FramePose> frames;          ///< that came since the last step
+  /// Whose own map this is, beside those of other robots; -1: the map is the only one, whoever made it.
+  std::int32_t robot = -1;
+  std::shared_ptr<const MapChanges> map;  ///< since the last step's of this robot
+  std::vector<FramePose> frames;          ///< that came since
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
 };
@@ -115,15 +128,16 @@ class StoreWriter {
   /// The same at a bounded cost: one transaction that adds what came since the last step. What the map had
   /// before must be in the file. Errors (kOutput): disk full, I/O; the next step must be of a whole map then.
   core::Result<void> add(const StoreStep& step);
-  /// A cloud that comes later than its keyframe, or replaces its cloud. One transaction.
-  core::Result<void> add_cloud(KeyframeId keyframe, const std::vector<std::uint8_t>& cloud);
+  /// A cloud that comes without a keyframe, or replaces one. One transaction.
+  core::Result<void> add_cloud(const StoreCloud& cloud);
   /// Bytes of others under a name, such as a vocabulary; replaces what had the name. One transaction.
   core::Result<void> attach(const std::string& name, const std::vector<std::uint8_t>& bytes);
-  /// The finished map, in one transaction: poses, landmarks and edges after all optimisation, all frames.
-  /// Marks the store as complete and leaves one file, as the destructor does. Of `rest`, log and clouds are
-  /// added.
+  /// The finished map, in one transaction: poses, landmarks and edges after all optimisation, all frames. It
+  /// is the only one then, of the robots that `robots` lists (empty: those of the header). Marks the store as
+  /// complete and leaves one file, as the destructor does. Of `rest`, logs and clouds are added.
   core::Result<void> save_final(const Map& map, const std::vector<FramePose>& frames,
-                                const ResultFrame& result = {}, const StoreStep& rest = {});
+                                const ResultFrame& result = {}, const std::vector<StoreStep>& rest = {},
+                                const std::vector<RobotInfo>& robots = {});
 
  private:
   struct Impl;
@@ -131,8 +145,8 @@ class StoreWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Reads a store, also one that is being written: then each call sees the keyframes committed by then. Not
-/// thread-safe; several readers may read one file.
+/// Reads a store, also one that is being written: then each call sees the keyframes committed by then. Clouds
+/// may be read from several threads at a time; several readers may read one file.
 class StoreReader {
  public:
   /// Errors (kInput): not there, no map store, damaged, written in a newer format.
@@ -145,8 +159,11 @@ class StoreReader {
   /// Tells the system that all of the file will be wanted soon: it is read from disk ahead.
   void read_ahead() const;
   /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
-  /// pictures of the camera's size. Errors (kInput): damaged.
+  /// pictures of the camera's size. Errors (kInput): damaged, or there are maps of several robots that are
+  /// not one yet.
   [[nodiscard]] core::Result<StoredMap> load() const;
+  /// The same of each map that there is: of robots whose maps are not one yet, by robot.
+  [[nodiscard]] core::Result<std::vector<StoredMap>> load_each() const;
   /// Errors (kInput): damaged.
   [[nodiscard]] core::Result<StoreContents> contents() const;
   /// Keyframes that have a cloud, by id; also such as left the map.
@@ -157,10 +174,10 @@ class StoreReader {
   /// The coarse surface of a keyframe's cloud, for unpack_surface; empty: none was kept. Errors (kInput):
   /// damaged.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> surface_bytes(KeyframeId keyframe) const;
-  /// Frames between keyframes that have a cloud: their places among StoredMap::frames, ascending.
-  [[nodiscard]] core::Result<std::vector<std::size_t>> frame_cloud_ids() const;
-  [[nodiscard]] core::Result<cloud::CloudPtr> frame_cloud(std::size_t frame) const;
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> frame_cloud_bytes(std::size_t frame) const;
+  /// Frames between keyframes that have a cloud.
+  [[nodiscard]] core::Result<std::vector<FrameId>> frame_cloud_ids() const;
+  [[nodiscard]] core::Result<cloud::CloudPtr> cloud(FrameId frame) const;
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(FrameId frame) const;
   /// None: nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
       const std::string& name) const;

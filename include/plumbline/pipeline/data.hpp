@@ -35,7 +35,9 @@ struct FrameRow {
 
 /// What tracking decided about one frame.
 struct TrackedFrame {
+  std::int32_t robot = 0;
   core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
+  maps::FrameId frame;        ///< its place on the robot's way; invalid: it lies nowhere
   double stamp = 0.0;         ///< seconds
   FrameRow row;
   geometry::Rigid3 depth_from_camera;               ///< motion between the stamps of colour and depth
@@ -52,12 +54,7 @@ struct KeyframePose {
   std::optional<mapping::KeyframeAccuracy> accuracy = std::nullopt;  ///< beside the map's first keyframe
 };
 
-/// A robot of a map of several.
-struct RobotInfo {
-  std::int32_t number = 0;  ///< in the map's ids
-  std::string name;
-  sensor::Camera camera;
-};
+using maps::RobotInfo;
 
 /// The map of one robot when its tracking has ended, or a finished map of one robot or several.
 struct RobotMap {
@@ -76,10 +73,11 @@ struct RobotMaps {
 
 /// The finished map but for its dense cloud; poses after all optimisation.
 struct MapResult {
-  std::shared_ptr<const maps::Map> map;      ///< null when the poses come from a file
-  std::vector<maps::FramePose> frame_poses;  ///< empty when `map` is null
-  geometry::Trajectory trajectory;           ///< tracked frames only
-  std::vector<KeyframePose> keyframes;       ///< by id
+  std::shared_ptr<const maps::Map> map;       ///< null when the poses come from a file
+  std::vector<maps::FramePose> frame_poses;   ///< empty when `map` is null
+  geometry::Trajectory trajectory;            ///< tracked frames only
+  std::vector<maps::FrameId> trajectory_ids;  ///< whose poses these are
+  std::vector<KeyframePose> keyframes;        ///< by id
   std::vector<maps::LineSegment3> lines;
   std::vector<RobotInfo> robots;  ///< by number; empty: one robot with the recording's camera
   std::string frame_columns;      ///< header of FrameRow::columns
@@ -90,9 +88,9 @@ struct MapResult {
 /// sees through (cloud::depth_view). Its points are those of the depth camera at the moment of the depth
 /// image: cloud::sensor_pose() leads from there to the camera of the poses.
 struct KeyframeCloud {
-  core::KeyframeId id;  ///< not valid: a frame between keyframes
-  double stamp = 0.0;   ///< seconds
-  std::int32_t robot = 0;
+  core::KeyframeId id;                                       ///< not valid: a frame between keyframes
+  maps::FrameId frame;                                       ///< as TrackedFrame
+  double stamp = 0.0;                                        ///< seconds
   cloud::CloudPtr cloud;                                     ///< null: what `compact` holds, not decoded
   std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it;
                                                              ///< null: it waits in a store
@@ -103,6 +101,8 @@ struct KeyframeCloud {
 
 /// The cloud, wherever it is. Errors (kInput): it cannot be read.
 core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe);
+/// The same for a store. Errors (kInput): it cannot be read.
+core::Result<maps::StoreCloud> store_cloud_of(const KeyframeCloud& keyframe);
 
 /// Voxels of the surfaces of keyframes that are kept with their clouds: as the stage refine wants them.
 constexpr double kSurfaceVoxel_m = 0.03;
@@ -119,7 +119,7 @@ struct DenseCloud {
   std::shared_ptr<const FusionState> state = nullptr;  ///< what it was laid down with
 };
 
-/// Tracked frames of one robot.
+/// The poses of one robot among `map.trajectory`.
 geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot);
 
 /// Trajectory, keyframe poses and lines of `result` as its map says now.

@@ -39,6 +39,9 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::size_t size() const override { return order_.size(); }
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  [[nodiscard]] std::optional<geometry::Trajectory> truth_of(std::int32_t robot) const {
+    return recordings_[static_cast<std::size_t>(robot)]->truth();
+  }
   /// Of a single recording.
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override {
     return recordings_.size() == 1 ? recordings_.front()->truth() : std::nullopt;

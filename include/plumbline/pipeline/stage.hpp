@@ -33,7 +33,8 @@ class FrameSource;
 
 namespace plumbline::maps {
 class Map;
-}
+struct RobotInfo;
+}  // namespace plumbline::maps
 
 namespace plumbline::pipeline {
 
@@ -113,9 +114,10 @@ class StageIo {
 /// What a run lends to its stages; outlives them.
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
-  const StoredMaps* stored_maps = nullptr;      ///< what a maps stage reads; null: there is none
-  const RobotRecordings* recordings = nullptr;  ///< `source`, when recordings are mapped; else null
-  std::string anchor;                           ///< robot whose frame finished maps are laid into; empty: any
+  const StoredMaps* stored_maps = nullptr;               ///< what a maps stage reads; null: there is none
+  const RobotRecordings* recordings = nullptr;           ///< `source`, when recordings are mapped; else null
+  const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
+  std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;
   core::StopToken stop;
@@ -124,7 +126,8 @@ struct RunContext {
   std::string configuration;            ///< the effective one, YAML; the same for any number of threads
   std::string input;                    ///< what is mapped, as text that another recording does not give
   double pace_hz = 0.0;                 ///< frames of each recording a second, at most; 0: no matter
-  bool keep_changes = false;            ///< some stage wants_map_changes
+  bool keeps_map = false;               ///< some stage keeps_map
+  bool keeps_clouds = false;            ///< and it gets the clouds that are to be laid down
   std::function<void(maps::Map&)>
       alter_map;                        ///< for tests: changes the map when tracking has ended; may be empty
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
@@ -156,8 +159,9 @@ class Stage {
   /// Asked after check: the files that will be written, relative to the result folder ('*' = a number); no
   /// two stages may write the same.
   [[nodiscard]] virtual std::vector<std::string> files() const { return {}; }
-  /// Asked after check: TrackedFrame::changes are wanted, which cost something.
-  [[nodiscard]] virtual bool wants_map_changes() const { return false; }
+  /// Asked after check: it writes the map with its clouds to map.db as they come, for which it wants
+  /// TrackedFrame::changes.
+  [[nodiscard]] virtual bool keeps_map() const { return false; }
   virtual core::Result<void> start(const RunContext& /*context*/) { return {}; }
   /// Of sources: how many frames there are; asked after start.
   [[nodiscard]] virtual std::size_t frames() const { return 0; }

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,12 +16,6 @@
 #include "plumbline/pipeline/data.hpp"
 
 namespace plumbline::pipeline {
-
-/// Name of the attachment of a store in which the robots of a map of several stand.
-inline const char* const kRobotsAttachment = "robots";
-std::vector<std::uint8_t> robots_to_bytes(const std::vector<RobotInfo>& robots);
-/// Errors (kInput): not such bytes.
-core::Result<std::vector<RobotInfo>> robots_from_bytes(const std::vector<std::uint8_t>& bytes);
 
 /// One store. Its robots have been given numbers that no other one's have.
 struct StoredPart {
@@ -39,10 +32,9 @@ struct StoredPart {
 /// A cloud that waits in a store.
 struct StoredCloud {
   std::size_t part = 0;
-  core::KeyframeId stored_id;  ///< as its store names it; invalid: of a frame between keyframes
-  std::size_t frame = 0;       ///< its place among the part's frames, for these
-  core::KeyframeId id;         ///< as this run names it
-  std::int32_t robot = 0;
+  std::int32_t stored_robot = 0;  ///< as its store numbers the robot; the rest is as this run does
+  core::KeyframeId id;            ///< invalid: of a frame between keyframes
+  maps::FrameId frame;            ///< of such a frame
   double stamp = 0.0;
 };
 
@@ -63,10 +55,10 @@ class StoredMaps : public dataset::FrameSource {
   /// What maps::unpack_surface makes the coarse surface of a keyframe's cloud of; empty: none was kept. May
   /// be called from several threads at a time.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> surface_bytes(std::size_t index) const;
-  /// The camera of a robot, by this run's number.
-  [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const;
+  /// Of all parts, by this run's numbers.
+  [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   /// What to say of a cloud that cannot be used.
-  [[nodiscard]] core::Error damaged(std::int32_t robot, const core::Error& how) const;
+  [[nodiscard]] core::Error damaged(core::KeyframeId id, maps::FrameId frame, const core::Error& how) const;
   /// The part of that name, or that has a robot of that name. Errors (kUsage): none has.
   [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;
 
@@ -87,8 +79,8 @@ class StoredMaps : public dataset::FrameSource {
   std::string name_ = "fused maps";
   std::string format_ = "map";
   std::vector<StoredPart> parts_;
+  std::vector<RobotInfo> robots_;
   std::vector<StoredCloud> clouds_;
-  mutable std::vector<std::mutex> one_at_a_time_;  ///< by part: a reader is one connection
 };
 
 }  // namespace plumbline::pipeline

@@ -18,6 +18,8 @@
 
 namespace plumbline::pipeline {
 
+struct StoredViews;
+
 /// What a user names as a map.
 struct MapPlace {
   std::optional<ResultFolder> result;  ///< of a run that came to its end
@@ -56,8 +58,7 @@ class StoredResult {
 
  private:
   StoredResult(std::filesystem::path file, maps::StoreReader reader, maps::StoredMap map);
-  [[nodiscard]] core::Result<std::vector<sensor::Pinhole>> cameras_of(
-      const std::vector<std::int32_t>& robots) const;
+  [[nodiscard]] core::Result<StoredViews> views() const;
 
   std::filesystem::path file_;
   std::unique_ptr<maps::StoreReader> reader_;

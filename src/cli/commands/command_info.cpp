@@ -45,10 +45,12 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
   const auto contents = reader->contents();
   if (!contents) return tl::unexpected<core::Error>(contents.error());
   const maps::StoreHeader& header = reader->header();
+  std::string robots;
+  for (const maps::RobotInfo& robot : header.robots) robots += (robots.empty() ? "" : ", ") + robot.name;
   std::error_code ec;
   const double file_mb = static_cast<double>(std::filesystem::file_size(file, ec)) / 1e6;
   fmt::print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
-             header.format, header.program_version, header.robot);
+             header.format, header.program_version, robots);
   fmt::print("store.complete: {}\n",
              contents->complete ? "yes" : "no; map --resume goes on from it, export and render read it");
   fmt::print("store.keyframes: {}\nstore.points: {}\nstore.lines: {}\n", contents->keyframes,

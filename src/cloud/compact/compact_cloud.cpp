@@ -5,28 +5,34 @@
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <optional>
+#include <string>
 
-#include "compact/compact_format.hpp"
 #include "compact/octahedral.hpp"
 #include "finite.hpp"
+#include "plumbline/core/packing.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
-constexpr double kMostSteps = 1 << 30;
+using core::ByteReader;
+using core::Bytes;
+using core::ByteWriter;
 
-/// Small numbers of either sign as small numbers.
-std::uint32_t zigzag(std::int32_t v) {
-  return static_cast<std::uint32_t>(v) << 1U ^ static_cast<std::uint32_t>(v >> 31);
-}
+constexpr std::array<std::uint8_t, 5> kCompactMagic{'P', 'L', 'C', 'C', 1};
+constexpr double kMostSteps = 1 << 30;
+constexpr std::uint32_t kMostPoints = 1U << 26;
+
+struct CompactHead {
+  std::uint32_t width = 0;   ///< of a grid; of a list the number of points
+  std::uint32_t height = 0;  ///< of a grid; 0: a list
+  double step_m = 0.0;
+};
 
 /// Tangents x/z of columns and y/z of rows.
 struct Rays {
@@ -56,71 +62,99 @@ std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
   return rays;
 }
 
-class Writer {
- public:
-  explicit Writer(std::size_t expected) { bytes_.reserve(expected); }
-  void raw(const void* data, std::size_t size) {
-    const auto* from = static_cast<const std::uint8_t*>(data);
-    bytes_.insert(bytes_.end(), from, from + size);
-  }
-  /// Differences of `values` as `planes` planes of bytes, lowest first.
-  void differences(const std::vector<std::int32_t>& values, int planes) {
-    const std::size_t at = bytes_.size();
-    const std::size_t count = values.size();
-    bytes_.resize(at + count * static_cast<std::size_t>(planes));
-    std::int32_t before = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      std::uint32_t code = zigzag(values[i] - before);
-      before = values[i];
-      for (int k = 0; k < planes; ++k, code >>= 8U) {
-        bytes_[at + static_cast<std::size_t>(k) * count + i] = static_cast<std::uint8_t>(code);
-      }
-    }
-  }
-  /// Differences modulo 256.
-  void differences(const std::vector<std::uint8_t>& values) {
-    std::uint8_t before = 0;
-    for (const std::uint8_t v : values) {
-      bytes_.push_back(static_cast<std::uint8_t>(v - before));
-      before = v;
-    }
-  }
-  [[nodiscard]] const std::vector<std::uint8_t>& bytes() const { return bytes_; }
-
- private:
-  std::vector<std::uint8_t> bytes_;
-};
-
-/// Colour (green, and red and blue relative to it) and normal of the finite points.
-void write_columns(const Cloud& cloud, std::size_t points, Writer& writer) {
-  std::array<std::vector<std::uint8_t>, 5> columns;
-  for (auto& column : columns) column.reserve(points);
-  for (const Point& p : cloud.points) {
-    if (!finite(p)) continue;
-    columns[0].push_back(p.g);
-    columns[1].push_back(static_cast<std::uint8_t>(p.r - p.g));
-    columns[2].push_back(static_cast<std::uint8_t>(p.b - p.g));
-    const auto normal = pack_direction({p.normal_x, p.normal_y, p.normal_z});
-    columns[3].push_back(normal[0]);
-    columns[4].push_back(normal[1]);
-  }
-  for (const auto& column : columns) writer.differences(column);
+std::int32_t steps_of(float value, double step_m) {
+  return static_cast<std::int32_t>(std::lround(static_cast<double>(value) / step_m));
 }
 
-void write_grid(const Cloud& cloud, const Rays& rays, double step_m, Writer& writer) {
-  writer.raw(rays.x.data(), rays.x.size() * sizeof(float));
-  writer.raw(rays.y.data(), rays.y.size() * sizeof(float));
-  std::vector<std::uint8_t> mask((cloud.size() + 7) / 8, 0);
-  std::vector<std::int32_t> depth;
-  depth.reserve(cloud.size());
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    if (!finite(cloud[i])) continue;
-    mask[i / 8] = static_cast<std::uint8_t>(mask[i / 8] | 1U << (i % 8));
-    depth.push_back(static_cast<std::int32_t>(std::lround(static_cast<double>(cloud[i].z) / step_m)));
+/// Whole numbers as `kPlanes` planes of bytes, lowest first, of their differences; small ones of either sign
+/// as small numbers.
+template <std::size_t kPlanes, typename Io>
+void differences(Io& io, std::vector<std::int32_t>& values) {
+  std::vector<std::uint32_t> codes(values.size());
+  std::uint32_t before = 0;
+  if constexpr (!Io::kReads) {
+    for (std::size_t i = 0; i < codes.size(); ++i) {
+      const auto now = static_cast<std::uint32_t>(values[i]);
+      const std::uint32_t difference = now - before;
+      codes[i] = difference << 1U ^ (0U - (difference >> 31U));
+      before = now;
+    }
   }
-  writer.raw(mask.data(), mask.size());
-  writer.differences(depth, 3);
-  write_columns(cloud, depth.size(), writer);
+  io.template planes<kPlanes>(codes.data(), codes.size());
+  if constexpr (Io::kReads) {
+    for (std::size_t i = 0; i < codes.size(); ++i) {
+      before += (codes[i] >> 1U) ^ (0U - (codes[i] & 1U));
+      values[i] = static_cast<std::int32_t>(before);
+    }
+  }
+}
+
+/// Colour (green, and red and blue relative to it) and normal of points: five planes of bytes, each of
+/// differences modulo 256.
+template <typename Io>
+void columns(Io& io, const std::vector<Point*>& points) {
+  const std::size_t count = points.size();
+  Bytes bytes(5 * count);
+  std::array<std::uint8_t, 5> before{};
+  if constexpr (!Io::kReads) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Point& p = *points[i];
+      const auto normal = pack_direction({p.normal_x, p.normal_y, p.normal_z});
+      const std::array<std::uint8_t, 5> now{p.g, static_cast<std::uint8_t>(p.r - p.g),
+                                            static_cast<std::uint8_t>(p.b - p.g), normal[0], normal[1]};
+      for (std::size_t k = 0; k < now.size(); ++k) {
+        bytes[k * count + i] = static_cast<std::uint8_t>(now[k] - before[k]);
+      }
+      before = now;
+    }
+  }
+  io.planes(bytes.data(), bytes.size());
+  if constexpr (Io::kReads) {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t k = 0; k < before.size(); ++k) {
+        before[k] = static_cast<std::uint8_t>(before[k] + bytes[k * count + i]);
+      }
+      Point& p = *points[i];
+      p.g = before[0];
+      p.r = static_cast<std::uint8_t>(before[0] + before[1]);
+      p.b = static_cast<std::uint8_t>(before[0] + before[2]);
+      p.a = 255;
+      p.getNormalVector3fMap() = unpack_direction({before[3], before[4]});
+    }
+  }
+}
+
+template <typename Io>
+void grid(Io& io, Rays& rays, double step_m, Cloud& cloud) {
+  for (float& ray : rays.x) io(ray);
+  for (float& ray : rays.y) io(ray);
+  std::vector<std::uint8_t> mask((cloud.size() + 7) / 8, 0);
+  if constexpr (!Io::kReads) {
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      if (finite(cloud[i])) mask[i / 8] = static_cast<std::uint8_t>(mask[i / 8] | 1U << (i % 8));
+    }
+  }
+  io.planes(mask.data(), mask.size());
+  std::vector<Point*> points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if ((mask[i / 8] >> (i % 8) & 1U) != 0) points.push_back(&cloud[i]);
+  }
+  std::vector<std::int32_t> depths(points.size());
+  if constexpr (!Io::kReads) {
+    for (std::size_t k = 0; k < points.size(); ++k) depths[k] = steps_of(points[k]->z, step_m);
+  }
+  differences<3>(io, depths);
+  if constexpr (Io::kReads) {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const auto i = static_cast<std::size_t>(points[k] - cloud.points.data());
+      const auto z = static_cast<float>(depths[k] * step_m);
+      points[k]->getVector3fMap() =
+          Eigen::Vector3f(rays.x[i % cloud.width] * z, rays.y[i / cloud.width] * z, z);
+    }
+    cloud.is_dense = points.size() == cloud.size();
+  }
+  columns(io, points);
 }
 
 /// A copy without points that cannot be coded.
@@ -134,24 +168,66 @@ Cloud codable_list(const Cloud& cloud, double step_m) {
   return list;
 }
 
-void write_list(const Cloud& cloud, double step_m, Writer& writer) {
+template <typename Io>
+void list(Io& io, double step_m, Cloud& cloud) {
   std::vector<std::int32_t> values(cloud.points.size());
   for (const auto axis : {&Point::x, &Point::y, &Point::z}) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = static_cast<std::int32_t>(std::lround(static_cast<double>(cloud.points[i].*axis) / step_m));
+    if constexpr (!Io::kReads) {
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] = steps_of(cloud.points[i].*axis, step_m);
     }
-    writer.differences(values, 4);
+    differences<4>(io, values);
+    if constexpr (Io::kReads) {
+      for (std::size_t i = 0; i < values.size(); ++i)
+        cloud.points[i].*axis = static_cast<float>(values[i] * step_m);
+    }
   }
-  write_columns(cloud, values.size(), writer);
+  std::vector<Point*> points;
+  points.reserve(cloud.points.size());
+  for (Point& p : cloud.points) points.push_back(&p);
+  columns(io, points);
 }
 
 /// Of the sensor, behind everything else; a pose that is none takes no bytes.
-void write_sensor_pose(const Cloud& cloud, Writer& writer) {
-  const Eigen::Quaternionf& turn = cloud.sensor_orientation_;
-  if (cloud.sensor_origin_.head<3>().isZero(0.0F) && turn.coeffs() == Eigen::Quaternionf::Identity().coeffs())
-    return;
-  writer.raw(cloud.sensor_origin_.data(), 3 * sizeof(float));
-  writer.raw(turn.coeffs().data(), 4 * sizeof(float));
+template <typename Io>
+void sensor_pose_fields(Io& io, Cloud& cloud) {
+  for (int k = 0; k < 3; ++k) io(cloud.sensor_origin_[k]);
+  for (int k = 0; k < 4; ++k) io(cloud.sensor_orientation_.coeffs()[k]);
+}
+
+bool has_sensor_pose(const Cloud& cloud) {
+  return !cloud.sensor_origin_.head<3>().isZero(0.0F) ||
+         cloud.sensor_orientation_.coeffs() != Eigen::Quaternionf::Identity().coeffs();
+}
+
+template <typename Io>
+void head_fields(Io& io, CompactHead& head) {
+  io(head.width, head.height, head.step_m);
+}
+
+CloudPtr decoded(const Bytes& content) {
+  ByteReader from(content);
+  CompactHead head;
+  head_fields(from, head);
+  const std::uint64_t cells = std::uint64_t{head.width} * std::max(head.height, 1U);
+  // A cell takes a bit at least.
+  from.check(
+      cells <= kMostPoints && cells / 8 <= content.size() && head.step_m > 0.0 && std::isfinite(head.step_m),
+      "its head is damaged");
+  Point none;
+  none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
+  auto cloud = std::make_shared<Cloud>();
+  cloud->points.assign(static_cast<std::size_t>(cells), none);
+  cloud->width = head.width;
+  cloud->height = std::max(1U, head.height);
+  if (head.height > 0) {
+    Rays rays{std::vector<float>(head.width), std::vector<float>(head.height)};
+    grid(from, rays, head.step_m, *cloud);
+  } else {
+    list(from, head.step_m, *cloud);
+  }
+  if (!from.at_end()) sensor_pose_fields(from, *cloud);
+  from.expect_end();
+  return cloud;
 }
 
 }  // namespace
@@ -159,29 +235,38 @@ void write_sensor_pose(const Cloud& cloud, Writer& writer) {
 std::vector<std::uint8_t> encode_cloud(const Cloud& cloud, const CompactCloudOptions& options) {
   const double step_m = options.step_m;
   if (!(step_m > 0.0)) throw std::invalid_argument("encode_cloud: step_m must be positive");
-  Writer writer(cloud.size() * 9 + 64);
-  if (const auto rays = rays_of(cloud, step_m)) {
-    const CompactHead head{cloud.width, cloud.height, step_m};
-    writer.raw(&head, sizeof(head));
-    write_grid(cloud, *rays, step_m, writer);
+  auto& whole = const_cast<Cloud&>(cloud);  // a writer changes nothing
+  ByteWriter writer;
+  if (auto rays = rays_of(cloud, step_m)) {
+    CompactHead head{cloud.width, cloud.height, step_m};
+    head_fields(writer, head);
+    grid(writer, *rays, step_m, whole);
   } else {
-    const Cloud list = codable_list(cloud, step_m);
-    const CompactHead head{static_cast<std::uint32_t>(list.points.size()), 0, step_m};
-    writer.raw(&head, sizeof(head));
-    write_list(list, step_m, writer);
+    Cloud codable = codable_list(cloud, step_m);
+    CompactHead head{static_cast<std::uint32_t>(codable.points.size()), 0, step_m};
+    head_fields(writer, head);
+    list(writer, step_m, codable);
   }
-  write_sensor_pose(cloud, writer);
-  const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), &ZSTD_freeCCtx);
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, options.level);
-  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
-  std::vector<std::uint8_t> bytes(kCompactMagic.size() + ZSTD_compressBound(writer.bytes().size()));
-  std::copy(kCompactMagic.begin(), kCompactMagic.end(), bytes.begin());
-  const std::size_t size =
-      ZSTD_compress2(context.get(), bytes.data() + kCompactMagic.size(), bytes.size() - kCompactMagic.size(),
-                     writer.bytes().data(), writer.bytes().size());
-  if (ZSTD_isError(size) != 0U) throw std::bad_alloc();  // the only way it can fail with room enough
-  bytes.resize(kCompactMagic.size() + size);
+  if (has_sensor_pose(cloud)) sensor_pose_fields(writer, whole);
+  Bytes bytes = core::pack(writer.bytes(), options.level);
+  bytes.insert(bytes.begin(), kCompactMagic.begin(), kCompactMagic.end());
   return bytes;
+}
+
+core::Result<CloudPtr> decode_cloud(const std::uint8_t* bytes, std::size_t size) {
+  constexpr std::size_t kBytesPerPoint = 17;
+  try {
+    if (size < kCompactMagic.size() || !std::equal(kCompactMagic.begin(), kCompactMagic.end() - 1, bytes)) {
+      throw core::BadBytes("these bytes are none");
+    }
+    if (bytes[kCompactMagic.size() - 1] != kCompactMagic.back()) {
+      throw core::BadBytes("it was written by another version");
+    }
+    return decoded(core::unpack(bytes + kCompactMagic.size(), size - kCompactMagic.size(),
+                                kBytesPerPoint * kMostPoints));
+  } catch (const core::BadBytes& bad) {
+    return core::input_error(std::string("stored cloud: ") + bad.what() + "; it cannot be used");
+  }
 }
 
 }  // namespace plumbline::cloud

@@ -85,20 +85,18 @@ class Runner {
   }
 
   core::Result<RunReport> run() {
-    if (context_.resumed != nullptr) before_ = context_.resumed->frames;
     for (Node& node : graph_.nodes) {
       auto started = guarded(node.name, [&] { return node.stage->start(context_); });
       if (!started) return tl::unexpected<core::Error>(started.error());
-      const std::vector<float> unknown(before_, std::numeric_limits<float>::quiet_NaN());
-      report_.stages.push_back({node.name, unknown, 0.0});
     }
-    report_.frames = before_;
-    report_.rss_mb.assign(before_, std::numeric_limits<float>::quiet_NaN());
-    started_ = before_;
     total_ = graph_.source().stage->frames();
     report_.frames_available = total_;
+    const std::vector<float> unknown(total_, std::numeric_limits<float>::quiet_NaN());
+    for (const Node& node : graph_.nodes) report_.stages.push_back({node.name, unknown, 0.0});
+    report_.rss_mb = unknown;
+    skip_done();
     const auto start = Clock::now();
-    pace_.emplace(context_.pace_hz, before_, context_.recordings);
+    pace_.emplace(context_.pace_hz, started_, context_.recordings);
     // A pipeline ends when the next frame is not due yet, and another one begins with that: whoever waits for
     // a frame keeps no thread from what else there is to do.
     while (!ended()) {
@@ -107,7 +105,10 @@ class Runner {
     }
     report_.behind_s = pace_->behind_s();
     if (failure_.any()) return tl::unexpected<core::Error>(failure_.error());
+    report_.frames = started_;
     report_.stopped = report_.frames < total_;
+    for (StageTiming& stage : report_.stages) stage.frame_ms.resize(report_.frames);
+    report_.rss_mb.resize(report_.frames);
     if (auto finished = finish(start); !finished) return tl::unexpected<core::Error>(finished.error());
     return std::move(report_);
   }
@@ -138,6 +139,11 @@ class Runner {
     return started_ >= total_ || context_.stop.stop_requested() || failure_.any();
   }
 
+  /// Over frames that the run did which this one goes on from.
+  void skip_done() {
+    while (started_ < total_ && context_.resumed != nullptr && context_.resumed->done[started_]) ++started_;
+  }
+
   TickPtr next(tbb::flow_control& control) {
     if (ended() || !pace_->is_due(started_)) {
       control.stop();
@@ -145,6 +151,7 @@ class Runner {
     }
     auto tick = std::make_shared<Tick>();
     tick->frame = started_++;
+    skip_done();
     tick->outputs.resize(graph_.nodes.size());
     tick->ms.assign(graph_.nodes.size(), std::numeric_limits<float>::quiet_NaN());
     return tick;
@@ -181,11 +188,10 @@ class Runner {
 
   void done(const Tick& tick) {
     if (failure_.before(tick.frame)) return;
-    for (std::size_t n = 0; n < tick.ms.size(); ++n) report_.stages[n].frame_ms.push_back(tick.ms[n]);
-    report_.rss_mb.push_back(static_cast<float>(rss_mb()));
-    ++report_.frames;
+    for (std::size_t n = 0; n < tick.ms.size(); ++n) report_.stages[n].frame_ms[tick.frame] = tick.ms[n];
+    report_.rss_mb[tick.frame] = static_cast<float>(rss_mb());
     pace_->done(tick.frame);
-    if (progress_) progress_(report_.frames, total_);
+    if (progress_) progress_(tick.frame + 1, total_);
   }
 
   core::Result<void> finish(Clock::time_point start) {
@@ -253,8 +259,7 @@ class Runner {
   std::vector<std::size_t> last_use_;  ///< [node]: the last node that reads from it
   FirstFailure failure_;
   std::size_t total_ = 0;
-  std::size_t before_ = 0;  ///< frames of the run that this one goes on from
-  std::size_t started_ = 0;
+  std::size_t started_ = 0;  ///< frames, or done by an earlier run
   std::optional<Pace> pace_;
   RunReport report_;
 };

@@ -66,16 +66,6 @@ void add_paths(ReportData& data) {
   if (robots.empty()) add_path("", data.folder, data);
 }
 
-/// The robots of a map of several, from its store.
-std::vector<RobotInfo> robots_of(const fs::path& store) {
-  const auto reader = maps::StoreReader::open(store);
-  if (!reader) return {};
-  const auto bytes = reader->attachment(kRobotsAttachment);
-  if (!bytes || !*bytes) return {};
-  auto robots = robots_from_bytes(**bytes);
-  return robots ? std::move(*robots) : std::vector<RobotInfo>();
-}
-
 /// Pairs of keyframes that loops, and merges of several robots' maps, tie together.
 void add_loops(const StoredResult& stored, ReportData& data) {
   std::map<core::KeyframeId, Eigen::Vector3d> places;
@@ -104,15 +94,16 @@ void add_store(ReportData& data) {
     return;
   }
   std::map<std::int32_t, sensor::Pinhole> cameras;
-  for (const RobotInfo& robot : robots_of(file)) {
+  const std::vector<RobotInfo>& robots = stored->stored().header.robots;
+  for (const RobotInfo& robot : robots) {
     cameras[robot.number] = robot.camera.color;
-    data.robot_names[robot.number] = robot.name;
+    if (robots.size() > 1) data.robot_names[robot.number] = robot.name;
     for (ReportPath& path : data.paths) {
       if (path.robot == robot.name && robot.number >= 0) path.number = static_cast<std::size_t>(robot.number);
     }
   }
   add_loops(*stored, data);
-  data.fit = fit_of(stored->stored().map, stored->stored().header.camera.color, cameras);
+  data.fit = fit_of(stored->stored().map, maps::camera_of(robots, 0).color, cameras);
 }
 
 /// Whether the folder is of plumbline fuse, whose results have no frames.

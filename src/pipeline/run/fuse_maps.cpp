@@ -11,6 +11,7 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
+#include "run/stored_views.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -69,6 +70,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   RunContext context;
   context.source = maps.get();
   context.stored_maps = maps.get();
+  context.robots = &maps->robots();
+  context.keeps_clouds = keeps_clouds(*graph);
   context.anchor = request.anchor;
   context.executor = &executor;
   context.log = &log;

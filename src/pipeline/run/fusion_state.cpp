@@ -2,7 +2,8 @@
 #include "run/fusion_state.hpp"
 
 #include <iterator>
-#include <nlohmann/json.hpp>
+
+#include "plumbline/core/archive.hpp"
 
 namespace plumbline::pipeline {
 
@@ -23,35 +24,57 @@ void FusionState::correct(std::int32_t robot, cloud::Cloud& camera_cloud) const 
   if (field != depth_fields.end()) field->second.correct(camera_cloud);
 }
 
+namespace {
+
+/// As it is kept: what its maps hold, one behind the other.
+struct KeptState {
+  struct Field {
+    std::int32_t robot = 0;
+    cloud::DepthField::Terms coefficients = cloud::DepthField::Terms::Zero();
+  };
+  struct View {
+    std::int32_t robot = 0;
+    double stamp = 0.0;
+    geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+  };
+  std::vector<Field> fields;
+  std::vector<View> views;
+};
+template <typename Io>
+void fields(Io& io, KeptState::Field& field) {
+  io(field.robot, field.coefficients);
+}
+template <typename Io>
+void fields(Io& io, KeptState::View& view) {
+  io(view.robot, view.stamp, view.covariance);
+}
+template <typename Io>
+void fields(Io& io, KeptState& state) {
+  io(state.fields, state.views);
+}
+
+}  // namespace
+
 std::vector<std::uint8_t> to_bytes(const FusionState& state) {
-  nlohmann::json json = {{"depth_fields", nlohmann::json::array()}, {"covariances", nlohmann::json::array()}};
-  for (const auto& [robot, field] : state.depth_fields) {
-    const auto& c = field.coefficients();
-    json["depth_fields"].push_back({robot, std::vector<double>(c.data(), c.data() + c.size())});
-  }
+  KeptState kept;
+  for (const auto& [robot, field] : state.depth_fields) kept.fields.push_back({robot, field.coefficients()});
   for (const auto& [view, covariance] : state.covariances) {
-    json["covariances"].push_back(
-        {view.first, view.second, std::vector<double>(covariance.data(), covariance.data() + 36)});
+    kept.views.push_back({view.first, view.second, covariance});
   }
-  return nlohmann::json::to_cbor(json);
+  core::ByteWriter bytes;
+  core::encode(kept, bytes);
+  return bytes.bytes();
 }
 
 core::Result<FusionState> fusion_state_of(const std::vector<std::uint8_t>& bytes) {
   FusionState state;
   try {
-    const nlohmann::json json = nlohmann::json::from_cbor(bytes);
-    for (const nlohmann::json& entry : json.at("depth_fields")) {
-      const std::vector<double> numbers = entry.at(1);
-      if (numbers.size() != cloud::DepthField::Terms::RowsAtCompileTime) throw std::range_error("field");
-      state.depth_fields[entry.at(0)] =
-          cloud::DepthField(Eigen::Map<const cloud::DepthField::Terms>(numbers.data()));
+    const auto kept = core::decode<KeptState>(bytes);
+    for (const auto& [robot, coefficients] : kept.fields) {
+      state.depth_fields[robot] = cloud::DepthField(coefficients);
     }
-    for (const nlohmann::json& entry : json.at("covariances")) {
-      const std::vector<double> numbers = entry.at(2);
-      if (numbers.size() != 36) throw std::range_error("covariance");
-      state.covariances[{entry.at(0), entry.at(1)}] = Eigen::Map<const geometry::Matrix6d>(numbers.data());
-    }
-  } catch (const std::exception&) {
+    for (const auto& [robot, stamp, covariance] : kept.views) state.covariances[{robot, stamp}] = covariance;
+  } catch (const core::BadBytes&) {
     return core::input_error("what its clouds were laid down with is damaged; map the recording again");
   }
   return state;

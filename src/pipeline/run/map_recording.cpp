@@ -19,6 +19,7 @@
 #include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "run/resumed_run.hpp"
+#include "run/stored_views.hpp"
 #include "stages/debug_video.hpp"
 
 namespace plumbline::pipeline {
@@ -98,9 +99,8 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
 core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::filesystem::path& pipeline) {
   if (!keeps) {
     return core::usage_error(
-        fmt::format("{}: keeps no map.db to go on from; it takes one recording, a track stage and a store "
-                    "stage, or leave out "
-                    "--resume",
+        fmt::format("{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave "
+                    "out --resume",
                     pipeline.string()));
   }
   if (!request.debug_video.empty()) {
@@ -112,8 +112,8 @@ core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::
 
 void report_resumed(const std::filesystem::path& folder, const std::optional<ResumedRun>& run,
                     core::Log& log) {
-  log.info(run ? fmt::format("going on after frame {}, with {} keyframes of {}", run->frames - 1,
-                             run->map.map.keyframe_count(), run->store.string())
+  log.info(run ? fmt::format("going on after {} frames, with {} keyframes of {}", run->frames, run->keyframes,
+                             run->store.string())
                : fmt::format("{}: nothing is there to go on from; beginning with the first frame",
                              folder.string()));
 }
@@ -163,9 +163,8 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   }
   const auto source = open_inputs(request, executor, log);
   if (!source) return fail(source.error());
-  const bool keeps =
-      request.others.empty() && std::any_of(graph->nodes.begin(), graph->nodes.end(),
-                                            [](const Node& node) { return node.stage->wants_map_changes(); });
+  const bool keeps = std::any_of(graph->nodes.begin(), graph->nodes.end(),
+                                 [](const Node& node) { return node.stage->keeps_map(); });
   if (request.resume) {
     if (auto can = can_resume(request, keeps && tracks, *pipeline_file); !can) return fail(can.error());
   }
@@ -174,8 +173,8 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   if (!output) return fail(output.error());
   std::optional<ResumedRun> resumed;
   if (request.resume) {
-    auto opened = open_resumed(output->path(), config_text(request, *graph, 0), input_text(**source),
-                               (*source)->camera());
+    auto opened =
+        open_resumed(output->path(), config_text(request, *graph, 0), input_text(**source), **source);
     if (!opened) return fail(opened.error());
     resumed = std::move(*opened);
     report_resumed(output->path(), resumed, log);
@@ -197,6 +196,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   RunContext context;
   context.source = source->get();
   context.recordings = source->get();
+  context.robots = &(*source)->robots();
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
@@ -205,7 +205,8 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   context.configuration = config_text(request, *graph, 0);
   context.input = input_text(**source);
   context.pace_hz = request.pace_hz;
-  context.keep_changes = keeps;
+  context.keeps_map = keeps;
+  context.keeps_clouds = keeps_clouds(*graph);
   context.alter_map = request.alter_map;
   if (resumed) context.resumed = &*resumed;
   if (request.prepared) request.prepared(output->path());

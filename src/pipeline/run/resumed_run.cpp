@@ -69,16 +69,16 @@ core::Result<void> check_same(const fs::path& file, const char* what, const std:
       file.string(), what, found.front(), more));
 }
 
-core::Result<std::vector<FrameRow>> rows_of(const fs::path& file, const std::vector<std::string>& log) {
-  std::vector<FrameRow> rows;
+/// Adds the lines of a log.
+core::Result<void> add_rows(const fs::path& file, const std::vector<std::string>& log,
+                            std::vector<FrameRow>& rows) {
   for (const std::string& line : log) {
     const std::size_t first = line.find(',');
     const std::size_t second = line.find(',', first + 1);
     FrameRow row;
     const char* end = line.data() + std::min(first, line.size());
     const auto [stop, error] = std::from_chars(line.data(), end, row.frame);
-    if (second == std::string::npos || error != std::errc() || stop != end ||
-        (!rows.empty() && row.frame <= rows.back().frame)) {
+    if (second == std::string::npos || error != std::errc() || stop != end) {
       return core::input_error(
           fmt::format("{}: its log is damaged; leave out --resume to begin anew", file.string()));
     }
@@ -86,7 +86,42 @@ core::Result<std::vector<FrameRow>> rows_of(const fs::path& file, const std::vec
     row.columns = line.substr(second + 1);
     rows.push_back(std::move(row));
   }
-  return rows;
+  return {};
+}
+
+/// Each robot's frames up to its last row are done; all, when only results were not written.
+core::Result<void> find_done(const RobotRecordings& recordings, ResumedRun& run) {
+  std::sort(run.rows.begin(), run.rows.end(),
+            [](const FrameRow& a, const FrameRow& b) { return a.frame < b.frame; });
+  std::map<std::int32_t, std::size_t> last;  // by robot
+  for (std::size_t i = 0; i < run.rows.size(); ++i) {
+    const std::size_t frame = run.rows[i].frame;
+    if (frame >= recordings.size() || (i > 0 && frame == run.rows[i - 1].frame)) {
+      return core::input_error(
+          fmt::format("{}: its log is damaged; leave out --resume to begin anew", run.store.string()));
+    }
+    last[recordings.robot_of(frame)] = frame;
+  }
+  for (std::size_t f = 0; f < recordings.size(); ++f) {
+    const auto found = last.find(recordings.robot_of(f));
+    run.done.push_back(run.merged || (found != last.end() && f <= found->second));
+    run.frames += run.done.back() ? 1 : 0;
+  }
+  return {};
+}
+
+/// Whose maps they are.
+void take_maps(std::vector<maps::StoredMap> maps, std::size_t robots, ResumedRun& run) {
+  for (maps::StoredMap& stored : maps) {
+    if (stored.map.keyframe_count() == 0) continue;
+    run.keyframes += stored.map.keyframe_count();
+    if (stored.complete && robots > 1) {
+      run.merged = RobotMap{"", stored.header.robots, std::make_shared<maps::Map>(std::move(stored.map)),
+                            std::move(stored.frames)};
+    } else {
+      run.maps[stored.map.keyframe_ids().front().robot] = std::move(stored);
+    }
+  }
 }
 
 /// A store in which nothing was committed yet, or none.
@@ -118,7 +153,8 @@ std::size_t stored_keyframes(const fs::path& folder) {
 }
 
 core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, const std::string& configuration,
-                                                     const std::string& input, const sensor::Camera& camera) {
+                                                     const std::string& input,
+                                                     const RobotRecordings& recordings) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   ResumedRun run;
   run.store = folder / kStoreFile;
@@ -126,26 +162,31 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
     remove_store(run.store);
     return std::nullopt;
   }
-  auto map = maps::load_map(run.store);
-  if (!map) return fail(map.error());
-  if (map->map.keyframe_count() == 0) {
+  const auto reader = maps::StoreReader::open(run.store);
+  if (!reader) return fail(reader.error());
+  auto maps = reader->load_each();
+  if (!maps) return fail(maps.error());
+  if (maps->size() == 1 && maps->front().map.keyframe_count() == 0) {
     remove_store(run.store);
     return std::nullopt;
   }
-  const maps::StoreHeader& header = map->header;
+  const maps::StoreHeader& header = reader->header();
   if (auto same = check_same(run.store, "recording", header.input, input); !same) return fail(same.error());
-  if (auto same = check_same(run.store, "camera", sensor::to_yaml(header.camera), sensor::to_yaml(camera));
-      !same) {
-    return fail(same.error());
+  for (const RobotInfo& robot : header.robots) {
+    const sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
+    if (auto same = check_same(run.store, "camera", sensor::to_yaml(robot.camera), sensor::to_yaml(camera));
+        !same) {
+      return fail(same.error());
+    }
   }
   if (auto same = check_same(run.store, "configuration", header.configuration, configuration); !same) {
     return fail(same.error());
   }
-  auto rows = rows_of(run.store, map->log);
-  if (!rows) return fail(rows.error());
-  run.rows = std::move(*rows);
-  run.frames = run.rows.empty() ? 0 : run.rows.back().frame + 1;
-  run.map = std::move(*map);
+  for (const maps::StoredMap& stored : *maps) {
+    if (auto rows = add_rows(run.store, stored.log, run.rows); !rows) return fail(rows.error());
+  }
+  take_maps(std::move(*maps), recordings.robots().size(), run);
+  if (auto found = find_done(recordings, run); !found) return fail(found.error());
   return run;
 }
 

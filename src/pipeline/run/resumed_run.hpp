@@ -3,7 +3,9 @@
 
 // What an interrupted run left in its store, for the stages of the run that goes on.
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,16 +13,20 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/pipeline/data.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
 
 namespace plumbline::pipeline {
 
 constexpr const char* kStoreFile = "map.db";  ///< in the result folder
 
 struct ResumedRun {
-  std::filesystem::path store;  ///< its file; clouds are read from there
-  maps::StoredMap map;
-  std::vector<FrameRow> rows;  ///< of the frames that are done and could be read
-  std::size_t frames = 0;      ///< how many are done, the unreadable ones too
+  std::filesystem::path store;                   ///< its file; clouds are read from there
+  std::map<std::int32_t, maps::StoredMap> maps;  ///< each robot's own
+  std::optional<RobotMap> merged;  ///< or the map of all, when the run had done all but write its results
+  std::vector<FrameRow> rows;      ///< of the frames that are done and could be read
+  std::vector<bool> done;          ///< by frame: each robot's up to its last keyframe
+  std::size_t frames = 0;          ///< how many are done, the unreadable ones too
+  std::size_t keyframes = 0;
 };
 
 /// A row as a line of frames.csv.
@@ -30,7 +36,8 @@ std::string to_line(const FrameRow& row);
 /// begun with another configuration, recording or camera; the message says what differs. kInput: damaged.
 core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path& folder,
                                                      const std::string& configuration,
-                                                     const std::string& input, const sensor::Camera& camera);
+                                                     const std::string& input,
+                                                     const RobotRecordings& recordings);
 
 /// Keyframes in the store of `folder`; 0 when there is none that opens.
 std::size_t stored_keyframes(const std::filesystem::path& folder);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <set>
 #include <system_error>
@@ -44,43 +43,6 @@ void renumber(StoredPart& part) {
 
 }  // namespace
 
-std::vector<std::uint8_t> robots_to_bytes(const std::vector<RobotInfo>& robots) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const RobotInfo& robot : robots) {
-    const sensor::Pinhole& c = robot.camera.color;
-    list.push_back({{"number", robot.number},
-                    {"name", robot.name},
-                    {"camera", robot.camera.name},
-                    {"size", {c.width, c.height}},
-                    {"focal", {c.fx, c.fy}},
-                    {"centre", {c.cx, c.cy}},
-                    {"fps", robot.camera.fps}});
-  }
-  const std::string text = list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  return {text.begin(), text.end()};
-}
-
-core::Result<std::vector<RobotInfo>> robots_from_bytes(const std::vector<std::uint8_t>& bytes) {
-  std::vector<RobotInfo> robots;
-  try {
-    for (const nlohmann::json& entry : nlohmann::json::parse(bytes.begin(), bytes.end())) {
-      RobotInfo robot;
-      robot.number = entry.at("number");
-      robot.name = entry.at("name");
-      robot.camera.name = entry.at("camera");
-      sensor::Pinhole& c = robot.camera.color;
-      c = {entry.at("size").at(0),  entry.at("size").at(1),   entry.at("focal").at(0),
-           entry.at("focal").at(1), entry.at("centre").at(0), entry.at("centre").at(1)};
-      robot.camera.fps = entry.at("fps");
-      robots.push_back(robot);
-    }
-  } catch (const nlohmann::json::exception&) {
-    return core::input_error("the list of its robots is damaged; map or fuse it again");
-  }
-  if (robots.empty()) return core::input_error("the list of its robots is empty; map or fuse it again");
-  return robots;
-}
-
 core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs::path>& maps,
                                                            const core::Executor& executor) {
   std::unique_ptr<StoredMaps> result(new StoredMaps);
@@ -90,7 +52,6 @@ core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs:
     if (!part) return tl::unexpected<core::Error>(part.error());
     result->parts_.push_back(std::move(*part));
   }
-  result->one_at_a_time_ = std::vector<std::mutex>(maps.size());
   if (auto arranged = result->arrange(executor); !arranged) {
     return tl::unexpected<core::Error>(arranged.error());
   }
@@ -118,15 +79,8 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
   StoredPart part;
   part.name = name_of(file);
   part.file = file;
-  const auto list = reader->attachment(kRobotsAttachment);
-  if (!list) return tl::unexpected<core::Error>(list.error());
-  if (*list) {
-    auto robots = robots_from_bytes(**list);
-    if (!robots) return core::input_error(fmt::format("{}: {}", file.string(), robots.error().message));
-    part.robots = std::move(*robots);
-  } else {
-    part.robots.push_back({stored->map.keyframe_ids().front().robot, part.name, stored->header.camera});
-  }
+  part.robots = reader->header().robots;
+  if (part.robots.size() == 1) part.robots.front().name = part.name;
   part.reader = std::make_unique<maps::StoreReader>(std::move(*reader));
   part.map = std::move(stored->map);
   part.frames = std::move(stored->frames);
@@ -165,6 +119,7 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
       robot.number = number++;
       robot.name = free_name(robot.name, robot_names);
       part.cameras[robot.number] = robot.camera.color;
+      robots_.push_back(robot);
     }
     for (const KeyframeId id : part.map.keyframe_ids()) {
       if (to.count(id.robot) == 0) {
@@ -186,23 +141,23 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
   const auto ids = part.reader->cloud_ids();
   if (!ids) return tl::unexpected<core::Error>(ids.error());
   for (const KeyframeId stored : *ids) {
-    StoredCloud cloud;
-    cloud.part = p;
-    cloud.stored_id = stored;
     const auto found = part.numbers.find(stored.robot);
     if (found == part.numbers.end()) continue;
-    cloud.robot = found->second;
-    cloud.id = {cloud.robot, stored.index};
-    if (!part.map.has_keyframe(cloud.id)) continue;
-    cloud.stamp = part.map.keyframe(cloud.id).stamp;
-    clouds_.push_back(cloud);
+    const KeyframeId id{found->second, stored.index};
+    if (part.map.has_keyframe(id)) clouds_.push_back({p, stored.robot, id, {}, part.map.keyframe(id).stamp});
   }
   const auto frames = part.reader->frame_cloud_ids();
   if (!frames) return tl::unexpected<core::Error>(frames.error());
-  for (const std::size_t frame : *frames) {
-    if (frame >= part.frames.size()) continue;
-    const maps::FramePose& pose = part.frames[frame];
-    clouds_.push_back({p, {}, frame, {}, pose.reference.robot, pose.stamp});
+  std::map<std::int32_t, std::vector<double>> stamps;  // of frames, by robot
+  for (const maps::FramePose& frame : part.frames) stamps[frame.reference.robot].push_back(frame.stamp);
+  for (const maps::FrameId stored : *frames) {
+    const auto found = part.numbers.find(stored.robot);
+    if (found == part.numbers.end()) continue;
+    const std::vector<double>& own = stamps[found->second];
+    const auto place = static_cast<std::size_t>(stored.index);
+    if (place < own.size()) {
+      clouds_.push_back({p, stored.robot, {}, {found->second, stored.index}, own[place]});
+    }
   }
   return {};
 }
@@ -215,32 +170,21 @@ std::vector<mapping::MapPart> StoredMaps::map_parts() const {
 
 core::Result<std::vector<std::uint8_t>> StoredMaps::cloud_bytes(std::size_t index) const {
   const StoredCloud& cloud = clouds_.at(index);
-  const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
   const maps::StoreReader& reader = *parts_[cloud.part].reader;
-  return cloud.stored_id.valid() ? reader.cloud_bytes(cloud.stored_id)
-                                 : reader.frame_cloud_bytes(cloud.frame);
+  return cloud.id.valid() ? reader.cloud_bytes(core::KeyframeId{cloud.stored_robot, cloud.id.index})
+                          : reader.cloud_bytes(maps::FrameId{cloud.stored_robot, cloud.frame.index});
 }
 
 core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t index) const {
   const StoredCloud& cloud = clouds_.at(index);
-  if (!cloud.stored_id.valid()) return std::vector<std::uint8_t>();
-  const std::lock_guard<std::mutex> lock(one_at_a_time_[cloud.part]);
-  return parts_[cloud.part].reader->surface_bytes(cloud.stored_id);
+  if (!cloud.id.valid()) return std::vector<std::uint8_t>();
+  return parts_[cloud.part].reader->surface_bytes({cloud.stored_robot, cloud.id.index});
 }
 
-sensor::Pinhole StoredMaps::camera_of(std::int32_t robot) const {
-  for (const StoredPart& part : parts_) {
-    const auto found = part.cameras.find(robot);
-    if (found != part.cameras.end()) return found->second;
-  }
-  return camera().color;
-}
-
-core::Error StoredMaps::damaged(std::int32_t robot, const core::Error& how) const {
-  std::string file = name_;
-  for (const StoredPart& part : parts_) {
-    if (part.cameras.count(robot) != 0) file = part.file.string();
-  }
+core::Error StoredMaps::damaged(KeyframeId id, maps::FrameId frame, const core::Error& how) const {
+  const auto cloud = std::find_if(clouds_.begin(), clouds_.end(),
+                                  [&](const StoredCloud& c) { return c.id == id && c.frame == frame; });
+  const std::string file = cloud == clouds_.end() ? name_ : parts_[cloud->part].file.string();
   return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, how.message)).value();
 }
 

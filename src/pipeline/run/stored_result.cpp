@@ -6,19 +6,17 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <mutex>
 #include <system_error>
 #include <utility>
 
 #include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/pipeline/output_folder.hpp"
-#include "plumbline/pipeline/stored_maps.hpp"
 #include "run/fusion_state.hpp"
 #include "run/resumed_run.hpp"
+#include "run/stored_views.hpp"
 #include "stages/chain_option.hpp"
 
 namespace plumbline::pipeline {
@@ -35,42 +33,6 @@ const core::ConfigNode* fuse_stage_of(const core::ConfigNode& root) {
     if (type != nullptr && type->scalar == "fuse") return &stage;
   }
   return nullptr;
-}
-
-/// Views of a store: poses, and where their clouds are.
-struct Views {
-  std::vector<geometry::Rigid3> world_from_camera;
-  std::vector<std::int32_t> robots;
-  std::vector<core::KeyframeId> keyframes;  ///< invalid: a frame's
-  std::vector<std::size_t> frames;
-  std::vector<double> stamps;
-};
-
-core::Result<Views> views_of(const maps::StoreReader& reader, const maps::StoredMap& stored) {
-  const auto ids = reader.cloud_ids();
-  if (!ids) return tl::unexpected<core::Error>(ids.error());
-  const auto frames = reader.frame_cloud_ids();
-  if (!frames) return tl::unexpected<core::Error>(frames.error());
-  Views views;
-  for (const core::KeyframeId id : *ids) {
-    if (!stored.map.has_keyframe(id)) continue;
-    views.world_from_camera.push_back(stored.map.camera_from_world(id).inverse());
-    views.robots.push_back(id.robot);
-    views.keyframes.push_back(id);
-    views.frames.push_back(0);
-    views.stamps.push_back(stored.map.keyframe(id).stamp);
-  }
-  for (const std::size_t frame : *frames) {
-    if (frame >= stored.frames.size() || !stored.frames[frame].tracked) continue;
-    const maps::FramePose& pose = stored.frames[frame];
-    views.world_from_camera.push_back(
-        (pose.camera_from_reference * stored.map.camera_from_world(pose.reference)).inverse());
-    views.robots.push_back(pose.reference.robot);
-    views.keyframes.emplace_back();
-    views.frames.push_back(frame);
-    views.stamps.push_back(pose.stamp);
-  }
-  return views;
 }
 
 }  // namespace
@@ -168,31 +130,21 @@ cloud::FilterChain StoredResult::fusion_filters() const {
   return problems.empty() && chain.writes().empty() ? chain : cloud::FilterChain();
 }
 
-core::Result<std::vector<sensor::Pinhole>> StoredResult::cameras_of(
-    const std::vector<std::int32_t>& robots) const {
-  std::vector<sensor::Pinhole> cameras(robots.size(), map_.header.camera.color);
-  const auto list = reader_->attachment(kRobotsAttachment);
-  if (!list) return tl::unexpected<core::Error>(list.error());
-  if (!*list) return cameras;
-  const auto known = robots_from_bytes(**list);
-  if (!known) return core::input_error(fmt::format("{}: {}", file_.string(), known.error().message));
-  for (std::size_t i = 0; i < robots.size(); ++i) {
-    for (const RobotInfo& robot : *known) {
-      if (robot.number == robots[i]) cameras[i] = robot.camera.color;
-    }
-  }
-  return cameras;
+core::Result<StoredViews> StoredResult::views() const {
+  MapResult map;
+  map.map = std::shared_ptr<const maps::Map>(&map_.map, [](const maps::Map*) {});  // for as long as this call
+  map.frame_poses = map_.frames;
+  take_poses_from_map(map);
+  return views_of(*reader_, map);
 }
 
 core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
                                                     const core::Executor& executor) const {
-  const auto views = views_of(*reader_, map_);
-  if (!views) return tl::unexpected<core::Error>(views.error());
-  if (views->keyframes.empty()) {
+  const auto stored = views();
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (stored->size() == 0) {
     return core::input_error(fmt::format("{}: holds no clouds; map the recording again", file_.string()));
   }
-  const auto cameras = cameras_of(views->robots);
-  if (!cameras) return tl::unexpected<core::Error>(cameras.error());
   FusionState state;
   const auto kept = reader_->attachment(kFusionAttachment);
   if (!kept) return tl::unexpected<core::Error>(kept.error());
@@ -201,26 +153,17 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
     if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
     state = std::move(*read);
   }
-  std::mutex one_at_a_time;  // the reader is one connection
-  const cloud::ReadView read = [&](std::size_t i) -> core::Result<cloud::CloudPtr> {
-    const core::KeyframeId id = views->keyframes[i];
-    auto bytes = [&] {
-      const std::lock_guard<std::mutex> lock(one_at_a_time);
-      return id.valid() ? reader_->cloud_bytes(id) : reader_->frame_cloud_bytes(views->frames[i]);
-    }();
-    if (!bytes) return tl::unexpected<core::Error>(bytes.error());
-    auto cloud = cloud::decode_cloud(bytes->data(), bytes->size());
-    if (cloud) {
-      state.correct(views->robots[i], **cloud);
-      return cloud;
-    }
-    return core::input_error(fmt::format("{}: {}", file_.string(), cloud.error().message));
-  };
   cloud::FusionViews all;
-  all.world_from_camera = views->world_from_camera;
-  all.cameras = *cameras;
-  all.read = read;
-  all.covariances = state.covariances_of(views->robots, views->stamps);
+  all.world_from_camera = stored->world_from_camera;
+  for (const std::int32_t robot : stored->robots) {
+    all.cameras.push_back(maps::camera_of(map_.header.robots, robot).color);
+  }
+  all.read = [&](std::size_t i) {
+    auto cloud = stored->read(i);
+    if (cloud) state.correct(stored->robots[i], **cloud);
+    return cloud;
+  };
+  all.covariances = state.covariances_of(stored->robots, stored->stamps);
   auto fused = cloud::fuse_views(all, options, executor);
   if (!fused) return fused;
   if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
@@ -244,15 +187,16 @@ core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& fo
   if (ec) {
     return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
   }
-  const auto ids = reader_->cloud_ids();
-  if (!ids) return tl::unexpected<core::Error>(ids.error());
+  const auto stored = views();
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
   std::size_t written = 0;
-  for (const core::KeyframeId id : *ids) {
-    if (!map_.map.has_keyframe(id)) continue;
-    const auto cloud = reader_->cloud(id);
+  for (std::size_t i = 0; i < stored->size(); ++i) {
+    const core::KeyframeId id = stored->keyframes[i];
+    if (!id.valid()) continue;
+    const auto cloud = stored->read(i);
     if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    cloud::transform(**cloud, map_.result.output_from_map * map_.map.camera_from_world(id).inverse() *
-                                  cloud::sensor_pose(**cloud));
+    cloud::transform(
+        **cloud, map_.result.output_from_map * stored->world_from_camera[i] * cloud::sensor_pose(**cloud));
     const std::string name =
         id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
     if (auto done = cloud::write_ply(folder / name, **cloud); !done) {

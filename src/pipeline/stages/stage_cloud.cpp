@@ -103,8 +103,8 @@ class CloudStage : public Stage {
     cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
+    result->frame = track->frame;
     result->stamp = track->stamp;
-    result->robot = robot;
     result->compact = std::make_shared<std::vector<std::uint8_t>>(cloud::encode_cloud(**made));
     if (result->id.valid()) {
       result->surface = std::make_shared<maps::StoredSurface>(

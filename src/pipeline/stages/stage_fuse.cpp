@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// fuse: keyframe clouds at their final poses as one cloud. Until then they wait on disk.
+// fuse: keyframe clouds at their final poses as one cloud. Until then they wait in a store.
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -19,16 +19,13 @@
 #include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
-#include "plumbline/dataset/frame_source.hpp"
-#include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "run/fusion_state.hpp"
-#include "run/resumed_run.hpp"
+#include "run/stored_views.hpp"
 #include "stages/chain_option.hpp"
 #include "stages/stages.hpp"
 #include "stages/up_frame.hpp"
-#include "stages/waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -68,23 +65,21 @@ class FuseStage : public Stage {
     auto clouds = WaitingClouds::create(context);
     if (!clouds) return tl::unexpected<core::Error>(clouds.error());
     clouds_.emplace(std::move(*clouds));
-    return context.resumed != nullptr ? read_clouds(*context.resumed) : core::Result<void>();
+    return {};
   }
   core::Result<void> process(StageIo& io) override {
-    const auto keyframe = io.input<KeyframeCloud>("cloud");
-    if (keyframe->id.valid()) {
-      places_[keyframe->id] = clouds_->size();
-    } else {
-      intermediate_.push_back({keyframe->robot, keyframe->stamp, clouds_->size()});
-    }
-    return clouds_->append(keyframe->compact.get(), io.frame());
+    return clouds_->append(*io.input<KeyframeCloud>("cloud"));
   }
 
   /// Poses move until the last optimisation, so the clouds are laid down now, in the order of their
   /// keyframes.
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
-    auto fused = fuse(*map);
+    const auto stored = clouds_->open();
+    if (!stored) return tl::unexpected<core::Error>(stored.error());
+    const auto views = views_of(**stored, *map, clouds_->arrivals());
+    if (!views) return tl::unexpected<core::Error>(views.error());
+    auto fused = fuse(*map, *views);
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
@@ -94,9 +89,9 @@ class FuseStage : public Stage {
     dense->state = state_;
     if (dense->upright) cloud::transform(*fused->cloud, frame_.output_from_map);
     if (keyframe_clouds_) {
-      if (auto written = write_keyframes(*map); !written) return written;
+      if (auto written = write_keyframes(*views); !written) return written;
     }
-    clouds_.reset();
+    clouds_->clear();
     if (auto done = filter(std::move(*fused), *dense); !done) return done;
     points_ = dense->cloud->size();
     for (const auto& column : dense->columns.others) {
@@ -118,129 +113,61 @@ class FuseStage : public Stage {
   }
 
  private:
-  /// Those of the run that this one goes on from.
-  core::Result<void> read_clouds(const ResumedRun& run) {
-    const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
-    const auto store = maps::StoreReader::open(run.store);
-    if (!store) return fail(store.error());
-    const auto keyframes = store->cloud_ids();
-    if (!keyframes) return fail(keyframes.error());
-    for (const core::KeyframeId id : *keyframes) {
-      const auto bytes = store->cloud_bytes(id);
-      if (!bytes) return fail(bytes.error());
-      places_[id] = clouds_->size();
-      if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
-    }
-    const auto frames = store->frame_cloud_ids();
-    if (!frames) return fail(frames.error());
-    for (const std::size_t frame : *frames) {
-      const auto bytes = store->frame_cloud_bytes(frame);
-      if (!bytes) return fail(bytes.error());
-      if (frame >= run.map.frames.size()) continue;
-      const maps::FramePose& pose = run.map.frames[frame];
-      intermediate_.push_back({pose.reference.robot, pose.stamp, clouds_->size()});
-      if (auto kept = clouds_->append(&*bytes, 0); !kept) return kept;
-    }
-    return {};
-  }
-
-  [[nodiscard]] sensor::Pinhole camera_of(std::int32_t robot) const {
-    return context_->stored_maps != nullptr ? context_->stored_maps->camera_of(robot)
-                                            : context_->recordings->robot(robot).camera.color;
-  }
-
-  /// A cloud of a keyframe or frame that was tracked.
-  struct View {
-    std::size_t place;  ///< among the clouds
-    std::int32_t robot;
-    double stamp;
-    geometry::Rigid3 world_from_camera;
-  };
-
-  /// Keyframes in the map's order, then frames between them.
-  [[nodiscard]] std::vector<View> views_at(const MapResult& map) const {
-    std::vector<View> views;
-    for (const KeyframePose& keyframe : map.keyframes) {
-      const auto found = places_.find(keyframe.id);
-      if (found == places_.end()) continue;
-      views.push_back({found->second, keyframe.id.robot, keyframe.stamp, keyframe.world_from_camera});
-    }
-    std::map<std::int32_t, geometry::Trajectory> trajectories;
-    for (const IntermediateFrame& between : intermediate_) {
-      const auto known = trajectories.find(between.robot);
-      const geometry::Trajectory& poses =
-          known != trajectories.end()
-              ? known->second
-              : trajectories.emplace(between.robot, trajectory_of(map, between.robot)).first->second;
-      const auto found =
-          std::lower_bound(poses.begin(), poses.end(), between.stamp,
-                           [](const geometry::StampedPose& p, double s) { return p.stamp < s; });
-      if (found == poses.end() || found->stamp != between.stamp) continue;  // a frame that was lost
-      views.push_back({between.place, between.robot, between.stamp, found->world_from_camera});
-    }
-    return views;
-  }
-
-  core::Result<cloud::FusedCloud> fuse(const MapResult& map) {
-    const std::vector<View> views = views_at(map);
-    if (find_depth_field_) {
-      if (auto found = find_fields(map, views); !found) return tl::unexpected<core::Error>(found.error());
-    }
-    read_covariances(map);
-    cloud::FusionViews laid;
-    std::vector<std::int32_t> robots;
-    std::vector<double> stamps;
-    for (const View& view : views) {
+  core::Result<cloud::FusedCloud> fuse(const MapResult& map, const StoredViews& stored) {
+    if (auto found = find_fields(map, stored); !found) return tl::unexpected<core::Error>(found.error());
+    cloud::FusionViews views;
+    views.world_from_camera = stored.world_from_camera;
+    views.cameras = cameras_of(stored);
+    if (map.robots.size() > 1) {
       constexpr std::int32_t kMostRobots = 254;
-      laid.world_from_camera.push_back(view.world_from_camera);
-      laid.cameras.push_back(camera_of(view.robot));
-      if (map.robots.size() > 1)
-        laid.robots.push_back(static_cast<std::uint8_t>(std::clamp(view.robot, 0, kMostRobots)));
-      robots.push_back(view.robot);
-      stamps.push_back(view.stamp);
+      for (const std::int32_t robot : stored.robots)
+        views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    laid.covariances = state_->covariances_of(robots, stamps);
-    laid.read = [&](std::size_t i) { return read_corrected(views[i].place, views[i].robot); };
+    for (const KeyframePose& keyframe : map.keyframes) {
+      if (!keyframe.accuracy) {
+        state_->covariances.clear();
+        break;
+      }
+      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
+    }
+    views.covariances = state_->covariances_of(stored.robots, stored.stamps);
+    views.read = [&](std::size_t i) { return read_corrected(stored, i); };
     cloud::FusionReport report;
-    auto fused = cloud::fuse_views(laid, options_, *context_->executor, &report);
+    auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
-        "{} clouds{}, fused in {} tiles; {} points seen through, {} isolated; colour gains {:.2f} "
-        "to {:.2f}",
-        views.size(),
-        clouds_->bytes() > 0 ? fmt::format(", {:.1f} MB", static_cast<double>(clouds_->bytes()) / 1e6)
-                             : std::string(),
-        report.tiles, report.seen_through, report.isolated, report.least_gain, report.most_gain));
+        "{} clouds, fused in {} tiles; {} points seen through, {} isolated; colour gains {:.2f} to {:.2f}",
+        stored.size(), report.tiles, report.seen_through, report.isolated, report.least_gain,
+        report.most_gain));
     return fused;
   }
 
-  /// Of all keyframes or none.
-  void read_covariances(const MapResult& map) {
-    for (const KeyframePose& keyframe : map.keyframes) {
-      if (!keyframe.accuracy) return state_->covariances.clear();
-      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
+  [[nodiscard]] std::vector<sensor::Pinhole> cameras_of(const StoredViews& views) const {
+    std::vector<sensor::Pinhole> cameras;
+    for (const std::int32_t robot : views.robots) {
+      cameras.push_back(maps::camera_of(*context_->robots, robot).color);
     }
+    return cameras;
   }
 
-  /// One depth field for each robot's camera, from its views in order of time.
-  core::Result<void> find_fields(const MapResult& map, const std::vector<View>& views) {
-    std::vector<geometry::Rigid3> poses;
-    std::map<std::int32_t, std::vector<std::size_t>> by_robot;
-    for (const View& view : views) {
-      by_robot[view.robot].push_back(poses.size());
-      poses.push_back(view.world_from_camera);
-    }
-    const cloud::ReadView read = [&](std::size_t i) { return clouds_->read(views[i].place); };
-    for (auto& [robot, own] : by_robot) {
+  /// One depth field for each robot's camera.
+  core::Result<void> find_fields(const MapResult& map, const StoredViews& stored) {
+    if (!find_depth_field_) return {};
+    std::map<std::int32_t, std::vector<std::size_t>> views;
+    for (std::size_t i = 0; i < stored.size(); ++i) views[stored.robots[i]].push_back(i);
+    const cloud::ReadView read = [&](std::size_t i) { return read_raw(stored, i); };
+    for (auto& [robot, own] : views) {
       std::stable_sort(own.begin(), own.end(),
-                       [&](std::size_t a, std::size_t b) { return views[a].stamp < views[b].stamp; });
+                       [&](std::size_t a, std::size_t b) { return stored.stamps[a] < stored.stamps[b]; });
+      const sensor::Pinhole camera = maps::camera_of(*context_->robots, robot).color;
       cloud::DepthFieldReport report;
-      const auto field = cloud::find_depth_field(own, poses, read, camera_of(robot), depth_field_,
+      const auto field = cloud::find_depth_field(own, stored.world_from_camera, read, camera, depth_field_,
                                                  *context_->executor, &report);
       if (!field) return tl::unexpected<core::Error>(field.error());
       state_->depth_fields[robot] = *field;
-      const auto info = std::find_if(map.robots.begin(), map.robots.end(),
-                                     [number = robot](const RobotInfo& r) { return r.number == number; });
-      const std::string name = info != map.robots.end() ? info->name : std::string();
+      std::string name;
+      for (const RobotInfo& info : map.robots) {
+        if (info.number == robot) name = info.name;
+      }
       reported_fields_.push_back({name, report, *field});
       context_->log->debug(fmt::format(
           "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
@@ -251,9 +178,16 @@ class FuseStage : public Stage {
     return {};
   }
 
-  [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(std::size_t place, std::int32_t robot) const {
-    auto cloud = clouds_->read(place);
-    if (cloud) state_->correct(robot, **cloud);
+  /// Of finished maps, what cannot be used is told with the name of its own file.
+  [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const StoredViews& views, std::size_t i) const {
+    auto cloud = views.read(i);
+    if (cloud || context_->stored_maps == nullptr) return cloud;
+    return tl::unexpected<core::Error>(
+        context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
+  }
+  [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(const StoredViews& views, std::size_t i) const {
+    auto cloud = read_raw(views, i);
+    if (cloud) state_->correct(views.robots[i], **cloud);
     return cloud;
   }
 
@@ -276,22 +210,21 @@ class FuseStage : public Stage {
     return {};
   }
 
-  core::Result<void> write_keyframes(const MapResult& map) const {
+  core::Result<void> write_keyframes(const StoredViews& views) const {
     const std::filesystem::path folder = context_->output_folder / "keyframes";
     std::error_code ec;
     std::filesystem::create_directories(folder, ec);
     if (ec)
       return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
-    for (const KeyframePose& keyframe : map.keyframes) {
-      const auto found = places_.find(keyframe.id);
-      if (found == places_.end()) continue;
-      const auto cloud = read_corrected(found->second, keyframe.id.robot);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const core::KeyframeId id = views.keyframes[i];
+      if (!id.valid()) continue;
+      const auto cloud = read_corrected(views, i);
       if (!cloud) return tl::unexpected<core::Error>(cloud.error());
       cloud::transform(**cloud,
-                       frame_.output_from_map * keyframe.world_from_camera * cloud::sensor_pose(**cloud));
-      const std::string name = keyframe.id.robot == 0
-                                   ? fmt::format("{:06}.ply", keyframe.id.index)
-                                   : fmt::format("{}_{:06}.ply", keyframe.id.robot, keyframe.id.index);
+                       frame_.output_from_map * views.world_from_camera[i] * cloud::sensor_pose(**cloud));
+      const std::string name = id.robot == 0 ? fmt::format("{:06}.ply", id.index)
+                                             : fmt::format("{}_{:06}.ply", id.robot, id.index);
       if (auto written = cloud::write_ply(folder / name, **cloud); !written) return written;
     }
     return {};
@@ -305,15 +238,7 @@ class FuseStage : public Stage {
   cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
-  std::optional<WaitingClouds> clouds_;             ///< camera frame
-  std::map<core::KeyframeId, std::size_t> places_;  ///< among the clouds
-  /// A cloud of a frame intermediate keyframes.
-  struct IntermediateFrame {
-    std::int32_t robot = 0;
-    double stamp = 0.0;
-    std::size_t place = 0;  ///< among the clouds
-  };
-  std::vector<IntermediateFrame> intermediate_;
+  std::optional<WaitingClouds> clouds_;
   std::shared_ptr<FusionState> state_ = std::make_shared<FusionState>();
   std::vector<RunSummary::DepthField> reported_fields_;
   std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters

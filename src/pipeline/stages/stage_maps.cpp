@@ -25,12 +25,12 @@ class MapsStage : public Stage {
     const StoredCloud& stored = maps_->clouds()[io.frame()];
     auto result = std::make_shared<KeyframeCloud>();
     result->id = stored.id;
+    result->frame = stored.frame;
     result->stamp = stored.stamp;
-    result->robot = stored.robot;
     result->stored = [maps = maps_, index = io.frame()] { return maps->cloud_bytes(index); };
     if (stored.id.valid()) {
       if (auto read = read_surface(io.frame(), *result); !read) {
-        return tl::unexpected<core::Error>(maps_->damaged(stored.robot, read.error()));
+        return tl::unexpected<core::Error>(maps_->damaged(stored.id, {}, read.error()));
       }
     }
     io.output<KeyframeCloud>("cloud", result);

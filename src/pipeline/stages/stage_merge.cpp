@@ -53,7 +53,7 @@ class MergeStage : public Stage {
     const auto maps = io.input<RobotMaps>("maps");
     end_.reset();
     std::shared_ptr<MapResult> result;
-    if (maps->maps.size() == 1 && context_->stored_maps == nullptr) {
+    if (maps->maps.size() == 1 && maps->maps.front().robots.size() == 1 && context_->stored_maps == nullptr) {
       result = std::make_shared<MapResult>();
       result->map = maps->maps.front().map;
       result->frame_poses = maps->maps.front().frame_poses;

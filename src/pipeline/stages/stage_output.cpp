@@ -88,7 +88,7 @@ class OutputStage : public Stage {
         [&] { return pcd_ ? cloud::write_pcd(folder / "map.pcd", *dense->cloud, columns) : nothing; },
         [&] { return write_levels(folder / "levels", *dense); },
         [&] { return lines_ ? maps::write_lines_ply(folder / "lines.ply", map.lines) : nothing; },
-        [&] { return write_trajectories(folder, map, dense->output_from_map); },
+        [&] { return write_trajectories(folder, map); },
         [&] { return write_keyframes(folder / "keyframes.csv", map); },
         [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
     };
@@ -149,8 +149,7 @@ class OutputStage : public Stage {
   }
 
   /// Several robots: each in its own folder.
-  static core::Result<void> write_trajectories(const std::filesystem::path& folder, const MapResult& map,
-                                               const geometry::Rigid3& output_from_map) {
+  static core::Result<void> write_trajectories(const std::filesystem::path& folder, const MapResult& map) {
     if (map.robots.size() < 2) {
       auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory);
       return written ? dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(map, {}))
@@ -159,10 +158,7 @@ class OutputStage : public Stage {
     for (const RobotInfo& robot : map.robots) {
       const std::filesystem::path own = folder / "robots" / robot.name;
       if (auto made = make_folder(own); !made) return made;
-      geometry::Trajectory poses = trajectory_of(map, robot.number);
-      for (geometry::StampedPose& pose : poses)
-        pose.world_from_camera = output_from_map * pose.world_from_camera;
-      auto written = dataset::write_trajectory(own / "trajectory.txt", poses);
+      auto written = dataset::write_trajectory(own / "trajectory.txt", trajectory_of(map, robot.number));
       if (!written) return written;
       written = dataset::write_trajectory(own / "keyframes.txt", keyframe_trajectory(map, robot.number));
       if (!written) return written;
@@ -245,9 +241,6 @@ class OutputStage : public Stage {
       path.name = robot.name;
       path.color = viz::category_color(number);
       path.trajectory = trajectory_of(map, robot.number);
-      for (geometry::StampedPose& pose : path.trajectory) {
-        pose.world_from_camera = dense.output_from_map * pose.world_from_camera;
-      }
       scene.paths.push_back(std::move(path));
       if (scene.robot_names.size() <= number) scene.robot_names.resize(number + 1);
       scene.robot_names[number] = robot.name;

@@ -2,6 +2,7 @@
 // poses: no tracking, poses come from a file or from the recording's own truth.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -19,7 +20,8 @@ class PosesStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     table.text("file", file_,
-               "Poses in TUM format (stamp tx ty tz qx qy qz qw); empty: the recording's own truth");
+               "Poses in TUM format (stamp tx ty tz qx qy qz qw), in a file for each robot when {robot} in "
+               "its name stands for the robot's; empty: the recordings' own truth");
     table.number("max_gap", max_gap_s_, {0.0, 10.0}, "s",
                  "Poses are interpolated; a frame further than this from the nearest pose has none");
     table.number("keyframe_distance", keyframe_distance_m_, {0.0, 10.0}, "m", "A keyframe after this way");
@@ -27,38 +29,42 @@ class PosesStage : public Stage {
   }
 
   core::Result<void> start(const RunContext& context) override {
-    if (context.recordings->robots().size() > 1)
-      return core::usage_error("known poses are those of one recording; map one at a time");
-    if (file_.empty()) {
-      const auto truth = context.source->truth();
-      if (!truth || truth->empty()) {
-        return core::input_error(
-            fmt::format("{}: the recording has no poses of its own; name a file with --set poses.file=FILE",
-                        context.source->name()));
-      }
-      poses_ = *truth;
-      return {};
+    recordings_ = context.recordings;
+    ways_.resize(recordings_->robots().size());
+    if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
+      return core::usage_error(
+          fmt::format("{}: are poses of one recording; write {} where the file's name "
+                      "has the robot's: poses/{}.txt",
+                      file_, kRobot, kRobot));
     }
-    auto poses = dataset::read_trajectory(file_);
-    if (!poses) return tl::unexpected<core::Error>(poses.error());
-    poses_ = std::move(*poses);
+    for (const RobotInfo& robot : recordings_->robots()) {
+      auto poses = poses_of(robot);
+      if (!poses) return tl::unexpected<core::Error>(poses.error());
+      ways_[static_cast<std::size_t>(robot.number)].poses = std::move(*poses);
+    }
     return {};
   }
 
   core::Result<void> process(StageIo& io) override {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
-    const std::optional<geometry::Rigid3> pose = geometry::pose_at(poses_, frame->stamp, max_gap_s_);
-    const std::string stamp = fmt::format("{:.6f}", frame->stamp);
+    const RobotInfo& robot = recordings_->robot(recordings_->robot_of(io.frame()));
+    Way& way = ways_[static_cast<std::size_t>(robot.number)];
+    const std::optional<geometry::Rigid3> pose = geometry::pose_at(way.poses, frame->stamp, max_gap_s_);
+    const std::string stamp = fmt::format("{}{:.6f}", several() ? robot.name + "," : "", frame->stamp);
     if (!pose) {
       map_.frames.push_back({io.frame(), "lost", stamp + ","});
       return {};
     }
     auto tracked = std::make_shared<TrackedFrame>();
+    tracked->robot = robot.number;
     tracked->stamp = frame->stamp;
-    tracked->depth_from_camera = depth_from_camera(*frame, *pose);
+    tracked->depth_from_camera = depth_from_camera(way.poses, *frame, *pose);
+    tracked->frame = {robot.number, way.frames++};
     map_.trajectory.push_back({frame->stamp, *pose});
-    if (map_.keyframes.empty() || is_new_view(map_.keyframes.back().world_from_camera, *pose)) {
-      tracked->keyframe = {0, static_cast<std::int32_t>(map_.keyframes.size())};
+    map_.trajectory_ids.push_back(tracked->frame);
+    if (way.keyframes == 0 || is_new_view(way.last, *pose)) {
+      tracked->keyframe = {robot.number, way.keyframes++};
+      way.last = *pose;
       map_.keyframes.push_back({tracked->keyframe, frame->stamp, *pose});
     }
     map_.frames.push_back({io.frame(), "tracked", stamp + (tracked->keyframe.valid() ? ",1" : ",0")});
@@ -67,7 +73,10 @@ class PosesStage : public Stage {
   }
 
   core::Result<void> finish(StageIo& io) override {
-    map_.frame_columns = "stamp,keyframe";
+    map_.frame_columns = several() ? "robot,stamp,keyframe" : "stamp,keyframe";
+    if (several()) map_.robots = recordings_->robots();
+    std::sort(map_.keyframes.begin(), map_.keyframes.end(),
+              [](const KeyframePose& a, const KeyframePose& b) { return a.id < b.id; });
     io.output<MapResult>("map", std::make_shared<MapResult>(map_));
     return {};
   }
@@ -75,14 +84,42 @@ class PosesStage : public Stage {
   void summarise(RunSummary& summary) const override {
     count_frames(map_.frames, summary);
     summary.keyframes = map_.keyframes.size();
+    for (const RobotInfo& robot : map_.robots) {
+      const Way& way = ways_[static_cast<std::size_t>(robot.number)];
+      summary.robots.push_back({robot.name, static_cast<std::size_t>(way.keyframes)});
+    }
   }
 
  private:
+  static constexpr const char* kRobot = "{robot}";
+  /// A robot's.
+  struct Way {
+    geometry::Trajectory poses;
+    std::int32_t frames = 0;
+    std::int32_t keyframes = 0;
+    geometry::Rigid3 last;  ///< keyframe's pose
+  };
+  [[nodiscard]] bool several() const { return ways_.size() > 1; }
+
+  [[nodiscard]] core::Result<geometry::Trajectory> poses_of(const RobotInfo& robot) const {
+    if (!file_.empty()) {
+      std::string file = file_;
+      if (const auto at = file.find(kRobot); at != std::string::npos) {
+        file.replace(at, std::string(kRobot).size(), robot.name);
+      }
+      return dataset::read_trajectory(file);
+    }
+    const auto truth = recordings_->truth_of(robot.number);
+    if (truth && !truth->empty()) return *truth;
+    return core::input_error(fmt::format(
+        "{}: the recording has no poses of its own; name a file with --set poses.file=FILE", robot.name));
+  }
   /// Between the moments of both images; identity where no pose is near that of the depth image.
-  [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame,
+  [[nodiscard]] geometry::Rigid3 depth_from_camera(const geometry::Trajectory& poses,
+                                                   const sensor::RgbdFrame& frame,
                                                    const geometry::Rigid3& world_from_camera) const {
     if (frame.depth_stamp == frame.stamp) return {};
-    const auto world_from_depth = geometry::pose_at(poses_, frame.depth_stamp, max_gap_s_);
+    const auto world_from_depth = geometry::pose_at(poses, frame.depth_stamp, max_gap_s_);
     return world_from_depth ? world_from_depth->inverse() * world_from_camera : geometry::Rigid3{};
   }
   [[nodiscard]] bool is_new_view(const geometry::Rigid3& last, const geometry::Rigid3& now) const {
@@ -95,7 +132,8 @@ class PosesStage : public Stage {
   double max_gap_s_ = 0.02;
   double keyframe_distance_m_ = 0.05;
   double keyframe_angle_rad_ = 0.05;
-  geometry::Trajectory poses_;
+  const RobotRecordings* recordings_ = nullptr;
+  std::vector<Way> ways_;  ///< by robot
   MapResult map_;
 };
 
@@ -103,7 +141,7 @@ class PosesStage : public Stage {
 
 StageType poses_stage() {
   return {"poses",
-          "Takes poses from a file or the recording's truth instead of tracking",
+          "Takes poses from files or the recordings' truth instead of tracking",
           Mode::kSerial,
           {{"frame", frame_port()}},
           {{"track", track_port()}, {"map", map_port()}},

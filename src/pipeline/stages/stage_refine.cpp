@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "run/resumed_run.hpp"
@@ -32,7 +31,7 @@ class RefineStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     executor_ = context.executor;
     log_ = context.log;
-    camera_ = context.source->camera().color;
+    for (const RobotInfo& robot : *context.robots) cameras_[robot.number] = robot.camera.color;
     return context.resumed != nullptr ? read_surfaces(*context.resumed) : core::Result<void>();
   }
   /// Only a coarse surface of each keyframe stays.
@@ -52,7 +51,7 @@ class RefineStage : public Stage {
     auto result = std::make_shared<MapResult>(*before);
     if (adjust_ && before->map != nullptr && before->map->keyframe_count() > 1) {
       auto map = std::make_shared<maps::Map>(*before->map);
-      const auto accuracy = refine(*map, before->robots);
+      const auto accuracy = refine(*map);
       result->map = map;
       take_poses_from_map(*result);
       for (std::size_t i = 0; i < accuracy.size(); ++i) result->keyframes[i].accuracy = accuracy[i];
@@ -92,16 +91,13 @@ class RefineStage : public Stage {
     return {};
   }
   /// How exactly the keyframes are known then, by id; empty: not known.
-  std::vector<mapping::KeyframeAccuracy> refine(maps::Map& map, const std::vector<RobotInfo>& robots) {
+  std::vector<mapping::KeyframeAccuracy> refine(maps::Map& map) {
     std::vector<mapping::PoseEdge> edges;
     if (icp_) edges = align(map);
     const std::size_t alignments = edges.size();
     const std::vector<mapping::PoseEdge> loops = mapping::loop_edges(map);
     edges.insert(edges.end(), loops.begin(), loops.end());
-    mapping::Cameras cameras;
-    for (const core::KeyframeId id : map.keyframe_ids()) cameras[id.robot] = camera_;
-    for (const RobotInfo& robot : robots) cameras[robot.number] = robot.camera.color;
-    const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras, edges, adjustment_);
+    const mapping::GlobalAdjustmentSummary summary = mapping::adjust_map(map, cameras_, edges, adjustment_);
     for (std::size_t i = 0; i < std::min(alignments, summary.extra.size()); ++i) {
       counts_.rejected += summary.extra[i].rejected ? 1U : 0U;
     }
@@ -122,7 +118,7 @@ class RefineStage : public Stage {
     for (std::size_t i = 0; i < edges.size(); ++i) {
       if (summary.extra.empty() || !summary.extra[i].rejected) believed.push_back(edges[i]);
     }
-    auto accuracy = mapping::keyframe_accuracy(map, cameras, believed, adjustment_);
+    auto accuracy = mapping::keyframe_accuracy(map, cameras_, believed, adjustment_);
     note(accuracy);
     return accuracy;
   }
@@ -158,7 +154,7 @@ class RefineStage : public Stage {
 
   const core::Executor* executor_ = nullptr;
   core::Log* log_ = nullptr;
-  sensor::Pinhole camera_;
+  mapping::Cameras cameras_;
   bool icp_ = true;
   bool adjust_ = true;
   bool accuracy_ = true;

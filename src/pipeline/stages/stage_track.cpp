@@ -2,6 +2,7 @@
 // track: the SLAM of each robot, frame by frame: poses, keyframes, landmarks.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -30,10 +31,12 @@ class TrackStage : public Stage {
       slams_.back()->set_shutter(robot.camera.readout_s);
     }
     revisions_.resize(slams_.size());
-    if (context.resumed != nullptr) {
-      slams_.front()->restore(context.resumed->map.map, context.resumed->map.frames);
-      revisions_.front() = slams_.front()->map().now();
-      rows_ = context.resumed->rows;
+    if (context.resumed == nullptr) return {};
+    rows_ = context.resumed->rows;
+    for (const auto& [robot, map] : context.resumed->maps) {
+      const auto number = static_cast<std::size_t>(robot);
+      slams_.at(number)->restore(map.map, map.frames);
+      revisions_[number] = slams_[number]->map().now();
     }
     return {};
   }
@@ -50,14 +53,18 @@ class TrackStage : public Stage {
                      several() ? robot.name + "," + row_columns(report) : row_columns(report)});
     note_times(io.frame(), report.bundle);
     auto tracked = std::make_shared<TrackedFrame>();
+    tracked->robot = robot.number;
     tracked->keyframe = report.keyframe;
     tracked->stamp = report.stamp;
     tracked->depth_from_camera = report.depth_from_camera;
     tracked->row = rows_.back();
     if (slam.frame_poses().size() > poses) tracked->pose = slam.frame_poses().back();
+    if (tracked->pose && tracked->pose->tracked) {
+      tracked->frame = {robot.number, static_cast<std::int32_t>(poses)};
+    }
     if (report.keyframe.valid()) {
       if (several()) tracked->map = std::make_shared<maps::Map>(slam.map());
-      if (context_->keep_changes) {
+      if (context_->keeps_map) {
         tracked->changes = std::make_shared<maps::MapChanges>(slam.map().changes_since(revisions_[number]));
         revisions_[number] = slam.map().now();
       }
@@ -70,6 +77,16 @@ class TrackStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     auto result = std::make_shared<RobotMaps>();
+    // Robots take turns; of those that went on from where they were, some were behind others.
+    std::sort(rows_.begin(), rows_.end(),
+              [](const FrameRow& a, const FrameRow& b) { return a.frame < b.frame; });
+    result->frame_columns = several() ? std::string("robot,") + kRowColumns : kRowColumns;
+    result->frames = rows_;
+    if (context_->resumed != nullptr && context_->resumed->merged) {
+      result->maps.push_back(*context_->resumed->merged);
+      io.output<RobotMaps>("maps", result);
+      return {};
+    }
     for (const RobotInfo& robot : recordings_->robots()) {
       mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       slam.finish();
@@ -81,8 +98,6 @@ class TrackStage : public Stage {
       if (context_->alter_map) context_->alter_map(*map);
       result->maps.push_back({robot.name, {robot}, std::move(map), slam.frame_poses()});
     }
-    result->frame_columns = several() ? std::string("robot,") + kRowColumns : kRowColumns;
-    result->frames = rows_;
     io.output<RobotMaps>("maps", result);
     return {};
   }

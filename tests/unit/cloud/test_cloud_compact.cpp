@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <random>
 
-#include "plumbline/cloud/cloud_spool.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
@@ -185,54 +180,6 @@ TEST(CompactCloud, DamagedBytesAreAnError) {
   ASSERT_FALSE(unknown.has_value());
   EXPECT_EQ(unknown.error().kind, core::ErrorKind::kInput);
   EXPECT_NE(unknown.error().message.find("version"), std::string::npos);
-}
-
-TEST(CloudSpool, GivesBackWhatItWasGivenAndLeavesNoFile) {
-  const auto folder = std::filesystem::temp_directory_path() / "plumbline_test_spool";
-  std::filesystem::create_directories(folder);
-  {
-    auto spool = CloudSpool::create(folder);
-    ASSERT_TRUE(spool.has_value());
-    const Cloud list = list_cloud(100);
-    const CloudPtr grid = grid_cloud();
-    ASSERT_TRUE(spool->append(list).has_value());
-    ASSERT_TRUE(spool->append(*grid).has_value());
-    ASSERT_EQ(spool->size(), 2U);
-    const auto second = spool->read(1);
-    const auto first = spool->read(0);
-    ASSERT_TRUE(first && second);
-    EXPECT_EQ((*first)->size(), 100U);
-    EXPECT_EQ((*second)->width, grid->width);
-    EXPECT_TRUE(std::filesystem::is_empty(folder));
-  }
-  std::filesystem::remove_all(folder);
-}
-
-TEST(CloudSpool, FolderThatIsNotThere) {
-  const auto spool = CloudSpool::create("/no/such/folder");
-  ASSERT_FALSE(spool.has_value());
-  EXPECT_EQ(spool.error().kind, core::ErrorKind::kOutput);
-}
-
-TEST(CloudSpool, FullDiskIsAnOutputError) {
-  // A limit on the size of files stands in for a full disk.
-  const auto folder = std::filesystem::temp_directory_path();
-  auto spool = CloudSpool::create(folder);
-  ASSERT_TRUE(spool.has_value());
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  rlimit small = before;
-  small.rlim_cur = 100'000;
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-  const Cloud list = list_cloud(5000);
-  core::Result<void> appended;
-  for (int i = 0; i < 5 && appended; ++i) appended = spool->append(list);
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, handler);
-  ASSERT_FALSE(appended.has_value());
-  EXPECT_EQ(appended.error().kind, core::ErrorKind::kOutput);
-  EXPECT_NE(appended.error().message.find(folder.string()), std::string::npos);
 }
 
 }  // namespace

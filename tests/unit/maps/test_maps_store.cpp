@@ -54,7 +54,7 @@ TEST(MapStore, EveryCommitIsTheMapInEveryBit) {
     const auto stored = load_map(folder.file());  // while it is being written
     ASSERT_TRUE(stored) << stored.error().message;
     ASSERT_TRUE(equal(stored->map, world.map)) << "after " << i;
-    ASSERT_TRUE(same_all(stored->frames, world.frames));
+    ASSERT_TRUE(same_all(stored->frames, world.frames_by_robot()));
     EXPECT_FALSE(stored->complete);
   }
   ASSERT_GT(world.map.edges().size(), 5U) << "the world is too simple";
@@ -83,7 +83,7 @@ TEST_P(FinalMap, IsSaved) {
   ASSERT_TRUE(stored) << stored.error().message;
   EXPECT_TRUE(stored->complete);
   EXPECT_TRUE(equal(stored->map, world.map));
-  EXPECT_TRUE(same_all(stored->frames, world.frames));
+  EXPECT_TRUE(same_all(stored->frames, world.frames_by_robot()));
   for (const char* beside : {"-wal", "-shm", "-journal"}) {
     EXPECT_FALSE(std::filesystem::exists(folder.file().string() + beside)) << beside;
   }
@@ -96,7 +96,7 @@ TEST_P(FinalMap, IsSaved) {
     EXPECT_EQ(reader->cloud_bytes(ids[i]).value(), cloud_bytes(static_cast<int>(i) + 1));
     EXPECT_EQ(reader->cloud(ids[i]).value()->size(), i + 1);
   }
-  EXPECT_EQ(reader->cloud({7, 7}).error().kind, core::ErrorKind::kInput);
+  EXPECT_EQ(reader->cloud(KeyframeId{7, 7}).error().kind, core::ErrorKind::kInput);
 }
 
 TEST(MapStore, KeepsHeaderAndAttachments) {
@@ -120,14 +120,16 @@ TEST(MapStore, KeepsHeaderAndAttachments) {
   const auto reader = StoreReader::open(folder.file());
   ASSERT_TRUE(reader) << reader.error().message;
   const StoreHeader& header = reader->header();
-  EXPECT_EQ(header.robot, "robot 'a'; DROP TABLE point");
+  EXPECT_EQ(header.robots.front().name, "robot 'a'; DROP TABLE point");
   EXPECT_EQ(header.configuration, header_of(camera).configuration);
   EXPECT_EQ(header.program_version, "1.2.3");
   EXPECT_EQ(header.format, kStoreFormat);
-  EXPECT_EQ(sensor::to_yaml(header.camera), sensor::to_yaml(camera));
-  EXPECT_EQ(header.camera.distortion, camera.distortion);
-  EXPECT_TRUE(tests::same(*header.camera.color_from_depth, *camera.color_from_depth));
-  EXPECT_EQ(header.camera.depth->fy, 263.0);
+  const sensor::Camera read = camera_of(header.robots, 0);
+  EXPECT_EQ(sensor::to_yaml(read), sensor::to_yaml(camera));
+  EXPECT_EQ(read.distortion, camera.distortion);
+  EXPECT_TRUE(tests::same(*read.color_from_depth, *camera.color_from_depth));
+  EXPECT_EQ(read.depth->fy, 263.0);
+  EXPECT_EQ(camera_of(header.robots, 7).name, camera.name) << "of one that is not there, the first one's";
   EXPECT_EQ(reader->attachment("robots").value(), robots);
   EXPECT_EQ(reader->attachment("empty").value(), std::vector<std::uint8_t>{});
   EXPECT_EQ(reader->attachment("nothing").value(), std::nullopt);
@@ -178,7 +180,7 @@ TEST(MapStore, GoesOnInAStore) {
   ASSERT_TRUE(stored) << stored.error().message;
   EXPECT_FALSE(stored->complete);
   EXPECT_TRUE(equal(stored->map, world.map));
-  EXPECT_TRUE(same_all(stored->frames, world.frames));
+  EXPECT_TRUE(same_all(stored->frames, world.frames_by_robot()));
   // A smaller and different map in the same file: what is no more goes, what is different is replaced.
   StoreWorld other(5);
   other.step();

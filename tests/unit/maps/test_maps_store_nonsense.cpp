@@ -38,7 +38,7 @@ std::vector<Reported> reported_by(const std::filesystem::path& file) {
     for (std::size_t at = 0; at < next->rows.size();) {
       const Bytes head(next->rows.begin() + static_cast<std::ptrdiff_t>(at),
                        next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength));
-      const std::size_t length = ByteReader(head).get<std::uint32_t>();
+      const std::size_t length = decode<std::uint32_t>(head);
       const auto begin = next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength);
       told.rows.push_back(parse_row(Bytes(begin, begin + static_cast<std::ptrdiff_t>(length))));
       at += kRowLength + length;
@@ -74,7 +74,7 @@ class Nonsense : public testing::Test {
     for (Reported told : all_) {
       for (StoreRow& row : told.rows) {
         if (changed || kRowTables[row.name.place].name != table) continue;
-        if (table == "header" && row.name.key != "camera") continue;
+        if (table == "header" && row.name.key != "robots") continue;
         change(row);
         changed = true;
       }
@@ -102,14 +102,14 @@ TEST_F(Nonsense, IsNamed) {
   const auto unpacked = [](const StoreRow& row) { return unpack(row.data.data(), row.data.size()); };
   contains(refusal("header",
                    [&](StoreRow& row) {
-                     sensor::Camera camera = world_.camera;
-                     camera.color.fx = nan;
-                     put(row, [&](ByteWriter& to) { encode(camera, to); });
+                     std::vector<RobotInfo> robots = header_of(world_.camera).robots;
+                     robots.front().camera.color.fx = nan;
+                     put(row, [&](ByteWriter& to) { encode(robots, to); });
                    }),
-           "header camera: a camera's focal length is none");
+           "header robots: a camera's focal length is none");
   contains(refusal("state",
                    [&](StoreRow& row) {
-                     KeyframeState state = decode_state(unpacked(row));
+                     KeyframeState state = decode<KeyframeState>(unpacked(row));
                      state.camera_from_world.translation.x() = nan;
                      put(row, [&](ByteWriter& to) { encode(state, to); });
                    }),

@@ -52,17 +52,15 @@ class Follower {
       log.push_back(step.log.back());
     }
     frames_ = world_.frames.size();
-    step.clouds.push_back({id, 0, stored_cloud(id.index + 1)});
-    if (frames_ > 1) {
-      step.clouds.push_back({{}, frames_ - 2, stored_cloud(500 + id.index)});
-      frame_clouds.push_back(frames_ - 2);
-    }
+    step.clouds.push_back({id, {}, stored_cloud(id.index + 1)});
+    frame_clouds.push_back(world_.frame_id(frames_ - 2));
+    step.clouds.push_back({{}, frame_clouds.back(), stored_cloud(500 + id.index)});
     return step;
   }
   void go_on() { moment_ = world_.map.now(); }
 
   std::vector<std::string> log;
-  std::vector<std::size_t> frame_clouds;
+  std::vector<FrameId> frame_clouds;
 
  private:
   StoreWorld& world_;
@@ -82,16 +80,17 @@ TEST(StoreSteps, EachLeavesTheMapInEveryBit) {
     const auto stored = load_map(folder.file());
     ASSERT_TRUE(stored) << i << ": " << stored.error().message;
     ASSERT_TRUE(equal(stored->map, world.map)) << "after " << i;
-    ASSERT_TRUE(same_all(stored->frames, world.frames)) << "after " << i;
+    ASSERT_TRUE(same_all(stored->frames, world.frames_by_robot())) << "after " << i;
     ASSERT_EQ(stored->log, follower.log) << "after " << i;
     ASSERT_FALSE(stored->complete);
   }
   ASSERT_GT(world.map.point_ids().back().index, 70) << "one page proves nothing";
   const auto reader = StoreReader::open(folder.file());
   ASSERT_TRUE(reader);
+  EXPECT_EQ(reader->cloud(follower.frame_clouds.front()).value()->size(), 500U);
+  EXPECT_EQ(reader->cloud(FrameId{0, 100000}).error().kind, core::ErrorKind::kInput);
+  std::sort(follower.frame_clouds.begin(), follower.frame_clouds.end());
   EXPECT_EQ(reader->frame_cloud_ids().value(), follower.frame_clouds);
-  EXPECT_EQ(reader->frame_cloud(follower.frame_clouds.front()).value()->size(), 500U);
-  EXPECT_EQ(reader->frame_cloud(100000).error().kind, core::ErrorKind::kInput);
   const StoreContents contents = reader->contents().value();
   EXPECT_EQ(contents.keyframes, world.map.keyframe_count());
   EXPECT_EQ(contents.points, world.map.point_count());
@@ -144,7 +143,7 @@ TEST(StoreSteps, GoOnAfterTheRunWasEnded) {
     const auto stored = load_map(folder.file());
     ASSERT_TRUE(stored) << stored.error().message;
     ASSERT_TRUE(equal(stored->map, world.map)) << i;
-    ASSERT_TRUE(same_all(stored->frames, world.frames));
+    ASSERT_TRUE(same_all(stored->frames, world.frames_by_robot()));
     ASSERT_EQ(stored->log, follower.log);
   }
 }
@@ -162,8 +161,8 @@ TEST(StoreSteps, TheEndKeepsTheRestAndTheFrameOfTheResults) {
   frame.upright = true;
   StoreStep rest;
   rest.log = {"last"};
-  rest.clouds.push_back({{}, 0, stored_cloud(7)});
-  const auto saved = writer->save_final(world.map, world.frames, frame, rest);
+  rest.clouds.push_back({{}, {0, 0}, stored_cloud(7)});
+  const auto saved = writer->save_final(world.map, world.frames, frame, {rest});
   ASSERT_TRUE(saved) << saved.error().message;
   const auto stored = load_map(folder.file());
   ASSERT_TRUE(stored) << stored.error().message;
@@ -172,7 +171,47 @@ TEST(StoreSteps, TheEndKeepsTheRestAndTheFrameOfTheResults) {
   EXPECT_EQ(stored->result.output_from_map.rotation, frame.output_from_map.rotation);
   EXPECT_EQ(stored->result.output_from_map.translation, frame.output_from_map.translation);
   EXPECT_EQ(stored->log.back(), "last");
-  EXPECT_EQ(StoreReader::open(folder.file())->frame_cloud(0).value()->size(), 7U);
+  EXPECT_EQ(StoreReader::open(folder.file())->cloud(FrameId{0, 0}).value()->size(), 7U);
+}
+
+TEST(StoreSteps, RobotsHaveMapsOfTheirOwnUntilTheyAreOne) {
+  const StoreFolder folder;
+  StoreWorld worlds[2] = {StoreWorld(27), StoreWorld(28)};
+  worlds[1].camera.color.width = 320;
+  StoreHeader header = header_of(worlds[0].camera);
+  header.robots.push_back({1, "b", worlds[1].camera});
+  worlds[0].other_robot = 0;
+  worlds[1].first_robot = worlds[1].other_robot = 1;
+  Follower followers[2] = {Follower(worlds[0]), Follower(worlds[1])};
+  auto writer = StoreWriter::create(folder.file(), header);
+  ASSERT_TRUE(writer);
+  for (int i = 0; i < 12; ++i) {
+    const int robot = i % 3 == 0 ? 1 : 0;
+    StoreStep step = followers[robot].step();
+    step.robot = robot;
+    ASSERT_TRUE(writer->add(step));
+    if (i == 0) continue;
+    const auto stored = StoreReader::open(folder.file())->load_each();
+    ASSERT_TRUE(stored) << stored.error().message;
+    ASSERT_EQ(stored->size(), 2U);
+    for (std::size_t r = 0; r < 2; ++r) {
+      EXPECT_TRUE(equal((*stored)[r].map, worlds[r].map)) << i;
+      EXPECT_TRUE(same_all((*stored)[r].frames, worlds[r].frames));
+      EXPECT_EQ((*stored)[r].log, followers[r].log);
+    }
+  }
+  const auto two = load_map(folder.file());
+  EXPECT_EQ(two.error().kind, core::ErrorKind::kInput);
+  EXPECT_NE(two.error().message.find("are not one yet"), std::string::npos) << two.error().message;
+  StoreWorld both(29);
+  both.other_robot = 1;
+  for (int i = 0; i < 6; ++i) both.step();
+  ASSERT_TRUE(writer->save_final(both.map, both.frames));
+  const auto one = load_map(folder.file());
+  ASSERT_TRUE(one) << one.error().message;
+  EXPECT_TRUE(equal(one->map, both.map));
+  EXPECT_TRUE(same_all(one->frames, both.frames_by_robot()));
+  EXPECT_EQ(one->log.size(), followers[0].log.size() + followers[1].log.size());
 }
 
 TEST(StoreSteps, SameStepsSameBytes) {

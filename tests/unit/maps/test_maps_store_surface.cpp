@@ -51,7 +51,7 @@ std::vector<KeyframeId> write_store(const std::filesystem::path& file, StoreWorl
     step.map = std::make_shared<MapChanges>(world.map.changes_since(moment));
     moment = world.map.now();
     const auto bytes = std::make_shared<std::vector<std::uint8_t>>(10, std::uint8_t{7});
-    step.clouds.push_back({ids.back(), 0, bytes, i == 0 ? nullptr : surface_of(200 * i)});
+    step.clouds.push_back({ids.back(), {}, bytes, i == 0 ? nullptr : surface_of(200 * i)});
     EXPECT_TRUE(writer->add(step));
   }
   return ids;
