@@ -123,11 +123,13 @@ std::string ambiguity(const std::vector<MapPart>& parts, const SortedPairs& all,
                        percent(merge.laid.seen_through()));
   }
   const bool few = merge.agreeing < options.min_pairs;
-  if (few && !fits_as_well(merge.laid, merge.laid, options)) {
+  if (const MapOverlay::Surfaces surfaces = few ? maps.surfaces(merge.a_from_b) : MapOverlay::Surfaces{};
+      few && (surfaces.there < kSurfaces || surfaces.contradict(kNoAlternativeOfFewSpots, kSurfaces))) {
     return fmt::format(
-        "only {} keyframes agree on how the maps lie, and laid over each other the maps have too little in "
-        "common: of {} landmarks {} match, {} were seen through",
-        merge.agreeing, merge.laid.expected, merge.laid.matched, merge.laid.contradicted);
+        "only {} keyframes agree on how the maps lie, and laid over each other {} pieces of surface are "
+        "there "
+        "and {} were seen through",
+        merge.agreeing, surfaces.there, surfaces.through);
   }
   // One keyframe may be mistaken; two that agree are an answer. Few have no such alternatives at all.
   if (merge.alternative >= (few ? 1 : 2) && merge.alternative >= options.alternative * merge.agreeing) {

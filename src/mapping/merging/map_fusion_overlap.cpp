@@ -2,12 +2,14 @@
 // Do two maps show the same place, and how do they lie to each other?
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
+#include <map>
+#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
 
+#include "merging/free_direction.hpp"
 #include "merging/map_fusion_sets.hpp"
 
 namespace plumbline::mapping {
@@ -47,41 +49,45 @@ void sum_up(MergeEvidence& merge) {
   }
 }
 
-/// How far apart the cameras of a map lie: the diagonal of the box around them, metres.
-double extent(const maps::Map& map) {
-  Eigen::AlignedBox3d box;
-  for (const KeyframeId id : map.keyframe_ids()) box.extend(map.camera_from_world(id).inverse().translation);
-  return box.isEmpty() ? 0.0 : box.diagonal().norm();
-}
-
-/// Few keyframes will do where each shows a whole picture of the same: not by chance, and what merely looks
-/// alike has less in common. That things repeat is seen by maps that reach farther than the place itself.
-bool few_suffice(const maps::Map& a, const maps::Map& b, const MergeEvidence& merge,
-                 const MapFusionOptions& options) {
-  if (extent(a) < options.few_extent_m || extent(b) < options.few_extent_m) return false;
-  std::set<KeyframeId> of_a;
-  std::set<KeyframeId> of_b;
+/// Points and lines (twice) in common: of each keyframe that agrees its best pair, on the side where that is
+/// less.
+int in_common(const maps::Map& a, const MergeEvidence& merge) {
+  std::map<KeyframeId, int> of_a;
+  std::map<KeyframeId, int> of_b;
   for (const VerifiedPair& pair : merge.pairs) {
-    if (pair.evidence.points + 2 * pair.evidence.lines < options.few_inliers) continue;
+    const int inliers = pair.evidence.points + 2 * pair.evidence.lines;
     const bool query_of_a = a.has_keyframe(pair.query);
-    of_a.insert(query_of_a ? pair.query : pair.match);
-    of_b.insert(query_of_a ? pair.match : pair.query);
+    int& best_a = of_a[query_of_a ? pair.query : pair.match];
+    int& best_b = of_b[query_of_a ? pair.match : pair.query];
+    best_a = std::max(best_a, inliers);
+    best_b = std::max(best_b, inliers);
   }
-  return static_cast<int>(std::min(of_a.size(), of_b.size())) >= options.few_pairs;
+  const auto sum = [](const std::map<KeyframeId, int>& best) {
+    return std::accumulate(best.begin(), best.end(), 0,
+                           [](int all, const auto& one) { return all + one.second; });
+  };
+  return std::min(sum(of_a), sum(of_b));
 }
 
 std::string judge(const maps::Map& a, const maps::Map& b, const MergeEvidence& merge,
                   const MapFusionOptions& options) {
   if (merge.verified == 0) return "no two keyframes were verified to show the same place";
-  if (merge.agreeing < options.min_pairs) {
-    if (few_suffice(a, b, merge, options)) return {};
+  const bool few = merge.agreeing < options.min_pairs;
+  if (const int common = in_common(a, merge);
+      few && (merge.agreeing < options.few_pairs || common < options.few_inliers)) {
     return fmt::format(
-        "only {} keyframes agree on how the maps lie ({} are needed, or {} with {} points and lines in "
-        "common "
-        "in maps of {} m and more)",
-        merge.agreeing, options.min_pairs, options.few_pairs, options.few_inliers, options.few_extent_m);
+        "only {} keyframes agree on how the maps lie, with {} points and lines in common ({} keyframes are "
+        "needed, or {} with {} in common)",
+        merge.agreeing, common, options.min_pairs, options.few_pairs, options.few_inliers);
   }
-  if (merge.span_m < options.min_span_m && merge.span_rad < options.min_span_rad) {
+  const FreeDirection free = free_direction(a, b, merge.a_from_b, merge.pairs);
+  if ((few ? free.slides() : free.corridor()) && free.reach_m < options.few_extent_m) {
+    return fmt::format(
+        "what they have in common slides along itself as a {} does, and the maps reach over {:.1f} m there "
+        "({} m are needed to see whether things repeat)",
+        free.corridor() ? "corridor" : "wall", free.reach_m, options.few_extent_m);
+  }
+  if (!few && merge.span_m < options.min_span_m && merge.span_rad < options.min_span_rad) {
     return fmt::format(
         "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike "
         "is not enough",
