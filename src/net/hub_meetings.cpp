@@ -57,7 +57,7 @@ void HubMeetings::restart() {
 void HubMeetings::take(const std::string& robot, std::int64_t transaction) {
   auto stored = maps::load_map(folder_ / "robots" / robot / "map.db");
   if (!stored) {  // rows that belong together came in part; the next ones will tell
-    done_.lines.push_back(fmt::format("{}: cannot be looked at yet: {}", robot, stored.error().message));
+    done_.lines.push_back(fmt::format("{}: is looked at when more of its rows are here", robot));
     return;
   }
   const std::vector<core::KeyframeId> ids = stored->map.keyframe_ids();
