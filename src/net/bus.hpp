@@ -3,6 +3,7 @@
 
 // Messages and who carries them. The carrier is CycloneDDS, in the part plumbline_dds.so (core/part.hpp): a
 // run without a network loads none of it.
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -16,7 +17,7 @@
 
 namespace plumbline::net {
 
-constexpr std::uint32_t kProtocol = 1;
+constexpr std::uint32_t kProtocol = 2;
 constexpr std::size_t kMostPiece = 1U << 20U;  ///< bytes; MOST_PIECE of messages.idl
 
 /// messages.idl says what the fields are.
@@ -43,6 +44,13 @@ enum class Answer : std::uint8_t {
   kDone,      ///< everything is here: the robot may leave
 };
 
+struct Place {
+  std::string frame_of;
+  std::array<double, 7> frame_from_robot{};
+  std::array<double, 7> frame_from_camera{};
+  std::array<double, 21> covariance{};
+};
+
 struct Word {
   std::uint32_t protocol = kProtocol;
   std::uint32_t store_format = 0;
@@ -59,6 +67,7 @@ struct Word {
   std::int64_t number = 0;
   std::uint64_t edition = 0;
   std::uint32_t pieces = 0;
+  Place place;
 };
 
 struct Piece {

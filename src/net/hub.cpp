@@ -89,11 +89,16 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
 
 /// The summary of the fusion, with what the network did.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
+                               const std::vector<pipeline::RunSummary::Meeting>& meetings,
                                const std::string& reason) {
   std::ifstream in(file);
   auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
   if (summary.is_discarded()) return core::output_error(file.string() + ": cannot be read again");
   summary["network"] = json_of(traffic);
+  for (const pipeline::RunSummary::Meeting& m : meetings) {
+    summary["meetings"].push_back(
+        {{"number", m.number}, {"a", m.a}, {"b", m.b}, {"log", m.frame}, {"taken_back", m.taken_back}});
+  }
   summary["trustworthy"] = reason.empty();
   summary["reason"] = reason;
   return core::write_file(file, summary.dump(2) + "\n");
@@ -156,7 +161,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
     log.write(keys ? core::LogLevel::kWarning : core::LogLevel::kDebug, "DDS: " + line);
   });
   if (!bus) return fail(bus.error());
-  auto desk = HubDesk::open(folder, request, std::move(*bus), log);
+  auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);
   if (!desk) return fail(desk.error());
   if (auto alone = (*desk)->look_for_others(stop); !alone) return fail(alone.error());
   log.info(
@@ -188,7 +193,10 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;
   if (auto moved = move_up(last.output, folder); !moved) return fail(moved.error());
-  if (auto added = add_network(folder / "summary.json", traffic, reason); !added) return fail(added.error());
+  if (auto added = add_network(folder / "summary.json", traffic, (*desk)->meetings().meetings(), reason);
+      !added) {
+    return fail(added.error());
+  }
   if (auto committed = output->commit(); !committed) return fail(committed.error());
   return summary;
 }

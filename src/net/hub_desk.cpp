@@ -33,8 +33,8 @@ std::string key_of(const std::string& robot, const char* what) {
 
 core::Result<std::unique_ptr<HubDesk>> HubDesk::open(const std::filesystem::path& folder,
                                                      const HubRequest& request, std::unique_ptr<HubBus> bus,
-                                                     core::Log& log) {
-  std::unique_ptr<HubDesk> desk(new HubDesk(folder, request, std::move(bus), log));
+                                                     const core::Executor& executor, core::Log& log) {
+  std::unique_ptr<HubDesk> desk(new HubDesk(folder, request, std::move(bus), executor, log));
   if (auto read = desk->read_ledger(); !read) return tl::unexpected<core::Error>(read.error());
   return desk;
 }
@@ -63,6 +63,7 @@ core::Result<void> HubDesk::read_ledger() {
     (*robot)->incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     (*robot)->done = texts[key_of(hello.name, "state")] == kDone;
     log_.info(fmt::format("{}: {} keyframes are here from before", hello.name, (*robot)->copy().keyframes()));
+    if ((*robot)->copy().keyframes() > 0) meetings_.committed(hello.name, (*robot)->copy().heads().map);
   }
   return {};
 }
@@ -170,7 +171,10 @@ void HubDesk::let_in(const Hello& hello) {
   }
   const auto rewound = robot.hear(hello);
   if (!rewound) return fail(rewound.error());
-  if (*rewound) log_.warning(robot.name + ": has lost what was here; everything is asked for again");
+  if (*rewound) {
+    log_.warning(robot.name + ": has lost what was here; everything is asked for again");
+    meetings_.restart();
+  }
   if (is_new || takes_over || *rewound) {
     if (auto put = remember(robot); !put) return fail(put.error());
     log_.info(fmt::format("{}: {} of its keyframes are here", robot.name, robot.copy().keyframes()));
@@ -201,8 +205,10 @@ void HubDesk::take_pieces(HubRobot& robot) {
     const bool other = piece.protocol != kProtocol || piece.name != robot.name || piece.run != robot.run ||
                        piece.incarnation != robot.incarnation;
     if (other || robot.answer == Answer::kRefused || Clock::now() < trouble_[robot.name]) continue;
+    const std::int64_t before = robot.copy().heads().map;
     const auto taken = robot.take(piece);
     if (taken) {
+      if (robot.copy().heads().map > before) meetings_.committed(robot.name, robot.copy().heads().map);
       if (robot.answer == Answer::kTrouble) robot.answer = Answer::kAccepted;
       if (robot.answer == Answer::kAccepted) robot.problem.clear();
       close(robot);
@@ -240,6 +246,7 @@ void HubDesk::say_all() {
     if (robot.run.empty() || !(again || robot.changed)) continue;
     // A robot whose pieces could not be stored is asked for them again.
     Word word = robot.word();
+    word.place = meetings_.place(name);
     if (word.answer == Answer::kTrouble && Clock::now() >= trouble_[name]) word.answer = Answer::kAccepted;
     say(word);
     robot.changed = false;
@@ -280,6 +287,9 @@ std::vector<RobotTraffic> HubDesk::serve(const core::StopToken& stop, const Stat
         report_once("another hub is there; robots stay with whom they found first");
     }
     for (auto& [name, robot] : robots_) take_pieces(robot);
+    if (meetings_.step()) {
+      for (auto& [name, robot] : robots_) robot.changed = true;
+    }
     say_all();
     const double since_s = std::chrono::duration<double>(Clock::now() - line_at).count();
     if (status && since_s >= 1.0) {
@@ -290,10 +300,13 @@ std::vector<RobotTraffic> HubDesk::serve(const core::StopToken& stop, const Stat
     }
     if (request_.robots > 0 && done() >= request_.robots) break;
   }
+  meetings_.finish();
   std::vector<RobotTraffic> traffic;
   for (const auto& [name, robot] : robots_) {
     traffic.push_back(robot.traffic());
-    if (robot.done) last_words_.push_back(robot.word());
+    if (!robot.done) continue;
+    last_words_.push_back(robot.word());
+    last_words_.back().place = meetings_.place(name);
   }
   robots_.clear();
   return traffic;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bus.hpp"
+#include "hub_meetings.hpp"
 #include "hub_robot.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/core/stop.hpp"
@@ -24,24 +25,26 @@ class HubDesk {
   /// kOutput): it cannot be read or written.
   static core::Result<std::unique_ptr<HubDesk>> open(const std::filesystem::path& folder,
                                                      const HubRequest& request, std::unique_ptr<HubBus> bus,
-                                                     core::Log& log);
+                                                     const core::Executor& executor, core::Log& log);
 
   /// Errors (kUsage): another hub is there.
   core::Result<void> look_for_others(const core::StopToken& stop);
   /// Until all robots that are waited for are done, or `stop` is asked for. Closes the copies; what came, by
   /// name.
   std::vector<RobotTraffic> serve(const core::StopToken& stop, const Status& status);
+  [[nodiscard]] const HubMeetings& meetings() const { return meetings_; }
   /// After that, until `stop`: robots that everything came of are told so, as often as they may need it.
   void say_goodbye(const core::StopToken& stop);
 
  private:
   HubDesk(std::filesystem::path folder, const HubRequest& request, std::unique_ptr<HubBus> bus,
-          core::Log& log)
+          const core::Executor& executor, core::Log& log)
       : folder_(std::move(folder)),
         request_(request),
         ledger_(folder_ / "network.db"),
         bus_(std::move(bus)),
-        log_(log) {}
+        log_(log),
+        meetings_(folder_, executor, log) {}
   core::Result<void> read_ledger();
   void hear(const HeardHello& heard);
   /// Why a robot may not come in; empty: it may.
@@ -71,6 +74,7 @@ class HubDesk {
   std::vector<Word> last_words_;
   std::map<std::string, Clock::time_point> trouble_;  ///< until when a robot's pieces are not looked at
   std::set<std::string> reported_;
+  HubMeetings meetings_;
 };
 
 }  // namespace plumbline::net

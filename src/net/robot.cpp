@@ -47,7 +47,8 @@ std::string line_of(const LinkStatus& s, double kbytes_per_s) {
   if (!s.refused.empty()) return "refused by the hub";
   if (!s.heard) return "no hub yet";
   if (!s.hub_now) return fmt::format("hub lost, behind by {} transactions", s.behind);
-  return fmt::format("hub, behind by {} transactions, {:.0f} kB/s", s.behind, kbytes_per_s);
+  return fmt::format("hub, behind by {} transactions, {:.0f} kB/s{}{}", s.behind, kbytes_per_s,
+                     s.place.empty() ? "" : ", ", s.place);
 }
 
 /// Rates over the last seconds.

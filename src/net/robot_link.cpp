@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -196,7 +197,27 @@ void RobotLink::take_answer(const Word& word) {
   const bool moved = word.map != word_.map || word.clouds != word_.clouds || word.pieces != word_.pieces;
   if (moved) status_.progress = Clock::now();
   word_ = word;
+  note_place(word.place);
   note_lags();
+}
+
+/// Told when the frame is another one; where in it is kept up in the status.
+void RobotLink::note_place(const Place& place) {
+  status_.place.clear();
+  const bool changed = std::exchange(frame_of_, place.frame_of) != place.frame_of;
+  if (place.frame_of.empty() || !is_robot_name(place.frame_of)) {
+    if (changed) log_.warning("hub: what was met is taken back; this map is in a frame of its own again");
+    return;
+  }
+  const auto sigma = [&](std::size_t x, std::size_t y, std::size_t z) {
+    return std::sqrt(std::max(0.0, place.covariance[x] + place.covariance[y] + place.covariance[z]));
+  };
+  constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+  const std::array<double, 7>& at = place.frame_from_camera;
+  status_.place = fmt::format("in {} at {:.2f} {:.2f} {:.2f} m (known to {:.0f} mm, {:.1f} deg)",
+                              place.frame_of == name_ ? "its own frame" : place.frame_of + "'s frame", at[0],
+                              at[1], at[2], 1e3 * sigma(0, 6, 11), kDegrees * sigma(15, 18, 20));
+  if (changed) log_.info("hub: others are met; now " + status_.place);
 }
 
 void RobotLink::note_lags() {

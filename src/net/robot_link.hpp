@@ -28,6 +28,7 @@ struct LinkStatus {
   bool done = false;        ///< it has everything, and said so
   std::string refused;      ///< why it never will; empty: it was not refused
   std::string problem;      ///< why it cannot now
+  std::string place;        ///< in the frame of which robot it is, for people; empty: it met nobody
   std::int64_t behind = 0;  ///< transactions that are not acknowledged
   std::uint64_t sent_bytes = 0;
   std::uint64_t again_bytes = 0;  ///< of these, sent before
@@ -73,6 +74,7 @@ class RobotLink {
   void say();
   void report_silence();
   void note_lags();
+  void note_place(const Place& place);
 
   std::unique_ptr<RobotBus> bus_;
   const std::string name_;
@@ -101,6 +103,7 @@ class RobotLink {
   bool silence_reported_ = false;
   bool foreign_reported_ = false;
   std::string problem_reported_;
+  std::string frame_of_;  ///< that was told last
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

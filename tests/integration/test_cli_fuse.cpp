@@ -132,6 +132,12 @@ TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {
   EXPECT_TRUE(summary["merges"][0]["accepted"]);
   EXPECT_GT(summary["merges"][0]["time_s"], 0.0);
   EXPECT_LT(summary["merges"][0]["time_s"], 3.0);
+  EXPECT_GT(summary["merges"][0]["evident_s"], 0.0);
+  ASSERT_EQ(summary["meetings"].size(), 1U);
+  EXPECT_FALSE(summary["meetings"][0]["taken_back"]);
+  const std::string meeting = "meetings/0001_robot0_robot0-2";
+  EXPECT_TRUE(read_json(path("two") / meeting / "meeting.json")["evidence"]["accepted"]);
+  EXPECT_TRUE(fs::exists(path("two") / meeting / "map.png"));
   ASSERT_EQ(summary["robots"].size(), 2U);
   EXPECT_GT(summary["robots"][0]["keyframes"], 2);
   EXPECT_EQ(summary["frames"]["tracked"], 60);
@@ -143,7 +149,9 @@ TEST_F(Fuse, RobotsSideBySideMeetWhileTheyMap) {
     EXPECT_LT(((*a)[i].world_from_camera.translation - (*b)[i].world_from_camera.translation).norm(), 0.03);
   }
   ASSERT_EQ(run("map world/robot0 twin -o again -q --threads 1" + lean).code, 0);
-  for (const char* file : {"map.ply", "frames.csv", "robots/robot0-2/trajectory.txt"}) {
+  for (const char* file :
+       {"map.ply", "frames.csv", "robots/robot0-2/trajectory.txt",
+        "meetings/0001_robot0_robot0-2/meeting.json", "meetings/0001_robot0_robot0-2/robot0.txt"}) {
     EXPECT_EQ(slurp(path("two") / file), slurp(path("again") / file)) << file;
   }
   for (const char* pipeline : {"fast", "points_only"}) {

@@ -33,7 +33,11 @@ TEST_F(Network, TheMapIsThatOfFuseAndTheEnvironmentIsNotRead) {
     EXPECT_GT(told["bytes"]["cloud"], 10000);
     EXPECT_GE(told["lag_s"]["p95"], told["lag_s"]["median"]);
   }
-  EXPECT_NE(slurp(path("out/hub.log")).find("a: everything is here"), std::string::npos);
+  const std::string log = slurp(path("out/hub.log"));
+  for (const char* line : {"a: everything is here", "a and b look similar", "a and b have met", "log 1: "})
+    EXPECT_NE(log.find(line), std::string::npos) << line << log;
+  EXPECT_TRUE(fs::exists(path("out/meetings/0001_a_b/meeting.json")));
+  EXPECT_TRUE(fs::exists(path("out/meetings/0001_a_b/map.png")));
   EXPECT_FALSE(fs::exists(path("out.partial")));
 }
 

@@ -27,9 +27,9 @@ namespace plumbline::mapping {
 
 struct MapFusionOptions {
   int min_pairs = 5;          ///< keyframes of each map that must agree
-  int few_pairs = 2;          ///< so few will do when each has
-  int few_inliers = 100;      ///< points and lines (twice) in common, and both maps extend
-  double few_extent_m = 3.0;  ///< so far, and nothing at all speaks for another answer
+  int few_pairs = 2;          ///< so few will do when they have
+  int few_inliers = 100;      ///< points and lines (twice) in common, surfaces hold in all directions or both
+  double few_extent_m = 3.0;  ///< maps reach so far where none do, and nothing speaks for another answer
   double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
   double min_span_rad = 0.5;  ///< how far turned
   ConsistencyOptions consistency;
@@ -40,6 +40,7 @@ struct MapFusionOptions {
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
   bool robust = true;          ///< the pose graph may take pairs for wrong
+  bool merge_doubles = true;   ///< landmarks that are one; a preview does without
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;
@@ -105,6 +106,10 @@ struct Ambiguity {
   int alternative = 0;  ///< keyframes that speak for another one that the maps do not refute, at most
   OverlayFit alternative_overlap;  ///< as the best other one has it that they do not refute, and
   double alternative_m = 0.0;      ///< how far off it puts b's cameras; 0: there is none
+  /// Pieces of surface of one map that the other one has, and that it saw through; counted where few
+  /// keyframes agree.
+  int surfaces_there = 0;
+  int surfaces_through = 0;
 };
 
 /// Do other keyframes see what they should, if the alignment is right?

@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finds while robots map where their maps overlap (docs/method/merging.md; Algorithm 2): looks up every new
-// keyframe among those of the other robots, verifies what is similar, and tells when two maps certainly
-// overlap.
+// Maps become one when robots meet (docs/method/merging.md; Algorithm 2): every new keyframe is looked up among
+// those of the other robots; what looks alike is verified; when it is certain that two maps overlap, all maps
+// that hang together are laid into one frame by a pose graph. That frame is kept up as keyframes come and
+// move, further robots join it, and a merge is taken back when evidence turns against it. A preview: doubles
+// of landmarks are not merged, surfaces not aligned; fuse_maps of the finished maps has the last word.
+//
+// Work goes on beside the caller, by logical time: what is begun at frame k of a log is committed at frame
+// k + lag, whatever the clock says. So the same log gives the same events for any number of threads.
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -15,25 +22,99 @@
 
 namespace plumbline::mapping {
 
+/// How far two robots have come (Fig. 3 of the paper).
+enum class MeetingStep { kNone, kSimilar, kVerified, kLocalMapAsked, kMet, kTakenBack };
+
+struct MeetingEvent {
+  MeetingStep step = MeetingStep::kNone;
+  std::size_t a = 0;  ///< robots, a < b
+  std::size_t b = 0;
+  std::int64_t frame = 0;                   ///< of the log, that brought the keyframe
+  core::KeyframeId keyframe;                ///< that made it happen
+  MergeEvidence evidence;                   ///< of kMet and kTakenBack
+  std::shared_ptr<const FusedMap> preview;  ///< of kMet: all maps that hang together now; parts: robots
+};
+
+/// Where a robot is in the frame that it shares with others.
+struct RobotPlace {
+  std::size_t anchor = 0;  ///< the robot whose world is the common frame: the first of those that met
+  geometry::Rigid3 anchor_from_robot;   ///< worlds
+  geometry::Rigid3 anchor_from_camera;  ///< of the newest keyframe
+  /// Of that camera's position (metres) and rotation (radians) as the merges on the way from the anchor know
+  /// it, in the anchor's axes; what the robots' own maps drift is not in it.
+  geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
+};
+
 class MergeServer {
  public:
-  /// `cameras`: of the robots, which are numbered 0, 1, ...
-  MergeServer(const MapFusionOptions& options, const std::vector<Cameras>& cameras,
-              const core::Executor& executor);
+  /// `lag`: frames of the log between taking keyframes and committing what comes of them. The executor must
+  /// outlive this.
+  MergeServer(const MapFusionOptions& options, int lag, const core::Executor& executor);
 
-  /// Looks up a keyframe that is new in `map`, its robot's. Overlaps that have become certain with it, each
-  /// pair of robots once. Throws std::invalid_argument: no such robot or keyframe.
-  std::vector<MergeEvidence> add(std::shared_ptr<const maps::Map> map, core::KeyframeId keyframe);
+  /// A robot joins; robots are numbered 0, 1, ..., in the ids of their maps too.
+  std::size_t join(const Cameras& cameras);
+
+  /// A keyframe that is new in `map`, its robot's, at a frame of the log; frames never decrease. Throws
+  /// std::invalid_argument: no such robot or keyframe.
+  void add(std::shared_ptr<const maps::Map> map, core::KeyframeId keyframe, std::int64_t frame);
+  /// What is to be committed at this frame; mostly nothing. To be called for every frame, after add().
+  std::vector<MeetingEvent> commit(std::int64_t frame);
+  /// All that is left, when the log has ended.
+  std::vector<MeetingEvent> finish();
+
+  /// As of the last commit; none: it has met nobody.
+  [[nodiscard]] std::optional<RobotPlace> place(std::size_t robot) const;
 
  private:
+  struct NewKeyframe {
+    std::shared_ptr<const maps::Map> map;
+    core::KeyframeId id;
+    std::int64_t frame = 0;
+  };
+  /// All that is known of two robots.
+  struct RobotPair {
+    MeetingStep step = MeetingStep::kNone;  ///< the farthest that was told
+    bool met = false;
+    std::vector<VerifiedPair> verified;
+    std::size_t decided_pairs = 0;  ///< when it was decided last
+    std::size_t decided_keyframes = 0;
+    MergeEvidence evidence;  ///< when met, of the last decision
+    core::KeyframeId a;      ///< of the pair that carries its answer along while the maps move
+    core::KeyframeId b;
+    geometry::Rigid3 a_from_b;  ///< their cameras
+  };
+  /// What the work beside the caller owns while it runs.
+  struct Work {
+    std::vector<std::shared_ptr<const maps::Map>> maps;  ///< by robot, as told last
+    std::vector<MapPart> parts;                          ///< the same
+    OverlapFinder finder;
+    std::map<std::pair<std::size_t, std::size_t>, RobotPair> pairs;
+    std::vector<MeetingEvent> events;
+    std::vector<std::optional<RobotPlace>> places;  ///< by robot
+  };
+  using Robots = std::pair<std::size_t, std::size_t>;
+
+  void begin(std::int64_t frame);
+  std::vector<MeetingEvent> put_back();
+  void look_up(const NewKeyframe& keyframe);
+  void verify(const std::vector<OverlapFinder::Candidate>& candidates, const NewKeyframe& keyframe);
+  void reach(const Robots& robots, MeetingStep step, const NewKeyframe& keyframe);
+  [[nodiscard]] bool worth_deciding(const Robots& robots) const;
+  void decide(const Robots& robots, const NewKeyframe& keyframe);
+  void meet(const Robots& robots, const NewKeyframe& keyframe);
+  void take_back(const Robots& robots, const MergeEvidence& evidence, const NewKeyframe& keyframe);
+  [[nodiscard]] std::vector<MergeEvidence> merges() const;
+  void update_places();
+
   MapFusionOptions options_;
+  int lag_;
   const core::Executor* executor_;
-  std::vector<std::shared_ptr<const maps::Map>> maps_;  ///< by robot, as each was told last
-  std::vector<MapPart> parts_;                          ///< the same
-  std::vector<core::KeyframeId> last_;                  ///< by robot
-  OverlapFinder finder_;
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<VerifiedPair>> verified_;
-  std::map<std::pair<std::size_t, std::size_t>, bool> merged_;
+  Work work_;
+  std::vector<NewKeyframe> waiting_;  ///< for the work that is under way
+  std::vector<std::optional<RobotPlace>> places_;
+  bool busy_ = false;
+  std::int64_t due_ = 0;
+  core::Executor::Job job_;  ///< last: done before the rest goes
 };
 
 }  // namespace plumbline::mapping

@@ -4,6 +4,7 @@
 // What is said of a finished run: summary.json and timing.csv.
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -87,9 +88,22 @@ struct RunSummary {
     std::string a;
     std::string b;
     double time_s = -1.0;  ///< of the recordings, when it happened while mapping; negative: afterwards
+    /// When the fifth keyframe of those that agree was there on both sides, or the last of fewer; negative:
+    /// not known.
+    double evident_s = -1.0;
     mapping::MergeEvidence evidence;
   };
   std::vector<Merge> merges;
+  /// Two robots that met while they mapped, or a meeting that was taken back.
+  struct Meeting {
+    int number = 0;  ///< from 1 on
+    std::string a;
+    std::string b;
+    double time_s = 0.0;     ///< of the recordings
+    std::int64_t frame = 0;  ///< of the run
+    bool taken_back = false;
+  };
+  std::vector<Meeting> meetings;
   /// The path as it was written beside what the tracker saw from frame to frame.
   struct Path {
     maps::PathCheck check;
@@ -149,6 +163,9 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
 /// the memory the process held when the frame was done, MB.
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
                                 const std::vector<StageTiming>& parts, const dataset::FrameSource& source);
+
+/// What summary.json says of a merge.
+std::string evidence_json(const RunSummary::Merge& merge);
 
 /// A few lines for people.
 std::string to_text(const RunSummary& summary);

@@ -110,9 +110,10 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
   table.integer(prefix + "few_pairs", few_pairs, {1, 1000}, "",
                 "So few will do when they have few_inliers in common and nothing speaks for another answer");
   table.integer(prefix + "few_inliers", few_inliers, {1, 10000}, "",
-                "Points and lines (counted twice) in common that each of so few keyframes needs");
+                "Points and lines (counted twice) that so few keyframes need in common");
   table.number(prefix + "few_extent", few_extent_m, {0.0, 1000.0}, "m",
-               "How far both maps must extend: only then it is seen whether things repeat");
+               "How far both maps must reach along a direction that no surface holds: only then it is seen "
+               "whether things repeat");
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
                "How far apart the keyframes that agree lie, at least");
   table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
@@ -186,6 +187,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   fused.refused = graph.refused;
   fused.refusal = graph.refusal;
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
+  if (!options.merge_doubles) return fused;
   std::vector<PoseEdge> believed;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     if (i >= graph.extra.size() || !graph.extra[i].rejected) believed.push_back(edges[i]);

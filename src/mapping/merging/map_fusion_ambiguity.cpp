@@ -104,6 +104,11 @@ Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3&
   const MapOverlay laid(maps.parts[maps.a], maps.parts[maps.b]);
   Ambiguity result;
   result.overlap = laid.fit(a_from_b);
+  if (support(sets.sets.front()) < maps.options.min_pairs) {
+    const MapOverlay::Surfaces surfaces = laid.surfaces(a_from_b);
+    result.surfaces_there = surfaces.there;
+    result.surfaces_through = surfaces.through;
+  }
   std::vector<Alternative> others = alternatives(maps, sets, a_from_b, laid);
   maps.executor.parallel_for(others.size(), [&](std::size_t i) {
     check_against_maps(laid, a_from_b, result.overlap, maps.options, others[i]);
@@ -128,11 +133,12 @@ std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionO
                        percent(overlap.seen_through()));
   }
   const bool few = agreeing < options.min_pairs;
-  if (few && !fits_as_well(overlap, overlap, options)) {
+  const MapOverlay::Surfaces surfaces{ambiguity.surfaces_there, ambiguity.surfaces_through};
+  if (few && (surfaces.there < kSurfaces || surfaces.contradict(kNoAlternativeOfFewSpots, kSurfaces))) {
     return fmt::format(
-        "only {} keyframes agree on how the maps lie, and laid over each other the maps have too little in "
-        "common: of {} landmarks {} match, {} were seen through",
-        agreeing, overlap.expected, overlap.matched, overlap.contradicted);
+        "only {} keyframes agree on how the maps lie, and laid over each other {} pieces of surface are "
+        "there and {} were seen through",
+        agreeing, surfaces.there, surfaces.through);
   }
   // One keyframe may be mistaken; two that agree are an alternative. Few have no such alternatives at all.
   if (ambiguity.alternative >= (few ? 1 : 2) && ambiguity.alternative >= options.alternative * agreeing) {

@@ -2,12 +2,14 @@
 // Do two maps show the same place, and how do they lie to each other?
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
+#include <map>
+#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
 
+#include "merging/free_direction.hpp"
 #include "merging/map_fusion_sets.hpp"
 
 namespace plumbline::mapping {
@@ -36,44 +38,45 @@ double turn_between(const maps::Map& map, const std::vector<PlacePair>& pairs) {
   return most;
 }
 
-/// How far apart the cameras of a map lie: the diagonal of the box around them, metres.
-double extent(const maps::Map& map) {
-  Eigen::AlignedBox3d box;
-  for (const KeyframeId id : map.keyframe_ids()) box.extend(map.camera_from_world(id).inverse().translation);
-  return box.isEmpty() ? 0.0 : box.diagonal().norm();
-}
-
-/// Few keyframes will do where each shows a whole picture of the same: not by chance, and what merely looks
-/// alike has less in common. That things repeat is seen by maps that reach farther than the place itself.
-bool few_suffice(const PartPair& maps, const Consistency& consistency) {
-  const maps::Map& a = maps.map_a();
-  const maps::Map& b = maps.map_b();
-  const MapFusionOptions& options = maps.options;
-  if (extent(a) < options.few_extent_m || extent(b) < options.few_extent_m) return false;
-  std::set<KeyframeId> of_a;
-  std::set<KeyframeId> of_b;
+/// Points and lines (twice) in common: of each keyframe that agrees its best pair, on the side where that is
+/// less.
+int in_common(const maps::Map& a, const Consistency& consistency) {
+  std::map<KeyframeId, int> of_a;
+  std::map<KeyframeId, int> of_b;
   for (const VerifiedPair& pair : consistency.pairs) {
-    if (pair.evidence.points + 2 * pair.evidence.lines < options.few_inliers) continue;
+    const int inliers = pair.evidence.points + 2 * pair.evidence.lines;
     const bool query_of_a = a.has_keyframe(pair.query);
-    of_a.insert(query_of_a ? pair.query : pair.match);
-    of_b.insert(query_of_a ? pair.match : pair.query);
+    int& best_a = of_a[query_of_a ? pair.query : pair.match];
+    int& best_b = of_b[query_of_a ? pair.match : pair.query];
+    best_a = std::max(best_a, inliers);
+    best_b = std::max(best_b, inliers);
   }
-  return static_cast<int>(std::min(of_a.size(), of_b.size())) >= options.few_pairs;
+  const auto sum = [](const std::map<KeyframeId, int>& best) {
+    return std::accumulate(best.begin(), best.end(), 0,
+                           [](int all, const auto& one) { return all + one.second; });
+  };
+  return std::min(sum(of_a), sum(of_b));
 }
 
-std::string objection(const PartPair& maps, const Consistency& consistency) {
+std::string objection(const PartPair& maps, const Consistency& consistency, const Rigid3& a_from_b) {
   const MapFusionOptions& options = maps.options;
   if (consistency.verified == 0) return "no two keyframes were verified to show the same place";
-  if (consistency.agreeing < options.min_pairs) {
-    if (few_suffice(maps, consistency)) return {};
+  const bool few = consistency.agreeing < options.min_pairs;
+  if (const int common = in_common(maps.map_a(), consistency);
+      few && (consistency.agreeing < options.few_pairs || common < options.few_inliers)) {
     return fmt::format(
-        "only {} keyframes agree on how the maps lie ({} are needed, or {} with {} points and lines in "
-        "common "
-        "in maps of {} m and more)",
-        consistency.agreeing, options.min_pairs, options.few_pairs, options.few_inliers,
-        options.few_extent_m);
+        "only {} keyframes agree on how the maps lie, with {} points and lines in common ({} keyframes are "
+        "needed, or {} with {} in common)",
+        consistency.agreeing, common, options.min_pairs, options.few_pairs, options.few_inliers);
   }
-  if (consistency.span_m < options.min_span_m && consistency.span_rad < options.min_span_rad) {
+  const FreeDirection free = free_direction(maps.map_a(), maps.map_b(), a_from_b, consistency.pairs);
+  if ((few ? free.slides() : free.corridor()) && free.reach_m < options.few_extent_m) {
+    return fmt::format(
+        "what they have in common slides along itself as a {} does, and the maps reach over {:.1f} m there "
+        "({} m are needed to see whether things repeat)",
+        free.corridor() ? "corridor" : "wall", free.reach_m, options.few_extent_m);
+  }
+  if (!few && consistency.span_m < options.min_span_m && consistency.span_rad < options.min_span_rad) {
     return fmt::format(
         "the keyframes that agree lie within {:.2f} m and {:.2f} rad: one place that looks alike is not "
         "enough",
@@ -202,7 +205,7 @@ MergeEvidence decide_overlap(const std::vector<MapPart>& parts, std::size_t a, s
   merge.consistency = consistency_of(maps, sets);
   if (!sets.sets.empty()) merge.alignment = mean_alignment(maps, sets.places_of(0));
   merge.pairs = merge.consistency.pairs;
-  merge.refused = objection(maps, merge.consistency);
+  merge.refused = objection(maps, merge.consistency, merge.alignment.a_from_b);
   if (merge.refused.empty()) {
     merge.ambiguity = ambiguity_of(maps, sets, merge.alignment.a_from_b);
     merge.refused = objection(merge.ambiguity, merge.consistency.agreeing, options);

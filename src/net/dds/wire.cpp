@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "wire.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 namespace plumbline::net {
 namespace {
 
@@ -60,6 +63,12 @@ void to_wire(const Word& from, plumbline_wire_Word& to) {
   to.number = number(from.number);
   to.edition = from.edition;
   to.pieces = from.pieces;
+  put_text(from.place.frame_of, to.place.frame_of);
+  std::copy(from.place.frame_from_robot.begin(), from.place.frame_from_robot.end(),
+            to.place.frame_from_robot);
+  std::copy(from.place.frame_from_camera.begin(), from.place.frame_from_camera.end(),
+            to.place.frame_from_camera);
+  std::copy(from.place.covariance.begin(), from.place.covariance.end(), to.place.covariance);
 }
 
 Word from_wire(const plumbline_wire_Word& from) {
@@ -79,6 +88,12 @@ Word from_wire(const plumbline_wire_Word& from) {
   to.number = number(from.number);
   to.edition = from.edition;
   to.pieces = from.pieces;
+  to.place.frame_of = get_text(from.place.frame_of);
+  std::copy(std::begin(from.place.frame_from_robot), std::end(from.place.frame_from_robot),
+            to.place.frame_from_robot.begin());
+  std::copy(std::begin(from.place.frame_from_camera), std::end(from.place.frame_from_camera),
+            to.place.frame_from_camera.begin());
+  std::copy(std::begin(from.place.covariance), std::end(from.place.covariance), to.place.covariance.begin());
   return to;
 }
 

@@ -53,7 +53,7 @@ const Keys kAdvanced{
       "verify.min_overlap",
       "verify.max_contradiction",
       "verify.rounds"}},
-    {"merge", {"few_pairs", "few_inliers", "few_extent", "verifications"}},
+    {"merge", {"few_pairs", "few_inliers", "few_extent", "verifications", "lag"}},
     {"cloud", {"free_space_every", "smooth_position", "base"}},
     {"refine",
      {"pairs.min_overlap", "pairs.per_map", "icp.samples", "icp.iterations", "icp.max_rms", "icp.max_shift",

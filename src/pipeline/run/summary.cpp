@@ -191,7 +191,21 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
     }
     if (e.accepted) add_alignment(e.alignment, entry);
     if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
+    if (merge.evident_s >= 0.0) entry["evident_s"] = rounded(merge.evident_s);
     list.push_back(entry);
+  }
+  return list;
+}
+
+nlohmann::ordered_json meetings_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::Meeting& meeting : summary.meetings) {
+    list.push_back({{"number", meeting.number},
+                    {"a", meeting.a},
+                    {"b", meeting.b},
+                    {"time_s", rounded(meeting.time_s)},
+                    {"frame", meeting.frame},
+                    {"taken_back", meeting.taken_back}});
   }
   return list;
 }
@@ -340,6 +354,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"refine", refine_of(s.refine)},
       {"path", path_of(s)},
       {"merges", merges_of(s)},
+      {"meetings", meetings_of(s)},
       {"robots", robots_of(s)},
       {"cloud", cloud_of(s)},
       {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
@@ -351,6 +366,12 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
   // Names of files need not be UTF-8: replace what JSON cannot hold.
   return core::write_file(file,
                           json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+std::string evidence_json(const RunSummary::Merge& merge) {
+  RunSummary one;
+  one.merges.push_back(merge);
+  return merges_of(one).front().dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,

@@ -76,7 +76,7 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   for (mapping::MergeEvidence& merge : evidence) {
     const std::string& a = parts[merge.a].name;
     const std::string& b = parts[merge.b].name;
-    result.merges.push_back({a, b, -1.0, std::move(merge)});
+    result.merges.push_back({a, b, -1.0, -1.0, std::move(merge)});
     report(result.merges.back(), log);
   }
   result.unconnected = left_out(parts, fused.parts, result.merges);

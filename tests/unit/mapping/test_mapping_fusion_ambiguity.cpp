@@ -4,6 +4,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "../../../src/mapping/merging/free_direction.hpp"
 #include "../../../src/mapping/merging/map_overlay.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "poster_view.hpp"
@@ -139,7 +140,7 @@ TEST(FusionAmbiguity, FewKeyframesWillDoWhenMapsShowThatNothingRepeats) {
   other.few_extent_m = 1.0;  // the maps are of 0.5 m
   EXPECT_NE(decide(a, as_second(a), Rigid3{}, other).refused.find("are needed"), std::string::npos);
   other = few;
-  other.few_inliers = 5000;
+  other.few_inliers = 1000000;
   EXPECT_FALSE(decide(a, as_second(a), Rigid3{}, other).accepted);
   other = few;
   other.few_pairs = 49;
@@ -161,7 +162,42 @@ TEST(FusionAmbiguity, MapsWithoutLandmarksTellNothing) {
   MapFusionOptions few;
   few.min_pairs = 50;
   few.few_extent_m = 0.3;
-  EXPECT_NE(decide(a, as_second(a), Rigid3{}, few).refused.find("too little in common"), std::string::npos);
+  EXPECT_NE(decide(a, as_second(a), Rigid3{}, few).refused.find("0 pieces of surface"), std::string::npos);
+}
+
+/// Pieces of walls that face these directions, seen by cameras that go along x.
+maps::Map hall(const std::vector<Eigen::Vector3f>& normals, double way_m) {
+  maps::Map map;
+  for (int i = 0; i < 3; ++i) {
+    auto keyframe = std::make_shared<maps::Keyframe>();
+    keyframe->id = {0, i};
+    for (const Eigen::Vector3f& normal : normals) keyframe->surface.push_back({normal, normal, 0.01F});
+    map.add_keyframe(keyframe, Rigid3(Eigen::Matrix3d::Identity(), {-0.5 * way_m * i, 0.0, 0.0}));
+  }
+  return map;
+}
+
+FreeDirection free_of(const maps::Map& a) {
+  std::vector<VerifiedPair> pairs;
+  for (int i = 0; i < 3; ++i) pairs.push_back({{1, i}, {0, i}, {}});
+  return free_direction(a, as_second(a), Rigid3{}, pairs);
+}
+
+TEST(FusionAmbiguity, ACorridorSlidesAlongItselfAndARoomDoesNot) {
+  const Eigen::Vector3f x(1.0F, 0.0F, 0.0F);
+  const Eigen::Vector3f y(0.0F, 1.0F, 0.0F);
+  const Eigen::Vector3f z(0.0F, 0.0F, 1.0F);
+  EXPECT_FALSE(free_of(hall({x, y, z}, 1.0)).slides());
+  const FreeDirection corridor = free_of(hall({y, z}, 2.0));
+  EXPECT_TRUE(corridor.slides());
+  EXPECT_TRUE(corridor.corridor());
+  EXPECT_NEAR(corridor.reach_m, 2.0, 1e-9);
+  const FreeDirection wall = free_of(hall({z}, 2.0));
+  EXPECT_TRUE(wall.slides());
+  EXPECT_FALSE(wall.corridor());
+  EXPECT_NEAR(wall.reach_m, 2.0, 1e-9);
+  EXPECT_NEAR(free_of(hall({x, z}, 2.0)).reach_m, 0.0, 1e-9) << "across the way";
+  EXPECT_TRUE(free_of(hall({}, 1.0)).slides());
 }
 
 }  // namespace

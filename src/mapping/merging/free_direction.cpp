@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "merging/free_direction.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+namespace plumbline::mapping {
+namespace {
+
+/// How far a map's cameras went along a direction of its world, metres.
+double way_along(const maps::Map& map, const Eigen::Vector3d& direction) {
+  double least = std::numeric_limits<double>::max();
+  double most = std::numeric_limits<double>::lowest();
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    const double at = direction.dot(map.camera_from_world(id).inverse().translation);
+    least = std::min(least, at);
+    most = std::max(most, at);
+  }
+  return std::max(0.0, most - least);
+}
+
+}  // namespace
+
+FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geometry::Rigid3& a_from_b,
+                             const std::vector<VerifiedPair>& agreeing) {
+  std::set<core::KeyframeId> keyframes;
+  for (const VerifiedPair& pair : agreeing) keyframes.insert({pair.query, pair.match});
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  double count = 0.0;
+  for (const core::KeyframeId id : keyframes) {
+    const Eigen::Matrix3d a_from_camera = a.has_keyframe(id)
+                                              ? a.camera_from_world(id).inverse().rotation
+                                              : (a_from_b * b.camera_from_world(id).inverse()).rotation;
+    for (const maps::SurfaceSample& sample : (a.has_keyframe(id) ? a : b).keyframe(id).surface) {
+      const Eigen::Vector3d normal = a_from_camera * sample.normal.cast<double>();
+      scatter += normal * normal.transpose();
+      count += 1.0;
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter / std::max(1.0, count));
+  FreeDirection free{axes.eigenvalues()[0], axes.eigenvalues()[1], 0.0};
+  const auto way = [&](int axis) {
+    const Eigen::Vector3d direction = axes.eigenvectors().col(axis);
+    return std::min(way_along(a, direction), way_along(b, a_from_b.rotation.transpose() * direction));
+  };
+  free.reach_m = free.corridor() ? way(0) : std::hypot(way(0), way(1));
+  return free;
+}
+
+}  // namespace plumbline::mapping

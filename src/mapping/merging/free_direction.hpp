@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Where nothing but pictures says how two maps lie: a corridor or a lone wall slides along itself, and what
+// looks alike may stand there again and again.
+#include <Eigen/Core>
+#include <vector>
+
+#include "plumbline/mapping/map_fusion.hpp"
+
+namespace plumbline::mapping {
+
+/// The direction in which the surfaces of the keyframes that agree hold least.
+struct FreeDirection {
+  double held = 0.0;       ///< mean squared cosine of their normals with it: 0 nothing holds, 1/3 as all
+  double held_next = 0.0;  ///< the same of the next direction: small too in front of a lone wall
+  double reach_m =
+      0.0;  ///< how far the cameras of both maps went along it (or along the wall), the smaller way
+  /// Surfaces leave it free.
+  [[nodiscard]] bool slides() const { return held < kHeld; }
+  /// ... and hold in the two others: a corridor.
+  [[nodiscard]] bool corridor() const { return slides() && held_next > kHeldWell; }
+
+  static constexpr double kHeld = 0.01;  ///< as if one sample in a hundred faced it
+  static constexpr double kHeldWell = 0.1;
+};
+
+FreeDirection free_direction(const maps::Map& a, const maps::Map& b, const geometry::Rigid3& a_from_b,
+                             const std::vector<VerifiedPair>& agreeing);
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/pipeline/meeting_log.hpp"
+
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/viz/snapshot.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+using mapping::MeetingEvent;
+using mapping::MeetingStep;
+
+geometry::Trajectory keyframe_poses(const maps::Map& map, std::size_t robot) {
+  geometry::Trajectory poses;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    if (static_cast<std::size_t>(id.robot) != robot) continue;
+    poses.push_back({map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
+  }
+  return poses;
+}
+
+/// Surfaces that keyframes hold and landmarks, each with its robot.
+viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::string>& names) {
+  viz::Scene scene;
+  auto cloud = std::make_shared<pcl::PointCloud<pcl::PointXYZRGBNormal>>();
+  const auto add = [&](const Eigen::Vector3d& at, const Eigen::Vector3d& normal, std::int32_t robot) {
+    pcl::PointXYZRGBNormal point;
+    point.getVector3fMap() = at.cast<float>();
+    point.getNormalVector3fMap() = normal.cast<float>();
+    cloud->push_back(point);
+    scene.scalars.push_back(static_cast<float>(robot));
+  };
+  for (const KeyframeId id : preview.map.keyframe_ids()) {
+    const Rigid3 world_from_camera = preview.map.camera_from_world(id).inverse();
+    for (const maps::SurfaceSample& sample : preview.map.keyframe(id).surface) {
+      add(world_from_camera * sample.point.cast<double>(),
+          world_from_camera.rotation * sample.normal.cast<double>(), id.robot);
+    }
+  }
+  for (const core::PointId id : preview.map.point_ids()) {
+    const maps::MapPoint& point = preview.map.point(id);
+    add(point.position, point.normal, id.robot);
+  }
+  scene.cloud = cloud;
+  scene.robot_names = names;
+  for (const std::size_t robot : preview.parts) {
+    viz::CameraPath path;
+    path.name = names[robot];
+    path.color = viz::category_color(robot);
+    path.trajectory = keyframe_poses(preview.map, robot);
+    scene.paths.push_back(std::move(path));
+  }
+  return scene;
+}
+
+std::string text_of(const RunSummary::Meeting& meeting, const MeetingEvent& event,
+                    const std::vector<std::string>& names) {
+  nlohmann::ordered_json robots = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < event.preview->parts.size(); ++i) {
+    const Eigen::Matrix4d world = event.preview->anchor_from_part[i].isometry().matrix();
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    for (int row = 0; row < 4; ++row)
+      rows.push_back({world(row, 0), world(row, 1), world(row, 2), world(row, 3)});
+    robots.push_back({{"name", names[event.preview->parts[i]]}, {"frame_from_robot", rows}});
+  }
+  nlohmann::ordered_json json = {
+      {"number", meeting.number},
+      {"preview", true},
+      {"a", meeting.a},
+      {"b", meeting.b},
+      {"frame", event.frame},
+      {"keyframe",
+       {{"robot", names[static_cast<std::size_t>(event.keyframe.robot)]}, {"number", event.keyframe.index}}},
+      {"frame_of", names[event.preview->parts.front()]},
+      {"robots", robots},
+      {"pairs_refused_by_graph", event.preview->rejected},
+      {"evidence",
+       nlohmann::ordered_json::parse(evidence_json({meeting.a, meeting.b, -1.0, -1.0, event.evidence}))}};
+  if (meeting.time_s >= 0.0) json["time_s"] = meeting.time_s;
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector<std::string>& names,
+                                    const std::string& when, double time_s) {
+  const std::string& a = names[event.a];
+  const std::string& b = names[event.b];
+  const std::string keyframe = fmt::format("keyframe {} of {}", event.keyframe.index,
+                                           names[static_cast<std::size_t>(event.keyframe.robot)]);
+  switch (event.step) {
+    case MeetingStep::kNone:
+      return {};
+    case MeetingStep::kSimilar:
+      log_->debug(fmt::format("{} and {} look similar {} ({})", a, b, when, keyframe));
+      return {};
+    case MeetingStep::kVerified:
+      log_->debug(fmt::format("{} and {}: a common place is verified {} ({})", a, b, when, keyframe));
+      return {};
+    case MeetingStep::kLocalMapAsked:
+      log_->debug(fmt::format("{} and {}: the local maps around it are asked for {}", a, b, when));
+      return {};
+    case MeetingStep::kMet:
+      meetings_.push_back({static_cast<int>(meetings_.size()) + 1, a, b, time_s, event.frame, false});
+      log_->info(
+          fmt::format("{} and {} have met {}: {} keyframes agree to {:.0f} mm; {} maps are in one frame now",
+                      a, b, when, event.evidence.consistency.agreeing,
+                      1e3 * event.evidence.alignment.spread_m, event.preview->parts.size()));
+      return write(event, names, when);
+    case MeetingStep::kTakenBack:
+      meetings_.push_back({static_cast<int>(meetings_.size()) + 1, a, b, time_s, event.frame, true});
+      log_->warning(
+          fmt::format("{} and {} have not met after all, {}: {}", a, b, when, event.evidence.refused));
+      return {};
+  }
+  return {};
+}
+
+core::Result<void> MeetingLog::write(const MeetingEvent& event, const std::vector<std::string>& names,
+                                     const std::string& when) {
+  const RunSummary::Meeting& meeting = meetings_.back();
+  const std::filesystem::path folder =
+      output_ / "meetings" / fmt::format("{:04}_{}_{}", meeting.number, meeting.a, meeting.b);
+  std::error_code ec;
+  std::filesystem::create_directories(folder, ec);
+  if (ec) return core::output_error(fmt::format("{}: cannot be made ({})", folder.string(), ec.message()));
+  for (const std::size_t robot : event.preview->parts) {
+    auto written = dataset::write_trajectory(folder / (names[robot] + ".txt"),
+                                             keyframe_poses(event.preview->map, robot));
+    if (!written) return written;
+  }
+  viz::Scene scene = scene_of(*event.preview, names);
+  scene.title = fmt::format("{} and {} have met {}", meeting.a, meeting.b, when);
+  pictures_.emplace_back(folder / "map.png", std::move(scene));
+  return core::write_file(folder / "meeting.json", text_of(meeting, event, names));
+}
+
+core::Result<void> MeetingLog::draw() {
+  for (const auto& [file, scene] : std::exchange(pictures_, {})) {
+    viz::SnapshotOptions options;
+    options.view = viz::View::kTop;
+    options.color = viz::ColorMode::kRobot;
+    if (auto drawn = viz::render_snapshot(scene, options, file); !drawn) return drawn;
+  }
+  return {};
+}
+
+}  // namespace plumbline::pipeline
