@@ -86,7 +86,8 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
     const Robust pixel = huber(r.head<2>().squaredNorm(), options.point_loss);
     n.cost += options.point_weight * pixel.cost;
     double depth_weight = 0.0;
-    if (rows == 3) {
+    const bool has_depth = rows == 3 && options.depth_rows;
+    if (has_depth) {
       const Robust depth = huber(r(2) * r(2), options.plane_loss);
       // A corner whose picture does not fit has no say about depth either.
       depth_weight = options.point_weight * depth.weight * pixel.weight;
@@ -95,7 +96,7 @@ NormalEquations evaluate(const PoseProblem& problem, const Rigid3& pose, const P
     if constexpr (kDerivatives) {
       sums.add(j3.row(0), r(0), options.point_weight * pixel.weight);
       sums.add(j3.row(1), r(1), options.point_weight * pixel.weight);
-      if (rows == 3) sums.add(j3.row(2), r(2), depth_weight);
+      if (has_depth) sums.add(j3.row(2), r(2), depth_weight);
     }
   }
   const Eigen::Matrix3d projection =
@@ -167,6 +168,7 @@ void PoseSolverOptions::declare(core::OptionTable& table) {
                "Huber threshold of grey values, standard deviations");
   table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
   table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
+  table.boolean("solver.depth_rows", depth_rows, "Points are held by their depth, too");
   table.number("solver.plane_weight", plane_weight, {0.0, 100.0}, "", "Weight of all depth samples together");
   table.number("solver.photometric_weight", photometric_weight, {0.0, 100.0}, "",
                "Weight of all grey values together");

@@ -108,6 +108,11 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("photometric", photometric, "Align grey values with keyframes directly");
   table.boolean("align_stamps", align_stamps,
                 "Bring colour and depth stamped apart together with the motion model");
+  table.boolean("thumbnails", thumbnails, "Small pictures tell where the camera may be");
+  table.boolean("motion_prior", motion_prior, "The motion model holds what measurements leave open");
+  table.boolean(
+      "pnp_start", pnp_start,
+      "Every frame begins with PnP over descriptors, where these are enough, not with the motion model");
   table.number(
       "readout", readout_s, {0.0, 0.1}, "s",
       "Rolling shutter: time from the first to the last row of a picture; 0: as the camera's file says");
@@ -209,7 +214,7 @@ TrackResult Tracker::estimate(const maps::Map& map, const sensor::RgbdFrame& fra
                           : surface_alone             ? Motion::kAlone
                           : knows_motion(frame.stamp) ? Motion::kLikely
                                                       : Motion::kUnknown;
-    problem.prior = motion_prior(result.estimate.information, predicted, motion);
+    if (options_.motion_prior) problem.prior = motion_prior(result.estimate.information, predicted, motion);
     if (round.gate) {
       drop_outliers(optimize::point_errors(problem, pose), kPointGate, result.points, problem.points);
       drop_outliers(optimize::line_errors(problem, pose), kLineGate, result.lines, problem.lines);

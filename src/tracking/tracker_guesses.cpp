@@ -13,10 +13,16 @@ Tracker::Guesses Tracker::guesses(const maps::Map& map, const sensor::RgbdFrame&
                                   const features::FrameFeatures& features) const {
   Guesses result;
   const Rigid3 predicted = predict(frame.stamp);
-  const ThumbnailAlignment alignment =
-      align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
-                       predicted * last_.camera_from_world.inverse());
-  if (alignment.better) result.poses.push_back(alignment.current_from_previous * last_.camera_from_world);
+  if (options_.pnp_start) {
+    const auto seen = relocalise(map, {local_map_.reference}, features, camera_, options_.min_inliers);
+    if (seen) result.poses.push_back(seen->camera_from_world);
+  }
+  if (options_.thumbnails) {
+    const ThumbnailAlignment alignment =
+        align_thumbnails(last_.thumbnail, last_.thumbnail_depth, features.thumbnail, camera_,
+                         predicted * last_.camera_from_world.inverse());
+    if (alignment.better) result.poses.push_back(alignment.current_from_previous * last_.camera_from_world);
+  }
   result.poses.push_back(predicted);
   result.poses.push_back(last_.camera_from_world);
   if (options_.photometric)
@@ -70,7 +76,8 @@ std::vector<Tracker::Guess> Tracker::guesses_by_picture(const maps::Map& map,
                                                         const features::FrameFeatures& features) const {
   constexpr int kLookAlikes = 24;
   constexpr std::size_t kAligned = 3;
-  const std::vector<LookAlike> alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
+  std::vector<LookAlike> alike;
+  if (options_.thumbnails) alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
   std::vector<Guess> guesses;
   if (options_.points) {
     std::vector<core::KeyframeId> candidates;

@@ -15,6 +15,9 @@ namespace plumbline::mapping {
 struct KeyframeRuleOptions {
   enum class Rule { kPlain, kCone };
   Rule rule = Rule::kPlain;
+  /// When a keyframe is made whatever the rule says: tracking gets thin; it is nearly lost; never.
+  enum class Urgent { kThin, kNearlyLost, kOff };
+  Urgent urgent = Urgent::kThin;
   int min_frames = 2;
   int max_frames = 60;
   double min_shared = 0.6;
@@ -28,6 +31,8 @@ struct KeyframeRuleOptions {
   int cone_min_points = 50;
   int cone_min_lines = 15;
   double cone_min_change_rad = 0.1745;
+  Balance cone_balance = Balance::kAbove;
+  double cone_epsilon = 1.0;
   void declare(core::OptionTable& table);
 };
 
@@ -41,6 +46,8 @@ struct ConeTerms {
   bool fires = false;      ///< D_c above its threshold, and balanced
 };
 
+enum class KeyframeCause { kNone, kPlain, kCone, kUrgent };
+
 /// The terms of one decision, as written to frames.csv.
 struct KeyframeDecision {
   int frames_since = 0;
@@ -51,7 +58,8 @@ struct KeyframeDecision {
   bool mapper_idle = true;
   ConeTerms cone;
   bool wanted = false;
-  bool urgent = false;  ///< tracking is about to be lost
+  bool urgent = false;                         ///< tracking is about to be lost
+  KeyframeCause cause = KeyframeCause::kNone;  ///< of those that are wanted
 };
 
 /// What the rule knows besides the track.
@@ -63,8 +71,8 @@ struct KeyframeCircumstances {
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
 /// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the picture; where next
-/// to no landmark knows its normal the plain rule speaks. Both: at once when tracking gets thin, and when
-/// depth is back after a keyframe that had none.
+/// to no landmark knows its normal, as on what is lit but not measured, the plain rule speaks. Both: at once
+/// when tracking gets thin, and when depth is back after a keyframe that had none.
 class KeyframeRule {
  public:
   explicit KeyframeRule(const KeyframeRuleOptions& options) : options_(options) {}
@@ -83,6 +91,8 @@ class KeyframeRule {
 
  private:
   [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;
+  [[nodiscard]] bool is_urgent(const KeyframeDecision& decision, int tracked) const;
+  [[nodiscard]] bool knows_cones() const;
   ConeTerms look_at_cones(const maps::Map& map, core::KeyframeId reference,
                           const tracking::TrackResult& track, const sensor::Pinhole& camera,
                           const KeyframeCircumstances& circumstances);

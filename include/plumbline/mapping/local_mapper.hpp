@@ -24,6 +24,7 @@ struct LocalMapperOptions {
   double max_landmark_turn_rate =
       0.6;  ///< rad/s; pictures taken while turning faster make and merge no landmarks
   LandmarkCullingOptions culling;
+  bool depth_normals = false;  ///< landmarks' normals from the depth image, not from surface samples
   bool triangulate = true;
   TriangulationOptions triangulation;
   bool fuse = true;
@@ -62,7 +63,7 @@ class LocalMapper {
                           const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
                           core::KeyframeId reference, double turn_rate);
 
-  /// Counts which landmarks a tracked frame should have seen and did.
+  /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
   void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
 
   /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
@@ -76,7 +77,8 @@ class LocalMapper {
   void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:
-  std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe);
+  static void count(maps::Map& map, const tracking::TrackResult& track);
+  std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
   void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestPicture& picture);
   [[nodiscard]] bool sheared(const maps::Map& map, core::KeyframeId keyframe) const;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kDepthIsBack = 50;     // corners with depth
 constexpr double kWellWithin = 0.8;  // of the limits: else the next frame would ask again
+constexpr int kFewNormals = 10;      // landmarks: fewer say nothing about cones
 
 struct ViewOverlap {
   double overlap = 1.0;
@@ -83,6 +84,16 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "", "The same of lines");
   table.number("keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
                "Cone rule: points whose viewing angle changed more are asked to spread over the picture");
+  table.choice("keyframe.cone_balance", cone_balance,
+               {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
+               "Cone rule: how far these must be spread (ECOG against its threshold)");
+  table.number("keyframe.cone_epsilon", cone_epsilon, {0.0, 100.0}, "",
+               "Cone rule: weight of lost matches in the threshold");
+  table.choice(
+      "keyframe.urgent", urgent,
+      {{"thin", Urgent::kThin}, {"nearly_lost", Urgent::kNearlyLost}, {"off", Urgent::kOff}},
+      "When a keyframe is made whatever the rule says: thin: much less is tracked than after the last "
+      "one, or min_features are not reached; nearly_lost: not even half of min_features; off: never");
 }
 
 bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {
@@ -92,6 +103,19 @@ bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {
       d.frames_since >= options_.max_frames &&
       (d.parallax > 0.25 * options_.max_parallax || d.rotation_rad > 0.25 * options_.max_rotation_rad);
   return moved || left || starving;
+}
+
+bool KeyframeRule::is_urgent(const KeyframeDecision& d, int tracked) const {
+  if (options_.urgent == KeyframeRuleOptions::Urgent::kOff) return false;
+  if (options_.urgent == KeyframeRuleOptions::Urgent::kNearlyLost)
+    return 2 * tracked < options_.min_features && d.shared < 0.8;
+  return d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap ||
+         (tracked < options_.min_features && d.shared < 0.8);
+}
+
+/// Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
+bool KeyframeRule::knows_cones() const {
+  return options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= kFewNormals;
 }
 
 ConeTerms KeyframeRule::look_at_cones(const maps::Map& map, core::KeyframeId reference,
@@ -117,13 +141,14 @@ ConeTerms KeyframeRule::look_at_cones(const maps::Map& map, core::KeyframeId ref
   const int common = landmarks_in_common(map, reference, track);
   if (first_.keyframe != reference) first_ = {reference, common, terms.now};
   terms.shared = first_.landmarks > 0 ? static_cast<double>(common) / first_.landmarks : 1.0;
-  terms.threshold = cone_threshold(terms.now, first_.counts);
+  terms.threshold = cone_threshold(terms.now, first_.counts, options_.cone_epsilon);
   terms.balance = grid_balance(grid);
   terms.candidate = (frames_since_ > options_.cone_patience || circumstances.mapper_idle) &&
                     enough(track.points.size(), options_.cone_min_points, track.visible_points.size()) &&
                     enough(track.lines.size(), options_.cone_min_lines, track.visible_lines.size()) &&
                     terms.shared <= options_.cone_max_shared;
-  terms.fires = terms.now.changed > terms.threshold.adaptive && terms.balance.ecog > terms.balance.offset;
+  terms.fires =
+      terms.now.changed > terms.threshold.adaptive && balanced(terms.balance, options_.cone_balance);
   return terms;
 }
 
@@ -141,16 +166,15 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId ref
   d.shared = features_after_keyframe_ > 0 ? static_cast<double>(tracked) / features_after_keyframe_ : 1.0;
   d.parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
-  d.urgent = d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap ||
-             (tracked < options_.min_features && d.shared < 0.8);
+  d.urgent = is_urgent(d, tracked);
   if (map.keyframe(reference).surface.empty() && circumstances.depth_points >= kDepthIsBack) d.urgent = true;
   d.mapper_idle = circumstances.mapper_idle;
   d.cone = look_at_cones(map, reference, track, camera, circumstances);
-  // Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
-  const bool by_cones =
-      options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= options_.cone_min_points;
+  const bool by_cones = knows_cones();
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
+  if (d.wanted)
+    d.cause = !wants ? KeyframeCause::kUrgent : by_cones ? KeyframeCause::kCone : KeyframeCause::kPlain;
   return d;
 }
 

@@ -298,6 +298,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
         {"longest_loss", s.frames.longest_loss},
         {"tracked_percent", rounded(s.frames.tracked_percent())}}},
       {"keyframes", s.keyframes},
+      {"keyframe_causes", {{"cone", s.causes.cone}, {"urgent", s.causes.urgent}, {"plain", s.causes.plain}}},
       {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
       {"loops",
        {{"candidates", s.loops.candidates},

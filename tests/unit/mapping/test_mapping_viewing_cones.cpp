@@ -47,6 +47,20 @@ TEST(ViewingCones, TheThresholdFollowsItsEquations) {
   EXPECT_NEAR(t.adaptive, (1.0 + 0.25 - 0.3 + 0.1) * 16.25, 1e-12);
 }
 
+TEST(ViewingCones, EpsilonWeighsLostMatches) {
+  const ConeThreshold t = cone_threshold({150, 700, 60}, {200, 800, 20}, 2.0);
+  EXPECT_NEAR(t.adaptive, (1.0 + 2.0 * 0.25 - 0.3 + 0.1) * t.initial, 1e-12);
+}
+
+TEST(ViewingCones, BalanceIsAskedForAsOneLikes) {
+  const GridBalance even{0.8, 0.1};
+  EXPECT_TRUE(balanced(even, Balance::kAbove));
+  EXPECT_FALSE(balanced(even, Balance::kBelow));
+  EXPECT_FALSE(balanced({}, Balance::kAbove));
+  EXPECT_FALSE(balanced({}, Balance::kBelow)) << "nothing is counted";
+  EXPECT_TRUE(balanced({}, Balance::kOff));
+}
+
 TEST(ViewingCones, EachTermPushesItsWay) {
   const ConeCounts first{200, 800, 20};
   const double usual = cone_threshold({200, 800, 50}, first).adaptive;
