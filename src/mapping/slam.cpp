@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/mapping/slam.hpp"
 
-#include <algorithm>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <utility>
 
-#include "plumbline/tracking/surface_sampler.hpp"
+#include "loop_closing/relocalisation_check.hpp"
 
 namespace plumbline::mapping {
 
@@ -30,11 +28,6 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
 }
 
-static int points_with_depth(const features::FrameFeatures& features) {
-  return static_cast<int>(std::count_if(features.points.begin(), features.points.end(),
-                                        [](const features::PointFeature& f) { return f.depth > 0.0F; }));
-}
-
 static SightingNoise noise_of(const SlamOptions& options) {
   SightingNoise noise = options.mapper.bundle_noise;
   noise.orb_scale_factor = options.tracker.association.scale_factor;
@@ -46,236 +39,132 @@ static LocalMapperOptions mapper_of(const SlamOptions& options) {
   LocalMapperOptions mapper = options.mapper;
   mapper.triangulation.scale_factor = options.tracker.association.scale_factor;
   mapper.triangulation.aligned = options.mapper.bundle_noise.aligned;
+  mapper.edges = options.mapper.edges && options.tracker.depth;
   return mapper;
+}
+
+FrameReport FrameReport::of(const sensor::RgbdFrame& frame, const tracking::TrackResult& track) {
+  FrameReport report;
+  report.frame_index = frame.index;
+  report.stamp = frame.stamp;
+  report.state = track.state;
+  report.reference = track.reference;
+  report.points = track.estimate.points;
+  report.lines = track.estimate.lines;
+  report.surface = track.estimate.planes;
+  report.photometric = track.estimate.photometric;
+  report.min_eigenvalue = track.min_eigenvalue;
+  report.degenerate_directions = track.degenerate_directions;
+  report.relocalised = track.relocalised;
+  return report;
 }
 
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
            const core::Executor& executor, core::Log& log)
     : options_(options),
-      camera_(camera),
-      robot_(robot),
-      log_(&log),
       tracker_(options.tracker, camera),
-      rule_(options.keyframe),
-      mapper_(mapper_of(options), camera),
+      keyframe_rule_(options.keyframe, camera),
+      mapper_(mapper_of(options), camera, robot),
       bundle_({options.mapper.bundle_keyframes, noise_of(options)}, options.mapper.bundle_options,
-              options.bundle_lag, camera, executor),
+              options.bundle_lag, camera, executor, log),
       closer_(options.loops, camera) {
   if (!options.loops.enabled) return;
   constexpr std::size_t kLookAlikes = 12;
   tracker_.set_place_finder([this](const features::FrameFeatures& picture) {
     return closer_.look_alikes(map_, picture, kLookAlikes);
   });
-  tracker_.set_place_judge([this](const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
-                                  core::KeyframeId keyframe, const Rigid3& camera_from_world) {
-    return is_place(frame, features, keyframe, camera_from_world);
+  tracker_.set_place_judge([this, check = RelocalisationCheck{camera, options.loops.verify,
+                                                              options.loops.seed, options.mapper.surface}](
+                               const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                               core::KeyframeId keyframe, const Rigid3& found_at) {
+    return check.passes(map_, tracker_.camera_from_world(), frame, features, keyframe, found_at);
   });
 }
 
-Slam::~Slam() = default;
-
-void Slam::set_shutter(std::optional<double> readout_s) {
-  if (options_.tracker.readout_s > 0.0 || !readout_s) return;
-  tracker_.set_readout(*readout_s);
-  all_rows_at_once_ = *readout_s == 0.0;
-}
-
-/// Keyframes know how fast the camera turned because that shears their pictures; not with all rows at once.
-double Slam::shear_rate() const { return all_rows_at_once_ ? 0.0 : tracker_.turn_rate(); }
-
-/// A camera that turns up far from where it was lost must pass as a loop would: corridors look alike from
-/// both ends. Near by there is nothing to confuse.
-bool Slam::is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
-                    core::KeyframeId keyframe, const Rigid3& camera_from_world) const {
-  constexpr double kNear_m = 0.6;
-  constexpr double kNear_rad = 0.6;
-  constexpr double kSame_m = 0.1;
-  constexpr double kSame_rad = 0.05;
-  const auto apart = [](const Rigid3& a, const Rigid3& b) {
-    return (a.inverse().translation - b.inverse().translation).norm();
-  };
-  const auto turned = [](const Rigid3& a, const Rigid3& b) {
-    return geometry::rotation_angle(a.rotation * b.rotation.transpose());
-  };
-  if (apart(camera_from_world, last_camera_from_world_) < kNear_m &&
-      turned(camera_from_world, last_camera_from_world_) < kNear_rad) {
-    return true;
+FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& features) {
+  BundleReport bundle;
+  if (bundle_.due(++frame_count_)) put_back_bundle(bundle);  // section 3.3, of an earlier keyframe
+  last_track_ = tracker_.track(map_, frame, features);       // section 3.2
+  const tracking::TrackResult& track = last_track_;
+  FrameReport report = FrameReport::of(frame, track);
+  report.bundle = bundle;
+  if (track.state == tracking::TrackState::kInitialising) {
+    if (can_start_map(frame)) start_map(frame, features, report);
+    return report;
   }
-  if (features.points.empty() && features.lines.empty()) return true;  // depth alone: nothing to match
-  auto seen = std::make_shared<maps::Keyframe>();
-  seen->id = {robot_, 0};
-  seen->stamp = frame.stamp;
-  seen->features = std::make_shared<features::FrameFeatures>(features);
-  seen->surface = tracking::sample_surface(frame.depth, camera_, options_.mapper.surface);
-  maps::Map probe;
-  probe.add_keyframe(seen, camera_from_world);
-  const PlaceVerification found = verify_place({&probe, seen->id, camera_}, {&map_, keyframe, camera_},
-                                               options_.loops.verify, options_.loops.seed);
-  if (!found.accepted) return false;
-  const Rigid3 verified = found.query_from_match * map_.camera_from_world(keyframe);
-  return apart(camera_from_world, verified) < kSame_m && turned(camera_from_world, verified) < kSame_rad;
+  maps::FramePose pose = frames_.measured(map_, frame.stamp, track);
+  if (pose.tracked) {
+    mapper_.count_observations(map_, track);  // section 3.3: the share of keyframes that find a landmark
+    report.decision = keyframe_rule_.decide(map_, track, bundle_.idle());  // section 4.1
+    if (report.decision.reuse.valid()) switch_reference(report);
+    if (report.decision.wanted) insert_keyframe(frame, features, report);
+  }
+  frames_.record(map_, pose, tracker_.reference(),
+                 pose.tracked ? tracker_.camera_from_world() : track.camera_from_world);
+  if (options_.tracker.align_stamps) report.depth_from_camera = frames_.depth_from_camera(map_, frame);
+  return report;
 }
 
-void Slam::start_map(const sensor::RgbdFrame& frame,
-                     const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report) {
-  tracking::TrackResult origin;
-  report.keyframe = mapper_.insert(map_, robot_, frame, features, origin, {}, {}, 0.0);
-  remember_picture(frame, report.keyframe);
-  report.reference = report.keyframe;
+void Slam::start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
+  report.keyframe = report.reference = mapper_.insert(map_, frame, last_track_, features->levels);
   report.state = tracking::TrackState::kTracked;
-  rule_.keyframe_made();
-  last_camera_from_world_ = origin.camera_from_world;
-  tracker_.map_changed(map_, report.keyframe, origin.camera_from_world);
-  if (options_.loops.enabled) close_loops(report.keyframe);
+  tracker_.add_keyframe(report.keyframe, frame, last_track_);
+  set_reference(report.keyframe);
+  close_loops(report.keyframe);
+  maps::FramePose origin;
+  origin.stamp = frame.stamp;
+  origin.tracked = true;
+  frames_.record(map_, origin, report.keyframe, {});
+}
+
+void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
+  const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels);  // section 3.3
+  mapper_.add_surface_edges(map_, id, frame.depth, last_track_, tracker_.photometric(),
+                            tracker_.local_map().keyframes);  // METHOD section 6: edges with covariance
+  tracker_.add_keyframe(id, frame, last_track_);
+  mapper_.refine(map_, id);  // section 3.3: merges duplicates, culls
+  set_reference(id);
+  close_loops(id);  // section 4.2
+  report.keyframe = report.reference = id;
+  if (!options_.mapper.bundle) return;
+  bundle_.request(map_, id,
+                  frame_count_);  // section 3.3: local bundle adjustment, put back `lag` frames later
+  if (bundle_.due(frame_count_)) put_back_bundle(report.bundle);
+}
+
+/// The map would grow as long as the camera moves, however often it has been there.
+void Slam::switch_reference(FrameReport& report) {
+  report.reference = report.decision.reuse;
+  set_reference(report.reference);
+}
+
+void Slam::set_reference(core::KeyframeId keyframe) {
+  keyframe_rule_.keyframe_made();
+  tracker_.map_changed(map_, keyframe, tracker_.camera_from_world());
 }
 
 /// What the tracker knows moves with its reference keyframe. The motion model is a motion between cameras:
 /// the world's place does not matter to it.
 void Slam::put_back_bundle(BundleReport& report) {
-  const std::optional<MapCorrection> correction = bundle_.commit(map_, clock_, report);
-  if (report.refused) {
-    ++refused_bundles_;
-    log_->warning("a local bundle was not put into the map: " + report.refused->text());
-  }
+  const std::optional<MapCorrection> correction = bundle_.commit(map_, frame_count_, report);
   if (!correction) return;
   const auto moved = correction->find(tracker_.reference());
-  if (moved != correction->end()) last_camera_from_world_ = last_camera_from_world_ * moved->second.inverse();
-  tracker_.map_changed(map_, tracker_.reference(), last_camera_from_world_);
-}
-
-/// The motion between the last two frames, per second, as the tracker had it.
-static geometry::Vector6d last_motion(const std::vector<maps::FramePose>& frames, const maps::Map& map) {
-  if (frames.size() < 2) return geometry::Vector6d::Zero();
-  const maps::FramePose& now = frames[frames.size() - 1];
-  const maps::FramePose& before = frames[frames.size() - 2];
-  constexpr double kLongest_s = 0.5;
-  const double dt = now.stamp - before.stamp;
-  if (!now.tracked || !before.tracked || !(dt > 1e-4 && dt < kLongest_s)) return geometry::Vector6d::Zero();
-  const Rigid3 now_from_world = now.camera_from_reference * map.camera_from_world(now.reference);
-  const Rigid3 before_from_world = before.camera_from_reference * map.camera_from_world(before.reference);
-  return geometry::log_se3(now_from_world * before_from_world.inverse()) / dt;
-}
-
-/// How the camera moved from the colour to the depth image, with the motion that was found for this frame.
-static Rigid3 motion_to_depth(const sensor::RgbdFrame& frame, const std::vector<maps::FramePose>& frames,
-                              const maps::Map& map) {
-  constexpr double kMost_s = 0.05;
-  const double dt = frame.depth_stamp - frame.stamp;
-  if (dt == 0.0 || std::abs(dt) > kMost_s) return {};
-  return geometry::exp_se3(last_motion(frames, map) * dt);
-}
-
-FrameReport Slam::process(const sensor::RgbdFrame& frame,
-                          std::shared_ptr<const features::FrameFeatures> features) {
-  FrameReport report;
-  report.frame_index = frame.index;
-  report.stamp = frame.stamp;
-  ++clock_;
-  if (bundle_.due(clock_)) put_back_bundle(report.bundle);
-  const std::shared_ptr<const features::FrameFeatures> taken = features;
-  last_track_ = tracker_.track(map_, frame, features);
-  if (last_track_.features != nullptr) features = last_track_.features;
-  const tracking::TrackResult& track = last_track_;
-  report.state = track.state;
-  if (track.state == tracking::TrackState::kInitialising) {
-    if (!can_start_map(frame)) return report;
-    start_map(frame, features, report);
-    remember_pose(frame.stamp, Rigid3{}, true);
-    return report;
-  }
-  report.reference = tracker_.reference();
-  report.points = track.estimate.points;
-  report.lines = track.estimate.lines;
-  report.surface = track.estimate.planes;
-  report.photometric = track.estimate.photometric;
-  report.min_eigenvalue = track.min_eigenvalue;
-  report.weak_directions = track.weak_directions;
-  report.relocalised = track.relocalised;
-  if (track.state != tracking::TrackState::kTracked) {
-    remember_pose(frame.stamp, track.camera_from_world, false);
-    return report;
-  }
-  last_camera_from_world_ = track.camera_from_world;
-  const auto step = motion_since_last(track.camera_from_world);  // in the map that it was tracked in
-  mapper_.count_sightings(map_, track);
-  report.decision =
-      rule_.decide(map_, tracker_.reference(), track, camera_,
-                   {static_cast<int>(features->points.size()), bundle_.idle(), points_with_depth(*features)});
-  if (report.decision.wanted && !report.decision.urgent) return_to_known_ground(report);
-  if (report.decision.wanted) make_keyframe(frame, features, taken->levels, report);
-  remember_pose(frame.stamp, last_camera_from_world_, true);
-  frames_.back().camera_from_previous = step;
-  frames_.back().step_sigma_m = track.sigma_m();
-  if (options_.tracker.align_stamps) report.depth_from_camera = motion_to_depth(frame, frames_, map_);
-  return report;
-}
-
-void Slam::return_to_known_ground(FrameReport& report) {
-  const core::KeyframeId known = rule_.known_ground(map_, tracker_.reference(), last_track_, camera_);
-  if (!known.valid()) return;
-  report.decision.wanted = false;
-  report.reference = known;
-  rule_.keyframe_made();
-  tracker_.map_changed(map_, known, last_camera_from_world_);
-}
-
-void Slam::make_keyframe(const sensor::RgbdFrame& frame,
-                         const std::shared_ptr<const features::FrameFeatures>& features,
-                         const std::vector<cv::Mat>& levels, FrameReport& report) {
-  report.keyframe =
-      mapper_.insert(map_, robot_, frame, features, last_track_, levels, tracker_.reference(), shear_rate());
-  report.reference = report.keyframe;
-  if (options_.mapper.edges && options_.tracker.depth) {
-    mapper_.add_surface_edges(map_, report.keyframe, frame.depth, last_track_, tracker_.photometric(),
-                              tracker_.local_map().keyframes);
-  }
-  remember_picture(frame, report.keyframe);
-  mapper_.refine(map_, report.keyframe);
-  rule_.keyframe_made();
-  tracker_.map_changed(map_, report.keyframe, last_camera_from_world_);
-  if (options_.loops.enabled) close_loops(report.keyframe);
-  if (!options_.mapper.bundle) return;
-  bundle_.request(map_, report.keyframe, clock_);
-  if (bundle_.due(clock_)) put_back_bundle(report.bundle);  // without a lag
-}
-
-void Slam::remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe) {
-  if (!options_.tracker.photometric || last_track_.photometric == nullptr) return;
-  tracker_.add_photometric(
-      keyframe,
-      std::make_shared<const features::PhotometricSamples>(features::sample_photometric(
-          *last_track_.photometric, frame.depth, camera_, last_track_.depth_from_camera.inverse())));
+  const Rigid3 last = tracker_.camera_from_world();
+  tracker_.map_changed(map_, tracker_.reference(),
+                       moved == correction->end() ? last : last * moved->second.inverse());
 }
 
 void Slam::restore(maps::Map map, std::vector<maps::FramePose> frames) {
   if (map.keyframe_count() == 0) return;
   map_ = std::move(map);
-  frames_ = std::move(frames);
-  clock_ = static_cast<std::int64_t>(frames_.size());
+  frames_ = FrameTrajectory(std::move(frames));
+  frame_count_ = static_cast<std::int64_t>(frame_poses().size());
   const core::KeyframeId newest = map_.keyframe_ids().back();
-  last_camera_from_world_ = map_.camera_from_world(newest);
-  tracker_.restore(map_, newest, last_camera_from_world_, last_motion(frames_, map_));
-  rule_.keyframe_made();
+  tracker_.restore(map_, newest, frames_.velocity(map_));
+  keyframe_rule_.keyframe_made();
   mapper_.restore(map_, newest);
   if (options_.loops.enabled) closer_.restore(map_, newest);
-  if (options_.mapper.bundle) bundle_.request(map_, newest, clock_);
-}
-
-/// The frame before lies where its keyframe does now.
-std::optional<Rigid3> Slam::motion_since_last(const Rigid3& camera_from_world) const {
-  if (frames_.empty() || !frames_.back().tracked) return std::nullopt;
-  const maps::FramePose& last = frames_.back();
-  return camera_from_world * (last.camera_from_reference * map_.camera_from_world(last.reference)).inverse();
-}
-
-void Slam::remember_pose(double stamp, const Rigid3& camera_from_world, bool tracked) {
-  const core::KeyframeId reference = tracker_.reference();
-  maps::FramePose pose;
-  pose.stamp = stamp;
-  pose.reference = reference;
-  pose.camera_from_reference = camera_from_world * map_.camera_from_world(reference).inverse();
-  pose.tracked = tracked;
-  frames_.push_back(pose);
+  if (options_.mapper.bundle) bundle_.request(map_, newest, frame_count_);
 }
 
 void Slam::settle_bundles() {
@@ -288,20 +177,21 @@ void Slam::settle_bundles() {
 /// The whole map may move: what was taken from it before must be back. The tracker waits, so that the next
 /// frame is tracked against the map as it is then, whatever the clock says.
 void Slam::close_loops(core::KeyframeId keyframe) {
+  if (!options_.loops.enabled) return;
   const std::vector<Loop> loops = closer_.look(map_, keyframe);
   if (loops.empty()) return;
   settle_bundles();
-  const Rigid3 camera_from_keyframe = last_camera_from_world_ * map_.camera_from_world(keyframe).inverse();
+  const Rigid3 camera_from_keyframe =
+      tracker_.camera_from_world() * map_.camera_from_world(keyframe).inverse();
   std::vector<PoseEdge> edges;
   for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
   if (!closer_.close(map_, edges)) return;
-  last_camera_from_world_ = camera_from_keyframe * map_.camera_from_world(keyframe);
-  tracker_.map_changed(map_, keyframe, last_camera_from_world_);
+  tracker_.map_changed(map_, keyframe, camera_from_keyframe * map_.camera_from_world(keyframe));
 }
 
 void Slam::finish() { settle_bundles(); }
 
-geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frames_, map_); }
+geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frame_poses(), map_); }
 
 geometry::Trajectory Slam::keyframe_trajectory() const { return maps::keyframe_trajectory(map_); }
 

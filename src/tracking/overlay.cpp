@@ -175,9 +175,9 @@ void write_state(Writer& out, const sensor::RgbdFrame& frame, const TrackResult&
   x = out.text(x + out.px(14), out.px(14), to_string(track.state), lost ? kLostText : kTrackedText);
   if (track.relocalised) x = out.text(x + out.px(14), out.px(14), "relocalised", kTrackedText);
   if (track.state == TrackState::kInitialising) return;
-  const cv::Scalar weak_color = track.weak_directions > 0 ? kLostText : kText;
-  out.text(x + out.px(14), out.px(14), "weak directions " + std::to_string(track.weak_directions) + " of 6",
-           weak_color);
+  const cv::Scalar weak_color = track.degenerate_directions > 0 ? kLostText : kText;
+  out.text(x + out.px(14), out.px(14),
+           "weak directions " + std::to_string(track.degenerate_directions) + " of 6", weak_color);
   x = out.px(6);
   for (const std::string& words :
        {family("points", track.estimate.points), family("lines", track.estimate.lines),

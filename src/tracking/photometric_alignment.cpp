@@ -65,6 +65,19 @@ std::shared_ptr<const features::PhotometricSamples> PhotometricKeyframes::find(c
   return nullptr;
 }
 
+std::optional<optimize::PhotometricFamily> PhotometricKeyframes::associate(
+    const maps::Map& map, const std::vector<core::KeyframeId>& keyframes, std::size_t level,
+    const PhotometricView& view, const Rigid3& camera_from_world) const {
+  if (view.image == nullptr) return std::nullopt;
+  for (const core::KeyframeId id : keyframes) {
+    const auto samples = find(id);
+    if (samples == nullptr) continue;
+    auto family = associate_photometric(*samples, level, view, map.camera_from_world(id), camera_from_world);
+    if (family) return family;
+  }
+  return std::nullopt;
+}
+
 std::optional<optimize::PhotometricFamily> associate_photometric(const features::PhotometricSamples& samples,
                                                                  std::size_t level,
                                                                  const PhotometricView& view,

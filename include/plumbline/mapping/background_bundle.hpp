@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
 #include "plumbline/mapping/local_bundle.hpp"
 
 namespace plumbline::mapping {
@@ -27,10 +28,11 @@ struct BundleReport {
 /// taken as soon as the one under way is put back: its surroundings hold the others.
 class BackgroundBundle {
  public:
-  /// `lag`: frames between taking and putting back; 0: adjusted on the spot. The executor must outlive this.
+  /// `lag`: frames between taking and putting back; 0: adjusted on the spot. Executor and log must outlive
+  /// this.
   BackgroundBundle(const LocalBundleOptions& window, const optimize::BundleOptions& solver, int lag,
-                   const sensor::Pinhole& camera, const core::Executor& executor)
-      : window_(window), solver_(solver), lag_(lag), camera_(camera), executor_(&executor) {}
+                   const sensor::Pinhole& camera, const core::Executor& executor, core::Log& log)
+      : window_(window), solver_(solver), lag_(lag), camera_(camera), executor_(&executor), log_(&log) {}
 
   /// Asks for the surroundings of a keyframe that was made at `frame`.
   void request(const maps::Map& map, core::KeyframeId keyframe, std::int64_t frame);
@@ -41,6 +43,8 @@ class BackgroundBundle {
   std::optional<MapCorrection> commit(maps::Map& map, std::int64_t frame, BundleReport& report);
   /// No bundle is under way or asked for.
   [[nodiscard]] bool idle() const { return running_ == nullptr && waiting_.empty(); }
+  /// Bundles that would have torn the map, and were not put into it.
+  [[nodiscard]] int refused() const { return refused_; }
 
  private:
   struct Running {
@@ -58,8 +62,10 @@ class BackgroundBundle {
   int lag_;
   sensor::Pinhole camera_;
   const core::Executor* executor_;
+  core::Log* log_;
   std::unique_ptr<Running> running_;
   std::vector<core::KeyframeId> waiting_;  ///< the newest first
+  int refused_ = 0;
 };
 
 }  // namespace plumbline::mapping

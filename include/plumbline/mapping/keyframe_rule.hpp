@@ -15,7 +15,8 @@ namespace plumbline::mapping {
 struct KeyframeRuleOptions {
   enum class Rule { kPlain, kCone };
   Rule rule = Rule::kPlain;
-  /// When a keyframe is made whatever the rule says: tracking gets thin; it is nearly lost; never.
+  /// When a keyframe is made whatever the rule says: tracking gets thin; it is nearly lost (fewer than
+  /// min_features); never.
   enum class Urgent { kThin, kNearlyLost, kOff };
   Urgent urgent = Urgent::kThin;
   int min_frames = 2;
@@ -32,6 +33,7 @@ struct KeyframeRuleOptions {
   int cone_min_lines = 15;
   double cone_min_change_rad = 0.1745;
   Balance cone_balance = Balance::kAbove;
+  bool cone_scaled = false;  ///< thresholds follow what a scene has, and balance is waited for six frames
   double cone_epsilon = 1.0;
   void declare(core::OptionTable& table);
 };
@@ -60,13 +62,7 @@ struct KeyframeDecision {
   bool wanted = false;
   bool urgent = false;                         ///< tracking is about to be lost
   KeyframeCause cause = KeyframeCause::kNone;  ///< of those that are wanted
-};
-
-/// What the rule knows besides the track.
-struct KeyframeCircumstances {
-  int frame_points = 0;     ///< corners in the picture
-  bool mapper_idle = true;  ///< no bundle waits to be put back
-  int depth_points = 0;     ///< corners with depth
+  core::KeyframeId reuse;  ///< instead of a new keyframe this one becomes the reference again; invalid: none
 };
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
@@ -75,38 +71,42 @@ struct KeyframeCircumstances {
 /// when tracking gets thin, and when depth is back after a keyframe that had none.
 class KeyframeRule {
  public:
-  explicit KeyframeRule(const KeyframeRuleOptions& options) : options_(options) {}
-  KeyframeDecision decide(const maps::Map& map, core::KeyframeId reference,
-                          const tracking::TrackResult& track, const sensor::Pinhole& camera,
-                          const KeyframeCircumstances& circumstances);
+  KeyframeRule(const KeyframeRuleOptions& options, const sensor::Pinhole& camera)
+      : options_(options), camera_(camera) {}
+  /// `track`: with its features and reference keyframe; `mapper_idle`: no bundle waits to be put back.
+  KeyframeDecision decide(const maps::Map& map, const tracking::TrackResult& track, bool mapper_idle);
   /// A new keyframe was made, or another one became the reference.
   void keyframe_made();
-  /// A keyframe other than `reference` that makes a new one needless, as far as the plain rule goes: it saw
+  /// A keyframe other than the reference that makes a new one needless, as far as the plain rule goes: it saw
   /// `min_shared` of the landmarks that the frame has matched, and the frame is well within the plain rule's
   /// limits for movement and for its surface. Of several the one that saw most; invalid: none. Without it a
   /// map would grow as long as the camera moves, however often it has been there.
-  [[nodiscard]] core::KeyframeId known_ground(const maps::Map& map, core::KeyframeId reference,
-                                              const tracking::TrackResult& track,
-                                              const sensor::Pinhole& camera) const;
+  [[nodiscard]] core::KeyframeId reusable_keyframe(const maps::Map& map,
+                                                   const tracking::TrackResult& track) const;
 
  private:
   [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;
   [[nodiscard]] bool is_urgent(const KeyframeDecision& decision, int tracked) const;
   [[nodiscard]] bool knows_cones() const;
-  ConeTerms look_at_cones(const maps::Map& map, core::KeyframeId reference,
-                          const tracking::TrackResult& track, const sensor::Pinhole& camera,
-                          const KeyframeCircumstances& circumstances);
+  ConeTerms cone_terms(const maps::Map& map, const tracking::TrackResult& track, bool mapper_idle);
+  [[nodiscard]] bool balance_will_do(const ConeTerms& terms);
+  [[nodiscard]] bool is_candidate(const ConeTerms& terms, const tracking::TrackResult& track,
+                                  bool mapper_idle) const;
 
   KeyframeRuleOptions options_;
+  sensor::Pinhole camera_;
   int frames_since_ = 0;
   int features_after_keyframe_ = 0;
   /// The first frame after the keyframe that cones are counted against.
   struct First {
     core::KeyframeId keyframe;
-    int landmarks = 0;  ///< of the keyframe, matched
+    int landmarks = 0;       ///< of the keyframe, matched
+    std::size_t points = 0;  ///< matched
+    std::size_t lines = 0;
     ConeCounts counts;
   };
   First first_;
+  int unbalanced_ = 0;  ///< candidates whose changes sufficed, but not their balance, since the keyframe
 };
 
 }  // namespace plumbline::mapping

@@ -49,8 +49,8 @@ struct LocalMapperOptions {
 
 class LocalMapper {
  public:
-  LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera)
-      : options_(options), camera_(camera), culler_(options.culling) {}
+  LocalMapper(const LocalMapperOptions& options, const sensor::Pinhole& camera, std::int32_t robot)
+      : options_(options), camera_(camera), robot_(robot), culler_(options.culling) {}
 
   /// Goes on where another mapper left `map`, whose newest keyframe is `newest`.
   void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
@@ -58,13 +58,11 @@ class LocalMapper {
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older
   /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its picture;
   /// empty: none.
-  core::KeyframeId insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
-                          const std::shared_ptr<const features::FrameFeatures>& features,
-                          const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
-                          core::KeyframeId reference, double turn_rate);
+  core::KeyframeId insert(maps::Map& map, const sensor::RgbdFrame& frame, const tracking::TrackResult& track,
+                          const std::vector<cv::Mat>& levels);
 
   /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
-  void count_sightings(maps::Map& map, const tracking::TrackResult& track) const;
+  void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
 
   /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
   /// image and the picture of the new one; what they say about its pose stays in the map as edges.
@@ -87,6 +85,7 @@ class LocalMapper {
 
   LocalMapperOptions options_;
   sensor::Pinhole camera_;
+  std::int32_t robot_;
   LandmarkCuller culler_;
 };
 

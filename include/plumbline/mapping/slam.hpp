@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One robot's SLAM: frames in, poses and a map out. Bundles are adjusted beside the tracker; what comes out
-// is the same for any number of threads.
+// One robot's SLAM: frames in, poses and a map out. The loop of sections 3 and 4 of Xia, Wu, Ma, Zhu, Cheng,
+// Zhu, "Multi-Robot Collaborative Mapping with Integrated Point-Line Features for Visual SLAM", Sensors 2024,
+// 24(17), 5743. Bundles are adjusted beside the tracker; what comes out is the same for any number of
+// threads.
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
@@ -15,10 +16,10 @@
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/mapping/background_bundle.hpp"
+#include "plumbline/mapping/frame_trajectory.hpp"
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
-#include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/tracking/tracker.hpp"
@@ -46,18 +47,18 @@ struct FrameReport {
   optimize::FamilySummary surface;
   optimize::FamilySummary photometric;
   double min_eigenvalue = 0.0;
-  int weak_directions = 0;
+  int degenerate_directions = 0;
   bool relocalised = false;
   geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
   KeyframeDecision decision;
   BundleReport bundle;  ///< put back before this frame was tracked (with a lag of 0: after)
+  static FrameReport of(const sensor::RgbdFrame& frame, const tracking::TrackResult& track);
 };
 
 class Slam {
  public:
   Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
        const core::Executor& executor, core::Log& log);
-  ~Slam();
   Slam(const Slam&) = delete;  // the tracker asks this one for places
   Slam& operator=(const Slam&) = delete;
 
@@ -66,21 +67,20 @@ class Slam {
   /// places known, as the map tells. A map without keyframes is no place to go on from: nothing happens.
   void restore(maps::Map map, std::vector<maps::FramePose> frames);
 
-  /// What the camera's file says of its shutter (sensor::Camera::readout_s); to be called before the first
-  /// frame. The option `readout` goes before. Turns shear no picture that is taken all at once: with a
-  /// readout of 0 keyframes speak however fast the camera turned.
-  void set_shutter(std::optional<double> readout_s);
+  /// As Tracker::set_shutter(). Turns distort no picture of a global shutter: keyframes count however fast
+  /// the camera turned.
+  void set_shutter(std::optional<double> readout_s) { tracker_.set_shutter(readout_s); }
 
+  using Features = std::shared_ptr<const features::FrameFeatures>;
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.
-  FrameReport process(const sensor::RgbdFrame& frame,
-                      std::shared_ptr<const features::FrameFeatures> features);
+  FrameReport process(const sensor::RgbdFrame& frame, const Features& features);
   /// Ends what still runs beside the tracker; call once, after the last frame.
   void finish();
 
   [[nodiscard]] const maps::Map& map() const { return map_; }
   [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
   /// Bundles and loops that would have torn the map, and were not put into it.
-  [[nodiscard]] int refused() const { return refused_bundles_ + closer_.counts().refused; }
+  [[nodiscard]] int refused() const { return bundle_.refused() + closer_.counts().refused; }
   /// Every place that was verified, with its evidence.
   [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
   /// Keyframes by what they look like; empty without loops.
@@ -88,7 +88,7 @@ class Slam {
   /// What the tracker said about the last frame; for pictures of it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.
-  [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_; }
+  [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_.poses(); }
   /// Poses after optimisation: tracked frames only, in order of time.
   [[nodiscard]] geometry::Trajectory trajectory() const;
   [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
@@ -96,40 +96,24 @@ class Slam {
   [[nodiscard]] std::vector<maps::LineSegment3> line_segments() const;
 
  private:
-  void start_map(const sensor::RgbdFrame& frame,
-                 const std::shared_ptr<const features::FrameFeatures>& features, FrameReport& report);
-  /// Instead of making a keyframe.
-  void remember_picture(const sensor::RgbdFrame& frame, core::KeyframeId keyframe);
-  void return_to_known_ground(FrameReport& report);
-  void make_keyframe(const sensor::RgbdFrame& frame,
-                     const std::shared_ptr<const features::FrameFeatures>& features,
-                     const std::vector<cv::Mat>& levels, FrameReport& report);
+  void start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
+  void switch_reference(FrameReport& report);
+  void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
+  void set_reference(core::KeyframeId keyframe);
   void put_back_bundle(BundleReport& report);
-  [[nodiscard]] double shear_rate() const;
   void settle_bundles();
   void close_loops(core::KeyframeId keyframe);
-  [[nodiscard]] bool is_place(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
-                              core::KeyframeId keyframe, const geometry::Rigid3& camera_from_world) const;
-  [[nodiscard]] std::optional<geometry::Rigid3> motion_since_last(
-      const geometry::Rigid3& camera_from_world) const;
-  void remember_pose(double stamp, const geometry::Rigid3& camera_from_world, bool tracked);
 
   SlamOptions options_;
-  sensor::Pinhole camera_;
-  std::int32_t robot_;
-  core::Log* log_;
   maps::Map map_;
   tracking::Tracker tracker_;
   tracking::TrackResult last_track_;
-  KeyframeRule rule_;
+  KeyframeRule keyframe_rule_;
   LocalMapper mapper_;
   BackgroundBundle bundle_;
-  bool all_rows_at_once_ = false;  ///< the shutter is known to be a global one
   LoopCloser closer_;
-  std::int64_t clock_ = 0;                   ///< frames so far: logical time
-  geometry::Rigid3 last_camera_from_world_;  ///< of the last tracked frame, in the map as it is now
-  std::vector<maps::FramePose> frames_;
-  int refused_bundles_ = 0;
+  std::int64_t frame_count_ = 0;  ///< logical time
+  FrameTrajectory frames_;
 };
 
 }  // namespace plumbline::mapping

@@ -33,9 +33,11 @@ struct ConeThreshold {
 };
 
 /// `now`: this frame; `first`: the first frame after the keyframe. Right after a keyframe next to nothing has
-/// changed and anything would fire, so D_r counts as 5 % of M_r at least. A ratio over nothing counts as 0:
+/// changed and anything would fire, so D_r counts as 5 % of M_r at least; `scaled`: of M_c, as the camera has
+/// turned away from the others, which can change no more. A ratio over nothing counts as 0:
 /// without matches nothing has changed, and D_c = 0 exceeds no threshold.
-ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon = 1.0);
+ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon = 1.0,
+                             bool scaled = false);
 
 /// Points by cell of a 3 x 3 grid over the picture, row by row.
 using GridCounts = std::array<int, 9>;

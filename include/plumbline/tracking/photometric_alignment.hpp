@@ -11,23 +11,11 @@
 #include "plumbline/core/ids.hpp"
 #include "plumbline/features/photometric.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/photometric_terms.hpp"
 #include "plumbline/sensor/camera.hpp"
 
 namespace plumbline::tracking {
-
-/// Samples of the keyframes that were made last; those of older ones are forgotten, so that memory does not
-/// grow with the map.
-class PhotometricKeyframes {
- public:
-  void add(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples);
-  /// Null: not known, or forgotten.
-  [[nodiscard]] std::shared_ptr<const features::PhotometricSamples> find(core::KeyframeId id) const;
-
- private:
-  static constexpr std::size_t kMost = 24;
-  std::vector<std::pair<core::KeyframeId, std::shared_ptr<const features::PhotometricSamples>>> kept_;
-};
 
 /// A picture to align, and the depth image that came with it.
 struct PhotometricView {
@@ -46,6 +34,23 @@ std::optional<optimize::PhotometricFamily> associate_photometric(const features:
                                                                  const geometry::Rigid3& reference_from_world,
                                                                  const geometry::Rigid3& camera_from_world);
 constexpr int kMinPhotometric = 500;
+
+/// Samples of the keyframes that were made last; those of older ones are forgotten, so that memory does not
+/// grow with the map.
+class PhotometricKeyframes {
+ public:
+  void add(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples);
+  /// Null: not known, or forgotten.
+  [[nodiscard]] std::shared_ptr<const features::PhotometricSamples> find(core::KeyframeId id) const;
+  /// associate_photometric() with the first of `keyframes` that has enough in view.
+  [[nodiscard]] std::optional<optimize::PhotometricFamily> associate(
+      const maps::Map& map, const std::vector<core::KeyframeId>& keyframes, std::size_t level,
+      const PhotometricView& view, const geometry::Rigid3& camera_from_world) const;
+
+ private:
+  static constexpr std::size_t kMost = 24;
+  std::vector<std::pair<core::KeyframeId, std::shared_ptr<const features::PhotometricSamples>>> kept_;
+};
 
 /// Gain, noise and weights as they are at a pose; false when fewer than kMinPhotometric terms are in view.
 /// A term weighs less the further an error of its depth would move it across its gradient.

@@ -49,6 +49,10 @@ std::optional<MapCorrection> BackgroundBundle::commit(maps::Map& map, std::int64
   report.solve_ms = done->solve_ms;
   std::optional<MapCorrection> correction;
   if (done->summary.usable) correction = put_back(done->bundle, map, &report.refused);
+  if (report.refused) {
+    ++refused_;
+    log_->warning("a local bundle was not put into the map: " + report.refused->text());
+  }
   begin(map, frame);
   return correction;
 }

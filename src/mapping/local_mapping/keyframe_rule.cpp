@@ -49,6 +49,11 @@ int landmarks_in_common(const maps::Map& map, core::KeyframeId keyframe, const t
   return common;
 }
 
+int points_with_depth(const features::FrameFeatures& features) {
+  return static_cast<int>(std::count_if(features.points.begin(), features.points.end(),
+                                        [](const features::PointFeature& f) { return f.depth > 0.0F; }));
+}
+
 /// In a scene that has fewer landmarks than a rule asks for, half of what should be seen will do.
 bool enough(std::size_t matched, int wanted, std::size_t visible) {
   return 2 * matched >= std::min(2 * static_cast<std::size_t>(wanted), visible);
@@ -87,6 +92,9 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.choice("keyframe.cone_balance", cone_balance,
                {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
                "Cone rule: how far these must be spread (ECOG against its threshold)");
+  table.boolean(
+      "keyframe.cone_scaled", cone_scaled,
+      "Cone rule: thresholds follow what a scene has, and balance is waited for six frames at most");
   table.number("keyframe.cone_epsilon", cone_epsilon, {0.0, 100.0}, "",
                "Cone rule: weight of lost matches in the threshold");
   table.choice(
@@ -107,10 +115,9 @@ bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {
 
 bool KeyframeRule::is_urgent(const KeyframeDecision& d, int tracked) const {
   if (options_.urgent == KeyframeRuleOptions::Urgent::kOff) return false;
-  if (options_.urgent == KeyframeRuleOptions::Urgent::kNearlyLost)
-    return 2 * tracked < options_.min_features && d.shared < 0.8;
-  return d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap ||
-         (tracked < options_.min_features && d.shared < 0.8);
+  const bool thin = tracked < options_.min_features && d.shared < 0.8;
+  if (options_.urgent == KeyframeRuleOptions::Urgent::kNearlyLost) return thin;
+  return d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap || thin;
 }
 
 /// Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
@@ -118,14 +125,26 @@ bool KeyframeRule::knows_cones() const {
   return options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= kFewNormals;
 }
 
-ConeTerms KeyframeRule::look_at_cones(const maps::Map& map, core::KeyframeId reference,
-                                      const tracking::TrackResult& track, const sensor::Pinhole& camera,
-                                      const KeyframeCircumstances& circumstances) {
+bool KeyframeRule::is_candidate(const ConeTerms& terms, const tracking::TrackResult& track,
+                                bool mapper_idle) const {
+  // What a scene has: what should be seen, or what was matched right after the keyframe.
+  const bool scaled = options_.cone_scaled;
+  const std::size_t points = scaled ? first_.points : track.visible_points.size();
+  const std::size_t lines = scaled ? first_.lines : track.visible_lines.size();
+  return (frames_since_ > options_.cone_patience || mapper_idle) &&
+         enough(track.points.size(), options_.cone_min_points, points) &&
+         enough(track.lines.size(), options_.cone_min_lines, lines) &&
+         terms.shared <= options_.cone_max_shared;
+}
+
+ConeTerms KeyframeRule::cone_terms(const maps::Map& map, const tracking::TrackResult& track,
+                                   bool mapper_idle) {
   ConeTerms terms;
-  const Eigen::Vector3d centre_then = map.camera_from_world(reference).inverse().translation;
+  const Eigen::Vector3d centre_then = map.camera_from_world(track.reference).inverse().translation;
   const Eigen::Vector3d centre_now = track.camera_from_world.inverse().translation;
-  GridCounts grid{};
-  terms.now.all = circumstances.frame_points;
+  std::vector<double> changes;
+  std::vector<Eigen::Vector2d> pixels;
+  terms.now.all = static_cast<int>(track.features->points.size());
   for (const tracking::PointMatch& match : track.points) {
     const maps::MapPoint& point = map.point(match.point);
     if (point.normal.isZero()) continue;
@@ -133,54 +152,63 @@ ConeTerms KeyframeRule::look_at_cones(const maps::Map& map, core::KeyframeId ref
     const double then = viewing_angle(point.position, point.normal, centre_then);
     const double now = viewing_angle(point.position, point.normal, centre_now);
     if (viewing_zone(then) != viewing_zone(now)) ++terms.now.changed;
-    if (std::abs(now - then) > options_.cone_min_change_rad) {
-      count_in_grid(camera.project(track.camera_from_world * point.position), camera.width, camera.height,
-                    grid);
-    }
+    changes.push_back(std::abs(now - then));
+    pixels.push_back(camera_.project(track.camera_from_world * point.position));
   }
-  const int common = landmarks_in_common(map, reference, track);
-  if (first_.keyframe != reference) first_ = {reference, common, terms.now};
+  const int common = landmarks_in_common(map, track.reference, track);
+  if (first_.keyframe != track.reference)
+    first_ = {track.reference, common, track.points.size(), track.lines.size(), terms.now};
   terms.shared = first_.landmarks > 0 ? static_cast<double>(common) / first_.landmarks : 1.0;
-  terms.threshold = cone_threshold(terms.now, first_.counts, options_.cone_epsilon);
+  terms.threshold = cone_threshold(terms.now, first_.counts, options_.cone_epsilon, options_.cone_scaled);
+  double least_change = options_.cone_min_change_rad;
+  if (options_.cone_scaled && !changes.empty()) least_change = std::min(least_change, core::median(changes));
+  GridCounts grid{};
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    if (changes[i] > least_change) count_in_grid(pixels[i], camera_.width, camera_.height, grid);
+  }
   terms.balance = grid_balance(grid);
-  terms.candidate = (frames_since_ > options_.cone_patience || circumstances.mapper_idle) &&
-                    enough(track.points.size(), options_.cone_min_points, track.visible_points.size()) &&
-                    enough(track.lines.size(), options_.cone_min_lines, track.visible_lines.size()) &&
-                    terms.shared <= options_.cone_max_shared;
-  terms.fires =
-      terms.now.changed > terms.threshold.adaptive && balanced(terms.balance, options_.cone_balance);
+  terms.candidate = is_candidate(terms, track, mapper_idle);
+  terms.fires = terms.now.changed > terms.threshold.adaptive && balance_will_do(terms);
   return terms;
 }
 
-KeyframeDecision KeyframeRule::decide(const maps::Map& map, core::KeyframeId reference,
-                                      const tracking::TrackResult& track, const sensor::Pinhole& camera,
-                                      const KeyframeCircumstances& circumstances) {
+/// In the published program the sixth frame in a row is taken however its changes are spread.
+bool KeyframeRule::balance_will_do(const ConeTerms& terms) {
+  constexpr int kPatience = 6;
+  if (balanced(terms.balance, options_.cone_balance)) return true;
+  return options_.cone_scaled && terms.candidate && ++unbalanced_ >= kPatience;
+}
+
+KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::TrackResult& track,
+                                      bool mapper_idle) {
   KeyframeDecision d;
+  const maps::Keyframe& reference = map.keyframe(track.reference);
   d.frames_since = ++frames_since_;
   const int tracked = static_cast<int>(track.points.size() + track.lines.size());
   if (frames_since_ == 1) features_after_keyframe_ = tracked;
   const geometry::Rigid3 camera_from_keyframe =
-      track.camera_from_world * map.camera_from_world(reference).inverse();
-  const ViewOverlap view = overlap_of(map.keyframe(reference), camera_from_keyframe, camera);
+      track.camera_from_world * map.camera_from_world(track.reference).inverse();
+  const ViewOverlap view = overlap_of(reference, camera_from_keyframe, camera_);
   d.overlap = view.overlap;
   d.shared = features_after_keyframe_ > 0 ? static_cast<double>(tracked) / features_after_keyframe_ : 1.0;
   d.parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
   d.urgent = is_urgent(d, tracked);
-  if (map.keyframe(reference).surface.empty() && circumstances.depth_points >= kDepthIsBack) d.urgent = true;
-  d.mapper_idle = circumstances.mapper_idle;
-  d.cone = look_at_cones(map, reference, track, camera, circumstances);
+  if (reference.surface.empty() && points_with_depth(*track.features) >= kDepthIsBack) d.urgent = true;
+  d.mapper_idle = mapper_idle;
+  d.cone = cone_terms(map, track, mapper_idle);
   const bool by_cones = knows_cones();
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
+  if (d.wanted && !d.urgent) d.reuse = reusable_keyframe(map, track);
+  if (d.reuse.valid()) d.wanted = false;
   if (d.wanted)
     d.cause = !wants ? KeyframeCause::kUrgent : by_cones ? KeyframeCause::kCone : KeyframeCause::kPlain;
   return d;
 }
 
-core::KeyframeId KeyframeRule::known_ground(const maps::Map& map, core::KeyframeId reference,
-                                            const tracking::TrackResult& track,
-                                            const sensor::Pinhole& camera) const {
+core::KeyframeId KeyframeRule::reusable_keyframe(const maps::Map& map,
+                                                 const tracking::TrackResult& track) const {
   if (!options_.reuse || options_.rule != KeyframeRuleOptions::Rule::kPlain) return {};
   std::map<core::KeyframeId, int> common;  // landmarks matched now that a keyframe saw
   const auto count = [&](const std::vector<maps::Observation>& observations) {
@@ -192,10 +220,10 @@ core::KeyframeId KeyframeRule::known_ground(const maps::Map& map, core::Keyframe
   core::KeyframeId best;
   int most = 0;
   for (const auto& [id, landmarks] : common) {
-    if (id == reference || landmarks <= most || landmarks < options_.min_shared * tracked) continue;
+    if (id == track.reference || landmarks <= most || landmarks < options_.min_shared * tracked) continue;
     const geometry::Rigid3 camera_from_keyframe =
         track.camera_from_world * map.camera_from_world(id).inverse();
-    const ViewOverlap view = overlap_of(map.keyframe(id), camera_from_keyframe, camera);
+    const ViewOverlap view = overlap_of(map.keyframe(id), camera_from_keyframe, camera_);
     const double parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
     if (parallax > kWellWithin * options_.max_parallax ||
         geometry::rotation_angle(camera_from_keyframe.rotation) > kWellWithin * options_.max_rotation_rad ||
@@ -212,6 +240,7 @@ void KeyframeRule::keyframe_made() {
   frames_since_ = 0;
   features_after_keyframe_ = 0;
   first_ = {};
+  unbalanced_ = 0;
 }
 
 }  // namespace plumbline::mapping

@@ -72,22 +72,21 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
   surface.declare(table);
 }
 
-core::KeyframeId LocalMapper::insert(maps::Map& map, std::int32_t robot, const sensor::RgbdFrame& frame,
-                                     const std::shared_ptr<const features::FrameFeatures>& features,
-                                     const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
-                                     core::KeyframeId reference, double turn_rate) {
+core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& frame,
+                                     const tracking::TrackResult& track, const std::vector<cv::Mat>& levels) {
   auto keyframe = std::make_shared<maps::Keyframe>();
-  keyframe->id = map.next_keyframe_id(robot);
+  keyframe->id = map.next_keyframe_id(robot_);
   keyframe->frame_index = frame.index;
   keyframe->stamp = frame.stamp;
-  keyframe->turn_rate = turn_rate;
-  if (reference.valid()) {
-    keyframe->reference = reference;
-    keyframe->camera_from_reference = track.camera_from_world * map.camera_from_world(reference).inverse();
+  keyframe->turn_rate = track.turn_rate;
+  if (track.reference.valid()) {
+    keyframe->reference = track.reference;
+    keyframe->camera_from_reference =
+        track.camera_from_world * map.camera_from_world(track.reference).inverse();
     keyframe->reference_sigma_m = track.sigma_m();
   }
   if (options_.culling.by_keyframes) count(map, track);
-  auto own = std::make_shared<features::FrameFeatures>(*features);
+  auto own = std::make_shared<features::FrameFeatures>(*track.features);
   if (!still(track.depth_from_camera))
     features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
   keyframe->features = own;
@@ -162,7 +161,7 @@ void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
   }
 }
 
-void LocalMapper::count_sightings(maps::Map& map, const tracking::TrackResult& track) const {
+void LocalMapper::count_observations(maps::Map& map, const tracking::TrackResult& track) const {
   if (!options_.culling.by_keyframes) count(map, track);
 }
 
@@ -177,6 +176,7 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
                                     const tracking::TrackResult& track,
                                     const tracking::PhotometricKeyframes& pictures,
                                     const std::vector<core::KeyframeId>& neighbours) {
+  if (!options_.edges) return;
   int made = 0;
   for (core::KeyframeId other : neighbours) {
     if (made >= options_.edge_keyframes) break;

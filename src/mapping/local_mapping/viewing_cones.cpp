@@ -28,11 +28,11 @@ double viewing_angle(const Eigen::Vector3d& point, const Eigen::Vector3d& normal
   return std::atan2(normal.cross(ray).norm(), normal.dot(ray));
 }
 
-ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon) {
+ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon, bool scaled) {
   const double m_c = now.matched;
   const double m_r = first.matched;
   const double d_c = now.changed;
-  const double d_r = std::max<double>(first.changed, kLeastChanged * m_r);
+  const double d_r = std::max<double>(first.changed, kLeastChanged * (scaled ? m_c : m_r));
   ConeThreshold t;
   t.theta = ratio(m_r - m_c, m_r);
   t.beta = ratio(d_c, m_c) - ratio(d_r, m_r);

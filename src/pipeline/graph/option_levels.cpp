@@ -103,6 +103,7 @@ const Keys kInternal{
       "verify.min_cells",
       "verify.neighbours",
       "keyframe.cone_balance",
+      "keyframe.cone_scaled",
       "keyframe.cone_epsilon",
       "keyframe.urgent",
       "thumbnails",

@@ -38,9 +38,9 @@ std::string row_columns(const mapping::FrameReport& r) {
       ",{},{},{}",
       r.stamp, r.reference.index, r.keyframe.index, r.relocalised ? 1 : 0, r.points.inliers, r.points.rms,
       r.lines.inliers, r.lines.rms, r.surface.inliers, r.surface.rms, r.photometric.inliers,
-      r.photometric.rms, r.min_eigenvalue, r.weak_directions, d.frames_since, d.shared, d.overlap, d.parallax,
-      d.rotation_rad, d.mapper_idle ? 1 : 0, columns_of(d.cone), d.wanted ? 1 : 0, d.urgent ? 1 : 0,
-      columns_of(r.bundle));
+      r.photometric.rms, r.min_eigenvalue, r.degenerate_directions, d.frames_since, d.shared, d.overlap,
+      d.parallax, d.rotation_rad, d.mapper_idle ? 1 : 0, columns_of(d.cone), d.wanted ? 1 : 0,
+      d.urgent ? 1 : 0, columns_of(r.bundle));
 }
 
 }  // namespace plumbline::pipeline

@@ -84,7 +84,8 @@ struct Outcome {
 Outcome run(int threads, int lag) {
   const core::Executor executor(threads);
   GrowingMap world;
-  BackgroundBundle bundle({}, {}, lag, kBundleCamera, executor);
+  core::Log log;
+  BackgroundBundle bundle({}, {}, lag, kBundleCamera, executor, log);
   world.add_keyframe();
   Outcome outcome;
   const auto commit = [&](int frame) {
@@ -163,7 +164,8 @@ TEST(BackgroundBundle, AnEndWithoutCommitWaitsForTheWork) {
   const core::Executor executor(2);
   GrowingMap world;
   world.add_keyframe();
-  BackgroundBundle bundle({}, {}, 3, kBundleCamera, executor);
+  core::Log log;
+  BackgroundBundle bundle({}, {}, 3, kBundleCamera, executor, log);
   bundle.request(world.map, world.add_keyframe(), 1);
   EXPECT_FALSE(bundle.due(3));
   EXPECT_TRUE(bundle.due(4));

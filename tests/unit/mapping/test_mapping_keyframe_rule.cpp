@@ -57,7 +57,9 @@ class Rule : public testing::Test {
   static tracking::TrackResult track(const Rigid3& pose, std::size_t points, std::size_t lines) {
     tracking::TrackResult track;
     track.state = tracking::TrackState::kTracked;
+    track.reference = {0, 0};
     track.camera_from_world = pose;
+    track.features = std::make_shared<features::FrameFeatures>();
     for (std::size_t i = 0; i < points; ++i)
       track.points.push_back({{0, static_cast<std::int32_t>(i)}, static_cast<int>(i), 0});
     for (std::size_t i = 0; i < lines; ++i)
@@ -65,14 +67,13 @@ class Rule : public testing::Test {
     return track;
   }
   KeyframeDecision decide(const Rigid3& pose, std::size_t features) {
-    return rule_.decide(map_, {0, 0}, track(pose, features * 9 / 10, features - features * 9 / 10),
-                        kRuleCamera, {});
+    return rule_.decide(map_, track(pose, features * 9 / 10, features - features * 9 / 10), true);
   }
   static Rigid3 moved(double x) { return {Eigen::Matrix3d::Identity(), {-x, 0.0, 0.0}}; }
   static Rigid3 turned(double yaw) { return {geometry::exp_so3({0.0, yaw, 0.0}), Eigen::Vector3d::Zero()}; }
 
   maps::Map map_;
-  KeyframeRule rule_{KeyframeRuleOptions{}};
+  KeyframeRule rule_{{}, kRuleCamera};
 };
 
 TEST_F(Rule, StandingStillNeverMakesAKeyframe) {
@@ -122,7 +123,9 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
   map_.add_keyframe(second, moved(0.5));
   for (int i = 0; i < 200; ++i) map_.observe(core::PointId{0, i}, {0, 1}, i);
   const auto known = [&](const Rigid3& pose, std::size_t points, const KeyframeRuleOptions& options = {}) {
-    return KeyframeRule(options).known_ground(map_, {0, 1}, track(pose, points, 10), kRuleCamera);
+    auto seen = track(pose, points, 10);
+    seen.reference = {0, 1};
+    return KeyframeRule(options, kRuleCamera).reusable_keyframe(map_, seen);
   };
   EXPECT_EQ(known(moved(0.05), 100), (core::KeyframeId{0, 0}));
   EXPECT_FALSE(known(moved(0.22), 100).valid());  // too near to its limit
@@ -134,10 +137,11 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
     map_.observe(map_.add_point(0, point), {0, 1}, 200 + i);
   }
   auto other = track(moved(0.05), 20, 0);
+  other.reference = {0, 1};
   for (std::int32_t i = 300; i < 360; ++i) other.points.push_back({{0, i}, i, 0});
-  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 1}, other, kRuleCamera).valid());
+  EXPECT_FALSE(KeyframeRule({}, kRuleCamera).reusable_keyframe(map_, other).valid());
   // The reference itself is no news, and who does not want it does not get it.
-  EXPECT_FALSE(KeyframeRule({}).known_ground(map_, {0, 0}, track(moved(0.05), 100, 10), kRuleCamera).valid());
+  EXPECT_FALSE(KeyframeRule({}, kRuleCamera).reusable_keyframe(map_, track(moved(0.05), 100, 10)).valid());
   KeyframeRuleOptions options;
   options.reuse = false;
   EXPECT_FALSE(known(moved(0.05), 100, options).valid());
@@ -146,7 +150,7 @@ TEST_F(Rule, AnOlderKeyframeThatServesAsWellIsFound) {
 TEST_F(Rule, LossOfSurfaceFires) {
   KeyframeRuleOptions options;
   options.max_rotation_rad = 3.0;  // only the overlap can speak
-  rule_ = KeyframeRule(options);
+  rule_ = KeyframeRule(options, kRuleCamera);
   decide({}, 100);
   const KeyframeDecision little = decide(turned(0.2), 100);
   EXPECT_LT(little.overlap, 0.95);
@@ -175,7 +179,11 @@ TEST_F(Rule, DepthThatIsBackIsTakenAtOnce) {
   blind->surface.clear();
   map.add_keyframe(blind, {});
   const auto decide_on = [this](const maps::Map& on, int corners) {
-    return rule_.decide(on, {0, 0}, track({}, 0, 0), kRuleCamera, {300, true, corners});
+    auto seen = track({}, 0, 0);
+    auto features = many_features();
+    for (int i = 0; i < corners; ++i) features.points[static_cast<std::size_t>(i)].depth = 2.0F;
+    seen.features = std::make_shared<features::FrameFeatures>(features);
+    return rule_.decide(on, seen, true);
   };
   for (int i = 0; i < 3; ++i) EXPECT_FALSE(decide_on(map, 10).wanted) << "there is none yet";
   EXPECT_FALSE(decide_on(map_, 200).wanted) << "the last keyframe has a surface";
@@ -212,8 +220,11 @@ TEST_F(Rule, AKeyframeWithoutDepthStillHasARule) {
   auto blind = std::make_shared<maps::Keyframe>();
   blind->id = {0, 1};
   map_.add_keyframe(blind, {});
-  rule_.decide(map_, {0, 1}, track({}, 100, 0), kRuleCamera, {});
-  const KeyframeDecision d = rule_.decide(map_, {0, 1}, track(moved(0.5), 100, 0), kRuleCamera, {});
+  auto seen = track({}, 100, 0);
+  seen.reference = {0, 1};
+  rule_.decide(map_, seen, true);
+  seen.camera_from_world = moved(0.5);
+  const KeyframeDecision d = rule_.decide(map_, seen, true);
   EXPECT_EQ(d.overlap, 1.0);
   EXPECT_TRUE(std::isfinite(d.parallax));
   EXPECT_TRUE(d.wanted);
@@ -226,7 +237,7 @@ class ConeRule : public Rule {
     Rule::SetUp();
     KeyframeRuleOptions options;
     options.rule = KeyframeRuleOptions::Rule::kCone;
-    rule_ = KeyframeRule(options);
+    rule_ = KeyframeRule(options, kRuleCamera);
     see({}, 200, 40);
   }
   /// Sideways, still looking at the same place.
@@ -238,7 +249,10 @@ class ConeRule : public Rule {
     tracking::TrackResult result = track(pose, points, lines);
     result.visible_points.resize(visible);
     result.visible_lines.resize(visible / 6);
-    return rule_.decide(map_, {0, 0}, result, kRuleCamera, {500, idle});
+    features::FrameFeatures features;
+    features.points.resize(500);
+    result.features = std::make_shared<features::FrameFeatures>(features);
+    return rule_.decide(map_, result, idle);
   }
 };
 
@@ -336,18 +350,32 @@ TEST_F(ConeRule, TellsWhatAKeyframeIsFor) {
   EXPECT_EQ(see(moved(0.001), 20, 2).cause, KeyframeCause::kUrgent);
 }
 
+TEST_F(ConeRule, BalanceIsWaitedForSixFramesWhenScaled) {
+  KeyframeRuleOptions options;
+  options.rule = KeyframeRuleOptions::Rule::kCone;
+  options.cone_scaled = true;
+  rule_ = KeyframeRule(options, kRuleCamera);
+  see({}, 200, 40);
+  for (int i = 1; i <= 6; ++i) {
+    const KeyframeDecision d = see(moved(0.6), 140, 30);  // the wall moves out of one side of the picture
+    EXPECT_GT(d.cone.now.changed, d.cone.threshold.adaptive);
+    EXPECT_LT(d.cone.balance.ecog, d.cone.balance.offset);
+    EXPECT_EQ(d.wanted, i == 6) << i;
+  }
+}
+
 TEST_F(ConeRule, UrgencyCanWaitUntilTrackingIsNearlyLost) {
   const auto urgent = [&](KeyframeRuleOptions::Urgent when, std::size_t points, std::size_t lines) {
     KeyframeRuleOptions options;
     options.rule = KeyframeRuleOptions::Rule::kCone;
     options.urgent = when;
-    rule_ = KeyframeRule(options);
+    rule_ = KeyframeRule(options, kRuleCamera);
     see({}, 200, 40);
     return see(moved(0.001), points, lines).urgent;
   };
   using Urgent = KeyframeRuleOptions::Urgent;
-  EXPECT_TRUE(urgent(Urgent::kThin, 40, 10));
-  EXPECT_FALSE(urgent(Urgent::kNearlyLost, 40, 10));
+  EXPECT_TRUE(urgent(Urgent::kThin, 60, 8));
+  EXPECT_FALSE(urgent(Urgent::kNearlyLost, 60, 8));
   EXPECT_TRUE(urgent(Urgent::kNearlyLost, 20, 2));
   EXPECT_FALSE(urgent(Urgent::kOff, 20, 2));
 }

@@ -164,14 +164,14 @@ TEST(SurfaceEdge, WithoutOverlapThereIsNone) {
 /// A keyframe's surface is where its colour camera was: what its depth camera measured later is carried back.
 TEST(SurfaceEdge, AKeyframesSurfaceIsThatOfItsColourImage) {
   const Rigid3 later(geometry::exp_so3({0.0, 0.02, 0.0}), Eigen::Vector3d(0.02, 0.0, -0.03));
-  LocalMapper mapper({}, kSurfaceCamera);
+  LocalMapper mapper({}, kSurfaceCamera, 0);
   maps::Map map;
   sensor::RgbdFrame frame;
   frame.depth = look(kCorner, later, 3);
   tracking::TrackResult track;
   track.depth_from_camera = later;
-  const core::KeyframeId id =
-      mapper.insert(map, 0, frame, std::make_shared<features::FrameFeatures>(), track, {}, {}, 0.0);
+  track.features = std::make_shared<features::FrameFeatures>();
+  const core::KeyframeId id = mapper.insert(map, frame, track, {});
   int near = 0;
   for (const maps::SurfaceSample& s : map.keyframe(id).surface) {
     double least = 1.0;

@@ -52,6 +52,14 @@ TEST(ViewingCones, EpsilonWeighsLostMatches) {
   EXPECT_NEAR(t.adaptive, (1.0 + 2.0 * 0.25 - 0.3 + 0.1) * t.initial, 1e-12);
 }
 
+TEST(ViewingCones, WhatIsLeftInViewCanBeScaledFor) {
+  const ConeCounts first{400, 1000, 0};
+  const ConeCounts few{60, 1000, 12};  // a fifth of what is left in view has changed
+  EXPECT_LT(few.changed, cone_threshold(few, first).adaptive);
+  EXPECT_GT(few.changed, cone_threshold(few, first, 1.0, true).adaptive);
+  EXPECT_EQ(cone_threshold(first, first, 1.0, true).initial, cone_threshold(first, first).initial);
+}
+
 TEST(ViewingCones, BalanceIsAskedForAsOneLikes) {
   const GridBalance even{0.8, 0.1};
   EXPECT_TRUE(balanced(even, Balance::kAbove));

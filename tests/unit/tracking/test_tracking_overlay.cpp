@@ -105,7 +105,7 @@ TEST_F(Overlay, UntrackedIsFaintAndFlatLinesHaveTheirColour) {
 TEST_F(Overlay, StateIsWritten) {
   const cv::Mat tracked = draw();
   track_.state = TrackState::kLost;
-  track_.weak_directions = 2;
+  track_.degenerate_directions = 2;
   const cv::Mat lost = draw();
   EXPECT_GT(cv::countNonZero(tracked.reshape(1).rowRange(0, 36)), 500);
   EXPECT_EQ(count(tracked, {0, 100, 2, 200}, reddish), 0);

@@ -211,7 +211,7 @@ double fallen(const std::vector<tests::WorldPlane>& others) {
   Tracker tracker({}, kTestCamera);
   geometry::Vector6d velocity = geometry::Vector6d::Zero();
   velocity(1) = -0.15;
-  tracker.restore(map, id, {}, velocity);
+  tracker.restore(map, id, velocity);
   double y = 0.0;
   for (int i = 1; i <= 20; ++i) {
     seen.frame.stamp = seen.frame.depth_stamp = i / 30.0;

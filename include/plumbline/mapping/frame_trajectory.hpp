@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The path of one robot's camera, frame by frame, each relative to its reference keyframe.
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/sensor/frame.hpp"
+#include "plumbline/tracking/tracker.hpp"
+
+namespace plumbline::mapping {
+
+class FrameTrajectory {
+ public:
+  FrameTrajectory() = default;
+  explicit FrameTrajectory(std::vector<maps::FramePose> poses) : poses_(std::move(poses)) {}
+
+  /// What the tracker measured of a frame, in the map that it was tracked in; for record().
+  [[nodiscard]] maps::FramePose measured(const maps::Map& map, double stamp,
+                                         const tracking::TrackResult& track) const;
+  /// Adds a frame where it lies in the map as it is now.
+  void record(const maps::Map& map, const maps::FramePose& frame, core::KeyframeId reference,
+              const geometry::Rigid3& camera_from_world);
+
+  /// The motion of camera_from_world between the last two frames, per second; zero when that is not known.
+  [[nodiscard]] geometry::Vector6d velocity(const maps::Map& map) const;
+  /// How the camera moved from the colour to the depth image of the frame recorded last.
+  [[nodiscard]] geometry::Rigid3 depth_from_camera(const maps::Map& map,
+                                                   const sensor::RgbdFrame& frame) const;
+  [[nodiscard]] const std::vector<maps::FramePose>& poses() const { return poses_; }
+
+ private:
+  std::vector<maps::FramePose> poses_;
+};
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Constant velocity on SE(3): where the camera is expected at a time, and how far that may be believed.
+#include <algorithm>
+
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::tracking {
+
+struct TrackResult;
+
+class MotionModel {
+ public:
+  /// camera_from_world at a time, at most 0.2 s after the last pose.
+  [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
+  /// The motion of camera_from_world within `dt` seconds.
+  [[nodiscard]] geometry::Rigid3 motion_within(double dt) const { return geometry::exp_se3(velocity_ * dt); }
+
+  /// A frame was tracked.
+  void update(double stamp, const TrackResult& result);
+  /// A frame was not.
+  void lost();
+  /// The camera turned up elsewhere: the past says nothing.
+  void reset();
+  /// Goes on from a keyframe, with this velocity of camera_from_world per second.
+  void restore(double stamp, const geometry::Vector6d& velocity);
+  /// The map was corrected: where the last pose lies now.
+  void set_camera_from_world(const geometry::Rigid3& pose) { camera_from_world_ = pose; }
+  [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return camera_from_world_; }
+
+  /// The frame before was tracked.
+  [[nodiscard]] bool continuous() const { return valid_ && lost_frames_ == 0; }
+  /// The velocity is known, and no frame is missing since.
+  [[nodiscard]] bool reliable(double stamp) const;
+  /// After a while without a pose the last one says little: surfaces near it fit by chance.
+  [[nodiscard]] bool outdated() const { return lost_frames_ >= 5; }
+  /// After some more it says nothing.
+  [[nodiscard]] bool expired() const { return lost_frames_ >= 30; }
+  /// Of the search for features around their prediction.
+  [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
+  /// Whether it may still hold alone what no measurement does.
+  [[nodiscard]] bool may_dead_reckon() const { return continuous() && dead_reckoning_s_ < 2.5; }
+  /// Measurements have contradicted it since surfaces have been all but alone.
+  [[nodiscard]] bool contradicted() const { return contradicted_; }
+
+  [[nodiscard]] double last_stamp() const { return stamp_; }
+  /// How the camera turns, rad/s in its frame: camera_from_world(t + dt) = Exp(w dt) camera_from_world(t).
+  /// Zero when that is not known.
+  [[nodiscard]] Eigen::Vector3d angular_velocity() const {
+    return continuous() ? Eigen::Vector3d(velocity_.tail<3>()) : Eigen::Vector3d::Zero();
+  }
+  [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
+
+ private:
+  double stamp_ = 0.0;  ///< of the last tracked frame
+  geometry::Rigid3 camera_from_world_;
+  bool valid_ = false;
+  geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
+  int steps_ = 0;        ///< between frames, one after the other, that it was found from
+  double step_s_ = 0.0;  ///< how long the last one was
+  int lost_frames_ = 0;
+  double dead_reckoning_s_ = 0.0;  ///< how long it has held what no measurement does
+  bool contradicted_ = false;
+};
+
+}  // namespace plumbline::tracking

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame_aligner.hpp"
+
+#include <cmath>
+
+#include "observability.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+#include "plumbline/tracking/align_points.hpp"
+
+namespace plumbline::tracking {
+namespace {
+
+using geometry::Rigid3;
+
+constexpr AlignmentRound kCoarseToFine[] = {
+    // search, plane, samples, level, rematch, reject outliers
+    {0.0, 0.15, 500, 1, true, false},
+    {0.0, 0.08, 700, 1, false, false},
+    {kFineRadius_px, 0.05, 1200, 0, true, true},
+    {kFineRadius_px, 0.03, 2400, 0, false, true},
+    {kFineRadius_px, 0.03, 2400, 0, false, false}};
+constexpr std::size_t kFine = 2;  // the first of the fine rounds
+
+constexpr int kIterations = 4;      // of a round; the next one associates anew
+constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
+constexpr double kLineGate = 9.2;   // 99 %: line ends are less exact than corners
+
+/// Reprojection, and depth where it was measured.
+std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
+                                             const features::FrameFeatures& features,
+                                             const AssociationOptions& options) {
+  std::vector<optimize::PointTerm> terms;
+  terms.reserve(matches.size());
+  for (const PointMatch& match : matches) {
+    const features::PointFeature& f = features.points[static_cast<std::size_t>(match.feature)];
+    optimize::PointTerm term;
+    term.world = map.point(match.point).position;
+    term.pixel = (f.pixel + match.shift).cast<double>();
+    term.pixel_sigma =
+        std::pow(options.scale_factor, f.octave) * (match.aligned ? options.aligned_sigma : 1.0);
+    const float depth = features.depth_beside(static_cast<std::size_t>(match.feature), match.shift);
+    if (depth > 0.0F) {
+      term.depth = static_cast<double>(depth);
+      // The landmark's own depth is no better than the measurement.
+      term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
+    }
+    terms.push_back(term);
+  }
+  return terms;
+}
+
+/// Distances of the measured ends from the projected Pluecker line.
+std::vector<optimize::LineTerm> line_terms(const maps::Map& map, const std::vector<LineMatch>& matches,
+                                           const features::FrameFeatures& features) {
+  std::vector<optimize::LineTerm> terms;
+  terms.reserve(matches.size());
+  for (const LineMatch& match : matches) {
+    const maps::MapLine& line = map.line(match.line);
+    const features::LineSegment& s = features.lines[static_cast<std::size_t>(match.feature)].segment;
+    optimize::LineTerm term;
+    term.world = geometry::line_through(line.start, line.end);
+    term.start = s.start.cast<double>();
+    term.end = s.end.cast<double>();
+    term.pixel_sigma = 0.6;
+    terms.push_back(term);
+  }
+  return terms;
+}
+
+/// Keeps what fits at the estimated pose.
+template <typename Match, typename Term>
+void keep_inliers(const std::vector<double>& errors, double gate, std::vector<Match>& matches,
+                  std::vector<Term>& terms) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!(errors[i] <= gate)) continue;
+    matches[kept] = matches[i];
+    terms[kept] = terms[i];
+    ++kept;
+  }
+  matches.resize(kept);
+  terms.resize(kept);
+}
+
+}  // namespace
+
+FrameAligner::FrameAligner(const AlignmentInput& input, const Rigid3& hypothesis, double search_radius_px)
+    : in_(input),
+      search_radius_px_(search_radius_px),
+      predicted_(input.motion.continuous() ? input.motion.predict(input.frame.stamp) : hypothesis),
+      use_motion_prior_(!input.motion.contradicted()) {
+  problem_.camera = in_.camera;
+  result_.camera_from_world = hypothesis;
+  result_.depth_from_camera = in_.depth_from_camera;
+}
+
+TrackResult FrameAligner::run() {
+  for (std::size_t i = search_radius_px_ > 0.0 ? 0 : kFine; i < std::size(kCoarseToFine); ++i)
+    align(kCoarseToFine[i]);
+  if (contradicts_motion_prior()) {
+    use_motion_prior_ = false;
+    for (std::size_t i = kFine; i < std::size(kCoarseToFine); ++i) align(kCoarseToFine[i]);
+  }
+  judge();
+  return std::move(result_);
+}
+
+void FrameAligner::align(const AlignmentRound& round) {
+  if (round.rematch) match_landmarks(round);  // points and lines, by projection: e_p and e_l of section 3.2
+  associate_surface(round);                   // point to plane: METHOD section 2, third residual family
+  associate_intensity(round);                 // direct alignment
+  solve();                                    // Levenberg-Marquardt over all of them
+  constrain_degenerate_directions();          // by the motion prior
+  if (round.reject_outliers) reject_outliers();  // chi-square gates
+}
+
+void FrameAligner::match_landmarks(const AlignmentRound& round) {
+  const double radius = round.search_radius_px > 0.0 ? round.search_radius_px : search_radius_px_;
+  const AssociationOptions& how = in_.options.association;
+  const Rigid3& pose = result_.camera_from_world;
+  result_.visible_points.clear();
+  result_.visible_lines.clear();
+  if (in_.options.points) {
+    result_.points = match_points(in_.map, in_.local_map.points, in_.features, in_.camera, pose, radius, how,
+                                  &result_.visible_points);
+    if (how.align && round.reject_outliers)
+      align_points(in_.map, in_.features, in_.camera, pose, how.scale_factor, result_.points);
+    problem_.points = point_terms(in_.map, result_.points, in_.features, how);
+  }
+  if (in_.options.lines) {
+    result_.lines = match_lines(in_.map, in_.local_map.lines, in_.features, in_.camera, pose, radius, how,
+                                &result_.visible_lines);
+    problem_.lines = line_terms(in_.map, result_.lines, in_.features);
+  }
+}
+
+void FrameAligner::associate_surface(const AlignmentRound& round) {
+  if (!in_.options.depth) return;
+  SurfaceAssociationOptions how;
+  how.max_distance_m = round.max_plane_distance_m;
+  how.max_samples = round.surface_samples;
+  problem_.planes = tracking::associate_surface(in_.local_map.surface, in_.frame.depth, in_.camera,
+                                                result_.camera_from_world, in_.depth_from_camera, how,
+                                                &result_.surface_in_view);
+}
+
+void FrameAligner::associate_intensity(const AlignmentRound& round) {
+  if (!in_.options.photometric) return;
+  const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
+                     settle_photometric(*problem_.photometric, result_.camera_from_world);
+  if (!again) {
+    problem_.photometric = in_.photometric.associate(
+        in_.map, in_.local_map.keyframes, round.pyramid_level,
+        {in_.features.photometric.get(), &in_.frame.depth, in_.depth_from_camera, in_.camera},
+        result_.camera_from_world);
+  }
+  intensity_level_ = round.pyramid_level;
+}
+
+/// Without intensity where it disagrees.
+void FrameAligner::solve() {
+  optimize::PoseSolverOptions solver = in_.options.solver;
+  solver.max_iterations = kIterations;
+  result_.estimate = optimize::solve_pose(problem_, result_.camera_from_world, solver);
+  if (problem_.photometric &&
+      !photometric_agrees(*problem_.photometric, result_.estimate.camera_from_world)) {
+    problem_.photometric.reset();
+    result_.estimate = optimize::solve_pose(problem_, result_.camera_from_world, solver);
+  }
+  result_.camera_from_world = result_.estimate.camera_from_world;
+}
+
+void FrameAligner::constrain_degenerate_directions() {
+  surface_only_ = uses_features() && !problem_.photometric && feature_inliers() < in_.options.min_inliers;
+  if (!in_.options.motion_prior) return;
+  MotionTrust trust = MotionTrust::kUnknown;
+  if (use_motion_prior_ && surface_only_) trust = MotionTrust::kSurfaceOnly;
+  if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(in_.frame.stamp))
+    trust = MotionTrust::kLikely;
+  problem_.prior = motion_prior(result_.estimate.information, predicted_, trust);
+}
+
+void FrameAligner::reject_outliers() {
+  keep_inliers(optimize::point_errors(problem_, result_.camera_from_world), kPointGate, result_.points,
+               problem_.points);
+  keep_inliers(optimize::line_errors(problem_, result_.camera_from_world), kLineGate, result_.lines,
+               problem_.lines);
+}
+
+int FrameAligner::feature_inliers() const {
+  return result_.estimate.points.inliers + 2 * result_.estimate.lines.inliers;
+}
+
+}  // namespace plumbline::tracking

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/tracking/motion_model.hpp"
+
+#include "plumbline/tracking/tracker.hpp"
+
+namespace plumbline::tracking {
+
+geometry::Rigid3 MotionModel::predict(double stamp) const {
+  return motion_within(std::clamp(stamp - stamp_, 0.0, 0.2)) * camera_from_world_;
+}
+
+bool MotionModel::reliable(double stamp) const {
+  constexpr double kLonger = 1.5;
+  return continuous() && steps_ >= 2 && stamp - stamp_ < kLonger * step_s_;
+}
+
+void MotionModel::update(double stamp, const TrackResult& result) {
+  constexpr double kDoubt = 0.75;  // of a change of motion in directions that hardly anything else holds
+  const double dt = stamp - stamp_;
+  dead_reckoning_s_ = result.dead_reckoned && valid_ ? dead_reckoning_s_ + dt : 0.0;
+  if (continuous() && dt > 1e-4 && dt < 0.5) {
+    const bool known = reliable(stamp);
+    const geometry::Vector6d before = velocity_;
+    velocity_ = geometry::log_se3(result.camera_from_world * camera_from_world_.inverse()) / dt;
+    // Where little but the motion model holds the camera, steps are noise above all, and would run away with
+    // it.
+    if (known && !result.motion_contradicted)
+      velocity_ -= kDoubt * (result.onto_degenerate * (velocity_ - before));
+    ++steps_;
+    step_s_ = dt;
+  } else {
+    reset();
+  }
+  contradicted_ = result.motion_contradicted;
+  lost_frames_ = 0;
+  stamp_ = stamp;
+  camera_from_world_ = result.camera_from_world;
+  valid_ = true;
+}
+
+void MotionModel::lost() {
+  ++lost_frames_;
+  velocity_ *= 0.8;
+}
+
+void MotionModel::reset() {
+  velocity_.setZero();
+  steps_ = 0;
+  valid_ = false;
+}
+
+void MotionModel::restore(double stamp, const geometry::Vector6d& velocity) {
+  stamp_ = stamp;
+  valid_ = true;
+  velocity_ = velocity;
+  steps_ = 2;
+  step_s_ = 0.2;  // not known: any that predict() looks ahead
+  lost_frames_ = 0;
+}
+
+}  // namespace plumbline::tracking

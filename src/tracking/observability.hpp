@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which directions of a pose the measurements constrain, and the motion model's part in constraining the
+// degenerate ones (compare Zhang, Kaess, Singh, ICRA 2016).
+#include <optional>
+
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/optimize/pose_solver.hpp"
+
+namespace plumbline::tracking {
+
+/// Principal directions of the information, rotations counted in units that move the scene as much as a metre
+/// of translation does, at 2 m.
+struct PrincipalDirections {
+  geometry::Vector6d eigenvalues;  ///< ascending
+  geometry::Matrix6d eigenvectors;
+};
+
+PrincipalDirections principal_directions(const geometry::Matrix6d& information);
+
+/// Information below which a direction is degenerate. Where surfaces are alone, the noise of their normals
+/// seems to hold what it does not: a direction needs its share of the normals. (Without features by choice
+/// there is nothing better to go by.)
+double degenerate_below(const geometry::Matrix6d& information, bool surface_only);
+
+/// Takes a motion (left perturbation of camera_from_world) to its part in the directions with less
+/// information than `below`.
+geometry::Matrix6d projector_onto_degenerate(const PrincipalDirections& directions, double below);
+
+/// What the motion prior is worth.
+enum class MotionTrust {
+  kUnknown,  ///< contradicted, or nothing is known of the past: 2 cm, where nothing holds better than that
+  kLikely,   ///< beside features: 5 mm, where they hold no better than that
+  kSurfaceOnly,  ///< beside surfaces alone: 0.3 mm where these hold nothing, so that what uneven normals say
+                 ///< does not brake the camera frame by frame
+};
+
+/// What measurements leave open is held by the motion model, in these directions only. None when there are
+/// none.
+std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
+                                                const geometry::Rigid3& predicted, MotionTrust trust);
+
+}  // namespace plumbline::tracking

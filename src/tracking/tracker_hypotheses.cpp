@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where the tracker looks for the camera, and which of the poses found from there it takes.
+#include <algorithm>
+
+#include "frame_aligner.hpp"
+#include "plumbline/tracking/thumbnail_alignment.hpp"
+
+namespace plumbline::tracking {
+
+using geometry::Rigid3;
+
+TrackResult Tracker::align(const maps::Map& map, const sensor::RgbdFrame& frame,
+                           const features::FrameFeatures& features, const Rigid3& hypothesis,
+                           double search_radius_px) const {
+  const AlignmentInput input{
+      options_, camera_, map, local_map_, photometric_, motion_, frame, features, depth_from_camera(frame)};
+  return FrameAligner(input, hypothesis, search_radius_px).run();
+}
+
+Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                                 const features::FrameFeatures& features) const {
+  PoseHypotheses result;
+  const Rigid3 predicted = motion_.predict(frame.stamp);
+  const Rigid3& last = motion_.camera_from_world();
+  if (options_.pnp_start) {  // METHOD section 2: PnP, then Levenberg-Marquardt
+    const auto seen =
+        tracking::relocalise(map, {local_map_.reference}, features, camera_, options_.min_inliers);
+    if (seen) result.camera_from_world.push_back(seen->camera_from_world);
+    result.searched = seen.has_value();
+  }
+  if (options_.thumbnails) {
+    const ThumbnailAlignment alignment = align_thumbnails(thumbnail_, thumbnail_depth_, features.thumbnail,
+                                                          camera_, predicted * last.inverse());
+    if (alignment.better) result.camera_from_world.push_back(alignment.current_from_previous * last);
+  }
+  result.camera_from_world.push_back(predicted);
+  result.camera_from_world.push_back(last);
+  if (options_.photometric)
+    rank_by_intensity(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
+  return result;
+}
+
+/// Before a bare wall thumbnails fit anywhere, and the motion model lags behind: grain tells which hypothesis
+/// is the best, or how far to the side of it the camera looks.
+void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& view,
+                                PoseHypotheses& hypotheses) const {
+  constexpr std::size_t kCoarse = 1;
+  constexpr double kSure = 0.3;  // correlation of what is searched for
+  std::vector<Rigid3>& poses = hypotheses.camera_from_world;
+  std::vector<std::optional<double>> agreement;
+  std::vector<std::optional<optimize::PhotometricFamily>> families;
+  for (const Rigid3& pose : poses) {
+    const auto& family =
+        families.emplace_back(photometric_.associate(map, local_map_.keyframes, kCoarse, view, pose));
+    agreement.push_back(family
+                            ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
+                            : std::nullopt);
+  }
+  const std::size_t best = likeliest_guess(agreement);
+  const Rigid3 likeliest = poses[best];
+  if (best > 0) {
+    poses.erase(poses.begin() + static_cast<std::ptrdiff_t>(best));
+    poses.insert(poses.begin(), likeliest);
+  }
+  if (!families[best] || *agreement[best] >= kGoodAgreement) return;
+  const ShiftedPose shifted = search_shift(*families[best], likeliest);
+  if (shifted.correlation < std::max(kSure, *agreement[best] + kBetterAgreement)) return;
+  poses.insert(poses.begin(), shifted.camera_from_world);
+  hypotheses.searched = true;
+}
+
+/// Terms that bear a pose out, each family with its weight.
+double Tracker::support(const TrackResult& result) const {
+  const optimize::PoseSummary& seen = result.estimate;
+  const optimize::PoseSolverOptions& weights = options_.solver;
+  return weights.point_weight * seen.points.inliers + weights.line_weight * 2 * seen.lines.inliers +
+         weights.plane_weight * seen.planes.inliers + weights.photometric_weight * seen.photometric.inliers;
+}
+
+/// Whether the camera would have been jolted as no hand or wheel does between two frames.
+bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
+  constexpr double kMost_m = 0.03;
+  constexpr double kMost_rad = 0.03;
+  if (!motion_.reliable(stamp)) return false;
+  const Rigid3 jump = camera_from_world * motion_.predict(stamp).inverse();
+  return jump.translation.norm() > kMost_m || geometry::rotation_angle(jump.rotation) > kMost_rad;
+}
+
+std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map,
+                                                            const sensor::RgbdFrame& frame,
+                                                            const features::FrameFeatures& features) const {
+  constexpr double kClearly = 1.15;  // more must bear a jump out than what is near the hypothesis
+  if (motion_.expired()) return std::nullopt;
+  const PoseHypotheses hypotheses = pose_hypotheses(map, frame, features);
+  const auto tracked = [&](const TrackResult& attempt) {
+    return attempt.state == TrackState::kTracked && (!motion_.outdated() || passes_strict_check(attempt));
+  };
+  std::optional<TrackResult> best;
+  for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
+    TrackResult attempt = align(map, frame, features, hypothesis, motion_.search_radius_px());
+    // Among look-alikes, the keys of a keyboard, wrong matches of the wide search can pull the pose further
+    // than the fine rounds look: the right ones around the hypothesis would never be tried.
+    if (jumps(frame.stamp, attempt.camera_from_world)) {
+      TrackResult near = align(map, frame, features, hypothesis, 0.0);
+      if (tracked(near) && !(tracked(attempt) && support(attempt) > kClearly * support(near)))
+        attempt = std::move(near);
+    }
+    if (tracked(attempt) && (!best || support(attempt) > support(*best))) best = std::move(attempt);
+    if (best && !hypotheses.searched) break;
+  }
+  return best;
+}
+
+std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
+    const maps::Map& map, const features::FrameFeatures& features) const {
+  constexpr int kLookAlikes = 24;
+  constexpr std::size_t kAligned = 3;
+  std::vector<LookAlike> alike;
+  if (options_.thumbnails) alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
+  std::vector<PlaceHypothesis> hypotheses;
+  if (options_.points) {
+    std::vector<core::KeyframeId> candidates;
+    const auto add = [&candidates](core::KeyframeId id) {
+      if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
+    };
+    for (core::KeyframeId id : local_map_.keyframes) add(id);
+    if (find_places_) {
+      for (core::KeyframeId id : find_places_(features)) add(id);
+    }
+    for (const LookAlike& a : alike) add(a.keyframe);
+    const auto seen = tracking::relocalise(map, candidates, features, camera_, options_.min_inliers);
+    if (seen) hypotheses.push_back({seen->keyframe, seen->camera_from_world, false});
+  }
+  for (std::size_t i = 0; i < std::min(kAligned, alike.size()); ++i) {
+    const core::KeyframeId id = alike[i].keyframe;
+    hypotheses.push_back({id, align_look_alike(map, id, features, camera_), true});
+  }
+  return hypotheses;
+}
+
+std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const sensor::RgbdFrame& frame,
+                                               const features::FrameFeatures& features) {
+  const std::vector<PlaceHypothesis> hypotheses = place_hypotheses(map, features);
+  LocalMap before = std::move(local_map_);
+  for (const PlaceHypothesis& place : hypotheses) {
+    local_map_ = build_local_map(map, place.keyframe, options_.local_map);
+    TrackResult attempt = align(map, frame, features, place.camera_from_world, place.coarse ? 24.0 : 10.0);
+    if (attempt.state != TrackState::kTracked || attempt.dead_reckoned) continue;
+    if (place.coarse && !passes_strict_check(attempt)) continue;
+    if (is_place_ && !is_place_(frame, features, place.keyframe, attempt.camera_from_world)) continue;
+    attempt.relocalised = true;
+    motion_.reset();
+    return attempt;
+  }
+  local_map_ = std::move(before);  // a mistake must not take the surroundings away
+  return std::nullopt;
+}
+
+/// Places can look alike: what only the thumbnail suggested must be confirmed by every family that is in use
+/// and has something to say there.
+bool Tracker::passes_strict_check(const TrackResult& result) const {
+  constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
+  if (result.degenerate_directions > 0) return false;
+  if (options_.depth &&
+      (result.estimate.planes.inliers < options_.min_surface || result.surface_share < kMostOfTheSurface)) {
+    return false;
+  }
+  if (!options_.points && !options_.lines) return true;
+  const auto found = static_cast<double>(result.points.size() + 2 * result.lines.size());
+  const auto expected = static_cast<double>(result.visible_points.size() + 2 * result.visible_lines.size());
+  return found >= options_.min_inliers && found >= kMostOfTheFeatures * expected;
+}
+
+}  // namespace plumbline::tracking
