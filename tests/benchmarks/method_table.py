@@ -24,6 +24,7 @@ OFF = {
     'depth': 'track.depth=off track.edges=off track.verify.align=off refine.icp=off refine.adjust.surface_weight=0',
     'grey values': 'features.photometric=off track.photometric=off track.edges.photometric=off',
 }
+CONES = 'track.keyframe.rule=cone track.landmark.depth_normals=on track.keyframe.urgent=nearly_lost'
 TABLES = {
     'families': {
         'points': '-p points_only',
@@ -44,9 +45,9 @@ TABLES = {
         '30 % by keyframes': 'track.landmark.by_keyframes=on track.landmark.min_visible=3',
         'three keyframes': 'track.landmark.min_keyframes=3',
         'no depth rows': 'track.solver.depth_rows=off track.bundle.depth_rows=off refine.adjust.depth_rows=off',
-        'cones, above': 'track.keyframe.rule=cone track.landmark.depth_normals=on',
-        'cones, below': 'track.keyframe.rule=cone track.landmark.depth_normals=on track.keyframe.cone_balance=below',
-        'cones, no balance': 'track.keyframe.rule=cone track.landmark.depth_normals=on track.keyframe.cone_balance=off',
+        'cones, not scaled': CONES,
+        **{f'cones, {balance}': f'{CONES} track.keyframe.cone_scaled=on track.keyframe.cone_balance={balance}'
+           for balance in ('above', 'below', 'off')},
         'absolute eta': 'track.places.min_score=0 track.places.min_absolute=0.05',
         'pair: R, t and structure': 'track.verify.joint=on',
     },
