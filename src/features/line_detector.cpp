@@ -42,7 +42,7 @@ std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& im
   std::vector<cv::Vec4f> lines;
   switch (options.method) {
     case LineMethod::kLsd:
-      lines = detect_lsd(image, min_length, static_cast<float>(options.min_gradient));
+      lines = detect_lsd(image, min_length, static_cast<float>(options.min_gradient), options.exact_nfa);
       break;
     case LineMethod::kEdlines: {
       auto drawing = cv::ximgproc::createEdgeDrawing();
@@ -62,8 +62,11 @@ std::vector<cv::Vec4f> run(const LineDetectorOptions& options, const cv::Mat& im
   return lines;
 }
 
-bool along_border(const LineSegment& s, const cv::Rect& region, float margin) {
-  const auto both_below = [&](float a, float b, float limit) { return a < limit && b < limit; };
+bool at_border(const LineSegment& s, const cv::Rect& region, const LineDetectorOptions& options) {
+  const auto margin = static_cast<float>(options.border_px);
+  const auto both_below = [&](float a, float b, float limit) {
+    return options.border_either ? a < limit || b < limit : a < limit && b < limit;
+  };
   const float left = static_cast<float>(region.x);
   const float top = static_cast<float>(region.y);
   const float right = static_cast<float>(region.x + region.width - 1);
@@ -89,6 +92,8 @@ void LineDetectorOptions::declare(core::OptionTable& table) {
   table.number("line.min_length", min_length_px, {5.0, 1000.0}, "px", "Shorter lines are dropped");
   table.number("line.border", border_px, {0.0, 100.0}, "px",
                "Lines that run within this margin of a side are dropped");
+  table.boolean("border_either", border_either, "Lines with one end within that margin are dropped, too");
+  table.boolean("exact_nfa", exact_nfa, "LSD: number of false alarms by its sum, not by a bound");
   table.integer("line.max_count", max_count, {0, 10000}, "", "Keep the longest so many lines; 0 keeps all");
   table.boolean("line.join", join, "Join collinear pieces and drop near-duplicates");
   table.number("line.join_gap", join_gap_px, {0.0, 200.0}, "px",
@@ -117,7 +122,7 @@ std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {
     LineSegment s;
     s.start = factor * Eigen::Vector2f(line[0], line[1]) + origin;
     s.end = factor * Eigen::Vector2f(line[2], line[3]) + origin;
-    if (!(s.length() >= piece) || along_border(s, region, static_cast<float>(options_.border_px))) continue;
+    if (!(s.length() >= piece) || at_border(s, region, options_)) continue;
     orient(s, gray);
     if (s.response >= kMinResponse) segments.push_back(s);
   }

@@ -35,7 +35,7 @@ struct Rectangle {
 
 class Lsd {
  public:
-  Lsd(const cv::Mat& image, float min_gradient);
+  Lsd(const cv::Mat& image, float min_gradient, bool exact);
   std::vector<cv::Vec4f> detect(float min_length);
 
  private:
@@ -60,6 +60,7 @@ class Lsd {
 
   int width_;
   int height_;
+  bool exact_;
   std::vector<Gradient> gradients_;
   std::vector<std::uint8_t> used_;  // in a region, or no usable gradient
   std::vector<int> seeds_;          // strongest first
@@ -67,9 +68,10 @@ class Lsd {
   Eigen::Vector2f sum_ = Eigen::Vector2f::Zero();  // of the region's unit gradients
 };
 
-Lsd::Lsd(const cv::Mat& image, float min_gradient)
+Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
     : width_(image.cols),
       height_(image.rows),
+      exact_(exact),
       gradients_(static_cast<std::size_t>(width_ * height_)),
       used_(static_cast<std::size_t>(width_ * height_), 1) {
   const int least_squared = std::max(1, static_cast<int>(std::ceil(4.0F * min_gradient * min_gradient)));
@@ -241,15 +243,32 @@ bool Lsd::make_dense(Rectangle& rectangle) {
   return true;
 }
 
-// NFA(r) = (N M)^(5/2) gamma B(n, k, p) <= 1, the binomial tail by its Chernoff bound exp(-n KL(k/n || p)).
+// log B(n, k, p), the binomial tail: each term is the one before times (n - j) / (j + 1) p / (1 - p).
+double log_binomial_tail(double n, double k, double p) {
+  const double first = std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0) +
+                       k * std::log(p) + (n - k) * std::log(1.0 - p);
+  double sum = 1.0;
+  double term = 1.0;
+  for (double j = k; j < n && term > 1e-9 * sum; ++j) {
+    term *= (n - j) / (j + 1.0) * p / (1.0 - p);
+    sum += term;
+  }
+  return first + std::log(sum);
+}
+
+// NFA(r) = (N M)^(5/2) gamma B(n, k, p) <= 1, the binomial tail by its Chernoff bound exp(-n KL(k/n || p)),
+// or as it is, with as many angle tolerances tried (gamma) as published.
 bool Lsd::meaningful(const Rectangle& rectangle) const {
   const auto k = static_cast<double>(region_.size());
   const double n = std::max(k, static_cast<double>((rectangle.length() + 1.0F) * rectangle.width));
   const double p = kTolerance / 3.14159265358979;
+  constexpr double kGamma = 11.0;
+  const double tests = 2.5 * std::log(static_cast<double>(width_) * height_);
+  if (exact_) return log_binomial_tail(std::round(n), k, p) + tests + std::log(kGamma) <= 0.0;
   const double q = k / n;
   const double divergence =
       q * std::log(q / p) + (q < 1.0 ? (1.0 - q) * std::log((1.0 - q) / (1.0 - p)) : 0.0);
-  return n * divergence >= 2.5 * std::log(static_cast<double>(width_) * height_);
+  return n * divergence >= tests;
 }
 
 std::vector<cv::Vec4f> Lsd::detect(float min_length) {
@@ -270,10 +289,10 @@ std::vector<cv::Vec4f> Lsd::detect(float min_length) {
 
 }  // namespace
 
-std::vector<cv::Vec4f> detect_lsd(const cv::Mat& image, float min_length, float min_gradient) {
+std::vector<cv::Vec4f> detect_lsd(const cv::Mat& image, float min_length, float min_gradient, bool exact) {
   CV_Assert(image.type() == CV_8UC1);
   if (image.cols < 4 || image.rows < 4) return {};
-  return Lsd(image, min_gradient).detect(min_length);
+  return Lsd(image, min_gradient, exact).detect(min_length);
 }
 
 }  // namespace plumbline::features

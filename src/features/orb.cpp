@@ -47,10 +47,11 @@ bool stronger(const Corner& a, const Corner& b) {
 }
 
 /// Picks about `wanted` corners: every cell gives its strongest in turn until enough are taken.
-std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, int wanted) {
+std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, int wanted, bool evenly) {
   const auto count = static_cast<std::size_t>(std::max(0, wanted));
-  if (corners.size() <= count) {
+  if (corners.size() <= count || !evenly) {
     std::sort(corners.begin(), corners.end(), stronger);
+    corners.resize(std::min(count, corners.size()));
     return corners;
   }
   const Cells cells(size.width, size.height);
@@ -156,6 +157,8 @@ void OrbOptions::declare(core::OptionTable& table) {
       "orb.min_corner", min_corner, {0.0, 1.0}, "",
       "Corners whose gradients across the main direction are weaker, squared, than this share of those "
       "along it lie on an edge and are left out; 0: none are");
+  table.boolean("orb.spread", spread,
+                "Points evenly over the picture; off: the strongest, wherever they are");
 }
 
 OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {
@@ -214,7 +217,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
     const std::vector<Corner> corners =
         spread(detect(image, inner, options_.fast_threshold,
                       std::min(options_.fast_threshold, options_.fast_threshold_min), options_.min_corner),
-               image.size(), wanted);
+               image.size(), wanted, options_.spread);
     if (corners.empty()) continue;
     std::vector<cv::KeyPoint> on_level;
     for (const Corner& c : corners) {

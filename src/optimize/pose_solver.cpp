@@ -84,7 +84,7 @@ void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolver
     cost += options.point_weight * pixel.cost;
     sums.add(j.row(0), r(0), options.point_weight * pixel.weight);
     sums.add(j.row(1), r(1), options.point_weight * pixel.weight);
-    if (rows < 3) continue;
+    if (rows < 3 || !options.depth_rows) continue;
     const Robust depth = huber(r(2) * r(2), options.plane_loss);
     cost += options.point_weight * depth.cost;
     // A corner whose picture does not fit has no say about depth either.
@@ -194,6 +194,7 @@ void PoseSolverOptions::declare(core::OptionTable& table) {
                "Huber threshold of grey values, standard deviations");
   table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
   table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
+  table.boolean("solver.depth_rows", depth_rows, "Points are held by their depth, too");
   table.number("solver.plane_weight", plane_weight, {0.0, 100.0}, "", "Weight of all depth samples together");
   table.number("solver.photometric_weight", photometric_weight, {0.0, 100.0}, "",
                "Weight of all grey values together");

@@ -172,6 +172,7 @@ void FrameAligner::solve() {
 
 void FrameAligner::constrain_degenerate_directions() {
   surface_only_ = uses_features() && !problem_.photometric && feature_inliers() < in_.options.min_inliers;
+  if (!in_.options.motion_prior) return;
   MotionTrust trust = MotionTrust::kUnknown;
   if (use_motion_prior_ && surface_only_) trust = MotionTrust::kSurfaceOnly;
   if (use_motion_prior_ && !surface_only_ && in_.motion.reliable(in_.frame.stamp))

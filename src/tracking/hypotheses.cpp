@@ -22,9 +22,17 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
   PoseHypotheses result;
   const Rigid3 predicted = motion_.predict(frame.stamp);
   const Rigid3& last = motion_.camera_from_world();
-  const ThumbnailAlignment alignment =
-      align_thumbnails(thumbnail_, thumbnail_depth_, features.thumbnail, camera_, predicted * last.inverse());
-  if (alignment.better) result.camera_from_world.push_back(alignment.current_from_previous * last);
+  if (options_.pnp_start) {  // METHOD section 2: PnP, then Levenberg-Marquardt
+    const auto seen =
+        tracking::relocalise(map, {local_map_.reference}, features, camera_, options_.min_inliers);
+    if (seen) result.camera_from_world.push_back(seen->camera_from_world);
+    result.searched = seen.has_value();
+  }
+  if (options_.thumbnails) {
+    const ThumbnailAlignment alignment = align_thumbnails(thumbnail_, thumbnail_depth_, features.thumbnail,
+                                                          camera_, predicted * last.inverse());
+    if (alignment.better) result.camera_from_world.push_back(alignment.current_from_previous * last);
+  }
   result.camera_from_world.push_back(predicted);
   result.camera_from_world.push_back(last);
   if (options_.photometric)
@@ -107,7 +115,8 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
     const maps::Map& map, const features::FrameFeatures& features) const {
   constexpr int kLookAlikes = 24;
   constexpr std::size_t kAligned = 3;
-  const std::vector<LookAlike> alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
+  std::vector<LookAlike> alike;
+  if (options_.thumbnails) alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
   std::vector<PlaceHypothesis> hypotheses;
   if (options_.points) {
     std::vector<core::KeyframeId> candidates;

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "plumbline/maps/covisibility.hpp"
+
 namespace plumbline::tracking {
 namespace {
 
@@ -111,7 +113,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   local.reference = reference;
   local.keyframes.push_back(reference);
   const auto wanted = static_cast<std::size_t>(options.keyframes);
-  for (const auto& [id, shared] : map.covisible(reference, 15)) {
+  for (const auto& [id, shared] : map.covisible(reference, maps::kCovisible)) {
     if (local.keyframes.size() >= wanted) break;
     append_unique(local.keyframes, id);
   }

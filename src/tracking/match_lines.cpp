@@ -29,13 +29,14 @@ bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_f
 struct LineCandidate {
   Eigen::Vector2f direction;
   Eigen::Vector2f middle;
+  float length = 0.0F;
 };
 
 std::vector<LineCandidate> candidates_of(const features::FrameFeatures& frame) {
   std::vector<LineCandidate> candidates;
   candidates.reserve(frame.lines.size());
   for (const features::LineFeature& line : frame.lines) {
-    candidates.push_back({line.segment.direction(), line.segment.middle()});
+    candidates.push_back({line.segment.direction(), line.segment.middle(), line.segment.length()});
   }
   return candidates;
 }
@@ -56,10 +57,13 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
     if (visible != nullptr) visible->push_back(id);
     LineMatch best{id, -1, options.max_line_hamming + 1};
     const Eigen::Vector2f d = predicted.direction();
+    const float length = predicted.length();
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       if (d.dot(candidates[i].direction) < min_cosine) continue;
       const Eigen::Vector2f r = candidates[i].middle - predicted.start;
       if (std::abs(d.x() * r.y() - d.y() * r.x()) > static_cast<float>(radius)) continue;
+      const auto [shorter, longer] = std::minmax(length, candidates[i].length);
+      if (shorter < static_cast<float>(options.min_line_ratio) * longer) continue;
       const features::LineFeature& candidate = frame.lines[i];
       if (features::overlap(predicted, candidate.segment) < 0.4) continue;
       const int distance = features::hamming(line->descriptor, candidate.descriptor);

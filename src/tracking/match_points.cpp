@@ -102,6 +102,8 @@ void AssociationOptions::declare(core::OptionTable& table) {
                 "Line descriptors may differ by so many bits");
   table.number("match.max_line_angle", max_line_angle_rad, {0.01, 1.6}, "rad",
                "Angle between a predicted and a measured line, at most");
+  table.number("match.min_line_ratio", min_line_ratio, {0.0, 1.0}, "",
+               "Shorter over longer of a predicted and a measured line, at least");
 }
 
 std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<core::PointId>& points,

@@ -39,6 +39,11 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("photometric", photometric, "Align grey values with keyframes directly");
   table.boolean("align_stamps", align_stamps,
                 "Bring colour and depth stamped apart together with the motion model");
+  table.boolean("thumbnails", thumbnails, "Small pictures tell where the camera may be");
+  table.boolean("motion_prior", motion_prior, "The motion model holds what measurements leave open");
+  table.boolean(
+      "pnp_start", pnp_start,
+      "Every frame begins with PnP over descriptors, where these are enough, not with the motion model");
   table.number(
       "readout", readout_s, {0.0, 0.1}, "s",
       "Rolling shutter: time from the first to the last row of a picture; 0: as the camera's file says");

@@ -12,11 +12,12 @@
 # Until the map: without the merged cloud and what is written at the end. With --estimate recordings are mapped as
 # fast as that goes, and a run counts as long as its frames take at 30 Hz, or as mapping took where that is longer,
 # plus what its stages did after the last frame; the third line is left out. Seconds mean something on an idle
-# machine only. Maps that are in WORK already are taken as they are.
+# machine only. Maps that are in WORK already are taken as they are. PIPELINE=NAME maps with that one, recordings of one
+# robot and of several alike.
 set -euo pipefail
 estimate=
 [ "${1:-}" = --estimate ] && { estimate=1; shift; }
-[ $# -ge 3 ] || { sed -n '3,18s/^# //p' "$0" >&2; exit 2; }
+[ $# -ge 3 ] || { sed -n '3,19s/^# //p' "$0" >&2; exit 2; }
 plumbline=$1 recording=$(realpath "$2") work=$3 shared=${4:-0}
 shift $(($# < 4 ? 3 : 4))
 options=(-q --force --set output.views= --set output.pcd=off "$@")
@@ -45,15 +46,16 @@ run() { # run NAME COMMAND...: its seconds in WORK/NAME.s; exit code 4 is a resu
 read -r first last < <(awk '!/^#/ {if (!n++) f = $1; l = $1} END {print f, l}' "$recording/rgb.txt")
 cut a "$first" "$(echo "($first + $last + $shared) / 2" | bc -l)"
 cut b "$(echo "($first + $last - $shared) / 2" | bc -l)" "$last"
-run one map "$recording" "${pace[@]}"
+whole=(${PIPELINE:+-p "$PIPELINE"})
+run one map "$recording" "${whole[@]}" "${pace[@]}"
 # Pictures and tables are no part of the pipeline `robot`.
 views=("${options[@]}")
 options=(-q --force "$@")
-run map_a map "$work/a" -p robot "${pace[@]}"
-run map_b map "$work/b" -p robot "${pace[@]}"
+run map_a map "$work/a" -p "${PIPELINE:-robot}" "${pace[@]}"
+run map_b map "$work/b" -p "${PIPELINE:-robot}" "${pace[@]}"
 options=("${views[@]}")
 run two fuse "$work/map_a" "$work/map_b"
-[ -n "$estimate" ] || run both map "$work/a" "$work/b" "${pace[@]}"
+[ -n "$estimate" ] || run both map "$work/a" "$work/b" "${whole[@]}" "${pace[@]}"
 
 python3 - "$work" "$recording" "$estimate" <<'PYTHON'
 import json

@@ -3,7 +3,10 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <algorithm>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
@@ -67,6 +70,47 @@ TEST_F(Pipelines, TheTutorialOfTheReadmeWorksWordForWord) {
   EXPECT_NE(slurp(path("out/mine/before.ply")), slurp(path("out/mine/map.ply")));
   EXPECT_GT(fs::file_size(path("before.png")), 10000U);
   EXPECT_GT(fs::file_size(path("after.png")), 10000U);
+}
+
+/// Sum of a column of frames.csv.
+double column_sum(const fs::path& file, const std::string& column) {
+  std::istringstream table(slurp(file));
+  const auto cells = [&](std::vector<std::string>& to) {
+    std::string line;
+    to.clear();
+    if (!std::getline(table, line)) return false;
+    std::istringstream rest(line);
+    for (std::string cell; std::getline(rest, cell, ',');) to.push_back(cell);
+    return true;
+  };
+  std::vector<std::string> row;
+  cells(row);
+  const auto at = std::find(row.begin(), row.end(), column) - row.begin();
+  EXPECT_LT(static_cast<std::size_t>(at), row.size()) << column;
+  double sum = 0.0;
+  while (cells(row)) sum += std::atof(row.at(static_cast<std::size_t>(at)).c_str());
+  return sum;
+}
+
+TEST_F(Pipelines, FamiliesAreWhatTheirNamesSay) {
+  const std::vector<std::string> families{"points", "lines", "surface", "photometric"};
+  const std::vector<std::pair<std::string, std::vector<std::string>>> pipelines{
+      {"points_only", {"points"}},
+      {"points_lines", {"points", "lines"}},
+      {"paper", {"points", "lines"}},
+      {"depth_only", {"surface"}}};
+  for (const auto& [pipeline, used] : pipelines) {
+    const Outcome o =
+        run("map 'synth:room?frames=16' --threads 1 --force -o out --set output.views= -p " + pipeline);
+    ASSERT_EQ(o.code, 0) << pipeline << "\n" << o;
+    for (const std::string& family : families) {
+      const bool is_used = std::find(used.begin(), used.end(), family) != used.end();
+      EXPECT_EQ(column_sum(path("out/frames.csv"), family) > 0.0, is_used) << pipeline << ": " << family;
+    }
+    const auto summary = read_json(path("out/summary.json"));
+    EXPECT_EQ(summary["refine"]["tried"] > 0, pipeline == "depth_only") << pipeline << ": aligned surfaces";
+    EXPECT_EQ(summary["landmarks"]["points"] > 0, used.front() == "points") << pipeline;
+  }
 }
 
 TEST_F(Pipelines, TapsWriteEveryPortAndFramesAreARecordingAgain) {

@@ -25,6 +25,8 @@ struct LineDetectorOptions {
       3.0;  ///< LSD: grey levels per px at the detection scale; under 5.2 where strong ones are few
   double min_length_px = 25.0;
   double border_px = 4.0;
+  bool border_either = false;  ///< lines with one end in that margin go too, not those along a side alone
+  bool exact_nfa = false;      ///< LSD's number of false alarms by its sum, not by a bound
   int max_count = 0;
   bool join = true;
   double join_gap_px = 12.0;

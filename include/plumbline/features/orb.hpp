@@ -32,6 +32,7 @@ struct OrbOptions {
   /// the stronger one, squared. On an edge a point matches as well a few pixels further along it, so that it
   /// holds a direction that it does not know. 0: all are kept.
   double min_corner = 0.03;
+  bool spread = true;  ///< evenly over the picture; off: the strongest, wherever they are
   void declare(core::OptionTable& table);
 };
 

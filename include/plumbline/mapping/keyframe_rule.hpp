@@ -15,6 +15,10 @@ namespace plumbline::mapping {
 struct KeyframeRuleOptions {
   enum class Rule { kPlain, kCone };
   Rule rule = Rule::kPlain;
+  /// When a keyframe is made whatever the rule says: tracking gets thin; it is nearly lost (fewer than
+  /// min_features); never.
+  enum class Urgent { kThin, kNearlyLost, kOff };
+  Urgent urgent = Urgent::kThin;
   int min_frames = 2;
   int max_frames = 60;
   double min_shared = 0.6;
@@ -28,6 +32,9 @@ struct KeyframeRuleOptions {
   int cone_min_points = 50;
   int cone_min_lines = 15;
   double cone_min_change_rad = 0.1745;
+  Balance cone_balance = Balance::kAbove;
+  bool cone_scaled = false;  ///< thresholds follow what a scene has, and balance is waited for six frames
+  double cone_epsilon = 1.0;
   void declare(core::OptionTable& table);
 };
 
@@ -41,6 +48,8 @@ struct ConeTerms {
   bool fires = false;      ///< D_c above its threshold, and balanced
 };
 
+enum class KeyframeCause { kNone, kPlain, kCone, kUrgent };
+
 /// The terms of one decision, as written to frames.csv.
 struct KeyframeDecision {
   int frames_since = 0;
@@ -51,14 +60,15 @@ struct KeyframeDecision {
   bool mapper_idle = true;
   ConeTerms cone;
   bool wanted = false;
-  bool urgent = false;     ///< tracking is about to be lost
+  bool urgent = false;                         ///< tracking is about to be lost
+  KeyframeCause cause = KeyframeCause::kNone;  ///< of those that are wanted
   core::KeyframeId reuse;  ///< instead of a new keyframe this one becomes the reference again; invalid: none
 };
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
 /// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the picture; where next
-/// to no landmark knows its normal the plain rule speaks. Both: at once when tracking gets thin, and when
-/// depth is back after a keyframe that had none.
+/// to no landmark knows its normal, as on what is lit but not measured, the plain rule speaks. Both: at once
+/// when tracking gets thin, and when depth is back after a keyframe that had none.
 class KeyframeRule {
  public:
   KeyframeRule(const KeyframeRuleOptions& options, const sensor::Pinhole& camera)
@@ -76,7 +86,12 @@ class KeyframeRule {
 
  private:
   [[nodiscard]] bool plain_wants(const KeyframeDecision& decision) const;
+  [[nodiscard]] bool is_urgent(const KeyframeDecision& decision, int tracked) const;
+  [[nodiscard]] bool knows_cones() const;
   ConeTerms cone_terms(const maps::Map& map, const tracking::TrackResult& track, bool mapper_idle);
+  [[nodiscard]] bool balance_will_do(const ConeTerms& terms);
+  [[nodiscard]] bool is_candidate(const ConeTerms& terms, const tracking::TrackResult& track,
+                                  bool mapper_idle) const;
 
   KeyframeRuleOptions options_;
   sensor::Pinhole camera_;
@@ -85,10 +100,13 @@ class KeyframeRule {
   /// The first frame after the keyframe that cones are counted against.
   struct First {
     core::KeyframeId keyframe;
-    int landmarks = 0;  ///< of the keyframe, matched
+    int landmarks = 0;       ///< of the keyframe, matched
+    std::size_t points = 0;  ///< matched
+    std::size_t lines = 0;
     ConeCounts counts;
   };
   First first_;
+  int unbalanced_ = 0;  ///< candidates whose changes sufficed, but not their balance, since the keyframe
 };
 
 }  // namespace plumbline::mapping

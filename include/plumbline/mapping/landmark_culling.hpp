@@ -15,6 +15,7 @@ struct LandmarkCullingOptions {
   int min_visible = 10;
   int min_keyframes = 1;  ///< 3 in the paper, whose keyframes are denser
   int grace_keyframes = 5;
+  bool by_keyframes = false;  ///< keyframes alone are counted for the share, as the paper has it
 
   void declare(core::OptionTable& table);
 };

@@ -4,6 +4,7 @@
 // Which way the surface under a landmark faces, from the depth image of the keyframe that made it:
 // the local cloud, not neighbouring sparse points (docs/method/mapping.md).
 #include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
 #include "plumbline/maps/map.hpp"
@@ -28,5 +29,11 @@ class SurfaceNormals {
   int rows_ = 0;
   std::vector<std::vector<int>> cells_;
 };
+
+/// The same of every corner with depth, from the depth image (CV_32FC1, metres): the plane that at least half
+/// of the pixels within 12 px of `pixel` lie on, those nearest to the corner's depth `z` first. At a fold it
+/// is the larger side's. Zero where there is none.
+Eigen::Vector3d depth_normal(const cv::Mat& depth, const Eigen::Vector2d& pixel, double z,
+                             const sensor::Pinhole& camera);
 
 }  // namespace plumbline::mapping

@@ -24,6 +24,7 @@ struct LocalMapperOptions {
   double max_landmark_turn_rate =
       0.6;  ///< rad/s; pictures taken while turning faster make and merge no landmarks
   LandmarkCullingOptions culling;
+  bool depth_normals = false;  ///< landmarks' normals from the depth image, not from surface samples
   bool triangulate = true;
   TriangulationOptions triangulation;
   bool fuse = true;
@@ -60,7 +61,7 @@ class LocalMapper {
   core::KeyframeId insert(maps::Map& map, const sensor::RgbdFrame& frame, const tracking::TrackResult& track,
                           const std::vector<cv::Mat>& levels);
 
-  /// Counts which landmarks a tracked frame should have seen and did.
+  /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
   void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
 
   /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
@@ -74,7 +75,8 @@ class LocalMapper {
   void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:
-  std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe);
+  static void count(maps::Map& map, const tracking::TrackResult& track);
+  std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
   void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestImage& picture);
   [[nodiscard]] bool distorted(const maps::Map& map, core::KeyframeId keyframe) const;

@@ -24,6 +24,9 @@ struct VerificationOptions {
   int rounds = 600;                 ///< of RANSAC, at most
   int neighbours = 8;               ///< keyframes around the match whose landmarks are looked for
   double orb_scale_factor = 1.2;
+  bool depth_rows = true;  ///< points are held by their depth, too
+  bool joint = false;      ///< landmarks are adjusted with the pose, as the paper has it
+  bool align = true;       ///< the pose as the surfaces say, too
   void declare(core::OptionTable& table);
 };
 

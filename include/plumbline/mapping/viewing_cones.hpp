@@ -30,13 +30,15 @@ struct ConeThreshold {
   double beta = 0.0;      ///< D_c / M_c - D_r / M_r: share of changes gained
   double alpha = 0.0;     ///< D_c / M_c - 0.5
   double initial = 0.0;   ///< 0.5 (M_c D_r / M_r + A_c D_r / A_r)
-  double adaptive = 0.0;  ///< (1 + theta - beta - alpha) initial; D_c must exceed it
+  double adaptive = 0.0;  ///< (1 + epsilon theta - beta - alpha) initial; D_c must exceed it
 };
 
 /// `now`: this frame; `first`: the first frame after the keyframe. Right after a keyframe next to nothing has
-/// changed and anything would fire, so D_r counts as 5 % of M_r at least. A ratio over nothing counts as 0:
+/// changed and anything would fire, so D_r counts as 5 % of M_r at least; `scaled`: of M_c, as the camera has
+/// turned away from the others, which can change no more. A ratio over nothing counts as 0:
 /// without matches nothing has changed, and D_c = 0 exceeds no threshold.
-ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first);
+ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon = 1.0,
+                             bool scaled = false);
 
 /// Points by cell of a 3 x 3 grid over the picture, row by row.
 using GridCounts = std::array<int, 9>;
@@ -51,5 +53,10 @@ struct GridBalance {
   double offset = 0.0;  ///< of the grid's centre of mass from its middle, cells
 };
 GridBalance grid_balance(const GridCounts& grid);
+
+/// What the balance is asked for: ecog above the offset, as the method that the rule is from has it; below,
+/// as the paper prints; nothing.
+enum class Balance { kAbove, kBelow, kOff };
+bool balanced(const GridBalance& balance, Balance asked);
 
 }  // namespace plumbline::mapping

@@ -40,6 +40,7 @@ struct PoseSolverOptions {
   double plane_loss = 1.0;
   double point_weight = 1.0;  ///< of the whole family: its terms are not quite independent
   double line_weight = 1.0;
+  bool depth_rows = true;      ///< points are held by their depth, too
   double plane_weight = 0.08;  ///< depth noise is correlated between neighbouring pixels
   double photometric_loss = 1.5;
   double photometric_weight = 0.04;  ///< grey values of neighbouring pixels are all but the same

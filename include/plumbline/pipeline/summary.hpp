@@ -54,6 +54,13 @@ struct RunSummary {
     [[nodiscard]] double tracked_percent() const;  ///< of read + unreadable
   } frames;
   std::size_t keyframes = 0;
+  /// Keyframes by what they were made for; the first of each robot, and those of a run that this one went on
+  /// from, are not among them.
+  struct Causes {
+    std::size_t cone = 0;
+    std::size_t urgent = 0;
+    std::size_t plain = 0;
+  } causes;
   std::size_t points = 0;  ///< point landmarks
   std::size_t lines = 0;   ///< line landmarks
   struct Loops {

@@ -35,6 +35,7 @@ struct AssociationOptions {
   double aligned_sigma = 0.3;  ///< standard deviation of those, over that of others
   int max_line_hamming = 90;
   double max_line_angle_rad = 0.2;
+  double min_line_ratio = 0.0;  ///< of the lengths of a predicted and a measured line
   void declare(core::OptionTable& table);
 };
 

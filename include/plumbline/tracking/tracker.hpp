@@ -37,6 +37,9 @@ struct TrackerOptions {
   bool depth = true;
   bool photometric = true;
   bool align_stamps = true;
+  bool thumbnails = true;    ///< small pictures tell where the camera may be
+  bool motion_prior = true;  ///< the motion model holds what measurements leave open
+  bool pnp_start = false;  ///< every frame begins with PnP, where there are matches enough (METHOD section 2)
   /// Time from the first to the last row of a picture, s; 0: all at once. What it shears is put right before
   /// a frame is tracked (features::undo_rolling_shutter), with the motion model's turn, and again with the
   /// turn that was found where that differs.

@@ -18,6 +18,8 @@ void ObservationNoise::declare(core::OptionTable& table, const std::string& pref
   table.number(
       prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
       "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
+  table.boolean(prefix + "depth_rows", depth_rows,
+                "The depth of corners and lines, beside where they are in the picture");
   table.number(prefix + "turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
                "What a picture says counts for half when the camera turned this fast");
 }
@@ -34,6 +36,7 @@ optimize::BundlePointObservation ObservationNoise::of(const features::PointFeatu
   optimize::BundlePointObservation seen;
   seen.pixel = corner.pixel.cast<double>();
   seen.pixel_sigma = motion_factor * corner_px * (is_aligned ? aligned : 1.0);
+  if (!depth_rows) return seen;
   seen.depth = static_cast<double>(corner.depth);
   seen.depth_sigma =
       corner.depth > 0.0F ? depth_factor * motion_factor * sensor::depth_sigma(seen.depth) : 1.0;
@@ -47,7 +50,7 @@ optimize::BundleLineObservation ObservationNoise::of(const features::LineFeature
   seen.start = line.segment.start.cast<double>();
   seen.end = line.segment.end.cast<double>();
   seen.pixel_sigma = line_sigma_px * motion_factor;
-  if (!line.line3) return seen;
+  if (!line.line3 || !depth_rows) return seen;
   const auto sigma = [&](const Eigen::Vector3d& end, const features::EndpointNoise& noise) {
     return depth_factor * motion_factor * std::max(kLeast_m, features::endpoint_sigma(end, noise));
   };

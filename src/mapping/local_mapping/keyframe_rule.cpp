@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kDepthIsBack = 50;     // corners with depth
 constexpr double kWellWithin = 0.8;  // of the limits: else the next frame would ask again
+constexpr int kFewNormals = 10;      // landmarks: fewer say nothing about cones
 
 struct ViewOverlap {
   double overlap = 1.0;
@@ -88,6 +89,19 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "", "The same of lines");
   table.number("keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
                "Cone rule: points whose viewing angle changed more are asked to spread over the picture");
+  table.choice("keyframe.cone_balance", cone_balance,
+               {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
+               "Cone rule: how far these must be spread (ECOG against its threshold)");
+  table.boolean(
+      "keyframe.cone_scaled", cone_scaled,
+      "Cone rule: thresholds follow what a scene has, and balance is waited for six frames at most");
+  table.number("keyframe.cone_epsilon", cone_epsilon, {0.0, 100.0}, "",
+               "Cone rule: weight of lost matches in the threshold");
+  table.choice(
+      "keyframe.urgent", urgent,
+      {{"thin", Urgent::kThin}, {"nearly_lost", Urgent::kNearlyLost}, {"off", Urgent::kOff}},
+      "When a keyframe is made whatever the rule says: thin: much less is tracked than after the last "
+      "one, or min_features are not reached; nearly_lost: not even half of min_features; off: never");
 }
 
 bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {
@@ -99,12 +113,37 @@ bool KeyframeRule::plain_wants(const KeyframeDecision& d) const {
   return moved || left || starving;
 }
 
+bool KeyframeRule::is_urgent(const KeyframeDecision& d, int tracked) const {
+  if (options_.urgent == KeyframeRuleOptions::Urgent::kOff) return false;
+  const bool thin = tracked < options_.min_features && d.shared < 0.8;
+  if (options_.urgent == KeyframeRuleOptions::Urgent::kNearlyLost) return thin;
+  return d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap || thin;
+}
+
+/// Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
+bool KeyframeRule::knows_cones() const {
+  return options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= kFewNormals;
+}
+
+bool KeyframeRule::is_candidate(const ConeTerms& terms, const tracking::TrackResult& track,
+                                bool mapper_idle) const {
+  // What a scene has: what should be seen, or what was matched right after the keyframe.
+  const bool scaled = options_.cone_scaled;
+  const std::size_t points = scaled ? first_.points : track.visible_points.size();
+  const std::size_t lines = scaled ? first_.lines : track.visible_lines.size();
+  return (frames_since_ > options_.cone_patience || mapper_idle) &&
+         enough(track.points.size(), options_.cone_min_points, points) &&
+         enough(track.lines.size(), options_.cone_min_lines, lines) &&
+         terms.shared <= options_.cone_max_shared;
+}
+
 ConeTerms KeyframeRule::cone_terms(const maps::Map& map, const tracking::TrackResult& track,
                                    bool mapper_idle) {
   ConeTerms terms;
   const Eigen::Vector3d centre_then = map.camera_from_world(track.reference).inverse().translation;
   const Eigen::Vector3d centre_now = track.camera_from_world.inverse().translation;
-  GridCounts grid{};
+  std::vector<double> changes;
+  std::vector<Eigen::Vector2d> pixels;
   terms.now.all = static_cast<int>(track.features->points.size());
   for (const tracking::PointMatch& match : track.points) {
     const maps::MapPoint& point = map.point(match.point);
@@ -113,22 +152,31 @@ ConeTerms KeyframeRule::cone_terms(const maps::Map& map, const tracking::TrackRe
     const double then = viewing_angle(point.position, point.normal, centre_then);
     const double now = viewing_angle(point.position, point.normal, centre_now);
     if (viewing_zone(then) != viewing_zone(now)) ++terms.now.changed;
-    if (std::abs(now - then) > options_.cone_min_change_rad) {
-      count_in_grid(camera_.project(track.camera_from_world * point.position), camera_.width, camera_.height,
-                    grid);
-    }
+    changes.push_back(std::abs(now - then));
+    pixels.push_back(camera_.project(track.camera_from_world * point.position));
   }
   const int common = landmarks_in_common(map, track.reference, track);
-  if (first_.keyframe != track.reference) first_ = {track.reference, common, terms.now};
+  if (first_.keyframe != track.reference)
+    first_ = {track.reference, common, track.points.size(), track.lines.size(), terms.now};
   terms.shared = first_.landmarks > 0 ? static_cast<double>(common) / first_.landmarks : 1.0;
-  terms.threshold = cone_threshold(terms.now, first_.counts);
+  terms.threshold = cone_threshold(terms.now, first_.counts, options_.cone_epsilon, options_.cone_scaled);
+  double least_change = options_.cone_min_change_rad;
+  if (options_.cone_scaled && !changes.empty()) least_change = std::min(least_change, core::median(changes));
+  GridCounts grid{};
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    if (changes[i] > least_change) count_in_grid(pixels[i], camera_.width, camera_.height, grid);
+  }
   terms.balance = grid_balance(grid);
-  terms.candidate = (frames_since_ > options_.cone_patience || mapper_idle) &&
-                    enough(track.points.size(), options_.cone_min_points, track.visible_points.size()) &&
-                    enough(track.lines.size(), options_.cone_min_lines, track.visible_lines.size()) &&
-                    terms.shared <= options_.cone_max_shared;
-  terms.fires = terms.now.changed > terms.threshold.adaptive && terms.balance.ecog > terms.balance.offset;
+  terms.candidate = is_candidate(terms, track, mapper_idle);
+  terms.fires = terms.now.changed > terms.threshold.adaptive && balance_will_do(terms);
   return terms;
+}
+
+/// In the published program the sixth frame in a row is taken however its changes are spread.
+bool KeyframeRule::balance_will_do(const ConeTerms& terms) {
+  constexpr int kPatience = 6;
+  if (balanced(terms.balance, options_.cone_balance)) return true;
+  return options_.cone_scaled && terms.candidate && ++unbalanced_ >= kPatience;
 }
 
 KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::TrackResult& track,
@@ -145,18 +193,17 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   d.shared = features_after_keyframe_ > 0 ? static_cast<double>(tracked) / features_after_keyframe_ : 1.0;
   d.parallax = camera_from_keyframe.inverse().translation.norm() / std::max(0.3, view.depth);
   d.rotation_rad = geometry::rotation_angle(camera_from_keyframe.rotation);
-  d.urgent = d.shared < 0.5 * options_.min_shared || d.overlap < 0.5 * options_.min_surface_overlap ||
-             (tracked < options_.min_features && d.shared < 0.8);
+  d.urgent = is_urgent(d, tracked);
   if (reference.surface.empty() && points_with_depth(*track.features) >= kDepthIsBack) d.urgent = true;
   d.mapper_idle = mapper_idle;
   d.cone = cone_terms(map, track, mapper_idle);
-  // Cones need landmarks that know their normal; where there are next to none the plain rule speaks.
-  const bool by_cones =
-      options_.rule == KeyframeRuleOptions::Rule::kCone && first_.counts.matched >= options_.cone_min_points;
+  const bool by_cones = knows_cones();
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
   d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
   if (d.wanted && !d.urgent) d.reuse = reusable_keyframe(map, track);
   if (d.reuse.valid()) d.wanted = false;
+  if (d.wanted)
+    d.cause = !wants ? KeyframeCause::kUrgent : by_cones ? KeyframeCause::kCone : KeyframeCause::kPlain;
   return d;
 }
 
@@ -193,6 +240,7 @@ void KeyframeRule::keyframe_made() {
   frames_since_ = 0;
   features_after_keyframe_ = 0;
   first_ = {};
+  unbalanced_ = 0;
 }
 
 }  // namespace plumbline::mapping

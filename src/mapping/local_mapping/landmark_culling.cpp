@@ -11,6 +11,7 @@ void LandmarkCullingOptions::declare(core::OptionTable& table) {
                "Landmarks found in a smaller share of the frames that should see them are removed");
   table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
                 "Frames that should have seen a landmark before that share is judged");
+  table.boolean("landmark.by_keyframes", by_keyframes, "Only frames that become keyframes are counted");
   table.integer("landmark.min_keyframes", min_keyframes, {1, 100}, "",
                 "Landmarks that fewer keyframes see are removed after the grace time; 1: none");
   table.integer("landmark.min_age", grace_keyframes, {1, 1000}, "",

@@ -7,6 +7,7 @@
 #include "plumbline/mapping/earlier_observations.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
 #include "plumbline/mapping/surface_edge.hpp"
+#include "plumbline/maps/covisibility.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 /// Keyframes that share most landmarks with `id`.
 std::vector<core::KeyframeId> nearest(const maps::Map& map, core::KeyframeId id, int count) {
   std::vector<core::KeyframeId> result;
-  for (const auto& [other, shared] : map.covisible(id, 15)) {
+  for (const auto& [other, shared] : map.covisible(id, maps::kCovisible)) {
     if (static_cast<int>(result.size()) < count) result.push_back(other);
   }
   return result;
@@ -47,6 +48,9 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
       "Pictures taken while turning faster are distorted by the rolling shutter of common sensors: no "
       "landmark is "
       "triangulated, looked for or merged with them");
+  table.boolean(
+      "landmark.depth_normals", depth_normals,
+      "Normals of landmarks from the depth image around them, not from the keyframe's surface samples");
   culling.declare(table);
   table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
   triangulation.declare(table);
@@ -82,6 +86,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
         track.camera_from_world * map.camera_from_world(track.reference).inverse();
     keyframe->reference_sigma_m = track.sigma_m();
   }
+  if (options_.culling.by_keyframes) count(map, track);
   auto own = std::make_shared<features::FrameFeatures>(*track.features);
   if (!still(track.depth_from_camera))
     features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
@@ -93,7 +98,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
     if (map.observe(m.point, id, m.feature, m.aligned)) map.refresh_point(m.point);
   }
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
-  const std::vector<core::PointId> made = add_points(map, id);
+  const std::vector<core::PointId> made = add_points(map, id, frame.depth);
   add_lines(map, id);
   map.attach(id);
   if (options_.fuse && options_.earlier_observations && !distorted(map, id))
@@ -104,7 +109,8 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   return id;
 }
 
-std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::KeyframeId id) {
+std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::KeyframeId id,
+                                                   const cv::Mat& depth) {
   std::vector<core::PointId> made;
   const features::FrameFeatures& features = *map.keyframe(id).features;
   const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
@@ -121,7 +127,10 @@ std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::Keyfram
     point.angle = f.angle;
     point.angle_keyframe = id;
     point.view_direction = (point.position - world_from_camera.translation).normalized();
-    point.normal = world_from_camera.rotation * normals.at(in_camera);
+    point.normal = world_from_camera.rotation *
+                   (options_.depth_normals
+                        ? depth_normal(depth, f.pixel.cast<double>(), static_cast<double>(f.depth), camera_)
+                        : normals.at(in_camera));
     point.reference_distance = in_camera.norm();
     point.reference_octave = f.octave;
     point.visible = 1;
@@ -154,6 +163,10 @@ void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {
 }
 
 void LocalMapper::count_observations(maps::Map& map, const tracking::TrackResult& track) const {
+  if (!options_.culling.by_keyframes) count(map, track);
+}
+
+void LocalMapper::count(maps::Map& map, const tracking::TrackResult& track) {
   for (core::PointId id : track.visible_points) ++map.point(id).visible;
   for (core::LineId id : track.visible_lines) ++map.line(id).visible;
   for (const tracking::PointMatch& m : track.points) ++map.point(m.point).found;

@@ -28,17 +28,17 @@ double viewing_angle(const Eigen::Vector3d& point, const Eigen::Vector3d& normal
   return std::atan2(normal.cross(ray).norm(), normal.dot(ray));
 }
 
-ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first) {
+ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon, bool scaled) {
   const double m_c = now.matched;
   const double m_r = first.matched;
   const double d_c = now.changed;
-  const double d_r = std::max<double>(first.changed, kLeastChanged * m_r);
+  const double d_r = std::max<double>(first.changed, kLeastChanged * (scaled ? m_c : m_r));
   ConeThreshold t;
   t.theta = ratio(m_r - m_c, m_r);
   t.beta = ratio(d_c, m_c) - ratio(d_r, m_r);
   t.alpha = ratio(d_c, m_c) - 0.5;
   t.initial = 0.5 * (m_c * ratio(d_r, m_r) + now.all * ratio(d_r, first.all));
-  t.adaptive = (1.0 + t.theta - t.beta - t.alpha) * t.initial;
+  t.adaptive = (1.0 + epsilon * t.theta - t.beta - t.alpha) * t.initial;
   return t;
 }
 
@@ -68,6 +68,11 @@ GridBalance grid_balance(const GridCounts& grid) {
   balance.ecog = (place(first) - place(second)).norm() * *second / (2.0 * std::sqrt(2.0) * *first);
   balance.offset = (centre / sum).norm();
   return balance;
+}
+
+bool balanced(const GridBalance& balance, Balance asked) {
+  if (asked == Balance::kOff) return true;
+  return asked == Balance::kAbove ? balance.ecog > balance.offset : balance.ecog < balance.offset;
 }
 
 }  // namespace plumbline::mapping

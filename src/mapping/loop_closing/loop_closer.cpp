@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "plumbline/maps/covisibility.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -19,7 +21,7 @@ constexpr int kPatience = 6;            // keyframes that a verified loop waits 
 std::vector<KeyframeId> neighbours_of(const maps::Map& map, KeyframeId id, std::size_t count) {
   std::vector<KeyframeId> result;
   if (!map.has_keyframe(id)) return result;
-  for (const auto& [other, shared] : map.covisible(id, 15)) {
+  for (const auto& [other, shared] : map.covisible(id, maps::kCovisible)) {
     if (result.size() >= count) break;
     result.push_back(other);
   }

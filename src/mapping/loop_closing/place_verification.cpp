@@ -9,11 +9,13 @@
 #include <numeric>
 #include <vector>
 
+#include "loop_closing/place_bundle.hpp"
 #include "loop_closing/place_matches.hpp"
 #include "loop_closing/place_pose.hpp"
 #include "loop_closing/place_surface.hpp"
 #include "plumbline/features/line_match.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/maps/covisibility.hpp"
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/association.hpp"
@@ -50,7 +52,8 @@ bool point_in_space(const PlaceView& view, std::size_t feature, Eigen::Vector3d&
   return true;
 }
 
-PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match, double scale_factor) {
+PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
+                              const VerificationOptions& how) {
   const FrameFeatures& q = features_of(query);
   const FrameFeatures& m = features_of(match);
   PosePairs pairs;
@@ -59,8 +62,8 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match, do
     if (!point_in_space(match, i, pair.match)) continue;
     const features::PointFeature& f = q.points[best];
     pair.query = f.pixel.cast<double>();
-    pair.sigma = std::pow(scale_factor, f.octave);
-    pair.depth = static_cast<double>(f.depth);
+    pair.sigma = std::pow(how.orb_scale_factor, f.octave);
+    if (how.depth_rows) pair.depth = static_cast<double>(f.depth);
     pairs.points.push_back(pair);
   }
   features::LineMatchOptions options;
@@ -94,7 +97,7 @@ std::vector<KeyframeId> surroundings(const PlaceView& match, int neighbours) {
       result.push_back(id);
     }
   };
-  for (const auto& [id, shared] : match.map->covisible(match.keyframe, 15)) add(id);
+  for (const auto& [id, shared] : match.map->covisible(match.keyframe, maps::kCovisible)) add(id);
   for (const maps::SurfaceEdge& e : match.map->edges_of(match.keyframe))
     add(e.a == match.keyframe ? e.b : e.a);
   return result;
@@ -120,6 +123,7 @@ class Growth {
     lines_.erase(std::unique(lines_.begin(), lines_.end()), lines_.end());
     problem.camera = query.camera;
     association_.scale_factor = options.orb_scale_factor;
+    solver_.depth_rows = options.depth_rows;
   }
 
   /// Poses are of the query's camera in the match's world.
@@ -133,15 +137,16 @@ class Growth {
                                              radius, association_, &visible_lines);
     problem.points.clear();
     problem.lines.clear();
+    common = {};
     for (const tracking::PointMatch& m : points) add(m);
     for (const tracking::LineMatch& m : lines) add(m);
     for (int round = 0; round < 2; ++round) {
-      summary = optimize::solve_pose(problem, camera_from_world, {});
+      summary = optimize::solve_pose(problem, camera_from_world, solver_);
       camera_from_world = summary.camera_from_world;
-      keep(optimize::point_errors(problem, camera_from_world), kPointGate, problem.points);
-      keep(optimize::line_errors(problem, camera_from_world), kLineGate, problem.lines);
+      keep(optimize::point_errors(problem, camera_from_world), kPointGate, problem.points, common.points);
+      keep(optimize::line_errors(problem, camera_from_world), kLineGate, problem.lines, common.lines);
     }
-    summary = optimize::solve_pose(problem, camera_from_world, {});
+    summary = optimize::solve_pose(problem, camera_from_world, solver_);
     camera_from_world = summary.camera_from_world;
   }
 
@@ -163,6 +168,7 @@ class Growth {
 
   optimize::PoseProblem problem;
   optimize::PoseSummary summary;
+  CommonLandmarks common;  ///< of problem
   std::vector<core::PointId> visible_points;
   std::vector<core::LineId> visible_lines;
 
@@ -178,6 +184,7 @@ class Growth {
       term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
     }
     problem.points.push_back(term);
+    common.points.emplace_back(m.point, m.feature);
   }
   void add(const tracking::LineMatch& m) {
     const maps::MapLine& line = match_.map->line(m.line);
@@ -187,20 +194,26 @@ class Growth {
     term.start = s.start.cast<double>();
     term.end = s.end.cast<double>();
     problem.lines.push_back(term);
+    common.lines.emplace_back(m.line, m.feature);
   }
-  template <typename Term>
-  static void keep(const std::vector<double>& errors, double gate, std::vector<Term>& terms) {
+  template <typename Term, typename Landmarks>
+  static void keep(const std::vector<double>& errors, double gate, std::vector<Term>& terms,
+                   Landmarks& landmarks) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < errors.size(); ++i) {
-      if (errors[i] <= gate) terms[kept++] = terms[i];
+      if (!(errors[i] <= gate)) continue;
+      landmarks[kept] = landmarks[i];
+      terms[kept++] = terms[i];
     }
     terms.resize(kept);
+    landmarks.resize(kept);
   }
 
   const PlaceView& query_;
   const PlaceView& match_;
   const VerificationOptions& options_;
   tracking::AssociationOptions association_;
+  optimize::PoseSolverOptions solver_;
   std::vector<core::PointId> points_;
   std::vector<core::LineId> lines_;
 };
@@ -292,12 +305,15 @@ void VerificationOptions::declare(core::OptionTable& table) {
   table.integer("verify.rounds", rounds, {10, 100000}, "", "RANSAC samples at most");
   table.integer("verify.neighbours", neighbours, {0, 100}, "",
                 "Keyframes around a place whose landmarks are looked for");
+  table.boolean("verify.depth_rows", depth_rows, "Points are held by their depth, too");
+  table.boolean("verify.joint", joint, "Landmarks are adjusted together with the pose between two keyframes");
+  table.boolean("verify.align", align, "Surfaces have a say in that pose");
 }
 
 PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
                                const VerificationOptions& options, std::uint64_t seed) {
   PlaceVerification result;
-  const PosePairs pairs = pairs_by_descriptor(query, match, options.orb_scale_factor);
+  const PosePairs pairs = pairs_by_descriptor(query, match, options);
   result.matched_points = static_cast<int>(pairs.points.size());
   result.matched_lines = static_cast<int>(pairs.lines.size());
   constexpr int kMinRansac = 10;
@@ -313,6 +329,12 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
   const Rigid3& match_from_world = match.map->camera_from_world(match.keyframe);
   Rigid3 camera_from_world = start->query_from_match * match_from_world;
   for (const double radius : {15.0, 8.0, 5.0}) growth.grow(camera_from_world, radius);
+  if (options.joint) {
+    ObservationNoise noise;
+    noise.orb_scale_factor = options.orb_scale_factor;
+    noise.depth_rows = options.depth_rows;
+    camera_from_world = adjust_pair(query, match, around, growth.common, noise, camera_from_world);
+  }
   result.query_from_match = camera_from_world * match_from_world.inverse();
   result.points = static_cast<int>(growth.problem.points.size());
   result.lines = static_cast<int>(growth.problem.lines.size());
@@ -329,7 +351,7 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
   compare_surfaces(query, match, near, result);
   result.refused = judge(result, options);
   result.accepted = result.refused.empty();
-  if (result.accepted) align(query, match, near, result);
+  if (result.accepted && options.align) align(query, match, near, result);
   result.information = with_floor(result.information);
   return result;
 }

@@ -6,13 +6,14 @@
 #include <algorithm>
 #include <set>
 
+#include "plumbline/maps/covisibility.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
 using core::KeyframeId;
 using geometry::Rigid3;
 
-constexpr int kSeesTheSame = 15;        // landmarks that keyframes share which see the same
 constexpr std::size_t kAroundPair = 4;  // keyframes around each end of a pair whose landmarks are compared
 
 /// Where each part of the anchor's group lies: along the merges with most pairs first (a spanning tree).
@@ -55,7 +56,7 @@ std::vector<PoseEdge> edges_of(const MergeEvidence& merge) {
 
 std::vector<KeyframeId> surroundings(const maps::Map& map, KeyframeId id) {
   std::vector<KeyframeId> result{id};
-  for (const auto& [other, shared] : map.covisible(id, kSeesTheSame)) {
+  for (const auto& [other, shared] : map.covisible(id, maps::kCovisible)) {
     if (result.size() > kAroundPair) break;
     if (other.robot == id.robot) result.push_back(other);
   }

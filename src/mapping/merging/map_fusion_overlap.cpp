@@ -11,6 +11,7 @@
 
 #include "merging/free_direction.hpp"
 #include "merging/map_fusion_sets.hpp"
+#include "plumbline/maps/covisibility.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -126,7 +127,7 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const places::Dat
     std::vector<KeyframeId> around;
     const std::size_t where = part_of(parts, id);
     if (where == parts.size()) return around;
-    for (const auto& [other, shared] : parts[where].map->covisible(id, 15)) {
+    for (const auto& [other, shared] : parts[where].map->covisible(id, maps::kCovisible)) {
       if (around.size() >= kSurroundings) break;
       around.push_back(other);
     }

@@ -349,6 +349,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"stopped", s.stopped},
       {"frames", frames_of(s.frames)},
       {"keyframes", s.keyframes},
+      {"keyframe_causes", {{"cone", s.causes.cone}, {"urgent", s.causes.urgent}, {"plain", s.causes.plain}}},
       {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
       {"loops", loops_of(s)},
       {"refine", refine_of(s.refine)},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -51,6 +52,7 @@ class TrackStage : public Stage {
     const mapping::FrameReport report = slam.process(*frame, features);
     rows_.push_back({io.frame(), tracking::to_string(report.state),
                      several() ? robot.name + "," + row_columns(report) : row_columns(report)});
+    if (report.keyframe.valid()) ++causes_[report.decision.cause];
     note_times(io.frame(), report.bundle);
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->robot = robot.number;
@@ -116,12 +118,18 @@ class TrackStage : public Stage {
       summary.path.refused += static_cast<std::size_t>(slam.refused());
       if (several()) summary.robots.push_back({robot.name, slam.map().keyframe_count()});
     }
+    summary.causes = {count(mapping::KeyframeCause::kCone), count(mapping::KeyframeCause::kUrgent),
+                      count(mapping::KeyframeCause::kPlain)};
     summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
     summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
   }
 
  private:
   [[nodiscard]] bool several() const { return slams_.size() > 1; }
+  [[nodiscard]] std::size_t count(mapping::KeyframeCause cause) const {
+    const auto found = causes_.find(cause);
+    return found != causes_.end() ? found->second : 0;
+  }
   void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
     if (!bundle.keyframe.valid()) return;
     bundle_wait_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
@@ -136,7 +144,8 @@ class TrackStage : public Stage {
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
   std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were told
   std::vector<FrameRow> rows_;
-  std::vector<float> bundle_wait_ms_;  ///< by frame; NaN: no bundle was put back
+  std::map<mapping::KeyframeCause, std::size_t> causes_;  ///< of the keyframes
+  std::vector<float> bundle_wait_ms_;                     ///< by frame; NaN: no bundle was put back
   std::vector<float> bundle_ms_;
 };
 

@@ -194,7 +194,20 @@ TEST(LineDetector, FindsNoLinesInNoise) {
   for (const double sigma : {2.0, 6.0, 15.0}) {
     const cv::Mat image = world::disturb(cv::Mat(480, 640, CV_8U, cv::Scalar(128)), sigma, 1.0, 0.0, 11);
     EXPECT_TRUE(LineDetector().detect(image).empty()) << "noise " << sigma;
+    LineDetectorOptions exact;
+    exact.exact_nfa = true;
+    EXPECT_TRUE(LineDetector(exact).detect(image).empty()) << "noise " << sigma;
   }
+}
+
+TEST(LineDetector, DropsWhatEndsAtTheBorderWhenAsked) {
+  cv::Mat image(480, 640, CV_8U, cv::Scalar(60));
+  cv::rectangle(image, cv::Rect(0, 200, 400, 100), cv::Scalar(180), cv::FILLED);  // out of the left side
+  LineDetectorOptions options;
+  EXPECT_GE(LineDetector(options).detect(image).size(), 3U);
+  options.border_either = true;
+  for (const LineSegment& l : LineDetector(options).detect(image))
+    EXPECT_GT(std::min(l.start.x(), l.end.x()), 300.0F);
 }
 
 TEST(LineJoin, JoinsCollinearPiecesAndNothingElse) {

@@ -335,6 +335,51 @@ TEST_F(ConeRule, WithoutNormalsThePlainRuleSpeaks) {
   EXPECT_TRUE(d.wanted) << "parallax";
 }
 
+TEST_F(ConeRule, AFewNormalsWillDo) {
+  for (core::PointId id : map_.point_ids()) {
+    if (id.index % 10 != 0) map_.point(id).normal.setZero();  // 20 of the 200 that are matched are left
+  }
+  rule_.keyframe_made();
+  EXPECT_EQ(see({}, 200, 40).cone.now.matched, 20);
+  EXPECT_FALSE(see(moved(0.3), 200, 40).wanted) << "parallax is the plain rule's business";
+}
+
+TEST_F(ConeRule, TellsWhatAKeyframeIsFor) {
+  EXPECT_EQ(see(moved(0.001), 140, 30).cause, KeyframeCause::kNone);
+  EXPECT_EQ(see(around(0.6), 140, 30).cause, KeyframeCause::kCone);
+  EXPECT_EQ(see(moved(0.001), 20, 2).cause, KeyframeCause::kUrgent);
+}
+
+TEST_F(ConeRule, BalanceIsWaitedForSixFramesWhenScaled) {
+  KeyframeRuleOptions options;
+  options.rule = KeyframeRuleOptions::Rule::kCone;
+  options.cone_scaled = true;
+  rule_ = KeyframeRule(options, kRuleCamera);
+  see({}, 200, 40);
+  for (int i = 1; i <= 6; ++i) {
+    const KeyframeDecision d = see(moved(0.6), 140, 30);  // the wall moves out of one side of the picture
+    EXPECT_GT(d.cone.now.changed, d.cone.threshold.adaptive);
+    EXPECT_LT(d.cone.balance.ecog, d.cone.balance.offset);
+    EXPECT_EQ(d.wanted, i == 6) << i;
+  }
+}
+
+TEST_F(ConeRule, UrgencyCanWaitUntilTrackingIsNearlyLost) {
+  const auto urgent = [&](KeyframeRuleOptions::Urgent when, std::size_t points, std::size_t lines) {
+    KeyframeRuleOptions options;
+    options.rule = KeyframeRuleOptions::Rule::kCone;
+    options.urgent = when;
+    rule_ = KeyframeRule(options, kRuleCamera);
+    see({}, 200, 40);
+    return see(moved(0.001), points, lines).urgent;
+  };
+  using Urgent = KeyframeRuleOptions::Urgent;
+  EXPECT_TRUE(urgent(Urgent::kThin, 60, 8));
+  EXPECT_FALSE(urgent(Urgent::kNearlyLost, 60, 8));
+  EXPECT_TRUE(urgent(Urgent::kNearlyLost, 20, 2));
+  EXPECT_FALSE(urgent(Urgent::kOff, 20, 2));
+}
+
 TEST_F(ConeRule, ANewKeyframeStartsTheCountsAgain) {
   EXPECT_TRUE(see(around(0.6), 140, 30).wanted);
   rule_.keyframe_made();

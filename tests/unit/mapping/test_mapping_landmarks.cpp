@@ -47,6 +47,50 @@ TEST(LandmarkNormal, AnEdgeHasNone) {
   EXPECT_LT((normals.at({0.2, 0.0, 2.2}) - Eigen::Vector3d(1.0, 0.0, -1.0).normalized()).norm(), 1e-6);
 }
 
+/// Depth of the planes normal . p = distance, the nearest first: what the camera sees.
+cv::Mat depth_of(const sensor::Pinhole& camera,
+                 const std::vector<std::pair<Eigen::Vector3d, double>>& planes) {
+  cv::Mat depth(camera.height, camera.width, CV_32FC1, cv::Scalar(0));
+  for (int v = 0; v < camera.height; ++v) {
+    for (int u = 0; u < camera.width; ++u) {
+      const Eigen::Vector3d ray = camera.unproject(u, v, 1.0);
+      double nearest = 1e9;
+      for (const auto& [normal, distance] : planes) {
+        const double z = distance / normal.dot(ray);
+        if (z > 0.0) nearest = std::min(nearest, z);
+      }
+      if (nearest < 10.0) depth.at<float>(v, u) = static_cast<float>(nearest);
+    }
+  }
+  return depth;
+}
+
+TEST(DepthNormal, IsThatOfThePlaneAroundACorner) {
+  const sensor::Pinhole camera = LandmarkWorld(1, 0, 0).camera;
+  const Eigen::Vector3d slanted = Eigen::Vector3d(0.5, -0.2, -1.0).normalized();
+  const cv::Mat depth = depth_of(camera, {{slanted, -2.0}});
+  const Eigen::Vector2d pixel(0.4 * camera.width, 0.6 * camera.height);
+  const double z = -2.0 / slanted.dot(camera.unproject(pixel.x(), pixel.y(), 1.0));
+  EXPECT_LT((depth_normal(depth, pixel, z, camera) - slanted).norm(), 0.01);
+  EXPECT_TRUE(depth_normal(depth, pixel, z - 0.5, camera).isZero()) << "it floats in front of the plane";
+  EXPECT_TRUE(depth_normal(depth, {-100.0, 0.0}, z, camera).isZero()) << "out of the picture";
+  EXPECT_TRUE(depth_normal(cv::Mat(depth.size(), CV_32FC1, cv::Scalar(0)), pixel, z, camera).isZero());
+}
+
+TEST(DepthNormal, BesideAFoldIsThatOfTheLargerSide) {
+  const sensor::Pinhole camera = LandmarkWorld(1, 0, 0).camera;
+  const Eigen::Vector3d left = Eigen::Vector3d(1.0, 0.0, -1.0).normalized();
+  const Eigen::Vector3d right = Eigen::Vector3d(-1.0, 0.0, -1.0).normalized();
+  const double distance = -2.0 / std::sqrt(2.0);  // they meet 2 m ahead, like the edge of a box
+  cv::Mat depth = depth_of(camera, {{left, distance}, {right, distance}});
+  depth = cv::max(depth_of(camera, {{left, distance}}), depth_of(camera, {{right, distance}}));
+  const Eigen::Vector2d pixel(camera.cx - 6.0, camera.cy);
+  const double z =
+      static_cast<double>(depth.at<float>(static_cast<int>(pixel.y()), static_cast<int>(pixel.x())));
+  const Eigen::Vector3d normal = depth_normal(depth, pixel, z, camera);
+  EXPECT_GT(std::max(normal.dot(left), normal.dot(right)), 0.97) << normal.transpose();
+}
+
 TEST(Triangulation, FindsPointsWithoutDepth) {
   LandmarkWorld world(2, 80, 0);
   world.depth = false;

@@ -33,6 +33,23 @@ TEST(PlaceVerification, FindsThePoseWhateverTheMapBelieves) {
   EXPECT_GE(v.cells, 10);
 }
 
+TEST(PlaceVerification, PoseAndStructureTogetherStandNoLandmarksThatAreOff) {
+  maps::Map map;
+  const cv::Mat poster = tests::poster(1200, 5);
+  const KeyframeId match = add_view(map, poster, kLeft, kLeft, 0.0);
+  const KeyframeId query = add_view(map, poster, kRight, kRight, 20.0);
+  VerificationOptions joint;
+  joint.joint = true;
+  joint.align = false;
+  joint.depth_rows = false;
+  const PlaceVerification v = verify_place({&map, query, kTestCamera}, {&map, match, kTestCamera}, joint, 1);
+  ASSERT_TRUE(v.accepted) << v.refused;
+  EXPECT_FALSE(v.surface_aligned);
+  const Rigid3 truth = kRight * kLeft.inverse();
+  EXPECT_LT(tests::distance(v.query_from_match, truth), 0.02);
+  EXPECT_LT(tests::angle(v.query_from_match, truth), 0.01);
+}
+
 TEST(PlaceVerification, SameSeedSameAnswer) {
   maps::Map map;
   const cv::Mat poster = tests::poster(1200, 5);

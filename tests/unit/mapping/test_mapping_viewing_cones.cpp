@@ -47,6 +47,28 @@ TEST(ViewingCones, TheThresholdFollowsItsEquations) {
   EXPECT_NEAR(t.adaptive, (1.0 + 0.25 - 0.3 + 0.1) * 16.25, 1e-12);
 }
 
+TEST(ViewingCones, EpsilonWeighsLostMatches) {
+  const ConeThreshold t = cone_threshold({150, 700, 60}, {200, 800, 20}, 2.0);
+  EXPECT_NEAR(t.adaptive, (1.0 + 2.0 * 0.25 - 0.3 + 0.1) * t.initial, 1e-12);
+}
+
+TEST(ViewingCones, WhatIsLeftInViewCanBeScaledFor) {
+  const ConeCounts first{400, 1000, 0};
+  const ConeCounts few{60, 1000, 12};  // a fifth of what is left in view has changed
+  EXPECT_LT(few.changed, cone_threshold(few, first).adaptive);
+  EXPECT_GT(few.changed, cone_threshold(few, first, 1.0, true).adaptive);
+  EXPECT_EQ(cone_threshold(first, first, 1.0, true).initial, cone_threshold(first, first).initial);
+}
+
+TEST(ViewingCones, BalanceIsAskedForAsOneLikes) {
+  const GridBalance even{0.8, 0.1};
+  EXPECT_TRUE(balanced(even, Balance::kAbove));
+  EXPECT_FALSE(balanced(even, Balance::kBelow));
+  EXPECT_FALSE(balanced({}, Balance::kAbove));
+  EXPECT_FALSE(balanced({}, Balance::kBelow)) << "nothing is counted";
+  EXPECT_TRUE(balanced({}, Balance::kOff));
+}
+
 TEST(ViewingCones, EachTermPushesItsWay) {
   const ConeCounts first{200, 800, 20};
   const double usual = cone_threshold({200, 800, 50}, first).adaptive;
