@@ -33,7 +33,7 @@ Place told_place(const mapping::RobotPlace& from, const std::string& frame_of) {
 }  // namespace
 
 HubMeetings::HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log)
-    : folder_(std::move(folder)), executor_(&executor), log_(&log), told_(folder_, log) {
+    : folder_(std::move(folder)), executor_(&executor), log_(&log), reported_(folder_, log) {
   std::error_code ignored;
   std::filesystem::remove_all(folder_ / "meetings", ignored);
   restart();
@@ -101,7 +101,7 @@ void HubMeetings::tell() {
   job_.wait();
   for (const std::string& line : std::exchange(done_.lines, {})) log_->debug(line);
   for (const mapping::MeetingEvent& event : std::exchange(done_.events, {})) {
-    const auto noted = told_.note(event, names_, fmt::format("(log {})", event.frame), -1.0);
+    const auto noted = reported_.note(event, names_, fmt::format("(log {})", event.frame), -1.0);
     if (!noted) log_->warning(noted.error().message);
   }
   places_.clear();
@@ -116,7 +116,7 @@ void HubMeetings::finish() {
     step();
     if (job_.valid()) tell();
   } while (!changed_.empty());
-  if (const auto drawn = told_.draw(); !drawn) log_->warning(drawn.error().message);
+  if (const auto drawn = reported_.draw(); !drawn) log_->warning(drawn.error().message);
 }
 
 Place HubMeetings::place(const std::string& robot) const {

@@ -31,7 +31,7 @@ class HubMeetings {
   /// What a robot is told of where it is.
   [[nodiscard]] Place place(const std::string& robot) const;
   [[nodiscard]] const std::vector<pipeline::RunSummary::Meeting>& meetings() const {
-    return told_.meetings();
+    return reported_.meetings();
   }
 
  private:
@@ -46,7 +46,7 @@ class HubMeetings {
   std::filesystem::path folder_;
   const core::Executor* executor_;
   core::Log* log_;
-  pipeline::MeetingLog told_;
+  pipeline::MeetingLog reported_;
   std::unique_ptr<mapping::MergeServer> server_;
   std::map<std::string, std::int64_t> changed_;  ///< copies with something new, up to which transaction
   std::map<std::string, Known> known_;

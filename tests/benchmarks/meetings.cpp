@@ -101,22 +101,22 @@ Log drive(std::vector<Robot>& robots) {
   return log;
 }
 
-struct Told {
+struct Reported {
   MeetingEvent event;
   double time = 0.0;
   std::uint64_t preview = 0;  ///< of its map
-  friend bool operator==(const Told& x, const Told& y) {
+  friend bool operator==(const Reported& x, const Reported& y) {
     return x.event.step == y.event.step && x.event.a == y.event.a && x.event.b == y.event.b &&
            x.event.frame == y.event.frame && x.time == y.time && x.preview == y.preview;
   }
 };
 
-std::vector<Told> replay(const Log& log, const std::vector<Robot>& robots, int lag, int threads) {
+std::vector<Reported> replay(const Log& log, const std::vector<Robot>& robots, int lag, int threads) {
   const core::Executor executor(threads);
   mapping::MergeServer server({}, lag, executor);
   for (std::size_t r = 0; r < robots.size(); ++r)
     server.join({{static_cast<std::int32_t>(r), robots[r].source->camera().color}});
-  std::vector<Told> told;
+  std::vector<Reported> told;
   const auto take = [&](const std::vector<MeetingEvent>& events, double time) {
     for (const MeetingEvent& event : events)
       told.push_back({event, time, event.preview ? mapping::content_hash(event.preview->map) : 0});
@@ -162,7 +162,7 @@ double ate(const maps::Map& map, const std::vector<KeyframeId>& ids, const std::
   return std::sqrt(sum / std::max(1.0, static_cast<double>(truth.size())));
 }
 
-void report(const std::vector<Robot>& robots, const Log& log, const std::vector<Told>& told) {
+void report(const std::vector<Robot>& robots, const Log& log, const std::vector<Reported>& told) {
   const core::Executor executor(2);
   std::vector<mapping::MapPart> parts;
   for (std::size_t r = 0; r < robots.size(); ++r) {
@@ -175,7 +175,7 @@ void report(const std::vector<Robot>& robots, const Log& log, const std::vector<
   int in_time = 0;
   for (const mapping::MergeEvidence& merge : merges) {
     double met = std::nan("");
-    for (const Told& t : told) {
+    for (const Reported& t : told) {
       if (t.event.a != merge.a || t.event.b != merge.b) continue;
       if (t.event.step == MeetingStep::kMet) met = t.time;
       if (t.event.step == MeetingStep::kTakenBack) met = std::nan("");
@@ -188,7 +188,7 @@ void report(const std::vector<Robot>& robots, const Log& log, const std::vector<
                met, met - since, merge.accepted || std::isnan(met) ? "" : " MET BUT APART: " + merge.refused);
   }
   fmt::print("{} of {} merged had met within 3 s\n", in_time, merged);
-  for (const Told& t : told) {
+  for (const Reported& t : told) {
     if (t.event.step == MeetingStep::kTakenBack) {
       fmt::print("{:.1f} s: {} and {} taken back: {}\n", t.time, robots[t.event.a].source->name(),
                  robots[t.event.b].source->name(), t.event.evidence.refused);
@@ -223,7 +223,7 @@ core::Result<void> run(const std::vector<std::string>& inputs, const std::string
   }
   const Log frames = drive(robots);
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<Told> told = replay(frames, robots, lag, 1);
+  const std::vector<Reported> told = replay(frames, robots, lag, 1);
   const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   report(robots, frames, told);
   fmt::print("{} keyframes in {:.1f} s of one thread; two threads: {}\n", frames.entries.size(), took,

@@ -35,10 +35,10 @@ TABLES = {
     },
     'deviations': {
         'ours': '',
-        'exact number of false alarms': 'features.exact_nfa=on',
-        'LSD at full scale': 'features.scale=full',
+        'exact number of false alarms': 'features.line.exact_nfa=on',
+        'LSD at full scale': 'features.line.scale=full',
         'strongest points': 'features.orb.spread=off',
-        'border by either end': 'features.border_either=on',
+        'border by either end': 'features.line.border_either=on',
         'lengths of matched lines': 'track.match.min_line_ratio=0.5',
         'matching to the last keyframe': 'track.local.keyframes=1',
         'PnP at every frame': 'track.pnp_start=on',

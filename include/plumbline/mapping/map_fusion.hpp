@@ -40,7 +40,7 @@ struct MapFusionOptions {
   double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
   bool robust = true;          ///< the pose graph may take pairs for wrong
-  bool merge_doubles = true;   ///< landmarks that are one; a preview does without
+  bool merge_duplicates = true;   ///< landmarks that are one; a preview does without
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;

@@ -188,7 +188,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   fused.refused = graph.refused;
   fused.refusal = graph.refusal;
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
-  if (!options.merge_doubles) return fused;
+  if (!options.merge_duplicates) return fused;
   std::vector<PoseEdge> believed;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     if (i >= graph.extra.size() || !graph.extra[i].rejected) believed.push_back(edges[i]);

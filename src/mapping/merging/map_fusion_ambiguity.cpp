@@ -79,7 +79,7 @@ std::vector<Alternative> alternatives(const PartPair& maps, const PairSets& sets
   return result;
 }
 
-/// Held against the maps. Surfaces are asked where landmarks leave it open; what landmarks alone speak for
+/// Held against the maps. Surfaces are tried where landmarks leave it open; what landmarks alone speak for
 /// must show at several spots.
 void check_against_maps(const MapOverlay& laid, const Rigid3& a_from_b, const OverlayFit& best,
                         const MapFusionOptions& options, Alternative& other) {

@@ -12,13 +12,13 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-/// What is looked up once, by the newer of two keyframes, is asked more liberally than where both ask.
+/// What is looked up once, by the newer of two keyframes, is tried more liberally than where both attempt.
 constexpr int kPlaces = 8;
 constexpr int kPlacesWhenMet = 1;  // of a robot that has been met
 
 MapFusionOptions live(MapFusionOptions options) {
   options.places.groups = kPlaces;
-  options.merge_doubles = false;
+  options.merge_duplicates = false;
   return options;
 }
 

@@ -166,13 +166,13 @@ TEST(FusionAmbiguity, MapsWithoutLandmarksTellNothing) {
 }
 
 /// Pieces of walls that face these directions, seen by cameras that go along x.
-maps::Map hall(const std::vector<Eigen::Vector3f>& normals, double way_m) {
+maps::Map hall(const std::vector<Eigen::Vector3f>& normals, double path_m) {
   maps::Map map;
   for (int i = 0; i < 3; ++i) {
     auto keyframe = std::make_shared<maps::Keyframe>();
     keyframe->id = {0, i};
     for (const Eigen::Vector3f& normal : normals) keyframe->surface.push_back({normal, normal, 0.01F});
-    map.add_keyframe(keyframe, Rigid3(Eigen::Matrix3d::Identity(), {-0.5 * way_m * i, 0.0, 0.0}));
+    map.add_keyframe(keyframe, Rigid3(Eigen::Matrix3d::Identity(), {-0.5 * path_m * i, 0.0, 0.0}));
   }
   return map;
 }
