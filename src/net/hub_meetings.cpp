@@ -66,7 +66,10 @@ void HubMeetings::take(const std::string& robot, std::int64_t transaction) {
   auto known = known_.find(robot);
   if (known == known_.end()) {
     const auto number = static_cast<std::int32_t>(names_.size());
-    known = known_.emplace(robot, Known{server_->join({{number, stored->header.camera.color}}), 0}).first;
+    known = known_
+                .emplace(robot,
+                         Known{server_->join({{number, maps::camera_of(stored->header.robots, 0).color}}), 0})
+                .first;
     names_.push_back(robot);
   }
   const auto number = static_cast<std::int32_t>(known->second.number);

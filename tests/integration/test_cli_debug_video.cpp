@@ -80,7 +80,7 @@ TEST_F(DebugVideo, WhatCannotBeWrittenIsExitCodeFive) {
   const Outcome nowhere = map("-o out --debug-video /proc/video");
   EXPECT_EQ(nowhere.code, 5) << nowhere;
   EXPECT_TRUE(nowhere.told("/proc/video")) << nowhere;
-  const Outcome full = run("map wall -q -o out --set store.enabled=off --debug-video video",
+  const Outcome full = run("map wall -q -o out -p robot --set store.enabled=off --debug-video video",
                            "ulimit -f 40; ");  // 20 or 40 kB a file
   EXPECT_EQ(full.code, 5) << full;
   EXPECT_TRUE(full.told("000000.png")) << full;

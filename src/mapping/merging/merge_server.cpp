@@ -224,8 +224,8 @@ std::vector<MergeEvidence> MergeServer::merges() const {
   for (const auto& [robots, pair] : work_.pairs) {
     if (!pair.met) continue;
     merges.push_back(pair.evidence);
-    merges.back().a_from_b = work_.maps[robots.first]->camera_from_world(pair.a).inverse() * pair.a_from_b *
-                             work_.maps[robots.second]->camera_from_world(pair.b);
+    merges.back().alignment.a_from_b = work_.maps[robots.first]->camera_from_world(pair.a).inverse() *
+                                       pair.a_from_b * work_.maps[robots.second]->camera_from_world(pair.b);
   }
   std::stable_sort(merges.begin(), merges.end(), [](const MergeEvidence& x, const MergeEvidence& y) {
     return x.pairs.size() > y.pairs.size();
