@@ -59,15 +59,16 @@ int main(int argc, char** argv) {
       continue;
     }
     const maps::Map second = mapping::renumbered(b->map, {{0, 1}});
-    const std::vector<mapping::MapPart> parts{{&a->map, {{0, a->header.camera.color}}},
-                                              {&second, {{1, b->header.camera.color}}}};
+    const std::vector<mapping::MapPart> parts{{&a->map, {{0, maps::camera_of(a->header.robots, 0).color}}},
+                                              {&second, {{1, maps::camera_of(b->header.robots, 0).color}}}};
     const auto merges = mapping::find_overlaps(parts, {}, executor);
     const mapping::MergeEvidence& merge = merges.front();
     const double error = merge.accepted ? error_of(a->map, *truth_a, second, *truth_b, merge)
                                         : std::numeric_limits<double>::quiet_NaN();
     fmt::print("{} {} {} verified {} keyframes {} {} agree {} error {:.3f} {}\n",
                merge.accepted ? "merged" : "apart", argv[i], argv[i + 2], merge.consistency.verified,
-               a->map.keyframe_count(), second.keyframe_count(), merge.consistency.agreeing, error, merge.refused);
+               a->map.keyframe_count(), second.keyframe_count(), merge.consistency.agreeing, error,
+               merge.refused);
   }
   return 0;
 }
