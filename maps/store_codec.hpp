@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a map consists of as bytes (docs/reference/store.md), before packing: `fields` of each type is the format.
+// What a map consists of as bytes (docs/reference/store.md), before packing: `fields` of each type is the
+// format.
 #include <algorithm>
 #include <cstdint>
 #include <memory>

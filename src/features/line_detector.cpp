@@ -92,7 +92,8 @@ void LineDetectorOptions::declare(core::OptionTable& table) {
   table.number("line.min_length", min_length_px, {5.0, 1000.0}, "px", "Shorter lines are dropped");
   table.number("line.border", border_px, {0.0, 100.0}, "px",
                "Lines that run within this margin of a side are dropped");
-  table.boolean("line.border_either", border_either, "Lines with one end within that margin are dropped, too");
+  table.boolean("line.border_either", border_either,
+                "Lines with one end within that margin are dropped, too");
   table.boolean("line.exact_nfa", exact_nfa, "LSD: number of false alarms by its sum, not by a bound");
   table.integer("line.max_count", max_count, {0, 10000}, "", "Keep the longest so many lines; 0 keeps all");
   table.boolean("line.join", join, "Join collinear pieces and drop near-duplicates");

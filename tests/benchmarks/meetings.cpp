@@ -184,8 +184,9 @@ void report(const std::vector<Robot>& robots, const Log& log, const std::vector<
     merged += merge.accepted ? 1 : 0;
     in_time += merge.accepted && met <= since + 3.0 ? 1 : 0;
     fmt::print("{} {} {} agree {} evident {:.1f} met {:.1f} late {:.1f}{}\n", robots[merge.a].source->name(),
-               robots[merge.b].source->name(), merge.accepted ? "merged" : "apart", merge.consistency.agreeing, since,
-               met, met - since, merge.accepted || std::isnan(met) ? "" : " MET BUT APART: " + merge.refused);
+               robots[merge.b].source->name(), merge.accepted ? "merged" : "apart",
+               merge.consistency.agreeing, since, met, met - since,
+               merge.accepted || std::isnan(met) ? "" : " MET BUT APART: " + merge.refused);
   }
   fmt::print("{} of {} merged had met within 3 s\n", in_time, merged);
   for (const Reported& t : told) {

@@ -37,10 +37,10 @@ struct MapFusionOptions {
   double alternative_share =
       0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
   double max_seen_through = 0.06;  ///< share of landmarks seen through that refutes such an answer
-  double min_confirmed = 0.5;  ///< share of the keyframes with a view of the other map that must confirm it
-  int verifications = 250;     ///< pairs of keyframes that are verified for each two maps, at most
-  bool robust = true;          ///< the pose graph may take pairs for wrong
-  bool merge_duplicates = true;   ///< landmarks that are one; a preview does without
+  double min_confirmed = 0.5;    ///< share of the keyframes with a view of the other map that must confirm it
+  int verifications = 250;       ///< pairs of keyframes that are verified for each two maps, at most
+  bool robust = true;            ///< the pose graph may take pairs for wrong
+  bool merge_duplicates = true;  ///< landmarks that are one; a preview does without
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps become one when robots meet (docs/method/merging.md; Algorithm 2): every new keyframe is looked up among
-// those of the other robots; what looks alike is verified; when it is certain that two maps overlap, all maps
-// that hang together are laid into one frame by a pose graph. That frame is kept up as keyframes come and
-// move, further robots join it, and a merge is taken back when evidence turns against it. A preview: doubles
-// of landmarks are not merged, surfaces not aligned; fuse_maps of the finished maps has the last word.
+// Maps become one when robots meet (docs/method/merging.md; Algorithm 2): every new keyframe is looked up
+// among those of the other robots; what looks alike is verified; when it is certain that two maps overlap,
+// all maps that hang together are laid into one frame by a pose graph. That frame is kept up as keyframes
+// come and move, further robots join it, and a merge is taken back when evidence turns against it. A preview:
+// doubles of landmarks are not merged, surfaces not aligned; fuse_maps of the finished maps has the last
+// word.
 //
 // Work goes on beside the caller, by logical time: what is begun at frame k of a log is committed at frame
 // k + lag, whatever the clock says. So the same log gives the same events for any number of threads.

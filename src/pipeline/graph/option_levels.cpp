@@ -65,9 +65,10 @@ const Keys kAdvanced{
 /// What nobody has been seen to set: accepted, and listed nowhere.
 const Keys kInternal{
     {"features",
-     {"line.border_either", "line.exact_nfa", "orb.spread", "line.join_gap", "line.join_angle", "line.join_offset",
-      "line.depth_side", "line.depth_inlier_sigmas", "line.depth_min_inlier_share", "line.depth_min_coverage",
-      "line.depth_min_inliers", "line.depth_ransac_rounds", "line.depth_pixel_sigma"}},
+     {"line.border_either", "line.exact_nfa", "orb.spread", "line.join_gap", "line.join_angle",
+      "line.join_offset", "line.depth_side", "line.depth_inlier_sigmas", "line.depth_min_inlier_share",
+      "line.depth_min_coverage", "line.depth_min_inliers", "line.depth_ransac_rounds",
+      "line.depth_pixel_sigma"}},
     {"track",
      {"match.max_point_angle",
       "match.aligned_sigma",
