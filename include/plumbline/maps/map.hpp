@@ -115,7 +115,7 @@ struct NextIds {
   std::uint64_t edge = 0;
 };
 
-/// A revision in the life of a map, to ask later what changed since. The default: before anything was there.
+/// Revision of a map, to ask later what changed since. The default: before anything was there.
 struct MapRevision {
   std::uint64_t points = 0;
   std::uint64_t lines = 0;

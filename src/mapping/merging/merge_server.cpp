@@ -12,7 +12,7 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-/// What is looked up once, by the newer of two keyframes, is tried more liberally than where both attempt.
+/// A pair is looked up once, by its newer keyframe, so more of them are tried than where both keyframes ask.
 constexpr int kPlaces = 8;
 constexpr int kPlacesWhenMet = 1;  // of a robot that has been met
 
