@@ -73,7 +73,7 @@ void HubMeetings::take(const std::string& robot, std::int64_t transaction) {
     names_.push_back(robot);
   }
   const auto number = static_cast<std::int32_t>(known->second.number);
-  const auto map = std::make_shared<maps::Map>(mapping::renumbered(stored->map, {{0, number}}));
+  const auto map = std::make_shared<maps::Map>(maps::renumbered(stored->map, {{0, number}}));
   ++done_.entry;
   int added = 0;
   for (const core::KeyframeId id : ids) {
