@@ -180,6 +180,15 @@ std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int 
   return result;
 }
 
+std::vector<KeyframeId> Map::neighbours(KeyframeId keyframe, std::size_t count) const {
+  std::vector<KeyframeId> result;
+  if (!has_keyframe(keyframe)) return result;
+  for (const auto& [id, shared] : covisible(keyframe, kCovisible)) {
+    if (result.size() < count) result.push_back(id);
+  }
+  return result;
+}
+
 int Map::shared(KeyframeId a, KeyframeId b) const {
   const auto& shared = keyframes_.at(a).shared;
   const auto found = shared.find(b);

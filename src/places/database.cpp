@@ -112,6 +112,7 @@ Database::Scores Database::query(const FrameFeatures& picture) const {
   Scores result;
   result.database_ = this;
   result.scores_.assign(keyframes_.size(), 0.0F);
+  result.votes_ = result.scores_;
   std::vector<Word> words;
   words.reserve(picture.descriptors.size() + picture.lines.size());
   for (const auto& d : picture.descriptors) words.push_back(vocabulary_.word(Kind::kPoint, d));
@@ -134,6 +135,7 @@ Database::Scores Database::query(const FrameFeatures& picture) const {
       while (i < entries.size() && entries[i].slot == slot) ++i;
       const double theirs = static_cast<double>(i - begin) * weight / seen_[at(slot)].mass;
       result.scores_[at(slot)] += static_cast<float>(std::min(share, theirs));
+      result.votes_[at(slot)] += 1.0F;
     }
   }
   return result;
@@ -144,15 +146,16 @@ double Database::Scores::of(KeyframeId id) const {
   return slot == nullptr || at(*slot) >= scores_.size() ? 0.0 : static_cast<double>(scores_[at(*slot)]);
 }
 
-std::vector<Hit> Database::Scores::best(std::size_t count,
-                                        const std::function<bool(KeyframeId)>& allowed) const {
+std::vector<Hit> Database::Scores::best(std::size_t count, const std::function<bool(KeyframeId)>& allowed,
+                                        bool by_votes) const {
+  const std::vector<float>& ranks = by_votes ? votes_ : scores_;
   std::vector<std::int32_t> slots;
   for (std::size_t i = 0; i < scores_.size(); ++i) {
     if (scores_[i] > 0.0F) slots.push_back(static_cast<std::int32_t>(i));
   }
   // `allowed` may be dear: it is asked for the best only, a block at a time.
   const auto better = [&](std::int32_t a, std::int32_t b) {
-    return std::make_pair(-scores_[at(a)], a) < std::make_pair(-scores_[at(b)], b);
+    return std::make_pair(-ranks[at(a)], a) < std::make_pair(-ranks[at(b)], b);
   };
   std::vector<Hit> hits;
   auto sorted = slots.begin();
@@ -167,6 +170,7 @@ std::vector<Hit> Database::Scores::best(std::size_t count,
       }
     }
   }
+  std::stable_sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.score > b.score; });
   return hits;
 }
 

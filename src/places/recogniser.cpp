@@ -32,6 +32,7 @@ void RecogniserOptions::declare(core::OptionTable& table) {
   table.integer("places.consistent", consistent, {1, 100}, "",
                 "Keyframes in a row that must see the same surroundings");
   table.integer("places.candidates", hits, {1, 1000}, "", "Most similar keyframes that are grouped");
+  table.boolean("places.votes", votes, "The most similar are those that share most words");
   table.integer("places.islands", groups, {1, 100}, "", "Places that are verified per keyframe, at most");
 }
 
@@ -48,7 +49,7 @@ std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, Key
                                              const Neighbours& neighbours) {
   const double usual = neighbour.valid() ? scores.of(neighbour) : 0.0;
   const double threshold = std::max(options_.min_absolute, options_.min_score * usual);
-  std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed);
+  std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed, options_.votes);
   while (!hits.empty() && hits.back().score < threshold) hits.pop_back();
   return seen_in_a_row(query.robot, islands(hits, usual, neighbours));
 }

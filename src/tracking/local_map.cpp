@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <unordered_map>
 
-#include "plumbline/maps/covisibility.hpp"
-
 namespace plumbline::tracking {
 namespace {
 
@@ -113,10 +111,7 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   local.reference = reference;
   local.keyframes.push_back(reference);
   const auto wanted = static_cast<std::size_t>(options.keyframes);
-  for (const auto& [id, shared] : map.covisible(reference, maps::kCovisible)) {
-    if (local.keyframes.size() >= wanted) break;
-    append_unique(local.keyframes, id);
-  }
+  for (const KeyframeId id : map.neighbours(reference, wanted - 1)) append_unique(local.keyframes, id);
   const geometry::Rigid3& reference_from_world = map.camera_from_world(reference);
   for (std::int32_t index = reference.index - 1; index >= 0 && index > reference.index - 40; --index) {
     if (local.keyframes.size() >= wanted) break;

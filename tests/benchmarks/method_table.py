@@ -48,6 +48,7 @@ TABLES = {
         'cones, not scaled': CONES,
         **{f'cones, {balance}': f'{CONES} track.keyframe.cone_scaled=on track.keyframe.cone_balance={balance}'
            for balance in ('above', 'below', 'off')},
+        'votes of the index': 'track.places.votes=on',
         'absolute eta': 'track.places.min_score=0 track.places.min_absolute=0.05',
         'pair: R, t and structure': 'track.verify.joint=on',
     },

@@ -21,6 +21,9 @@ using core::KeyframeId;
 using core::LineId;
 using core::PointId;
 
+/// Landmarks that covisible keyframes share, at least (section 3.3 of the paper).
+constexpr int kCovisible = 20;
+
 /// A piece of surface that a keyframe's depth image measured, in the keyframe's camera frame.
 struct SurfaceSample {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();    ///< metres
@@ -231,6 +234,8 @@ class Map {
   /// Keyframes that share at least `min_shared` landmarks with `keyframe`, most first, ties by id. If there
   /// are none, the ones that share most.
   [[nodiscard]] std::vector<std::pair<KeyframeId, int>> covisible(KeyframeId keyframe, int min_shared) const;
+  /// Covisible keyframes, those that share most first, `count` at most; none of a keyframe that is not there.
+  [[nodiscard]] std::vector<KeyframeId> neighbours(KeyframeId keyframe, std::size_t count) const;
 
   /// Landmarks that both see.
   [[nodiscard]] int shared(KeyframeId a, KeyframeId b) const;

@@ -41,13 +41,16 @@ class Database {
    public:
     [[nodiscard]] double of(core::KeyframeId id) const;
     /// The best `count` among those that `allowed` lets pass, best first, ties by order of adding; no zeros.
+    /// `by_votes`: the `count` that share most words, in order of their scores.
     [[nodiscard]] std::vector<Hit> best(std::size_t count,
-                                        const std::function<bool(core::KeyframeId)>& allowed) const;
+                                        const std::function<bool(core::KeyframeId)>& allowed,
+                                        bool by_votes = false) const;
 
    private:
     friend class Database;
     const Database* database_ = nullptr;
     std::vector<float> scores_;  ///< by order of adding
+    std::vector<float> votes_;   ///< words in common
   };
   /// Valid until the next add.
   [[nodiscard]] Scores query(const features::FrameFeatures& picture) const;

@@ -43,7 +43,7 @@ std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe,
     if (map.has_keyframe(id)) append(id);
   }
   for (const maps::SurfaceEdge& edge : map.edges_of(keyframe)) append(edge.a == keyframe ? edge.b : edge.a);
-  for (const auto& [id, shared] : map.covisible(keyframe, 20)) append(id);
+  for (const KeyframeId id : map.neighbours(keyframe, map.keyframe_count())) append(id);
   return window;
 }
 

@@ -7,19 +7,9 @@
 #include "plumbline/mapping/earlier_observations.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
 #include "plumbline/mapping/surface_edge.hpp"
-#include "plumbline/maps/covisibility.hpp"
 
 namespace plumbline::mapping {
 namespace {
-
-/// Keyframes that share most landmarks with `id`.
-std::vector<core::KeyframeId> nearest(const maps::Map& map, core::KeyframeId id, int count) {
-  std::vector<core::KeyframeId> result;
-  for (const auto& [other, shared] : map.covisible(id, maps::kCovisible)) {
-    if (static_cast<int>(result.size()) < count) result.push_back(other);
-  }
-  return result;
-}
 
 bool still(const geometry::Rigid3& motion) {
   return motion.translation.isZero(0.0) && motion.rotation.isIdentity(0.0);
@@ -201,7 +191,7 @@ bool LocalMapper::distorted(const maps::Map& map, core::KeyframeId id) const {
 
 std::vector<core::KeyframeId> LocalMapper::nearest_undistorted(const maps::Map& map, core::KeyframeId id,
                                                                int count) const {
-  std::vector<core::KeyframeId> neighbours = nearest(map, id, count);
+  std::vector<core::KeyframeId> neighbours = map.neighbours(id, static_cast<std::size_t>(count));
   const auto bad = [&](core::KeyframeId k) { return distorted(map, k); };
   neighbours.erase(std::remove_if(neighbours.begin(), neighbours.end(), bad), neighbours.end());
   return neighbours;

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "plumbline/maps/covisibility.hpp"
-
 namespace plumbline::mapping {
 namespace {
 
@@ -17,16 +15,6 @@ using geometry::Rigid3;
 constexpr int kRelated = 5;             // shared landmarks: the same surroundings, not a loop
 constexpr std::size_t kAroundLoop = 8;  // keyframes on each side whose landmarks are compared
 constexpr int kPatience = 6;            // keyframes that a verified loop waits for another one
-
-std::vector<KeyframeId> neighbours_of(const maps::Map& map, KeyframeId id, std::size_t count) {
-  std::vector<KeyframeId> result;
-  if (!map.has_keyframe(id)) return result;
-  for (const auto& [other, shared] : map.covisible(id, maps::kCovisible)) {
-    if (result.size() >= count) break;
-    result.push_back(other);
-  }
-  return result;
-}
 
 /// The query's pose in the world, as the loop says.
 Rigid3 world_from_query(const maps::Map& map, const Loop& loop) {
@@ -142,7 +130,7 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
     if (!map.has_keyframe(id) || std::abs(now - map.keyframe(id).stamp) < options_.min_gap_s) return false;
     return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
   };
-  const auto neighbours = [&](KeyframeId id) { return neighbours_of(map, id, kAroundLoop); };
+  const auto neighbours = [&](KeyframeId id) { return map.neighbours(id, kAroundLoop); };
   const auto candidates = recogniser_.recognise(database_, keyframe, *features, last_, allowed, neighbours);
   const std::vector<Loop> verified = verify(map, keyframe, candidates);
   database_.add(keyframe, features);
@@ -169,9 +157,9 @@ void LoopCloser::restore(const maps::Map& map, KeyframeId newest) {
 }
 
 void LoopCloser::merge_duplicates(maps::Map& map, const PoseEdge& edge) const {
-  std::vector<KeyframeId> old_side = neighbours_of(map, edge.a, kAroundLoop);
+  std::vector<KeyframeId> old_side = map.neighbours(edge.a, kAroundLoop);
   old_side.insert(old_side.begin(), edge.a);
-  std::vector<KeyframeId> new_side = neighbours_of(map, edge.b, kAroundLoop);
+  std::vector<KeyframeId> new_side = map.neighbours(edge.b, kAroundLoop);
   new_side.insert(new_side.begin(), edge.b);
   for (const KeyframeId id : new_side) {
     std::vector<KeyframeId> others;

@@ -15,7 +15,6 @@
 #include "loop_closing/place_surface.hpp"
 #include "plumbline/features/line_match.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
-#include "plumbline/maps/covisibility.hpp"
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/association.hpp"
@@ -97,7 +96,8 @@ std::vector<KeyframeId> surroundings(const PlaceView& match, int neighbours) {
       result.push_back(id);
     }
   };
-  for (const auto& [id, shared] : match.map->covisible(match.keyframe, maps::kCovisible)) add(id);
+  for (const KeyframeId id : match.map->neighbours(match.keyframe, static_cast<std::size_t>(neighbours)))
+    add(id);
   for (const maps::SurfaceEdge& e : match.map->edges_of(match.keyframe))
     add(e.a == match.keyframe ? e.b : e.a);
   return result;

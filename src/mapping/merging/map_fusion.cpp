@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <set>
 
-#include "plumbline/maps/covisibility.hpp"
-
 namespace plumbline::mapping {
 namespace {
 
@@ -56,7 +54,7 @@ std::vector<PoseEdge> edges_of(const MergeEvidence& merge) {
 
 std::vector<KeyframeId> surroundings(const maps::Map& map, KeyframeId id) {
   std::vector<KeyframeId> result{id};
-  for (const auto& [other, shared] : map.covisible(id, maps::kCovisible)) {
+  for (const KeyframeId other : map.neighbours(id, map.keyframe_count())) {
     if (result.size() > kAroundPair) break;
     if (other.robot == id.robot) result.push_back(other);
   }

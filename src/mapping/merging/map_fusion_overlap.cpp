@@ -11,7 +11,6 @@
 
 #include "merging/free_direction.hpp"
 #include "merging/map_fusion_sets.hpp"
-#include "plumbline/maps/covisibility.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -124,14 +123,9 @@ std::vector<OverlapFinder::Candidate> OverlapFinder::recognise(const places::Dat
                                                                KeyframeId before) {
   std::vector<Candidate> result;
   const auto neighbours = [&](KeyframeId id) {
-    std::vector<KeyframeId> around;
     const std::size_t where = part_of(parts, id);
-    if (where == parts.size()) return around;
-    for (const auto& [other, shared] : parts[where].map->covisible(id, maps::kCovisible)) {
-      if (around.size() >= kSurroundings) break;
-      around.push_back(other);
-    }
-    return around;
+    return where == parts.size() ? std::vector<KeyframeId>{}
+                                 : parts[where].map->neighbours(id, kSurroundings);
   };
   const auto allowed = [&](KeyframeId id) {
     const std::size_t where = part_of(parts, id);
