@@ -35,6 +35,10 @@ struct StoreHeads {
 struct StoreTransaction {
   std::int64_t number = 0;
   std::vector<std::uint8_t> rows;
+  template <typename Io>
+  friend void fields(Io& io, StoreTransaction& transaction) {
+    io(transaction.number, transaction.rows);
+  }
 };
 
 /// What a store holds at this moment, while it may be written; opens and closes the file. Errors (kInput) as
