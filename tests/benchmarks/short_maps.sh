@@ -17,7 +17,7 @@ truth() { # SEED SPEED
   local folder="$work/truth_$1_$2"
   [ -d "$folder" ] || "$program" synth office -o "$folder" --frames "$(python3 -c "print(round(1500/$2))")" --seed "$1" \
     --speed "$2" --width 64 --height 48 --reference-spacing 1 -q
-  ls "$folder"/groundtruth.txt "$folder"/*/groundtruth.txt 2>/dev/null | head -1
+  find "$folder" -name groundtruth.txt
 }
 
 arguments=() others=()
