@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "plumbline/cloud/compact_cloud.hpp"
-#include "store/store_codec.hpp"
+#include "store/map_rows.hpp"
 #include "store/store_schema.hpp"
 
 namespace plumbline::maps {
@@ -24,145 +24,30 @@ void read_table(Database& database, const std::string& table, const Row& row) {
     const std::int64_t robot = rows.integer(0);
     const std::int64_t number = rows.integer(1);
     try {
-      row(KeyframeId{static_cast<std::int32_t>(robot), static_cast<std::int32_t>(number)}, number,
-          rows.unpacked(2));
+      row(robot, number, rows.unpacked(2));
     } catch (const BadBytes& bad) {
       throw BadBytes(table + " " + std::to_string(robot) + "/" + std::to_string(number) + ": " + bad.what());
     }
   }
 }
 
-/// The maps of a store while they are read.
-class Pieces {
- public:
-  struct Piece {
-    MapRow row;
-    MapParts parts;
-    StoredMap stored;
-    std::size_t states = 0;  ///< read so far
-  };
-  explicit Pieces(Database& database) {
-    read_table(database, "map", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
-      pieces_[key.robot].row = decode<MapRow>(bytes);
-    });
-    if (pieces_.empty()) pieces_[0];  // nothing was added yet
-  }
-  /// That of a robot: the only one, or its own.
-  Piece& of(std::int32_t robot) {
-    if (pieces_.size() == 1) return pieces_.begin()->second;
-    const auto found = pieces_.find(robot);
-    if (found == pieces_.end()) throw BadBytes("it belongs to no map");
-    return found->second;
-  }
-  [[nodiscard]] std::map<std::int32_t, Piece>& all() { return pieces_; }
-
- private:
-  std::map<std::int32_t, Piece> pieces_;
-};
-
-template <typename Landmark>
-void read_landmarks(Database& database, const std::string& table, Pieces& pieces,
-                    std::vector<Landmark> MapParts::*member) {
-  read_table(database, table, [&](KeyframeId key, std::int64_t page, const Bytes& bytes) {
-    std::vector<Landmark>& landmarks = pieces.of(key.robot).parts.*member;
-    const std::size_t before = landmarks.size();
-    decode_page(bytes, landmarks);
-    for (std::size_t i = before; i < landmarks.size(); ++i) {
-      if (landmarks[i].id.robot != key.robot || landmarks[i].id.index / kLandmarksPerPage != page) {
-        throw BadBytes("it holds what belongs to another row");
-      }
-    }
-  });
-}
-
 bool is_complete(Database& database) {
   return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
 }
 
-void read_keyframes(Database& database, const std::vector<RobotInfo>& robots, Pieces& pieces) {
-  std::map<std::int32_t, sensor::Camera> cameras;
-  read_table(database, "keyframe", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
-    const auto camera = cameras.try_emplace(id.robot, camera_of(robots, id.robot)).first;
-    MapParts& parts = pieces.of(id.robot).parts;
-    parts.keyframes.push_back({decode_keyframe(bytes, camera->second.color), {}, {}});
-    if (parts.keyframes.back().data->id != id) throw BadBytes("it holds what belongs to another row");
-  });
-  read_table(database, "state", [&](KeyframeId id, std::int64_t, const Bytes& bytes) {
-    Pieces::Piece& piece = pieces.of(id.robot);
-    std::vector<MapParts::KeyframePart>& keyframes = piece.parts.keyframes;
-    if (piece.states == keyframes.size() || keyframes[piece.states].data->id != id) {
-      throw BadBytes("its keyframe is missing");
-    }
-    const KeyframeState state = decode<KeyframeState>(bytes);
-    keyframes[piece.states].camera_from_world = state.camera_from_world;
-    keyframes[piece.states++].parent = state.parent;
-  });
-  for (const auto& [robot, piece] : pieces.all()) {
-    if (piece.states != piece.parts.keyframes.size()) throw BadBytes("a keyframe has no pose");
-  }
-}
-
-/// Rows that were lost with a page of the file leave no other trace.
-void check_totals(const Pieces::Piece& piece) {
-  const auto expect = [](std::uint64_t expected, std::size_t found, const char* what) {
-    if (expected == found) return;
-    throw BadBytes("it holds " + std::to_string(found) + " of " + std::to_string(expected) + " " + what);
-  };
-  expect(piece.row.keyframes, piece.parts.keyframes.size(), "keyframes");
-  expect(piece.row.points, piece.parts.points.size(), "points");
-  expect(piece.row.lines, piece.parts.lines.size(), "lines");
-  expect(piece.row.edges, piece.parts.edges.size(), "edges");
-  expect(piece.row.frames, piece.stored.frames.size(), "frames");
-  expect(piece.row.log, piece.stored.log.size(), "lines of its log");
-}
-
-void check_frames(const std::vector<FramePose>& frames, const Map& map) {
-  for (const FramePose& frame : frames) {
-    if (frame.tracked && !map.has_keyframe(frame.reference)) {
-      throw BadBytes("a frame hangs on a keyframe that is not there");
-    }
-  }
-}
-
-StoredMap whole(Pieces::Piece& piece) {
-  check_totals(piece);
-  std::sort(piece.parts.edges.begin(), piece.parts.edges.end(),  // the table is by robot first
-            [](const auto& a, const auto& b) { return a.first < b.first; });
-  piece.parts.next = std::move(piece.row.next);
-  piece.parts.loops = std::move(piece.row.loops);
-  try {
-    piece.stored.map = Map(std::move(piece.parts));
-  } catch (const std::invalid_argument& contradiction) {
-    throw BadBytes(contradiction.what());
-  }
-  check_frames(piece.stored.frames, piece.stored.map);
-  return std::move(piece.stored);
-}
-
 std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) {
   const Transaction moment(database, false);  // one moment of a store that is being written
-  Pieces pieces(database);
-  read_keyframes(database, header.robots, pieces);
-  read_landmarks(database, "point", pieces, &MapParts::points);
-  read_landmarks(database, "line", pieces, &MapParts::lines);
-  read_table(database, "edge", [&](KeyframeId key, std::int64_t number, const Bytes& bytes) {
-    const auto row = decode<EdgeRow>(bytes);
-    if (row.number != static_cast<std::uint64_t>(number))
-      throw BadBytes("it holds what belongs to another row");
-    pieces.of(key.robot).parts.edges.emplace_back(row.number, row.edge);
-  });
-  read_table(database, "frame", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
-    decode_page(bytes, pieces.of(key.robot).stored.frames);
-  });
-  read_table(database, "log", [&](KeyframeId key, std::int64_t, const Bytes& bytes) {
-    decode_page(bytes, pieces.of(key.robot).stored.log);
-  });
-  std::vector<StoredMap> maps;
-  for (auto& [robot, piece] : pieces.all()) {
-    maps.push_back(whole(piece));
-    maps.back().header = header;
-    maps.back().complete = is_complete(database);
-    if (maps.back().complete) maps.back().result = read_result_frame(database);
+  MapRows rows;
+  for (const char* table : MapRows::kTables) {
+    read_table(database, table, [&](std::int64_t robot, std::int64_t number, const Bytes& plain) {
+      rows.put(table, {robot, number}, plain, header.robots);
+    });
+  }
+  std::vector<StoredMap> maps = rows.maps();
+  for (StoredMap& map : maps) {
+    map.header = header;
+    map.complete = is_complete(database);
+    if (map.complete) map.result = read_result_frame(database);
   }
   return maps;
 }
@@ -307,15 +192,15 @@ core::Result<StoreContents> StoreReader::contents() const {
     const auto count = [&](const char* sql) { return static_cast<std::size_t>(database.number(sql)); };
     StoreContents contents;
     contents.complete = is_complete(database);
-    Pieces pieces(database);
-    for (const auto& [robot, piece] : pieces.all()) {
-      contents.keyframes += piece.row.keyframes;
-      contents.points += piece.row.points;
-      contents.lines += piece.row.lines;
-      contents.edges += piece.row.edges;
-      contents.loops += piece.row.loops.size();
-      contents.frames += piece.row.frames;
-    }
+    read_table(database, "map", [&](std::int64_t, std::int64_t, const Bytes& plain) {
+      const auto row = maps::decode<MapRow>(plain);
+      contents.keyframes += row.keyframes;
+      contents.points += row.points;
+      contents.lines += row.lines;
+      contents.edges += row.edges;
+      contents.loops += row.loops.size();
+      contents.frames += row.frames;
+    });
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
     contents.cloud_bytes = count(

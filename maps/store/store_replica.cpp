@@ -193,20 +193,10 @@ core::Result<void> StoreReplica::take(const std::uint8_t* bytes, std::size_t siz
     if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
     Bytes& waiting = impl_->waiting;
     waiting.insert(waiting.end(), bytes, bytes + size);
-    std::size_t at = 0;
-    while (waiting.size() - at >= kRowLength) {
-      const auto length =
-          decode<std::uint32_t>(Bytes(waiting.begin() + static_cast<std::ptrdiff_t>(at),
-                                      waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength)));
-      if (length > kMostRowBytes) throw BadBytes("a row is too large");
-      if (waiting.size() - at - kRowLength < length) break;
-      const auto begin = waiting.begin() + static_cast<std::ptrdiff_t>(at + kRowLength);
-      const StoreRow row = parse_row(Bytes(begin, begin + static_cast<std::ptrdiff_t>(length)));
+    take_rows(waiting, [&](const StoreRow& row, std::size_t length) {
       impl_->take_row(row);
-      impl_->count(kRowTables[row.name.place], kRowLength + length);
-      at += kRowLength + length;
-    }
-    waiting.erase(waiting.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(at));
+      impl_->count(kRowTables[row.name.place], length);
+    });
   });
 }
 

@@ -44,12 +44,24 @@ void append(StoreRow row, ByteWriter& to) {
   to.raw(bytes.bytes());
 }
 
-StoreRow parse_row(const Bytes& bytes) {
-  ByteReader from(bytes);
-  StoreRow row;
-  row_fields(from, row);
-  from.expect_end();
-  return row;
+void take_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::size_t)>& row) {
+  constexpr std::size_t kLength = sizeof(std::uint32_t);  // in front of each
+  const auto at = [&](std::size_t place) { return bytes.begin() + static_cast<std::ptrdiff_t>(place); };
+  std::size_t done = 0;
+  while (bytes.size() - done >= kLength) {
+    const auto length = decode<std::uint32_t>(Bytes(at(done), at(done + kLength)));
+    if (length > kMostRowBytes) throw BadBytes("a row is too large");
+    const std::size_t end = done + kLength + length;
+    if (bytes.size() < end) break;
+    const Bytes content(at(done + kLength), at(end));
+    ByteReader from(content);
+    StoreRow next;
+    row_fields(from, next);
+    from.expect_end();
+    row(next, end - done);
+    done = end;
+  }
+  bytes.erase(bytes.begin(), at(done));
 }
 
 }  // namespace plumbline::maps

@@ -5,6 +5,8 @@
 // row is removed (one byte), its key, what SQLite type it has (one byte), its content.
 #include <sqlite3.h>
 
+#include <functional>
+
 #include "store/store_check.hpp"
 
 namespace plumbline::maps {
@@ -18,10 +20,9 @@ struct StoreRow {
   std::int64_t integer = 0;
 };
 
-constexpr std::size_t kRowLength = sizeof(std::uint32_t);  ///< bytes of the length in front
-
 void append(StoreRow row, ByteWriter& to);
-/// What follows the length. Throws BadBytes.
-StoreRow parse_row(const Bytes& bytes);
+/// Takes all rows that are whole from the front of `bytes`: `row` gets each with the bytes that it took.
+/// Throws BadBytes.
+void take_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::size_t)>& row);
 
 }  // namespace plumbline::maps

@@ -63,7 +63,7 @@ core::Result<void> HubDesk::read_ledger() {
     (*robot)->incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     (*robot)->done = texts[key_of(hello.name, "state")] == kDone;
     log_.info(fmt::format("{}: {} keyframes are here from before", hello.name, (*robot)->copy().keyframes()));
-    if ((*robot)->copy().keyframes() > 0) meetings_.committed(hello.name, (*robot)->copy().heads().map);
+    if ((*robot)->copy().keyframes() > 0) meetings_.committed(hello.name);
   }
   return {};
 }
@@ -208,7 +208,7 @@ void HubDesk::take_pieces(HubRobot& robot) {
     const std::int64_t before = robot.copy().heads().map;
     const auto taken = robot.take(piece);
     if (taken) {
-      if (robot.copy().heads().map > before) meetings_.committed(robot.name, robot.copy().heads().map);
+      if (robot.copy().heads().map > before) meetings_.committed(robot.name);
       if (robot.answer == Answer::kTrouble) robot.answer = Answer::kAccepted;
       if (robot.answer == Answer::kAccepted) robot.problem.clear();
       close(robot);
@@ -286,7 +286,12 @@ std::vector<RobotTraffic> HubDesk::serve(const core::StopToken& stop, const Stat
       if (word.hub != id_ && word.up_s >= 0.0)
         report_once("another hub is there; robots stay with whom they found first");
     }
-    for (auto& [name, robot] : robots_) take_pieces(robot);
+    for (auto& [name, robot] : robots_) {
+      take_pieces(robot);
+      const bool silent = robot.silent() && !robot.done;
+      if (std::exchange(robot.silence_reported, silent) != silent)
+        log_.info(fmt::format("{}: {}", name, silent ? "is not heard any more" : "is heard"));
+    }
     if (meetings_.step()) {
       for (auto& [name, robot] : robots_) robot.changed = true;
     }

@@ -4,10 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <system_error>
 #include <utility>
 
-#include "plumbline/maps/store.hpp"
+#include "plumbline/core/packing.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -17,6 +18,8 @@ void put_pose(const geometry::Rigid3& pose, std::array<double, 7>& to) {
   const Eigen::Vector3d& t = pose.translation;
   to = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
 }
+
+constexpr std::size_t kEntryHead = sizeof(std::uint32_t);  // bytes of the length in front of an entry
 
 Place told_place(const mapping::RobotPlace& from, const std::string& frame_of) {
   Place place;
@@ -36,55 +39,121 @@ HubMeetings::HubMeetings(std::filesystem::path folder, const core::Executor& exe
     : folder_(std::move(folder)), executor_(&executor), log_(&log), reported_(folder_, log) {
   std::error_code ignored;
   std::filesystem::remove_all(folder_ / "meetings", ignored);
-  restart();
+  begin();
+  job_ = executor_->submit([this] { take_again(); });
 }
 
-void HubMeetings::committed(const std::string& robot, std::int64_t transaction) {
-  changed_[robot] = transaction;
-}
-
-void HubMeetings::restart() {
-  job_.wait();
+void HubMeetings::begin() {
   server_ = std::make_unique<mapping::MergeServer>(mapping::MapFusionOptions{}, 0, *executor_);
-  for (const auto& [robot, known] : known_) changed_.emplace(robot, 0);
   known_.clear();
   names_.clear();
   places_.clear();
   done_ = {};
 }
 
+void HubMeetings::restart() {
+  job_.wait();
+  for (const auto& [robot, known] : known_) changed_.insert(robot);
+  begin();
+  std::error_code ignored;
+  std::filesystem::remove(log_file(), ignored);
+}
+
+/// In the work. An entry that was not written to its end was not taken.
+void HubMeetings::take_again() {
+  std::uintmax_t whole = 0;
+  {
+    std::ifstream file(log_file(), std::ios::binary);
+    core::Bytes bytes(kEntryHead);
+    while (file.read(reinterpret_cast<char*>(bytes.data()), kEntryHead)) {
+      core::Bytes packed(core::decode<std::uint32_t>(bytes));
+      if (!file.read(reinterpret_cast<char*>(packed.data()), static_cast<std::streamsize>(packed.size())))
+        break;
+      try {
+        take(core::decode<Entry>(core::unpack(packed.data(), packed.size())));
+      } catch (const core::BadBytes&) {
+        break;
+      }
+      whole += kEntryHead + packed.size();
+    }
+  }
+  std::error_code ignored;
+  if (std::filesystem::exists(log_file(), ignored)) std::filesystem::resize_file(log_file(), whole, ignored);
+}
+
 /// In the work: what is new in one robot's copy.
-void HubMeetings::take(const std::string& robot, std::int64_t transaction) {
-  auto stored = maps::load_map(folder_ / "robots" / robot / "map.db");
+void HubMeetings::look_at(const std::string& robot) {
+  const std::filesystem::path copy = folder_ / "robots" / robot / "map.db";
+  Entry entry{robot, {}};
+  std::int64_t head = known_[robot].follower.head();
+  while (true) {
+    auto next = maps::next_transaction(copy, maps::StoreShare::kMap, head);
+    if (!next || !*next) break;
+    head = (*next)->number;
+    entry.rows.push_back(std::move(**next));
+  }
+  if (entry.rows.empty()) return;
+  if (const auto kept = keep(entry); !kept) done_.lines.push_back(kept.error().message);
+  take(entry);
+}
+
+/// Before it is taken: what was told follows from what is kept.
+core::Result<void> HubMeetings::keep(const Entry& entry) const {
+  core::ByteWriter bytes;
+  core::encode(entry, bytes);
+  const core::Bytes packed = core::pack(bytes.bytes());
+  core::ByteWriter head;
+  head.number(static_cast<std::uint32_t>(packed.size()));
+  std::ofstream file(log_file(), std::ios::binary | std::ios::app);
+  for (const core::Bytes* part : {&head.bytes(), &packed}) {
+    file.write(reinterpret_cast<const char*>(part->data()), static_cast<std::streamsize>(part->size()));
+  }
+  file.flush();
+  if (file) return {};
+  return core::output_error(log_file().string() +
+                            ": cannot be written; a hub that goes on may tell other meetings");
+}
+
+/// In the work: an entry of the log.
+void HubMeetings::take(const Entry& entry) {
+  Known& known = known_[entry.robot];
+  const std::string head = fmt::format("log {}: {}", ++done_.entry, entry.robot);
+  for (const maps::StoreTransaction& rows : entry.rows) {
+    if (const auto taken = known.follower.take(rows); !taken)
+      done_.lines.push_back(head + ": " + taken.error().message);
+  }
+  const auto stored = known.follower.map();
   if (!stored) {  // rows that belong together came in part; the next ones will tell
-    done_.lines.push_back(fmt::format("{}: is looked at when more of its rows are here", robot));
+    done_.lines.push_back(head + " is looked at when more of its rows are here");
     return;
   }
-  const std::vector<core::KeyframeId> ids = stored->map.keyframe_ids();
+  const int added = add(entry.robot, *stored);
+  done_.lines.push_back(
+      fmt::format("{} up to transaction {}, {} new keyframes", head, known.follower.head(), added));
+  for (mapping::MeetingEvent& event : server_->finish()) done_.events.push_back(std::move(event));
+}
+
+/// The keyframes of a robot's map that are new; how many.
+int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
+  Known& known = known_[robot];
+  const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
   const auto of_others = [](core::KeyframeId id) { return id.robot != 0; };
-  if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return;  // of several robots already
-  auto known = known_.find(robot);
-  if (known == known_.end()) {
-    const auto number = static_cast<std::int32_t>(names_.size());
-    known = known_
-                .emplace(robot,
-                         Known{server_->join({{number, maps::camera_of(stored->header.robots, 0).color}}), 0})
-                .first;
+  if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return 0;  // of several robots already
+  if (!known.number) {
+    const auto next = static_cast<std::int32_t>(names_.size());
+    known.number = server_->join({{next, maps::camera_of(stored.header.robots, 0).color}});
     names_.push_back(robot);
   }
-  const auto number = static_cast<std::int32_t>(known->second.number);
-  const auto map = std::make_shared<maps::Map>(maps::renumbered(stored->map, {{0, number}}));
-  ++done_.entry;
+  const auto number = static_cast<std::int32_t>(*known.number);
+  const auto map = std::make_shared<maps::Map>(maps::renumbered(stored.map, {{0, number}}));
   int added = 0;
   for (const core::KeyframeId id : ids) {
-    if (id.index < known->second.keyframes) continue;
+    if (id.index < known.keyframes) continue;
     server_->add(map, {number, id.index}, done_.entry);
-    known->second.keyframes = id.index + 1;
+    known.keyframes = id.index + 1;
     ++added;
   }
-  done_.lines.push_back(fmt::format("log {}: {} up to transaction {}, {} new keyframes", done_.entry, robot,
-                                    transaction, added));
-  for (mapping::MeetingEvent& event : server_->finish()) done_.events.push_back(std::move(event));
+  return added;
 }
 
 bool HubMeetings::step() {
@@ -95,7 +164,7 @@ bool HubMeetings::step() {
   }
   if (changed_.empty()) return false;
   job_ = executor_->submit([this, changed = std::exchange(changed_, {})] {
-    for (const auto& [robot, transaction] : changed) take(robot, transaction);
+    for (const std::string& robot : changed) look_at(robot);
   });
   return false;
 }
@@ -109,7 +178,8 @@ void HubMeetings::tell() {
   }
   places_.clear();
   for (const auto& [robot, known] : known_) {
-    if (const auto place = server_->place(known.number))
+    if (!known.number) continue;
+    if (const auto place = server_->place(*known.number))
       places_[robot] = told_place(*place, names_[place->anchor]);
   }
 }
@@ -120,6 +190,8 @@ void HubMeetings::finish() {
     if (job_.valid()) tell();
   } while (!changed_.empty());
   if (const auto drawn = reported_.draw(); !drawn) log_->warning(drawn.error().message);
+  std::error_code ignored;
+  std::filesystem::remove(log_file(), ignored);
 }
 
 Place HubMeetings::place(const std::string& robot) const {

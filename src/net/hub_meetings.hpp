@@ -2,31 +2,35 @@
 #pragma once
 
 // Robots that meet while they map, as the hub sees it in the copies of their stores. Beside the hub's thread:
-// a commit never waits for it. What is taken is numbered in the log: from that alone the previews follow.
+// a commit never waits for it. What is taken is numbered in the log, which is kept with its rows beside the
+// copies: from that alone the previews follow, also when the hub was ended and goes on.
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "bus.hpp"
 #include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/maps/store_replica.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 
 namespace plumbline::net {
 
 class HubMeetings {
  public:
-  /// Previews of an earlier process are made again, below the folder.
+  /// What an earlier process took, as its log in the folder has it, is taken again in the same order.
   HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log);
 
-  /// The copy of a robot's store, below the folder, holds rows of its map up to this transaction.
-  void committed(const std::string& robot, std::int64_t transaction);
+  /// The copy of a robot's store, below the folder, has new rows of its map.
+  void committed(const std::string& robot) { changed_.insert(robot); }
   /// A copy was emptied: everything is looked at again.
   void restart();
   /// Tells what was found and begins with what came since; to be called often. True: places have changed.
   bool step();
-  /// When nothing more will come: tells all that is left, and draws.
+  /// When nothing more will come: tells all that is left, draws, and removes the log.
   void finish();
   /// What a robot is told of where it is.
   [[nodiscard]] Place place(const std::string& robot) const;
@@ -35,12 +39,27 @@ class HubMeetings {
   }
 
  private:
-  /// A robot whose copy was read once at least.
+  /// A robot of which something was taken.
   struct Known {
-    std::size_t number = 0;
-    std::int32_t keyframes = 0;  ///< that were taken
+    maps::MapFollower follower;
+    std::optional<std::size_t> number;  ///< when it has keyframes
+    std::int32_t keyframes = 0;         ///< that were taken
   };
-  void take(const std::string& robot, std::int64_t transaction);
+  struct Entry {
+    std::string robot;
+    std::vector<maps::StoreTransaction> rows;
+    template <typename Io>
+    friend void fields(Io& io, Entry& entry) {
+      io(entry.robot, entry.rows);
+    }
+  };
+  [[nodiscard]] std::filesystem::path log_file() const { return folder_ / "meetings.log"; }
+  void begin();
+  void take_again();
+  void look_at(const std::string& robot);
+  core::Result<void> keep(const Entry& entry) const;
+  void take(const Entry& entry);
+  int add(const std::string& robot, const maps::StoredMap& stored);
   void tell();
 
   std::filesystem::path folder_;
@@ -48,7 +67,7 @@ class HubMeetings {
   core::Log* log_;
   pipeline::MeetingLog reported_;
   std::unique_ptr<mapping::MergeServer> server_;
-  std::map<std::string, std::int64_t> changed_;  ///< copies with something new, up to which transaction
+  std::set<std::string> changed_;  ///< whose copies have something new
   std::map<std::string, Known> known_;
   std::vector<std::string> names_;  ///< by number
   std::map<std::string, Place> places_;

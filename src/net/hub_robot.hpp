@@ -42,6 +42,7 @@ class HubRobot {
   [[nodiscard]] Word word() const;
   [[nodiscard]] RobotTraffic traffic() const;
   [[nodiscard]] bool silent() const;  ///< for some seconds
+  bool silence_reported = true;       ///< as long as it was not heard
 
  private:
   HubRobot() = default;

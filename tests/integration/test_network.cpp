@@ -75,6 +75,33 @@ TEST_F(Network, AHubThatIsKilledGoesOn) {
   expect_the_bytes_of_fuse(path("out"));
 }
 
+TEST_F(Network, AHubThatIsKilledTellsTheSameMeetingsAgain) {
+  Process h = hub(" --robots 3");  // one never comes
+  std::map<std::string, Process> robots;
+  for (const std::string name : {"a", "b"}) {
+    fs::copy(world(name), path(name), fs::copy_options::recursive);
+    robots[name] = start(name, "robot " + name + " --name " + name + network());
+    ASSERT_EQ(robots[name].wait(kLong_s), 0) << robots[name].told() << h.told();
+  }
+  const fs::path meeting = path("out.partial/meetings/0001_a_b");
+  const auto told = [&] { return fs::exists(meeting / "meeting.json"); };
+  ASSERT_TRUE(happens(told, kLong_s)) << h.told();
+  h.end(SIGKILL);
+  std::map<std::string, std::string> before;
+  for (const char* file : {"meeting.json", "a.txt", "b.txt"}) before[file] = slurp(meeting / file);
+  // As a process leaves it that was ended while it wrote.
+  std::ofstream(path("out.partial/meetings.log"), std::ios::app | std::ios::binary) << "1234 and no more";
+  for (int i = 0; i < 2; ++i) {
+    fs::remove_all(meeting);
+    h = hub(" --robots 3 --resume");
+    ASSERT_TRUE(happens(told, kLong_s)) << h.told();
+    h.end(SIGKILL);
+    for (const auto& [file, bytes] : before) EXPECT_EQ(slurp(meeting / file), bytes) << file;
+  }
+  const std::string log = slurp(path("out.partial/hub.log"));
+  EXPECT_NE(log.find("a: is heard"), std::string::npos) << log;
+}
+
 TEST_F(Network, ARobotThatIsKilledGoesOn) {
   Process h = hub();
   Process a = robot("a", " --pace 4");

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "plumbline/core/error.hpp"
+#include "plumbline/maps/store.hpp"
 
 namespace plumbline::maps {
 
@@ -34,6 +35,10 @@ struct StoreHeads {
 struct StoreTransaction {
   std::int64_t number = 0;
   std::vector<std::uint8_t> rows;
+  template <typename Io>
+  friend void fields(Io& io, StoreTransaction& transaction) {
+    io(transaction.number, transaction.rows);
+  }
 };
 
 /// What a store holds at this moment, while it may be written; opens and closes the file. Errors (kInput) as
@@ -88,6 +93,25 @@ class StoreReplica {
  private:
   struct Impl;
   explicit StoreReplica(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The map in a store of one robot as it grows: what was taken once stays decoded.
+class MapFollower {
+ public:
+  MapFollower();
+  MapFollower(MapFollower&& other) noexcept;
+  MapFollower& operator=(MapFollower&& other) noexcept;
+  ~MapFollower();
+  /// The next one, of the share kMap. Errors (kInput): it is not what a store sends.
+  core::Result<void> take(const StoreTransaction& transaction);
+  [[nodiscard]] std::int64_t head() const;  ///< number of the last one
+  /// With the robots' cameras as header. Errors (kInput): rows that belong together are not all here yet, or
+  /// are of several robots whose maps are not one.
+  [[nodiscard]] core::Result<StoredMap> map() const;
+
+ private:
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -35,14 +35,8 @@ std::vector<Reported> reported_by(const std::filesystem::path& file) {
   while (const auto next = next_transaction(file, StoreShare::kMap, after).value()) {
     after = next->number;
     Reported told{next->number, {}};
-    for (std::size_t at = 0; at < next->rows.size();) {
-      const Bytes head(next->rows.begin() + static_cast<std::ptrdiff_t>(at),
-                       next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength));
-      const std::size_t length = decode<std::uint32_t>(head);
-      const auto begin = next->rows.begin() + static_cast<std::ptrdiff_t>(at + kRowLength);
-      told.rows.push_back(parse_row(Bytes(begin, begin + static_cast<std::ptrdiff_t>(length))));
-      at += kRowLength + length;
-    }
+    Bytes rows = next->rows;
+    take_rows(rows, [&](const StoreRow& row, std::size_t) { told.rows.push_back(row); });
     all.push_back(std::move(told));
   }
   return all;

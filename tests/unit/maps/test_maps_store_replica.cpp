@@ -104,6 +104,40 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
   EXPECT_GT(copy->bytes().cloud, 0U);
 }
 
+TEST(MapFollower, HasTheMapOfTheStoreAtEachMomentAndKeepsWhatItDecoded) {
+  const StoreFolder folder;
+  StoreWorld world(36);
+  world.other_robot = world.first_robot;
+  auto writer = StoreWriter::create(folder.file(), header_of(world.camera));
+  ASSERT_TRUE(writer) << writer.error().message;
+  MapFollower follower;
+  std::vector<Map> earlier;
+  int kept = 0;
+  for (int i = 0; i < 24; ++i) {
+    ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(i), world.frames));
+    if (i % 5 == 1) continue;  // several at once
+    while (const auto next = next_transaction(folder.file(), StoreShare::kMap, follower.head()).value()) {
+      ASSERT_TRUE(follower.take(*next));
+    }
+    const auto map = follower.map();
+    ASSERT_TRUE(map) << map.error().message;
+    ASSERT_TRUE(equal(map->map, world.map)) << "after " << i;
+    ASSERT_TRUE(equal(load_map(folder.file())->map, world.map)) << "after " << i;
+    EXPECT_EQ(map->header.robots.front().camera.name, world.camera.name);
+    EXPECT_EQ(follower.head(), store_heads(folder.file())->map);
+    const KeyframeId id = world.map.keyframe_ids().front();
+    if (!earlier.empty() && earlier.back().has_keyframe(id))
+      kept += &earlier.back().keyframe(id) == &map->map.keyframe(id) ? 1 : 0;
+    earlier.push_back(map->map);
+  }
+  EXPECT_GT(kept, 10) << "keyframes are decoded again";
+  MapFollower late;
+  const auto last = next_transaction(folder.file(), StoreShare::kMap, 3).value();
+  ASSERT_TRUE(last && late.take(*last));
+  EXPECT_EQ(late.map().error().kind, core::ErrorKind::kInput) << "rows before it are missing";
+  EXPECT_EQ(late.take({9, {1, 2, 3}}).error().kind, core::ErrorKind::kInput);
+}
+
 TEST(StoreReplica, OneThatComesLateIsToldLess) {
   const StoreFolder folder;
   StoreWorld world(32);
