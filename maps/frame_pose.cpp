@@ -37,8 +37,9 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
     const FramePose* before = std::exchange(last[frame.reference.robot], &frame);
     if (before == nullptr || !before->tracked || !frame.tracked || !frame.camera_from_previous) continue;
     if (before->reference == frame.reference) continue;
-    const geometry::Rigid3 step = frame.camera_from_reference * map.camera_from_world(frame.reference) *
-                                  (before->camera_from_reference * map.camera_from_world(before->reference)).inverse();
+    const geometry::Rigid3 step =
+        frame.camera_from_reference * map.camera_from_world(frame.reference) *
+        (before->camera_from_reference * map.camera_from_world(before->reference)).inverse();
     const geometry::Rigid3 off = step * frame.camera_from_previous->inverse();
     const PathStep seen{frame.stamp, before->reference, frame.reference, off.translation.norm(),
                         geometry::rotation_angle(off.rotation)};
@@ -51,10 +52,28 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
 
 geometry::Trajectory keyframe_trajectory(const Map& map) {
   geometry::Trajectory result;
-  for (const core::KeyframeId id : map.keyframe_ids()) {
-    result.push_back({map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
+  for (const KeyframePose& keyframe : keyframe_poses(map)) {
+    result.push_back({keyframe.stamp, keyframe.world_from_camera});
   }
   return result;
+}
+
+std::vector<KeyframePose> keyframe_poses(const Map& map) {
+  std::vector<KeyframePose> poses;
+  for (const core::KeyframeId id : map.keyframe_ids()) {
+    poses.push_back({id, map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
+  }
+  return poses;
+}
+
+MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames) {
+  MapPoses poses{trajectory(frames, map), {}, keyframe_poses(map)};
+  std::map<std::int32_t, std::int32_t> numbers;  // by robot
+  for (const FramePose& frame : frames) {
+    const std::int32_t number = numbers[frame.reference.robot]++;
+    if (frame.tracked) poses.trajectory_ids.push_back({frame.reference.robot, number});
+  }
+  return poses;
 }
 
 }  // namespace plumbline::maps

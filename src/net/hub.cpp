@@ -14,8 +14,8 @@
 
 #include "hub_desk.hpp"
 #include "plumbline/core/output_file.hpp"
-#include "plumbline/pipeline/output_folder.hpp"
-#include "plumbline/pipeline/stored_maps.hpp"
+#include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/stored_maps.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -114,7 +114,7 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
     if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
     if (t.keyframes == 0) continue;
     // One that is damaged must not keep the others from being fused.
-    const auto stored = pipeline::StoredMaps::open({file.parent_path()}, executor);
+    const auto stored = maps::StoredMaps::open({file.parent_path()}, executor);
     if (stored) {
       maps.push_back(file.parent_path());
       continue;
@@ -136,8 +136,8 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   const auto options = checked(request.network, true);
   if (!options) return fail(options.error());
   const pipeline::FuseRequest& fuse = request.fuse;
-  auto output = request.resume ? pipeline::OutputFolder::resume(fuse.output, fuse.replace)
-                               : pipeline::OutputFolder::prepare(fuse.output, fuse.replace);
+  auto output = request.resume ? maps::OutputFolder::resume(fuse.output, fuse.replace)
+                               : maps::OutputFolder::prepare(fuse.output, fuse.replace);
   if (!output) return fail(output.error());
   output->keep();
   const fs::path folder = output->path();

@@ -13,13 +13,13 @@
 namespace plumbline::net {
 namespace {
 
+constexpr std::size_t kEntryHead = sizeof(std::uint32_t);  // bytes of the length in front of an entry
+
 void put_pose(const geometry::Rigid3& pose, std::array<double, 7>& to) {
   const Eigen::Quaterniond q = pose.quaternion();
   const Eigen::Vector3d& t = pose.translation;
   to = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
 }
-
-constexpr std::size_t kEntryHead = sizeof(std::uint32_t);  // bytes of the length in front of an entry
 
 Place told_place(const mapping::RobotPlace& from, const std::string& frame_of) {
   Place place;
@@ -145,7 +145,7 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
     names_.push_back(robot);
   }
   const auto number = static_cast<std::int32_t>(*known.number);
-  const auto map = std::make_shared<maps::Map>(mapping::renumbered(stored.map, {{0, number}}));
+  const auto map = std::make_shared<maps::Map>(maps::renumbered(stored.map, {{0, number}}));
   int added = 0;
   for (const core::KeyframeId id : ids) {
     if (id.index < known.keyframes) continue;

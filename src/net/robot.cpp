@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/maps/output_folder.hpp"
 #include "robot_link.hpp"
 
 namespace plumbline::net {
@@ -113,7 +113,7 @@ fs::path earlier_run(const std::string& input) {
   std::error_code ec;
   if (input.rfind("synth:", 0) == 0) return {};
   if (fs::exists(fs::path(input) / kStore, ec)) return input;
-  const fs::path partial = pipeline::OutputFolder::partial_of(input);
+  const fs::path partial = maps::OutputFolder::partial_of(input);
   if (fs::exists(partial / kStore, ec)) return partial;
   return {};
 }

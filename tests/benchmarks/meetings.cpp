@@ -119,7 +119,7 @@ std::vector<Reported> replay(const Log& log, const std::vector<Robot>& robots, i
   std::vector<Reported> told;
   const auto take = [&](const std::vector<MeetingEvent>& events, double time) {
     for (const MeetingEvent& event : events)
-      told.push_back({event, time, event.preview ? mapping::content_hash(event.preview->map) : 0});
+      told.push_back({event, time, event.preview ? maps::content_hash(event.preview->map) : 0});
   };
   std::size_t next = 0;
   for (std::size_t f = 0; f < log.times.size(); ++f) {

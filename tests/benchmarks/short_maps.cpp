@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
       fmt::print("{} {}: cannot be read\n", argv[i], argv[i + 2]);
       continue;
     }
-    const maps::Map second = mapping::renumbered(b->map, {{0, 1}});
+    const maps::Map second = maps::renumbered(b->map, {{0, 1}});
     const std::vector<mapping::MapPart> parts{{&a->map, {{0, maps::camera_of(a->header.robots, 0).color}}},
                                               {&second, {{1, maps::camera_of(b->header.robots, 0).color}}}};
     const auto merges = mapping::find_overlaps(parts, {}, executor);

@@ -20,12 +20,12 @@ LAYERS = [
     ["tracking", "places", "evaluate", "synth"],
     ["mapping"],
     ["viz"],
-    ["pipeline"],
+    ["pipeline", "report"],
     ["net"],
     ["cli"],
 ]
 LAYER_OF = {module: height for height, layer in enumerate(LAYERS) for module in layer}
-TOP_LEVEL = {"maps", "viz"}  # modules whose folder is not below src/
+FOLDERS = {"maps": "maps", "viz": "viz", "report": "viz/report"}  # of modules that are not below src/
 
 # A library that only one module may include or link. Both patterns match from the start of the name.
 CONFINED = [
@@ -57,7 +57,7 @@ CORPORA = Path("tests/fuzz/corpus")  # inputs byte for byte: a line more would e
 
 
 def folder_of(module):
-    return Path(module) if module in TOP_LEVEL else Path("src") / module
+    return Path(FOLDERS.get(module, f"src/{module}"))
 
 
 def code_of(root, module):
@@ -65,7 +65,8 @@ def code_of(root, module):
     files = []
     for folder in (root / folder_of(module), root / "include" / "plumbline" / module):
         files += [f for f in folder.rglob("*") if f.suffix in CODE]
-    return sorted(files)
+    inner = {root / folder_of(other) for other in FOLDERS if folder_of(module) in folder_of(other).parents}
+    return sorted(f for f in files if not inner & set(f.parents))
 
 
 def without_comment(line):
@@ -147,6 +148,21 @@ def check_code(root, module, reachable):
     return problems
 
 
+def check_subfolders(root, module):
+    """Subfolders of a module include each other one way only."""
+    home, sees, at = root / folder_of(module), {}, {}
+    for file in code_of(root, module):
+        folder = file.parent.name if file.parent.parent == home else ""
+        for number, line in enumerate(file.read_text(errors="replace").splitlines(), 1):
+            include = INCLUDE.match(line)
+            other = Path(include.group(2)).parts[0] if include and include.group(1) == '"' else ""
+            if folder and other != folder and (home / other).is_dir() and other:
+                sees.setdefault(folder, set()).add(other)
+                at[folder, other] = f"{file.relative_to(root)}:{number}"
+    seen = closure({name: sees.get(name, set()) for name in set(sees) | {o for s in sees.values() for o in s}})
+    return [f"{where}: {a} includes {b}, which includes {a}" for (a, b), where in at.items() if a in seen[b]]
+
+
 def check_folders(root):
     """A module without a layer would escape every other check."""
     problems = []
@@ -180,7 +196,7 @@ def check(root):
         problems += wrong
     reachable = closure(depends)
     for module in LAYER_OF:
-        problems += check_code(root, module, reachable[module])
+        problems += check_code(root, module, reachable[module]) + check_subfolders(root, module)
     return problems, sum(len(code_of(root, module)) for module in LAYER_OF)
 
 

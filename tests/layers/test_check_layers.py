@@ -81,6 +81,13 @@ class CheckLayers(unittest.TestCase):
     def test_include_out_of_the_folder(self):
         self.assert_found("own folder", '#include "../core/secret.hpp"', "src/geometry/a.cpp")
 
+    def test_subfolders_that_include_each_other(self):
+        self.write("src/mapping/one/a.hpp", SPDX_CPP)
+        self.write("src/mapping/two/b.hpp", SPDX_CPP + '#include "one/a.hpp"\n')
+        self.assertEqual(self.problems(), [])
+        self.write("src/mapping/one/a.hpp", SPDX_CPP + '#include "two/b.hpp"\n')
+        self.assertEqual(len(self.problems()), 2)
+
     def test_confined_libraries(self):
         self.assert_found("VTK belongs to viz", "#include <vtkActor.h>", "src/pipeline/a.cpp")
         self.setUp()

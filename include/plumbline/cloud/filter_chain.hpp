@@ -40,6 +40,9 @@ class FilterChain {
   /// The same from a parsed tree, e.g. a chain inside a pipeline; `path` is the dotted path of `node`.
   static FilterChain parse(const core::ConfigNode& node, const std::string& path,
                            const FilterRegistry& registry, core::ConfigProblems& problems);
+  /// The same from the list of filters alone; the last word of `path` names the chain.
+  static FilterChain parse_list(const core::ConfigNode& list, const std::string& path,
+                                const FilterRegistry& registry, core::ConfigProblems& problems);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::size_t size() const { return filters_.size(); }

@@ -21,6 +21,7 @@
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/place_verification.hpp"
 #include "plumbline/maps/map.hpp"
+#include "plumbline/maps/map_join.hpp"
 #include "plumbline/places/recogniser.hpp"
 
 namespace plumbline::mapping {
@@ -221,15 +222,5 @@ struct FusedMap {
 /// the fusion is done without them.
 FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>& merges, std::size_t anchor,
                    const MapFusionOptions& options);
-
-/// Depends on what the keyframes measured and on their poses, not on names and robots' numbers.
-std::uint64_t content_hash(const maps::Map& map);
-
-/// The same map with other numbers for its robots; robots that are not named in `to` keep theirs.
-maps::Map renumbered(const maps::Map& map, const std::map<std::int32_t, std::int32_t>& to);
-
-/// One map of several, whose robots' numbers differ, each moved by its world_from_map.
-maps::Map joined(const std::vector<const maps::Map*>& maps,
-                 const std::vector<geometry::Rigid3>& world_from_map);
 
 }  // namespace plumbline::mapping

@@ -13,6 +13,8 @@ namespace plumbline::maps {
 
 class Map;
 
+using FrameId = core::Id<struct FrameTag>;  ///< a robot's frame: its place among the robot's FramePoses
+
 struct FramePose {
   double stamp = 0.0;  ///< seconds
   core::KeyframeId reference;
@@ -51,5 +53,22 @@ geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map&
 
 /// World poses of the keyframes, by id.
 geometry::Trajectory keyframe_trajectory(const Map& map);
+
+struct KeyframePose {
+  core::KeyframeId id;
+  double stamp = 0.0;  ///< seconds
+  geometry::Rigid3 world_from_camera;
+};
+
+std::vector<KeyframePose> keyframe_poses(const Map& map);  ///< by id
+
+struct MapPoses {
+  geometry::Trajectory trajectory;      ///< tracked frames only
+  std::vector<FrameId> trajectory_ids;  ///< whose poses these are
+  std::vector<KeyframePose> keyframes;  ///< by id
+};
+
+/// All poses as they lie in `map` now; frames in the order given.
+MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames);
 
 }  // namespace plumbline::maps

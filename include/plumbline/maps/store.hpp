@@ -21,8 +21,7 @@ namespace plumbline::maps {
 
 /// Stores of other formats are refused.
 constexpr int kStoreFormat = 7;
-
-using FrameId = core::Id<struct FrameTag>;  ///< a robot's frame: its place among the robot's FramePoses
+constexpr const char* kStoreFile = "map.db";  ///< in a result folder
 
 /// A robot of a map.
 struct RobotInfo {

@@ -18,6 +18,7 @@
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/mapping/global_adjustment.hpp"
 #include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/maps/store.hpp"
@@ -47,13 +48,6 @@ struct TrackedFrame {
   std::shared_ptr<const maps::Map> map;             ///< of several robots: as it is with this keyframe
 };
 
-struct KeyframePose {
-  core::KeyframeId id;
-  double stamp = 0.0;  ///< seconds
-  geometry::Rigid3 world_from_camera;
-  std::optional<mapping::KeyframeAccuracy> accuracy = std::nullopt;  ///< beside the map's first keyframe
-};
-
 using maps::RobotInfo;
 
 /// The map of one robot when its tracking has ended, or a finished map of one robot or several.
@@ -72,12 +66,10 @@ struct RobotMaps {
 };
 
 /// The finished map but for its dense cloud; poses after all optimisation.
-struct MapResult {
-  std::shared_ptr<const maps::Map> map;       ///< null when the poses come from a file
-  std::vector<maps::FramePose> frame_poses;   ///< empty when `map` is null
-  geometry::Trajectory trajectory;            ///< tracked frames only
-  std::vector<maps::FrameId> trajectory_ids;  ///< whose poses these are
-  std::vector<KeyframePose> keyframes;        ///< by id
+struct MapResult : maps::MapPoses {
+  std::shared_ptr<const maps::Map> map;             ///< null when the poses come from a file
+  std::vector<maps::FramePose> frame_poses;         ///< empty when `map` is null
+  std::vector<mapping::KeyframeAccuracy> accuracy;  ///< of the keyframes; empty: not known
   std::vector<maps::LineSegment3> lines;
   std::vector<RobotInfo> robots;  ///< by number; empty: one robot with the recording's camera
   std::string frame_columns;      ///< header of FrameRow::columns
@@ -107,16 +99,14 @@ core::Result<maps::StoreCloud> store_cloud_of(const KeyframeCloud& keyframe);
 /// Voxels of the surfaces of keyframes that are kept with their clouds: as the stage refine wants them.
 constexpr double kSurfaceVoxel_m = 0.03;
 
-struct FusionState;
-
 /// The merged cloud in the output's frame, which output_from_map leads to: all results are written in it.
 struct DenseCloud {
   cloud::CloudPtr cloud;
   cloud::CloudColumns columns;  ///< of the cloud's points
   double voxel_m = 0.0;
   geometry::Rigid3 output_from_map;
-  bool upright = false;                                ///< z is up in the output's frame
-  std::shared_ptr<const FusionState> state = nullptr;  ///< what it was laid down with
+  bool upright = false;                                      ///< z is up in the output's frame
+  std::shared_ptr<const maps::FusionState> state = nullptr;  ///< what it was laid down with
 };
 
 /// The poses of one robot among `map.trajectory`.

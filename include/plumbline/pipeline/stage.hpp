@@ -34,6 +34,7 @@ class FrameSource;
 namespace plumbline::maps {
 class Map;
 struct RobotInfo;
+class StoredMaps;
 }  // namespace plumbline::maps
 
 namespace plumbline::pipeline {
@@ -41,7 +42,6 @@ namespace plumbline::pipeline {
 struct ResumedRun;
 struct RunSummary;
 class RobotRecordings;
-class StoredMaps;
 
 /// How often a port carries a value.
 enum class Rate {
@@ -114,7 +114,7 @@ class StageIo {
 /// What a run lends to its stages; outlives them.
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
-  const StoredMaps* stored_maps = nullptr;               ///< what a maps stage reads; null: there is none
+  const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
   const RobotRecordings* recordings = nullptr;           ///< `source`, when recordings are mapped; else null
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
   std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any

@@ -11,7 +11,7 @@
 #include "plumbline/cloud/mesh.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/line_export.hpp"
-#include "plumbline/pipeline/stored_result.hpp"
+#include "plumbline/maps/stored_result.hpp"
 #include "silenced_stdio.hpp"
 
 namespace plumbline::cli {
@@ -32,50 +32,49 @@ struct ExportRequest {
 };
 
 /// Whether the run wrote this file, so that the store need not be asked.
-bool written(const pipeline::MapPlace& place, const std::filesystem::path& file) {
+bool written(const maps::MapPlace& place, const std::filesystem::path& file) {
   std::error_code ec;
   return place.store.empty() || (place.result && std::filesystem::exists(file, ec));
 }
 
-core::Result<geometry::Trajectory> path_of(const pipeline::MapPlace& place, bool keyframes) {
-  const pipeline::ResultFolder folder = place.result.value_or(pipeline::ResultFolder{});
+core::Result<geometry::Trajectory> path_of(const maps::MapPlace& place, bool keyframes) {
+  const maps::ResultFolder folder = place.result.value_or(maps::ResultFolder{});
   const std::filesystem::path file = keyframes ? folder.keyframes() : folder.trajectory();
   if (written(place, file)) return dataset::read_trajectory(file);
-  const auto stored = pipeline::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place.store);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   return keyframes ? stored->keyframe_trajectory() : stored->trajectory();
 }
 
-core::Result<void> export_path(const pipeline::MapPlace& place, bool keyframes,
-                               const std::filesystem::path& to) {
+core::Result<void> export_path(const maps::MapPlace& place, bool keyframes, const std::filesystem::path& to) {
   if (to.extension() != ".txt" && to.extension() != ".ply") {
     return core::usage_error(fmt::format("{}: paths are written as .txt (TUM format) or .ply", to.string()));
   }
   const auto trajectory = path_of(place, keyframes);
   if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
   if (to.extension() == ".txt") return dataset::write_trajectory(to, *trajectory);
-  return pipeline::write_trajectory_ply(to, *trajectory);
+  return maps::write_trajectory_ply(to, *trajectory);
 }
 
-core::Result<void> export_lines(const pipeline::MapPlace& place, const std::filesystem::path& to) {
+core::Result<void> export_lines(const maps::MapPlace& place, const std::filesystem::path& to) {
   if (to.extension() != ".ply") {
     return core::usage_error(fmt::format("{}: lines are written as .ply", to.string()));
   }
-  const pipeline::ResultFolder folder = place.result.value_or(pipeline::ResultFolder{});
+  const maps::ResultFolder folder = place.result.value_or(maps::ResultFolder{});
   if (written(place, folder.lines())) {
-    const auto lines = pipeline::read_lines_ply(folder.lines());
+    const auto lines = maps::read_lines_ply(folder.lines());
     if (!lines) return tl::unexpected<core::Error>(lines.error());
     return maps::write_lines_ply(to, *lines);
   }
-  const auto stored = pipeline::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place.store);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   return maps::write_lines_ply(to, stored->lines());
 }
 
 /// The cloud as the run wrote it, or with other voxels from the store.
-core::Result<cloud::CloudFile> cloud_of(const pipeline::MapPlace& place, const ExportRequest& request,
+core::Result<cloud::CloudFile> cloud_of(const maps::MapPlace& place, const ExportRequest& request,
                                         const core::Executor& executor) {
-  if (request.voxel.empty()) return pipeline::read_map_cloud(place, executor);
+  if (request.voxel.empty()) return maps::read_map_cloud(place, executor);
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   cloud::DenseFusionOptions options;
   core::OptionTable table;
@@ -91,7 +90,7 @@ core::Result<cloud::CloudFile> cloud_of(const pipeline::MapPlace& place, const E
         "--voxel: {} has no map.db to lay the cloud down from; map again without store.enabled=off",
         request.input.string()));
   }
-  const auto stored = pipeline::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place.store);
   if (!stored) return fail(stored.error());
   const double voxel_m = options.voxels.voxel_m;
   options = stored->fusion_options();
@@ -104,20 +103,20 @@ core::Result<cloud::CloudFile> cloud_of(const pipeline::MapPlace& place, const E
   return file;
 }
 
-core::Result<void> export_keyframes(const pipeline::MapPlace& place, const ExportRequest& request) {
+core::Result<void> export_keyframes(const maps::MapPlace& place, const ExportRequest& request) {
   if (place.store.empty()) {
     return core::usage_error(fmt::format(
         "--keyframes: {} has no map.db with the clouds of keyframes; map again without store.enabled=off",
         request.input.string()));
   }
-  const auto stored = pipeline::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place.store);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   const auto count = stored->write_keyframe_clouds(request.keyframes);
   if (!count) return tl::unexpected<core::Error>(count.error());
   return {};
 }
 
-core::Result<void> export_mesh(const pipeline::MapPlace& place, const ExportRequest& request,
+core::Result<void> export_mesh(const maps::MapPlace& place, const ExportRequest& request,
                                const core::Executor& executor) {
   if (request.output.extension() != ".ply" && request.output.extension() != ".obj") {
     return core::usage_error(fmt::format("{}: meshes are written as .ply or .obj", request.output.string()));
@@ -137,7 +136,7 @@ core::Result<void> run_export(const ExportRequest& request, const core::Executor
   if (request.output.empty() && request.keyframes.empty()) {
     return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
   }
-  const auto place = pipeline::find_map(request.input);
+  const auto place = maps::find_map(request.input);
   if (!place) return tl::unexpected<core::Error>(place.error());
   if (!request.keyframes.empty()) {
     auto done = export_keyframes(*place, request);

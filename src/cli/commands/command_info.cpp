@@ -17,8 +17,8 @@
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/maps/stored_result.hpp"
 #include "plumbline/pipeline/input.hpp"
-#include "plumbline/pipeline/stored_result.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::cli {
@@ -98,7 +98,7 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
   return {};
 }
 
-core::Result<void> describe_map(const pipeline::MapPlace& place) {
+core::Result<void> describe_map(const maps::MapPlace& place) {
   if (place.result) {
     if (auto described = describe_result(place.result->folder); !described) return described;
   }
@@ -141,7 +141,7 @@ core::Result<void> info(Session& session, InfoRequest& request) {
   if (synth::is_synth_url(request.input)) return describe_recording(session, request);
   std::error_code ec;
   const std::filesystem::path path = request.input;
-  const auto map = pipeline::find_map(path);  // also of a run that was interrupted and has left no `path`
+  const auto map = maps::find_map(path);  // also of a run that was interrupted and has left no `path`
   if (map) return describe_map(*map);
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));

@@ -15,8 +15,8 @@
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/ply.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
-#include "plumbline/pipeline/output_folder.hpp"
-#include "plumbline/pipeline/stored_result.hpp"
+#include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/stored_result.hpp"
 #include "plumbline/viz/snapshot.hpp"
 #include "plumbline/viz/turntable.hpp"
 #include "video.hpp"
@@ -52,20 +52,20 @@ core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& opt
 }
 
 /// The map that `input` is, or is map.ply or map.pcd of; none: a cloud by itself.
-core::Result<std::optional<pipeline::MapPlace>> map_of(const fs::path& input) {
+core::Result<std::optional<maps::MapPlace>> map_of(const fs::path& input) {
   std::error_code ec;
   const std::string name = input.filename().string();
   if (fs::is_regular_file(input, ec) && input.extension() != ".db") {
     const fs::path folder = fs::absolute(input).parent_path();
-    if ((name != "map.ply" && name != "map.pcd") || !pipeline::is_result_folder(folder)) return std::nullopt;
-    return pipeline::MapPlace{pipeline::ResultFolder{folder}, {}};
+    if ((name != "map.ply" && name != "map.pcd") || !maps::is_result_folder(folder)) return std::nullopt;
+    return maps::MapPlace{maps::ResultFolder{folder}, {}};
   }
-  auto place = pipeline::find_map(input);
+  auto place = maps::find_map(input);
   if (!place) return tl::unexpected<core::Error>(place.error());
   return std::move(*place);
 }
 
-core::Result<void> add_paths(const pipeline::MapPlace& place, bool lines, viz::Scene& scene) {
+core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene& scene) {
   viz::CameraPath path;
   std::vector<maps::LineSegment3> segments;
   if (place.result) {
@@ -76,12 +76,12 @@ core::Result<void> add_paths(const pipeline::MapPlace& place, bool lines, viz::S
   std::error_code ec;
   const bool has_lines = place.result && (fs::exists(place.result->lines(), ec) || place.store.empty());
   if (lines && has_lines) {
-    auto read = pipeline::read_lines_ply(place.result->lines());
+    auto read = maps::read_lines_ply(place.result->lines());
     if (!read) return tl::unexpected<core::Error>(read.error());
     segments = std::move(*read);
   }
   if (!place.result || (lines && !has_lines)) {
-    const auto stored = pipeline::StoredResult::open(place.store);
+    const auto stored = maps::StoredResult::open(place.store);
     if (!stored) return tl::unexpected<core::Error>(stored.error());
     if (!place.result) path.trajectory = stored->trajectory();
     if (lines) segments = stored->lines();
@@ -161,11 +161,11 @@ core::Result<void> render(RenderRequest& request, Session& session) {
   if (auto checked = check_output(request); !checked) return checked;
   const auto found = map_of(request.input);
   if (!found) return tl::unexpected<core::Error>(found.error());
-  const std::optional<pipeline::MapPlace>& place = *found;
+  const std::optional<maps::MapPlace>& place = *found;
   std::error_code ec;
   const bool cloud_file = fs::is_regular_file(request.input, ec) && request.input.extension() != ".db";
   const auto file =
-      cloud_file ? cloud::read_cloud(request.input) : pipeline::read_map_cloud(*place, session.executor());
+      cloud_file ? cloud::read_cloud(request.input) : maps::read_map_cloud(*place, session.executor());
   if (!file) return tl::unexpected<core::Error>(file.error());
   viz::Scene scene;
   scene.cloud = file->cloud;

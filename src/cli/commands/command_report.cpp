@@ -5,13 +5,13 @@
 #include <memory>
 
 #include "app.hpp"
-#include "plumbline/pipeline/report.hpp"
+#include "plumbline/report/report.hpp"
 
 namespace plumbline::cli {
 namespace {
 
-int report(Session& session, const pipeline::ReportRequest& request) {
-  const auto done = pipeline::write_report(request);
+int report(Session& session, const report::ReportRequest& request) {
+  const auto done = report::write_report(request);
   if (!done) return session.fail(done.error());
   for (const std::string& line : done->missing) session.console().warning(line);
   if (!session.quiet) {
@@ -23,7 +23,7 @@ int report(Session& session, const pipeline::ReportRequest& request) {
 }  // namespace
 
 void add_report(CLI::App& app, Session& session) {
-  const auto request = std::make_shared<pipeline::ReportRequest>();
+  const auto request = std::make_shared<report::ReportRequest>();
   CLI::App* command = add_command(app, session, "report", "Tell a result as one HTML page: OUT/report.html",
                                   [&session, request] { return report(session, *request); });
   command->add_option("OUT", request->result, "Result folder of plumbline map or fuse")->required();

@@ -99,10 +99,18 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
         {filters == nullptr ? node.mark : filters->mark, prefix + "filters", "must be a list of filters"});
     return chain;
   }
+  chain.filters_ = parse_list(*filters, path, registry, problems).filters_;
+  return chain;
+}
+
+FilterChain FilterChain::parse_list(const ConfigNode& list, const std::string& path,
+                                    const FilterRegistry& registry, ConfigProblems& problems) {
+  FilterChain chain;
+  chain.name_ = path.substr(path.rfind('.') + 1);
   std::vector<std::filesystem::path> written;
-  for (std::size_t i = 0; i < filters->items.size(); ++i) {
-    const ConfigNode& entry = filters->items[i];
-    const std::string place = fmt::format("{}filters[{}]", prefix, i);
+  for (std::size_t i = 0; i < list.items.size(); ++i) {
+    const ConfigNode& entry = list.items[i];
+    const std::string place = fmt::format("{}{}filters[{}]", path, path.empty() ? "" : ".", i);
     const FilterInfo* info = find_type(entry, place, registry, problems);
     if (info == nullptr) continue;
     const std::shared_ptr<Filter> filter = info->make();

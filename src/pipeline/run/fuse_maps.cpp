@@ -8,16 +8,16 @@
 
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
+#include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/graph.hpp"
-#include "plumbline/pipeline/output_folder.hpp"
-#include "plumbline/pipeline/stored_maps.hpp"
-#include "run/stored_views.hpp"
+#include "stages/waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
 
 /// The same whatever the order in which the maps were named.
-std::string config_text(const FuseRequest& request, const StoredMaps& maps, const Graph& graph) {
+std::string config_text(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph) {
   std::string text =
       fmt::format("# What plumbline {} fused with: plumbline fuse MAP... -p config.yaml\n", core::version());
   text += "run:\n  maps: [";
@@ -28,9 +28,9 @@ std::string config_text(const FuseRequest& request, const StoredMaps& maps, cons
   return text + to_yaml(graph);
 }
 
-std::string names_of(const StoredMaps& maps) {
+std::string names_of(const maps::StoredMaps& maps) {
   std::string names;
-  for (const StoredPart& part : maps.parts()) names += (names.empty() ? "" : " ") + part.name;
+  for (const maps::StoredPart& part : maps.parts()) names += (names.empty() ? "" : " ") + part.name;
   return names;
 }
 
@@ -42,7 +42,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
                                           DeferredDestruction* deferred_destruction) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
-  std::unique_ptr<StoredMaps> maps;  // goes last: stages may still be at work on it
+  std::unique_ptr<maps::StoredMaps> maps;  // goes last: stages may still be at work on it
   const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
   if (!pipeline_file) return fail(pipeline_file.error());
   StageRegistry registry;
@@ -58,13 +58,13 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
                     pipeline_file->string(), graph->source().type->name));
   }
   if (request.maps.empty()) return core::usage_error("name a map");
-  auto opened = StoredMaps::open(request.maps, executor);
+  auto opened = maps::StoredMaps::open(request.maps, executor);
   if (!opened) return fail(opened.error());
   maps = std::move(*opened);
   if (!request.anchor.empty()) {
     if (const auto part = maps->find_part(request.anchor); !part) return fail(part.error());
   }
-  auto output = OutputFolder::prepare(request.output, request.replace);
+  auto output = maps::OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
 
   RunContext context;
@@ -99,7 +99,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   if (auto committed = output->commit(); !committed) return fail(committed.error());
   if (deferred_destruction != nullptr) {
     deferred_destruction->push_back(std::make_shared<Graph>(std::move(*graph)));
-    deferred_destruction->push_back(std::shared_ptr<StoredMaps>(std::move(maps)));
+    deferred_destruction->push_back(std::shared_ptr<maps::StoredMaps>(std::move(maps)));
   }
   return summary;
 }

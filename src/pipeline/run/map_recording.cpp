@@ -14,13 +14,13 @@
 #include "plumbline/core/hash.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
+#include "plumbline/maps/output_folder.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
-#include "plumbline/pipeline/output_folder.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
-#include "run/resumed_run.hpp"
-#include "run/stored_views.hpp"
 #include "stages/debug_video.hpp"
+#include "stages/resumed_run.hpp"
+#include "stages/waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -119,12 +119,12 @@ void report_resumed(const std::filesystem::path& folder, const std::optional<Res
 }
 
 /// What a run that fails had stored stays.
-core::Error with_what_is_kept(core::Error error, OutputFolder& output) {
+core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
   const std::size_t keyframes = stored_keyframes(output.path());
   if (keyframes == 0) return error;
   output.keep();
   error.message += fmt::format("; {} keyframes are kept in {}: --resume goes on from there", keyframes,
-                               (output.path() / kStoreFile).string());
+                               (output.path() / maps::kStoreFile).string());
   return error;
 }
 
@@ -132,7 +132,7 @@ core::Error with_what_is_kept(core::Error error, OutputFolder& output) {
 
 bool is_finished(const std::filesystem::path& out) {
   std::error_code ec;
-  return is_result_folder(out) && !std::filesystem::exists(OutputFolder::partial_of(out), ec);
+  return maps::is_result_folder(out) && !std::filesystem::exists(maps::OutputFolder::partial_of(out), ec);
 }
 
 core::Result<RunSummary> map_recording(const MapRequest& given, const core::Executor& executor,
@@ -168,8 +168,8 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   if (request.resume) {
     if (auto can = can_resume(request, keeps && tracks, *pipeline_file); !can) return fail(can.error());
   }
-  auto output = request.resume ? OutputFolder::resume(request.output, request.replace)
-                               : OutputFolder::prepare(request.output, request.replace);
+  auto output = request.resume ? maps::OutputFolder::resume(request.output, request.replace)
+                               : maps::OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
   std::optional<ResumedRun> resumed;
   if (request.resume) {

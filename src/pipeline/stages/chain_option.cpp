@@ -14,19 +14,6 @@ namespace plumbline::pipeline {
 using core::ConfigNode;
 using Kind = ConfigNode::Kind;
 
-ConfigNode as_chain(const ConfigNode& list, const std::string& path) {
-  ConfigNode name;
-  name.kind = Kind::kScalar;
-  name.mark = list.mark;
-  name.scalar = path.substr(path.rfind('.') + 1);
-  ConfigNode chain;
-  chain.kind = Kind::kMap;
-  chain.mark = list.mark;
-  chain.entries = {{"chain", std::move(name)}, {"filters", list}};
-  chain.key_marks = {list.mark, list.mark};
-  return chain;
-}
-
 ChainOption::ChainOption(const std::string& file) {
   value_.kind = file.empty() ? Kind::kSequence : Kind::kScalar;
   value_.scalar = file;
@@ -36,7 +23,7 @@ void ChainOption::check(const CheckContext& context, const std::string& path,
                         core::ConfigProblems& problems) {
   const std::size_t before = problems.size();
   if (value_.kind == Kind::kSequence) {
-    chain_ = cloud::FilterChain::parse(as_chain(value_, path), path, *context.filters, problems);
+    chain_ = cloud::FilterChain::parse_list(value_, path, *context.filters, problems);
   } else if (!value_.scalar.empty()) {
     const std::filesystem::path file = context.find(value_.scalar, value_.mark);
     if (file.empty()) {

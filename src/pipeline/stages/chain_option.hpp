@@ -31,9 +31,6 @@ class ChainOption {
   cloud::FilterChain chain_;
 };
 
-/// A list of filters as the tree that a chain's file would hold; the last word of `path` is the chain's name.
-core::ConfigNode as_chain(const core::ConfigNode& list, const std::string& path);
-
 /// Adds what filters took from the merged cloud to what the run tells.
 void add_left_out(const std::vector<cloud::FilterReport>& reports, RunSummary& summary);
 

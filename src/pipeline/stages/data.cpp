@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/pipeline/data.hpp"
 
-#include <map>
 #include <utility>
 
 #include "plumbline/cloud/compact_cloud.hpp"
@@ -33,19 +32,9 @@ geometry::Trajectory trajectory_of(const MapResult& map, std::int32_t robot) {
 }
 
 void take_poses_from_map(MapResult& result) {
-  const maps::Map& map = *result.map;
-  result.trajectory = maps::trajectory(result.frame_poses, map);
-  result.trajectory_ids.clear();
-  std::map<std::int32_t, std::int32_t> frames;  // by robot
-  for (const maps::FramePose& frame : result.frame_poses) {
-    const std::int32_t number = frames[frame.reference.robot]++;
-    if (frame.tracked) result.trajectory_ids.push_back({frame.reference.robot, number});
-  }
-  result.lines = maps::line_segments(map);
-  result.keyframes.clear();
-  for (const core::KeyframeId id : map.keyframe_ids()) {
-    result.keyframes.push_back({id, map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
-  }
+  static_cast<maps::MapPoses&>(result) = maps::poses_of(*result.map, result.frame_poses);
+  result.accuracy.clear();
+  result.lines = maps::line_segments(*result.map);
 }
 
 }  // namespace plumbline::pipeline

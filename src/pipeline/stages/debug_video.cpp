@@ -62,7 +62,7 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
   }
   const fs::path relative = inside(out, folder);
   if (relative.empty()) {
-    auto own = OutputFolder::prepare(folder, replace, is_debug_folder);
+    auto own = maps::OutputFolder::prepare(folder, replace, is_debug_folder);
     if (!own) return tl::unexpected<core::Error>(own.error());
     result.path_ = own->path();
     result.own_.emplace(std::move(*own));

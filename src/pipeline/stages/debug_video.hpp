@@ -8,7 +8,7 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/mapping/slam.hpp"
-#include "plumbline/pipeline/output_folder.hpp"
+#include "plumbline/maps/output_folder.hpp"
 
 namespace plumbline::pipeline {
 
@@ -28,7 +28,7 @@ class DebugFolder {
 
  private:
   std::filesystem::path path_;
-  std::optional<OutputFolder> own_;  ///< none inside the result folder
+  std::optional<maps::OutputFolder> own_;  ///< none inside the result folder
 };
 
 /// Writes FOLDER/<number, six digits>.png: `frame` as `slam` has just processed it. Errors are kOutput.

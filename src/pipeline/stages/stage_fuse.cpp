@@ -19,13 +19,13 @@
 #include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
-#include "plumbline/pipeline/stored_maps.hpp"
+#include "plumbline/maps/fusion_state.hpp"
+#include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
-#include "run/fusion_state.hpp"
-#include "run/stored_views.hpp"
 #include "stages/chain_option.hpp"
 #include "stages/stages.hpp"
 #include "stages/up_frame.hpp"
+#include "stages/waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -113,7 +113,7 @@ class FuseStage : public Stage {
   }
 
  private:
-  core::Result<cloud::FusedCloud> fuse(const MapResult& map, const StoredViews& stored) {
+  core::Result<cloud::FusedCloud> fuse(const MapResult& map, const maps::StoredViews& stored) {
     if (auto found = find_fields(map, stored); !found) return tl::unexpected<core::Error>(found.error());
     cloud::FusionViews views;
     views.world_from_camera = stored.world_from_camera;
@@ -123,12 +123,9 @@ class FuseStage : public Stage {
       for (const std::int32_t robot : stored.robots)
         views.robots.push_back(static_cast<std::uint8_t>(std::clamp(robot, 0, kMostRobots)));
     }
-    for (const KeyframePose& keyframe : map.keyframes) {
-      if (!keyframe.accuracy) {
-        state_->covariances.clear();
-        break;
-      }
-      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = keyframe.accuracy->covariance;
+    for (std::size_t i = 0; i < map.accuracy.size(); ++i) {
+      const maps::KeyframePose& keyframe = map.keyframes[i];
+      state_->covariances[{keyframe.id.robot, keyframe.stamp}] = map.accuracy[i].covariance;
     }
     views.covariances = state_->covariances_of(stored.robots, stored.stamps);
     views.read = [&](std::size_t i) { return read_corrected(stored, i); };
@@ -141,7 +138,7 @@ class FuseStage : public Stage {
     return fused;
   }
 
-  [[nodiscard]] std::vector<sensor::Pinhole> cameras_of(const StoredViews& views) const {
+  [[nodiscard]] std::vector<sensor::Pinhole> cameras_of(const maps::StoredViews& views) const {
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : views.robots) {
       cameras.push_back(maps::camera_of(*context_->robots, robot).color);
@@ -150,7 +147,7 @@ class FuseStage : public Stage {
   }
 
   /// One depth field for each robot's camera.
-  core::Result<void> find_fields(const MapResult& map, const StoredViews& stored) {
+  core::Result<void> find_fields(const MapResult& map, const maps::StoredViews& stored) {
     if (!find_depth_field_) return {};
     std::map<std::int32_t, std::vector<std::size_t>> views;
     for (std::size_t i = 0; i < stored.size(); ++i) views[stored.robots[i]].push_back(i);
@@ -179,13 +176,14 @@ class FuseStage : public Stage {
   }
 
   /// Of finished maps, what cannot be used is told with the name of its own file.
-  [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const StoredViews& views, std::size_t i) const {
+  [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
     if (cloud || context_->stored_maps == nullptr) return cloud;
     return tl::unexpected<core::Error>(
         context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
   }
-  [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(const StoredViews& views, std::size_t i) const {
+  [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(const maps::StoredViews& views,
+                                                             std::size_t i) const {
     auto cloud = read_raw(views, i);
     if (cloud) state_->correct(views.robots[i], **cloud);
     return cloud;
@@ -210,7 +208,7 @@ class FuseStage : public Stage {
     return {};
   }
 
-  core::Result<void> write_keyframes(const StoredViews& views) const {
+  core::Result<void> write_keyframes(const maps::StoredViews& views) const {
     const std::filesystem::path folder = context_->output_folder / "keyframes";
     std::error_code ec;
     std::filesystem::create_directories(folder, ec);
@@ -239,7 +237,7 @@ class FuseStage : public Stage {
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;
-  std::shared_ptr<FusionState> state_ = std::make_shared<FusionState>();
+  std::shared_ptr<maps::FusionState> state_ = std::make_shared<maps::FusionState>();
   std::vector<RunSummary::DepthField> reported_fields_;
   std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
   UpFrame frame_;

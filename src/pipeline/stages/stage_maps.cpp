@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "plumbline/pipeline/stored_maps.hpp"
+#include "plumbline/maps/stored_maps.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -22,7 +22,7 @@ class MapsStage : public Stage {
 
   /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
   core::Result<void> process(StageIo& io) override {
-    const StoredCloud& stored = maps_->clouds()[io.frame()];
+    const maps::StoredCloud& stored = maps_->clouds()[io.frame()];
     auto result = std::make_shared<KeyframeCloud>();
     result->id = stored.id;
     result->frame = stored.frame;
@@ -39,7 +39,7 @@ class MapsStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     auto result = std::make_shared<RobotMaps>();
-    for (const StoredPart& part : maps_->parts()) {
+    for (const maps::StoredPart& part : maps_->parts()) {
       result->maps.push_back({part.name, part.robots, std::make_shared<maps::Map>(part.map), part.frames});
     }
     io.output<RobotMaps>("maps", result);
@@ -58,7 +58,7 @@ class MapsStage : public Stage {
     return {};
   }
 
-  const StoredMaps* maps_ = nullptr;
+  const maps::StoredMaps* maps_ = nullptr;
 };
 
 }  // namespace

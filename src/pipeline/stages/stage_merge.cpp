@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
-#include "plumbline/pipeline/stored_maps.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "stages/robot_merge.hpp"
 #include "stages/stages.hpp"

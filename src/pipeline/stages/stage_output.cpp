@@ -108,7 +108,7 @@ class OutputStage : public Stage {
     for (geometry::StampedPose& pose : map.trajectory) {
       pose.world_from_camera = output_from_map * pose.world_from_camera;
     }
-    for (KeyframePose& keyframe : map.keyframes) {
+    for (maps::KeyframePose& keyframe : map.keyframes) {
       keyframe.world_from_camera = output_from_map * keyframe.world_from_camera;
     }
     for (auto& [start, end] : map.lines) {
@@ -141,7 +141,7 @@ class OutputStage : public Stage {
 
   static geometry::Trajectory keyframe_trajectory(const MapResult& map, std::optional<std::int32_t> robot) {
     geometry::Trajectory poses;
-    for (const KeyframePose& keyframe : map.keyframes) {
+    for (const maps::KeyframePose& keyframe : map.keyframes) {
       if (!robot || keyframe.id.robot == *robot)
         poses.push_back({keyframe.stamp, keyframe.world_from_camera});
     }
@@ -172,13 +172,14 @@ class OutputStage : public Stage {
     for (const RobotInfo& robot : map.robots) names[robot.number] = robot.name;
     core::OutputFile out(file);
     out.write("robot,keyframe,stamp,tx,ty,tz,qx,qy,qz,qw,sigma_position,sigma_rotation,points,lines,edges\n");
-    for (const KeyframePose& keyframe : map.keyframes) {
+    for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+      const maps::KeyframePose& keyframe = map.keyframes[i];
       const Eigen::Vector3d& t = keyframe.world_from_camera.translation;
       const Eigen::Quaterniond q = keyframe.world_from_camera.quaternion();
       out.write(fmt::format("{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},",
                             names[keyframe.id.robot], keyframe.id.index, keyframe.stamp, t.x(), t.y(), t.z(),
                             q.x(), q.y(), q.z(), q.w()));
-      const auto& known = keyframe.accuracy;
+      const auto* known = map.accuracy.empty() ? nullptr : &map.accuracy[i];
       out.write(known ? fmt::format("{:.6f},{:.7f},{},{},{}\n", known->sigma_position_m(),
                                     known->sigma_rotation_rad(), known->points, known->lines, known->edges)
                       : ",,,,\n");

@@ -76,7 +76,7 @@ class PosesStage : public Stage {
     map_.frame_columns = several() ? "robot,stamp,keyframe" : "stamp,keyframe";
     if (several()) map_.robots = recordings_->robots();
     std::sort(map_.keyframes.begin(), map_.keyframes.end(),
-              [](const KeyframePose& a, const KeyframePose& b) { return a.id < b.id; });
+              [](const maps::KeyframePose& a, const maps::KeyframePose& b) { return a.id < b.id; });
     io.output<MapResult>("map", std::make_shared<MapResult>(map_));
     return {};
   }

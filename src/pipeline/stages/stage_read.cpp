@@ -7,7 +7,7 @@
 
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/pipeline/summary.hpp"
-#include "run/resumed_run.hpp"
+#include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {

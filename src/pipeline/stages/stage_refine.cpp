@@ -11,7 +11,7 @@
 
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/summary.hpp"
-#include "run/resumed_run.hpp"
+#include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -51,10 +51,10 @@ class RefineStage : public Stage {
     auto result = std::make_shared<MapResult>(*before);
     if (adjust_ && before->map != nullptr && before->map->keyframe_count() > 1) {
       auto map = std::make_shared<maps::Map>(*before->map);
-      const auto accuracy = refine(*map);
+      auto accuracy = refine(*map);
       result->map = map;
       take_poses_from_map(*result);
-      for (std::size_t i = 0; i < accuracy.size(); ++i) result->keyframes[i].accuracy = accuracy[i];
+      result->accuracy = std::move(accuracy);
     }
     clearing_ = executor_->submit([this] { surfaces_.clear(); });  // beside what comes next
     io.output<MapResult>("map", result);

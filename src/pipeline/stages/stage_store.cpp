@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "plumbline/core/version.hpp"
+#include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/store.hpp"
-#include "run/fusion_state.hpp"
-#include "run/resumed_run.hpp"
+#include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -24,7 +24,7 @@ class StoreStage : public Stage {
         "Write map.db, the map with its clouds, as the run goes: what a run that was ended can go on from");
   }
   [[nodiscard]] std::vector<std::string> files() const override {
-    return enabled_ ? std::vector<std::string>{kStoreFile} : std::vector<std::string>{};
+    return enabled_ ? std::vector<std::string>{maps::kStoreFile} : std::vector<std::string>{};
   }
   [[nodiscard]] bool keeps_map() const override { return enabled_; }
 
@@ -38,7 +38,7 @@ class StoreStage : public Stage {
     header.program_version = core::version();
     // What is fused of finished maps is begun again, whatever ends it.
     const auto use = context.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
-    return take(maps::StoreWriter::create(context.output_folder / kStoreFile, header, use));
+    return take(maps::StoreWriter::create(context.output_folder / maps::kStoreFile, header, use));
   }
 
   /// One transaction a keyframe, with what came of its robot since the last one; other clouds have their
@@ -70,7 +70,7 @@ class StoreStage : public Stage {
     if (const auto dense = io.input<DenseCloud>("result")) {
       frame = {dense->output_from_map, dense->upright};
       if (dense->state != nullptr) {
-        if (auto kept = writer_->attach(kFusionAttachment, to_bytes(*dense->state)); !kept) return kept;
+        if (auto kept = writer_->attach(maps::kFusionAttachment, to_bytes(*dense->state)); !kept) return kept;
       }
     }
     std::vector<maps::StoreStep> rest;

@@ -11,8 +11,8 @@
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/summary.hpp"
-#include "run/resumed_run.hpp"
 #include "stages/debug_video.hpp"
+#include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
 #include "stages/track_rows.hpp"
 

@@ -7,7 +7,7 @@
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
-#include "plumbline/pipeline/result_folder.hpp"
+#include "plumbline/maps/result_folder.hpp"
 #include "stages/stages.hpp"
 #include "taps/tap_file.hpp"
 
@@ -69,7 +69,7 @@ class MapTap : public Tap {
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("in");
     return file_.ending() == ".txt" ? dataset::write_trajectory(file_.path(), map->trajectory)
-                                    : write_trajectory_ply(file_.path(), map->trajectory);
+                                    : maps::write_trajectory_ply(file_.path(), map->trajectory);
   }
 };
 
@@ -81,7 +81,7 @@ class MapsTap : public Tap {
     for (std::size_t i = 0; i < maps->maps.size(); ++i) {
       const auto path = maps::trajectory(maps->maps[i].frame_poses, *maps->maps[i].map);
       auto written = file_.ending() == ".txt" ? dataset::write_trajectory(file_.path(i), path)
-                                              : write_trajectory_ply(file_.path(i), path);
+                                              : maps::write_trajectory_ply(file_.path(i), path);
       if (!written) return written;
     }
     return {};

@@ -11,9 +11,9 @@
 
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/store_replica.hpp"
-#include "store_codec.hpp"
+#include "store/store_codec.hpp"
 #include "store_folder.hpp"
-#include "store_row.hpp"
+#include "store/store_row.hpp"
 #include "store_world.hpp"
 
 namespace plumbline::maps {

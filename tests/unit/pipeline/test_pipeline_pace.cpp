@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-#include "../../../src/pipeline/graph/pace.hpp"
+#include "../../../src/pipeline/run/pace.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "test_pipeline_toys.hpp"
 

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Maps given other numbers and other worlds, and put together as one.
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::maps {
+
+/// Depends on what the keyframes measured and on their poses, not on names and robots' numbers.
+std::uint64_t content_hash(const Map& map);
+
+/// The same map with other numbers for its robots; robots that are not named in `to` keep theirs.
+Map renumbered(const Map& map, const std::map<std::int32_t, std::int32_t>& to);
+
+/// One map of several, whose robots' numbers differ, each moved by its world_from_map.
+Map joined(const std::vector<const Map*>& maps, const std::vector<geometry::Rigid3>& world_from_map);
+
+}  // namespace plumbline::maps

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A result folder that appears whole or not at all.
+#include <filesystem>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::maps {
+
+/// Whether a folder holds the result of an earlier run.
+bool is_result_folder(const std::filesystem::path& folder);
+
+/// Results are written to OUT.partial, which commit() renames to OUT; an earlier result is replaced only
+/// then. A run that fails leaves OUT as it was, and no OUT.partial.
+class OutputFolder {
+ public:
+  /// Checks and makes OUT.partial. kUsage: OUT exists and `replace` is false, or OUT is neither empty nor an
+  /// earlier result (then `replace` does not help: nothing else is ever deleted), or another run is writing
+  /// there. kOutput: cannot be created or written, or less than 64 MB are free. `is_earlier` tells what an
+  /// earlier result is: what alone may be deleted.
+  using IsEarlier = bool (*)(const std::filesystem::path&);
+  static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace,
+                                            IsEarlier is_earlier = is_result_folder);
+
+  /// The same, but takes over what an interrupted run left in OUT.partial, and leaves it there again unless
+  /// committed.
+  static core::Result<OutputFolder> resume(const std::filesystem::path& out, bool replace,
+                                           IsEarlier is_earlier = is_result_folder);
+  /// Where results are written until they are whole.
+  static std::filesystem::path partial_of(const std::filesystem::path& out);
+
+  OutputFolder(OutputFolder&& other) noexcept;
+  OutputFolder& operator=(OutputFolder&&) = delete;
+  ~OutputFolder();
+
+  [[nodiscard]] const std::filesystem::path& path() const { return partial_; }  ///< where to write
+  core::Result<void> commit();
+  /// What is there stays when this one ends without commit(), for another run to go on from.
+  void keep() { kept_ = true; }
+
+ private:
+  static core::Result<OutputFolder> open(const std::filesystem::path& target,
+                                         const std::filesystem::path& partial, IsEarlier is_earlier);
+  OutputFolder(std::filesystem::path target, std::filesystem::path partial, int lock, IsEarlier is_earlier);
+  std::filesystem::path target_;
+  std::filesystem::path partial_;  ///< empty: nothing to clean up
+  int lock_ = -1;                  ///< descriptor of the locked marker file
+  IsEarlier is_earlier_;
+  bool kept_ = false;
+};
+
+}  // namespace plumbline::maps

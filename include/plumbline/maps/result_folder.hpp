@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A finished result folder, read back for pictures, exports and questions.
+#include <filesystem>
+#include <vector>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/maps/line_export.hpp"
+
+namespace plumbline::maps {
+
+/// The folder's files, whether they are there or not.
+struct ResultFolder {
+  std::filesystem::path folder;
+  [[nodiscard]] std::filesystem::path ply() const { return folder / "map.ply"; }
+  [[nodiscard]] std::filesystem::path pcd() const { return folder / "map.pcd"; }
+  [[nodiscard]] std::filesystem::path trajectory() const { return folder / "trajectory.txt"; }
+  [[nodiscard]] std::filesystem::path keyframes() const { return folder / "keyframes.txt"; }
+  [[nodiscard]] std::filesystem::path lines() const { return folder / "lines.ply"; }
+  [[nodiscard]] std::filesystem::path summary() const { return folder / "summary.json"; }
+};
+
+/// Errors (kInput): no such folder, or not a result.
+core::Result<ResultFolder> open_result(const std::filesystem::path& folder);
+
+/// map.ply, or map.pcd where the pipeline was told to write no PLY.
+core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result);
+
+/// Segments of lines.ply.
+core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::path& file);
+
+/// A path as a PLY of vertices and edges.
+core::Result<void> write_trajectory_ply(const std::filesystem::path& file,
+                                        const geometry::Trajectory& trajectory);
+
+}  // namespace plumbline::maps

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A map in its store as results: clouds laid down anew, paths and lines, also of a run that was interrupted.
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/cloud/filter_chain.hpp"
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/maps/result_folder.hpp"
+#include "plumbline/maps/store.hpp"
+
+namespace plumbline::maps {
+
+struct StoredViews;
+
+/// What a user names as a map.
+struct MapPlace {
+  std::optional<ResultFolder> result;  ///< of a run that came to its end
+  std::filesystem::path store;  ///< its map.db, or that of a run that was interrupted; empty: there is none
+};
+
+/// `input`: a result folder, map.db itself, or OUT where a run was interrupted and left OUT.partial. Errors
+/// (kInput): nothing of these.
+core::Result<MapPlace> find_map(const std::filesystem::path& input);
+
+/// A store as it was when it was opened. All poses, lines and clouds are given in the frame of the run's
+/// results; of a run that was interrupted, in that of its first camera.
+class StoredResult {
+ public:
+  /// Errors (kInput) as StoreReader.
+  static core::Result<StoredResult> open(const std::filesystem::path& store);
+
+  [[nodiscard]] const StoredMap& stored() const { return map_; }
+  [[nodiscard]] geometry::Trajectory trajectory() const;      ///< tracked frames, by robot, then time
+  [[nodiscard]] std::vector<KeyframePose> keyframes() const;  ///< by id; also such as left the map
+  [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
+  [[nodiscard]] std::vector<LineSegment3> lines() const;
+
+  /// How the run fused its clouds, as far as its configuration tells; else the defaults.
+  [[nodiscard]] cloud::DenseFusionOptions fusion_options() const;
+  /// The filters of its merged cloud, as far as its configuration tells. None where there is one of a plugin,
+  /// or one that writes a file.
+  [[nodiscard]] cloud::FilterChain fusion_filters() const;
+  /// The dense cloud: with the run's own options the one it wrote, filters and all. Errors (kInput): damaged,
+  /// no clouds; those of filters.
+  [[nodiscard]] core::Result<cloud::FusedCloud> fused(const cloud::DenseFusionOptions& options,
+                                                      const core::Executor& executor) const;
+  /// The cloud of each keyframe as FOLDER/<number, six digits>.ply; makes the folder. Returns how many.
+  /// Errors (kOutput), (kInput): damaged.
+  [[nodiscard]] core::Result<std::size_t> write_keyframe_clouds(const std::filesystem::path& folder) const;
+
+ private:
+  StoredResult(std::filesystem::path file, StoreReader reader, StoredMap map);
+  [[nodiscard]] core::Result<StoredViews> views() const;
+
+  std::filesystem::path file_;
+  std::unique_ptr<StoreReader> reader_;
+  StoredMap map_;
+};
+
+/// result.ply(), result.pcd() or, where neither was written, the store's cloud.
+core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core::Executor& executor);
+
+}  // namespace plumbline::maps

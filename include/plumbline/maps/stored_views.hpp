@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Views that clouds are laid down from: poses of a map, and clouds that lie in a store.
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "plumbline/maps/store.hpp"
+
+namespace plumbline::maps {
+
+/// All that have a cloud and a pose: keyframes by id, then frames between them.
+struct StoredViews {
+  const StoreReader* reader = nullptr;
+  std::vector<core::KeyframeId> keyframes;  ///< invalid: a frame's
+  std::vector<FrameId> frames;
+  std::vector<geometry::Rigid3> world_from_camera;
+  std::vector<std::int32_t> robots;
+  std::vector<double> stamps;
+
+  [[nodiscard]] std::size_t size() const { return stamps.size(); }
+  /// A view's cloud; from several threads at a time. Errors (kInput): damaged.
+  [[nodiscard]] core::Result<cloud::CloudPtr> read(std::size_t view) const;
+};
+
+/// When clouds of frames came; those that are not there came before.
+using Arrivals = std::map<FrameId, std::size_t>;
+
+/// `reader` must outlive the views. Frames stand in the order of their arrival, else by robot and order: sums
+/// of a dense cloud are rounded as they come. Errors (kInput): damaged.
+core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
+                                   const Arrivals& arrivals = {});
+
+}  // namespace plumbline::maps

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A result folder as one HTML page: what was mapped, whether to trust it, pictures, paths, tables.
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::report {
+
+struct ReportRequest {
+  std::filesystem::path result;  ///< folder of map or fuse
+  std::filesystem::path output;  ///< empty: report.html in the folder
+  std::filesystem::path truth;   ///< empty: none. A recording, a folder of recordings by robot, or a TUM file
+  bool replace = false;          ///< an earlier report, and nothing else, may be replaced
+};
+
+struct ReportSummary {
+  std::filesystem::path file;
+  std::uint64_t bytes = 0;
+  std::vector<std::string> missing;  ///< what the page lacks, and why; one line each
+};
+
+/// Writes the page: one file that holds its pictures and needs nothing else, the same bytes for the same
+/// folder. What is missing or damaged in the folder is left out and told, on the page and in `missing`.
+/// Errors: kInput (no result, a run that was interrupted, summary.json damaged, no truth that fits), kUsage
+/// (the file exists), kOutput (cannot be written; nothing is left behind).
+core::Result<ReportSummary> write_report(const ReportRequest& request);
+
+}  // namespace plumbline::report

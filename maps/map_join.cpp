@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/map_join.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "plumbline/core/hash.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+using RobotNumbers = std::map<std::int32_t, std::int32_t>;
+
+template <typename IdType>
+IdType renamed(IdType id, const RobotNumbers& to) {
+  const auto found = id.valid() ? to.find(id.robot) : to.end();
+  if (found != to.end()) id.robot = found->second;
+  return id;
+}
+
+std::vector<Observation> renamed(std::vector<Observation> seen, const RobotNumbers& to) {
+  for (Observation& o : seen) o.keyframe = renamed(o.keyframe, to);
+  return seen;
+}
+
+/// Appends a map's parts, moved by `world_from_map`. Edges come after those that are there.
+class PartsCollector {
+ public:
+  void add(const Map& map, const RobotNumbers& to, const Rigid3& world_from_map) {
+    const Rigid3 map_from_world = world_from_map.inverse();
+    // A map that stays where it is keeps every bit.
+    const bool stays = world_from_map.rotation.isIdentity(0.0) && world_from_map.translation.isZero(0.0);
+    for (const KeyframeId id : map.keyframe_ids()) {
+      auto data = std::make_shared<Keyframe>(map.keyframe(id));
+      data->id = renamed(id, to);
+      data->reference = renamed(data->reference, to);
+      parts_.keyframes.push_back(
+          {data, stays ? map.camera_from_world(id) : map.camera_from_world(id) * map_from_world,
+           renamed(map.parent(id), to)});
+    }
+    for (const core::PointId id : map.point_ids()) {
+      MapPoint point = map.point(id);
+      point.id = renamed(id, to);
+      point.position = world_from_map * point.position;
+      point.view_direction = world_from_map.rotation * point.view_direction;
+      point.normal = world_from_map.rotation * point.normal;
+      point.angle_keyframe = renamed(point.angle_keyframe, to);
+      point.observations = renamed(std::move(point.observations), to);
+      parts_.points.push_back(std::move(point));
+    }
+    for (const core::LineId id : map.line_ids()) {
+      MapLine line = map.line(id);
+      line.id = renamed(id, to);
+      line.start = world_from_map * line.start;
+      line.end = world_from_map * line.end;
+      line.observations = renamed(std::move(line.observations), to);
+      parts_.lines.push_back(std::move(line));
+    }
+    const std::uint64_t first_edge = parts_.next.edge;
+    for (const auto& [order, edge] : map.edges()) {
+      SurfaceEdge moved = edge;
+      moved.a = renamed(edge.a, to);
+      moved.b = renamed(edge.b, to);
+      parts_.edges.emplace_back(first_edge + order, moved);
+    }
+    for (const LoopEdge& loop : map.loops()) {
+      parts_.loops.push_back({renamed(loop.a, to), renamed(loop.b, to), loop.b_from_a, loop.information});
+    }
+    const NextIds next = map.next_ids();
+    for (const KeyframeId id : next.keyframes) parts_.next.keyframes.push_back(renamed(id, to));
+    for (const core::PointId id : next.points) parts_.next.points.push_back(renamed(id, to));
+    for (const core::LineId id : next.lines) parts_.next.lines.push_back(renamed(id, to));
+    parts_.next.edge = first_edge + next.edge;
+  }
+
+  [[nodiscard]] Map take() {
+    const auto by_id = [](const auto& a, const auto& b) { return a.id < b.id; };
+    std::sort(parts_.keyframes.begin(), parts_.keyframes.end(),
+              [](const auto& a, const auto& b) { return a.data->id < b.data->id; });
+    std::sort(parts_.points.begin(), parts_.points.end(), by_id);
+    std::sort(parts_.lines.begin(), parts_.lines.end(), by_id);
+    std::sort(parts_.next.keyframes.begin(), parts_.next.keyframes.end());
+    std::sort(parts_.next.points.begin(), parts_.next.points.end());
+    std::sort(parts_.next.lines.begin(), parts_.next.lines.end());
+    return Map(std::move(parts_));
+  }
+
+ private:
+  MapParts parts_;
+};
+
+}  // namespace
+
+Map renumbered(const Map& map, const RobotNumbers& to) {
+  PartsCollector collector;
+  collector.add(map, to, Rigid3{});
+  return collector.take();
+}
+
+Map joined(const std::vector<const Map*>& maps, const std::vector<Rigid3>& world_from_map) {
+  if (maps.size() != world_from_map.size()) throw std::invalid_argument("joined: a pose for each map");
+  PartsCollector collector;
+  for (std::size_t i = 0; i < maps.size(); ++i) collector.add(*maps[i], {}, world_from_map[i]);
+  return collector.take();
+}
+
+std::uint64_t content_hash(const Map& map) {
+  core::Hash hash;
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const Keyframe& keyframe = map.keyframe(id);
+    hash.number(keyframe.stamp);
+    const Rigid3& pose = map.camera_from_world(id);
+    hash.bytes(pose.rotation.data(), 9 * sizeof(double));
+    hash.bytes(pose.translation.data(), 3 * sizeof(double));
+    if (keyframe.features == nullptr) continue;
+    for (const features::PointFeature& f : keyframe.features->points) {
+      hash.number(f.pixel.x());
+      hash.number(f.pixel.y());
+      hash.number(f.depth);
+    }
+    for (const features::Descriptor256& d : keyframe.features->descriptors) hash.bytes(&d, sizeof d);
+    for (const features::LineFeature& f : keyframe.features->lines) {
+      hash.number(f.segment.start.x());
+      hash.number(f.segment.end.y());
+    }
+  }
+  return hash.value();
+}
+
+}  // namespace plumbline::maps

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/result_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <system_error>
+
+#include "plumbline/cloud/ply.hpp"
+#include "plumbline/maps/output_folder.hpp"
+
+namespace plumbline::maps {
+
+core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
+  std::error_code ec;
+  if (std::filesystem::is_regular_file(folder, ec)) {
+    return core::input_error(
+        fmt::format("{}: is a file; give the result folder of plumbline map", folder.string()));
+  }
+  if (!std::filesystem::is_directory(folder, ec)) {
+    return core::input_error(
+        fmt::format("{}: no such folder; give the result folder of plumbline map", folder.string()));
+  }
+  if (!is_result_folder(folder)) {
+    return core::input_error(fmt::format(
+        "{}: is not a result of plumbline map (summary.json or config.yaml is missing)", folder.string()));
+  }
+  return ResultFolder{folder};
+}
+
+core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result) {
+  std::error_code ec;
+  if (!std::filesystem::exists(result.ply(), ec) && std::filesystem::exists(result.pcd(), ec)) {
+    return cloud::read_cloud(result.pcd());
+  }
+  return cloud::read_cloud(result.ply());
+}
+
+core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::path& file) {
+  const auto data = cloud::read_ply(file);
+  if (!data) return tl::unexpected<core::Error>(data.error());
+  const std::vector<float>* x = data->floats("x");
+  const std::vector<float>* y = data->floats("y");
+  const std::vector<float>* z = data->floats("z");
+  if (x == nullptr || y == nullptr || z == nullptr) {
+    return core::input_error(fmt::format("{}: the vertices have no x, y, z", file.string()));
+  }
+  const auto vertex = [&](std::uint32_t i) {
+    return Eigen::Vector3f((*x)[i], (*y)[i], (*z)[i]).cast<double>();
+  };
+  std::vector<LineSegment3> lines;
+  for (const auto& [a, b] : data->edges) lines.emplace_back(vertex(a), vertex(b));
+  return lines;
+}
+
+core::Result<void> write_trajectory_ply(const std::filesystem::path& file,
+                                        const geometry::Trajectory& trajectory) {
+  std::array<std::vector<float>, 3> xyz;
+  cloud::PlyData data;
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const Eigen::Vector3f p = trajectory[i].world_from_camera.translation.cast<float>();
+    for (int axis = 0; axis < 3; ++axis) xyz[static_cast<std::size_t>(axis)].push_back(p[axis]);
+    const auto index = static_cast<std::uint32_t>(i);
+    if (i > 0) data.edges.push_back({index - 1, index});
+  }
+  data.add("x", std::move(xyz[0]));
+  data.add("y", std::move(xyz[1]));
+  data.add("z", std::move(xyz[2]));
+  return cloud::write_ply(file, data);
+}
+
+}  // namespace plumbline::maps

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/stored_result.hpp"
+
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/transform.hpp"
+#include "plumbline/core/config.hpp"
+#include "plumbline/maps/fusion_state.hpp"
+#include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/stored_views.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The stage of type fuse in a configuration; null: none.
+const core::ConfigNode* fuse_stage_of(const core::ConfigNode& root) {
+  const core::ConfigNode* stages = root.find("stages");
+  if (stages == nullptr) return nullptr;
+  for (const auto& [name, stage] : stages->entries) {
+    const core::ConfigNode* type = stage.find("type");
+    if (type != nullptr && type->scalar == "fuse") return &stage;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+core::Result<MapPlace> find_map(const fs::path& input) {
+  std::error_code ec;
+  MapPlace place;
+  if (fs::is_regular_file(input, ec) && input.extension() == ".db") {
+    place.store = input;
+    return place;
+  }
+  if (!fs::exists(input, ec)) {
+    const fs::path left = OutputFolder::partial_of(input) / kStoreFile;
+    if (!input.empty() && fs::is_regular_file(left, ec)) {
+      place.store = left;
+      return place;
+    }
+  }
+  if (fs::is_regular_file(input / kStoreFile, ec)) place.store = input / kStoreFile;
+  auto result = open_result(input);
+  if (result) place.result = std::move(*result);
+  if (!result && place.store.empty()) return tl::unexpected<core::Error>(result.error());
+  return place;
+}
+
+StoredResult::StoredResult(fs::path file, StoreReader reader, StoredMap map)
+    : file_(std::move(file)),
+      reader_(std::make_unique<StoreReader>(std::move(reader))),
+      map_(std::move(map)) {}
+
+core::Result<StoredResult> StoredResult::open(const fs::path& store) {
+  auto reader = StoreReader::open(store);
+  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  auto map = reader->load();
+  if (!map) return tl::unexpected<core::Error>(map.error());
+  return StoredResult(store, std::move(*reader), std::move(*map));
+}
+
+geometry::Trajectory StoredResult::trajectory() const {
+  geometry::Trajectory poses = maps::trajectory(map_.frames, map_.map);
+  for (geometry::StampedPose& pose : poses) {
+    pose.world_from_camera = map_.result.output_from_map * pose.world_from_camera;
+  }
+  return poses;
+}
+
+std::vector<KeyframePose> StoredResult::keyframes() const {
+  std::vector<KeyframePose> poses = keyframe_poses(map_.map);
+  for (KeyframePose& pose : poses) {
+    pose.world_from_camera = map_.result.output_from_map * pose.world_from_camera;
+  }
+  return poses;
+}
+
+geometry::Trajectory StoredResult::keyframe_trajectory() const {
+  geometry::Trajectory poses;
+  for (const KeyframePose& keyframe : keyframes()) {
+    poses.push_back({keyframe.stamp, keyframe.world_from_camera});
+  }
+  return poses;
+}
+
+std::vector<LineSegment3> StoredResult::lines() const {
+  std::vector<LineSegment3> segments = line_segments(map_.map);
+  for (auto& [start, end] : segments) {
+    start = map_.result.output_from_map * start;
+    end = map_.result.output_from_map * end;
+  }
+  return segments;
+}
+
+cloud::DenseFusionOptions StoredResult::fusion_options() const {
+  cloud::DenseFusionOptions options;
+  core::OptionTable table;
+  options.declare(table);
+  const auto root = core::parse_yaml(map_.header.configuration, file_.string());
+  const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
+  if (stage == nullptr) return options;
+  core::ConfigProblems ignored;  // of another version: what it does not know keeps its default
+  for (const core::OptionSpec& spec : table.specs()) {
+    if (const core::ConfigNode* value = stage->find(spec.key)) table.set(spec.key, *value, "fuse", ignored);
+  }
+  return options;
+}
+
+cloud::FilterChain StoredResult::fusion_filters() const {
+  const auto root = core::parse_yaml(map_.header.configuration, file_.string());
+  const core::ConfigNode* stage = root ? fuse_stage_of(*root) : nullptr;
+  const core::ConfigNode* list = stage != nullptr ? stage->find("filters") : nullptr;
+  if (list == nullptr || list->kind != core::ConfigNode::Kind::kSequence) return {};
+  core::ConfigProblems problems;
+  const auto chain = cloud::FilterChain::parse_list(*list, "fuse", cloud::builtin_filters(), problems);
+  return problems.empty() && chain.writes().empty() ? chain : cloud::FilterChain();
+}
+
+core::Result<StoredViews> StoredResult::views() const {
+  return views_of(*reader_, poses_of(map_.map, map_.frames));
+}
+
+core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
+                                                    const core::Executor& executor) const {
+  const auto stored = views();
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (stored->size() == 0) {
+    return core::input_error(fmt::format("{}: holds no clouds; map the recording again", file_.string()));
+  }
+  FusionState state;
+  const auto kept = reader_->attachment(kFusionAttachment);
+  if (!kept) return tl::unexpected<core::Error>(kept.error());
+  if (*kept) {
+    auto read = fusion_state_of(**kept);
+    if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
+    state = std::move(*read);
+  }
+  cloud::FusionViews all;
+  all.world_from_camera = stored->world_from_camera;
+  for (const std::int32_t robot : stored->robots) {
+    all.cameras.push_back(camera_of(map_.header.robots, robot).color);
+  }
+  all.read = [&](std::size_t i) {
+    auto cloud = stored->read(i);
+    if (cloud) state.correct(stored->robots[i], **cloud);
+    return cloud;
+  };
+  all.covariances = state.covariances_of(stored->robots, stored->stamps);
+  auto fused = cloud::fuse_views(all, options, executor);
+  if (!fused) return fused;
+  if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
+  const cloud::FilterChain filters = fusion_filters();
+  if (filters.size() == 0) return fused;
+  cloud::FusedCloud result;
+  cloud::FilterContext context;
+  context.executor = &executor;
+  context.spacing_m = options.voxels.voxel_m;
+  context.columns = &fused->columns;
+  context.made_columns = &result.columns;
+  auto filtered = filters.apply(std::move(fused->cloud), context);
+  if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+  result.cloud = std::move(*filtered);
+  return result;
+}
+
+core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& folder) const {
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  if (ec) {
+    return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  }
+  const auto stored = views();
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  std::size_t written = 0;
+  for (std::size_t i = 0; i < stored->size(); ++i) {
+    const core::KeyframeId id = stored->keyframes[i];
+    if (!id.valid()) continue;
+    const auto cloud = stored->read(i);
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    cloud::transform(
+        **cloud, map_.result.output_from_map * stored->world_from_camera[i] * cloud::sensor_pose(**cloud));
+    const std::string name =
+        id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
+    if (auto done = cloud::write_ply(folder / name, **cloud); !done) {
+      return tl::unexpected<core::Error>(done.error());
+    }
+    ++written;
+  }
+  return written;
+}
+
+core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core::Executor& executor) {
+  std::error_code ec;
+  const bool written =
+      place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));
+  if (written || place.store.empty()) return read_result_cloud(*place.result);
+  const auto stored = StoredResult::open(place.store);
+  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  auto fused = stored->fused(stored->fusion_options(), executor);
+  if (!fused) return tl::unexpected<core::Error>(fused.error());
+  cloud::CloudFile file;
+  file.cloud = std::move(fused->cloud);
+  file.columns = std::move(fused->columns);
+  file.has_color = true;
+  file.has_normals = true;
+  return file;
+}
+
+}  // namespace plumbline::maps

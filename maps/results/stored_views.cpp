@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/stored_views.hpp"
+
+#include <algorithm>
+#include <set>
+#include <system_error>
+#include <utility>
+
+namespace plumbline::maps {
+
+core::Result<cloud::CloudPtr> StoredViews::read(std::size_t view) const {
+  return keyframes[view].valid() ? reader->cloud(keyframes[view]) : reader->cloud(frames[view]);
+}
+
+core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map, const Arrivals& arrivals) {
+  const auto keyframes = reader.cloud_ids();
+  if (!keyframes) return tl::unexpected<core::Error>(keyframes.error());
+  auto frames = reader.frame_cloud_ids();
+  if (!frames) return tl::unexpected<core::Error>(frames.error());
+  const auto arrival = [&](FrameId frame) {
+    const auto found = arrivals.find(frame);
+    return found == arrivals.end() ? 0 : found->second;
+  };
+  std::stable_sort(frames->begin(), frames->end(),
+                   [&](FrameId a, FrameId b) { return arrival(a) < arrival(b); });
+  StoredViews views;
+  views.reader = &reader;
+  const auto add = [&](core::KeyframeId keyframe, FrameId frame, double stamp,
+                       const geometry::Rigid3& world_from_camera) {
+    views.keyframes.push_back(keyframe);
+    views.frames.push_back(frame);
+    views.world_from_camera.push_back(world_from_camera);
+    views.robots.push_back(keyframe.valid() ? keyframe.robot : frame.robot);
+    views.stamps.push_back(stamp);
+  };
+  const std::set<core::KeyframeId> there(keyframes->begin(), keyframes->end());
+  std::set<std::pair<std::int32_t, double>> seen;  // a run that went on may make a keyframe of what was none
+  for (const KeyframePose& keyframe : map.keyframes) {
+    if (there.count(keyframe.id) == 0) continue;
+    add(keyframe.id, {}, keyframe.stamp, keyframe.world_from_camera);
+    seen.emplace(keyframe.id.robot, keyframe.stamp);
+  }
+  std::map<FrameId, std::size_t> places;
+  for (std::size_t i = 0; i < map.trajectory_ids.size(); ++i) places[map.trajectory_ids[i]] = i;
+  for (const FrameId frame : *frames) {
+    const auto found = places.find(frame);
+    if (found == places.end()) continue;  // it was lost, or its map is left out
+    const geometry::StampedPose& pose = map.trajectory[found->second];
+    if (seen.count({frame.robot, pose.stamp}) == 0) add({}, frame, pose.stamp, pose.world_from_camera);
+  }
+  return views;
+}
+
+}  // namespace plumbline::maps

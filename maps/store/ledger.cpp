@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <system_error>
+#include <utility>
+
+#include "plumbline/maps/store_replica.hpp"
+#include "store/store_sqlite.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using core::ErrorKind;
+
+constexpr std::int64_t kLedgerApplication = 0x504c4e57;  // "PLNW", in the head of the SQLite file
+
+void check_ledger(Database& database) {
+  if (database.number("PRAGMA application_id") != kLedgerApplication) {
+    throw StoreFailure(ErrorKind::kInput, "is no network.db of Plumbline; move it away");
+  }
+}
+
+std::vector<std::pair<std::string, std::string>> read_all(Database& database) {
+  std::vector<std::pair<std::string, std::string>> texts;
+  Statement rows(database, "SELECT name, value FROM text ORDER BY name");
+  while (rows.step()) texts.emplace_back(rows.text(0), rows.text(1));
+  return texts;
+}
+
+}  // namespace
+
+core::Result<std::vector<std::pair<std::string, std::string>>> Ledger::all() const {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file_, ignored)) return std::vector<std::pair<std::string, std::string>>();
+  return guarded(file_, ErrorKind::kInput, [&] {
+    Database database(file_, Database::Access::kRead);
+    check_ledger(database);
+    return read_all(database);
+  });
+}
+
+core::Result<std::optional<std::string>> Ledger::get(const std::string& name) const {
+  const auto texts = all();
+  if (!texts) return tl::unexpected<core::Error>(texts.error());
+  for (const auto& [key, value] : *texts) {
+    if (key == name) return value;
+  }
+  return std::nullopt;
+}
+
+core::Result<void> Ledger::put(const std::vector<std::pair<std::string, std::string>>& texts) const {
+  return guarded(file_, ErrorKind::kOutput, [&] {
+    Database database(file_, Database::Access::kCreate);
+    database.run("PRAGMA synchronous = FULL");
+    Transaction whole(database, true);
+    if (database.number("SELECT count(*) FROM sqlite_master") == 0) {
+      database.run("PRAGMA application_id = " + std::to_string(kLedgerApplication));
+      database.run("CREATE TABLE text (name TEXT PRIMARY KEY, value TEXT NOT NULL)");
+    }
+    check_ledger(database);
+    Statement put(database, "REPLACE INTO text VALUES (?, ?)");
+    for (const auto& [name, value] : texts) put.bind(1, name).bind(2, value).run();
+    whole.commit();
+  });
+}
+
+}  // namespace plumbline::maps

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "store/store_check.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <cmath>
+#include <limits>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+constexpr std::int64_t kMostRobots = 255;
+constexpr std::int64_t kMostNumbers = 1 << 22;  // of keyframes, of pages: far above what a run can have
+constexpr std::size_t kMostPlain = 64U << 20U;  // bytes of a keyframe or a surface, unpacked
+constexpr std::size_t kMostPage = 8U << 20U;    // of a page of landmarks, frames or lines of the log
+constexpr std::size_t kMostSmall = 64U << 10U;
+constexpr double kMostSide = 16384;  // pixels
+
+void demand(bool holds, const char* otherwise) {
+  if (!holds) throw BadBytes(otherwise);
+}
+
+template <typename Matrix>
+bool all_finite(const Matrix& m) {
+  return m.allFinite();
+}
+
+void check(const geometry::Rigid3& pose) {
+  demand(all_finite(pose.rotation) && all_finite(pose.translation), "a pose is not finite");
+  const Eigen::Matrix3d unit = pose.rotation * pose.rotation.transpose();
+  demand(unit.isIdentity(1e-3) && pose.rotation.determinant() > 0.0, "a pose is no rotation");
+}
+
+void check(const sensor::Pinhole& c) {
+  const bool finite =
+      std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
+  demand(finite && c.fx > 0.0 && c.fy > 0.0, "a camera's focal length is none");
+  demand(c.width > 0 && c.height > 0 && c.width <= kMostSide && c.height <= kMostSide,
+         "a camera's picture has no size");
+}
+
+void check_id(const core::KeyframeId& id) {
+  demand(!id.valid() || (id.robot <= kMostRobots && id.index < kMostNumbers), "an id is out of range");
+}
+
+template <typename Ids>
+void check_next(const Ids& ids) {
+  constexpr std::int64_t kMost = kMostNumbers * kLandmarksPerPage;
+  for (const auto& id : ids) {
+    demand(id.robot >= 0 && id.robot <= kMostRobots && id.index >= 0 && id.index < kMost,
+           "an id is out of range");
+  }
+}
+
+void check_keyframe(const Bytes& bytes, const RowName& name, const std::vector<RobotInfo>& robots) {
+  demand(!robots.empty(), "there is no camera");
+  const auto keyframe =
+      decode_keyframe(bytes, camera_of(robots, static_cast<std::int32_t>(name.robot)).color);
+  demand(keyframe->id.robot == name.robot && keyframe->id.index == name.number,
+         "it holds what belongs to another row");
+  demand(std::isfinite(keyframe->stamp) && std::isfinite(keyframe->turn_rate), "its stamp is not finite");
+  check_id(keyframe->reference);
+  check(keyframe->camera_from_reference);
+  if (keyframe->features == nullptr) return;
+  for (const features::PointFeature& p : keyframe->features->points) {
+    demand(all_finite(p.pixel) && p.pixel.cwiseAbs().maxCoeff() <= static_cast<float>(kMostSide),
+           "a point's pixel is out of range");
+  }
+}
+
+template <typename Landmark>
+void check_landmarks(const Bytes& bytes, const RowName& name) {
+  std::vector<Landmark> landmarks;
+  decode_page(bytes, landmarks);
+  std::int32_t last = -1;
+  for (const Landmark& landmark : landmarks) {
+    demand(landmark.id.robot == name.robot && landmark.id.index / kLandmarksPerPage == name.number,
+           "it holds what belongs to another row");
+    demand(landmark.id.index > last, "a landmark is there twice");
+    last = landmark.id.index;
+    if constexpr (std::is_same_v<Landmark, MapPoint>) {
+      demand(
+          all_finite(landmark.position) && all_finite(landmark.normal) && all_finite(landmark.view_direction),
+          "a landmark is not finite");
+    } else {
+      demand(all_finite(landmark.start) && all_finite(landmark.end), "a landmark is not finite");
+    }
+    for (const Observation& o : landmark.observations) check_id(o.keyframe);
+  }
+}
+
+void check_frame_page(const Bytes& bytes) {
+  std::vector<FramePose> frames;
+  decode_page(bytes, frames);
+  for (const FramePose& frame : frames) {
+    demand(std::isfinite(frame.stamp), "a frame's stamp is not finite");
+    check_id(frame.reference);
+    if (!frame.tracked) continue;
+    check(frame.camera_from_reference);
+    if (frame.camera_from_previous) check(*frame.camera_from_previous);
+  }
+}
+
+template <typename Edge>
+void check_edge(const Edge& edge) {
+  check_id(edge.a);
+  check_id(edge.b);
+  check(edge.b_from_a);
+  demand(all_finite(edge.information), "an edge is not finite");
+}
+
+void check(const sensor::Camera& camera) {
+  check(camera.color);
+  if (camera.depth) check(*camera.depth);
+  if (camera.color_from_depth) check(*camera.color_from_depth);
+  for (const double k : camera.distortion) demand(std::isfinite(k), "the camera is not finite");
+  for (const double k : camera.depth_slope) demand(std::isfinite(k), "the camera is not finite");
+}
+
+void check_map(const Bytes& bytes) {
+  const MapRow row = decode<MapRow>(bytes);
+  check_next(row.next.keyframes);
+  check_next(row.next.points);
+  check_next(row.next.lines);
+  for (const LoopEdge& loop : row.loops) check_edge(loop);
+}
+
+void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+  const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
+  if (key == "robots") {
+    robots = decode<std::vector<RobotInfo>>(plain(kMostSmall));
+    demand(!robots.empty(), "there is no robot");
+    for (const RobotInfo& robot : robots) {
+      demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
+      check(robot.camera);
+    }
+  } else if (key == "result") {
+    check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
+  } else {
+    const bool known = key == "input" || key == "program" || key == "configuration" || key == "complete";
+    demand(known, "nothing has this name");
+  }
+}
+
+void check_log(const Bytes& plain) {
+  std::vector<std::string> lines;
+  decode_page(plain, lines);
+}
+
+void check_cloud(const Bytes& bytes) {
+  const auto cloud = cloud::decode_cloud(bytes.data(), bytes.size());
+  if (!cloud) throw BadBytes(cloud.error().message);
+}
+
+}  // namespace
+
+void check_name(const RowName& name) {
+  const RowTable& table = kRowTables[name.place];
+  if (table.named) {
+    demand(!name.key.empty() && name.key.size() <= 64, "its name is out of range");
+  } else {
+    const std::string text = table.name;
+    const std::int64_t most = text == "edge"          ? 1LL << 40U
+                              : text == "frame_cloud" ? std::numeric_limits<std::int32_t>::max()
+                                                      : kMostNumbers;
+    demand(name.robot >= 0 && name.robot <= kMostRobots && name.number >= 0 && name.number < most,
+           "its number is out of range");
+  }
+}
+
+void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
+  check_name(name);
+  const std::string table = kRowTables[name.place].name;
+  const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
+  if (table == "header") return check_header(name.key, bytes, robots);
+  if (table == "map") return check_map(plain(kMostPlain));
+  if (table == "keyframe") return check_keyframe(plain(kMostPlain), name, robots);
+  if (table == "state") {
+    const KeyframeState state = decode<KeyframeState>(plain(kMostSmall));
+    check(state.camera_from_world);
+    return check_id(state.parent);
+  }
+  if (table == "point") return check_landmarks<MapPoint>(plain(kMostPage), name);
+  if (table == "line") return check_landmarks<MapLine>(plain(kMostPage), name);
+  if (table == "edge") {
+    const auto row = decode<EdgeRow>(plain(kMostSmall));
+    demand(row.number == static_cast<std::uint64_t>(name.number), "it holds what belongs to another row");
+    return check_edge(row.edge);
+  }
+  if (table == "frame") return check_frame_page(plain(kMostPage));
+  if (table == "log") return check_log(plain(kMostPage));
+  if (table == "attachment") {
+    plain(kMostPlain);
+    return;
+  }
+  if (table == "surface") {
+    decode_surface(plain(kMostPlain));
+    return;
+  }
+  check_cloud(bytes);
+}
+
+}  // namespace plumbline::maps

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a map consists of as bytes (docs/reference/store.md), before packing: `fields` of each type is the
+// format.
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/sensor/camera.hpp"
+#include "store/store_bytes.hpp"
+
+namespace plumbline::geometry {
+
+template <typename Io>
+void fields(Io& io, Rigid3& transform) {
+  io(transform.rotation, transform.translation);
+}
+
+}  // namespace plumbline::geometry
+
+namespace plumbline::sensor {
+
+template <typename Io>
+void fields(Io& io, Pinhole& p) {
+  constexpr int kMost = 1 << 16;
+  io(p.width, p.height);
+  io.check(p.width >= 0 && p.height >= 0 && p.width <= kMost && p.height <= kMost,
+           "a picture's size is wrong");
+  io(p.fx, p.fy, p.cx, p.cy);
+}
+
+template <typename Io>
+void fields(Io& io, Camera& c) {
+  io(c.name, c.color, c.distortion, c.depth_scale, c.fps, c.color_from_depth, c.depth, c.readout_s,
+     c.depth_slope);
+}
+
+}  // namespace plumbline::sensor
+
+namespace plumbline::maps {
+
+/// Landmarks and frame poses of neighbouring numbers share a row.
+constexpr std::int32_t kLandmarksPerPage = IdMap<PointId, MapPoint>::kIdsPerPage;
+static_assert(kLandmarksPerPage == 64, "the store's format");
+constexpr std::size_t kFramesPerPage = 256;
+
+template <typename Io>
+void fields(Io& io, RobotInfo& robot) {
+  io(robot.number, robot.name, robot.camera);
+}
+
+template <typename Io>
+void fields(Io& io, ResultFrame& frame) {
+  io(frame.output_from_map, frame.upright);
+}
+
+/// Pose and parent, which change as the map is refined.
+struct KeyframeState {
+  geometry::Rigid3 camera_from_world;
+  KeyframeId parent;
+};
+template <typename Io>
+void fields(Io& io, KeyframeState& state) {
+  io(state.camera_from_world, state.parent);
+}
+
+template <typename Io>
+void fields(Io& io, Observation& o) {
+  constexpr std::int32_t kAligned = 1 << 30;  // beside the number of a feature
+  std::int32_t number = o.aligned ? o.feature | kAligned : o.feature;
+  io(o.keyframe, number);
+  if constexpr (Io::kReads) {
+    const bool aligned = number >= 0 && (number & kAligned) != 0;
+    o = {o.keyframe, aligned ? number - kAligned : number, aligned};
+  }
+}
+
+template <typename Io>
+void fields(Io& io, MapPoint& p) {
+  io(p.id, p.position, p.descriptor, p.angle, p.angle_keyframe, p.view_direction, p.normal,
+     p.reference_distance, p.reference_octave, p.visible, p.found, p.observations);
+}
+
+template <typename Io>
+void fields(Io& io, MapLine& l) {
+  io(l.id, l.start, l.end, l.descriptor, l.visible, l.found, l.observations);
+}
+
+template <typename Io>
+void fields(Io& io, LoopEdge& loop) {
+  io(loop.a, loop.b, loop.b_from_a, loop.information);
+}
+
+/// A surface edge with its number, which tells a row that holds another's bytes.
+struct EdgeRow {
+  std::uint64_t number = 0;
+  SurfaceEdge edge;
+};
+template <typename Io>
+void fields(Io& io, EdgeRow& row) {
+  io(row.number, row.edge.a, row.edge.b, row.edge.b_from_a, row.edge.information);
+}
+
+template <typename Io>
+void fields(Io& io, FramePose& f) {
+  io(f.stamp, f.reference, f.camera_from_reference, f.tracked, f.camera_from_previous, f.step_sigma_m);
+}
+
+/// What belongs to a map as a whole, and how much of everything there must be: tells when rows were lost.
+struct MapRow {
+  std::uint64_t keyframes = 0;
+  std::uint64_t points = 0;
+  std::uint64_t lines = 0;
+  std::uint64_t edges = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t log = 0;
+  NextIds next;
+  std::vector<LoopEdge> loops;
+};
+template <typename Io>
+void fields(Io& io, MapRow& row) {
+  io(row.keyframes, row.points, row.lines, row.edges, row.frames, row.log, row.next.edge);
+  io(row.next.keyframes, row.next.points, row.next.lines, row.loops);
+  // Every id that was ever given takes four bytes of a map.
+  const auto check = [&](const auto& ids) {
+    for (const auto& id : ids) {
+      io.check(id.index >= 0 && id.index <= 1 << 28, "a next id is out of range");
+    }
+  };
+  check(row.next.keyframes);
+  check(row.next.points);
+  check(row.next.lines);
+}
+
+void encode(const Keyframe& keyframe, ByteWriter& to);
+/// `picture` is what the look-up grid of the points is made for.
+std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& picture);
+
+/// Rounded: points to 0.2 mm, normals to 0.2 degrees, sigma to 0.005 mm.
+void encode(const StoredSurface& surface, ByteWriter& to);
+StoredSurface decode_surface(const Bytes& bytes);
+
+}  // namespace plumbline::maps

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "plumbline/cloud/compact_cloud.hpp"
+#include "store/map_rows.hpp"
+#include "store/store_schema.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using core::ErrorKind;
+
+/// Calls row(robot, number, bytes) for all rows of `table` by robot and number; what `row` dislikes is told
+/// with the row's name.
+template <typename Row>
+void read_table(Database& database, const std::string& table, const Row& row) {
+  Statement rows(database, ("SELECT robot, number, data FROM " + table + " ORDER BY robot, number").c_str());
+  while (rows.step()) {
+    const std::int64_t robot = rows.integer(0);
+    const std::int64_t number = rows.integer(1);
+    try {
+      row(robot, number, rows.unpacked(2));
+    } catch (const BadBytes& bad) {
+      throw BadBytes(table + " " + std::to_string(robot) + "/" + std::to_string(number) + ": " + bad.what());
+    }
+  }
+}
+
+bool is_complete(Database& database) {
+  return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
+}
+
+std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) {
+  const Transaction moment(database, false);  // one moment of a store that is being written
+  MapRows rows;
+  for (const char* table : MapRows::kTables) {
+    read_table(database, table, [&](std::int64_t robot, std::int64_t number, const Bytes& plain) {
+      rows.put(table, {robot, number}, plain, header.robots);
+    });
+  }
+  std::vector<StoredMap> maps = rows.maps();
+  for (StoredMap& map : maps) {
+    map.header = header;
+    map.complete = is_complete(database);
+    if (map.complete) map.result = read_result_frame(database);
+  }
+  return maps;
+}
+
+template <typename IdType>
+std::string name_of(IdType id) {
+  return std::to_string(id.robot) + "/" + std::to_string(id.index);
+}
+
+}  // namespace
+
+struct StoreReader::Impl {
+  std::filesystem::path file;
+  std::unique_ptr<Database> database;
+  StoreHeader header;
+
+  template <typename IdType>
+  [[nodiscard]] core::Result<std::vector<IdType>> ids(const char* sql) const;
+  /// A cloud's bytes; `what` names it.
+  template <typename IdType>
+  [[nodiscard]] core::Result<std::vector<std::uint8_t>> blob(const char* sql, IdType id,
+                                                             const std::string& what) const;
+  [[nodiscard]] core::Result<cloud::CloudPtr> decode(const core::Result<std::vector<std::uint8_t>>& bytes,
+                                                     const std::string& what) const;
+};
+
+StoreReader::StoreReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+StoreReader::StoreReader(StoreReader&& other) noexcept = default;
+StoreReader::~StoreReader() = default;
+
+core::Result<StoreReader> StoreReader::open(const std::filesystem::path& file) {
+  return guarded(file, ErrorKind::kInput, [&] {
+    check_file(file);
+    auto impl = std::make_unique<Impl>();
+    impl->file = file;
+    impl->database = std::make_unique<Database>(file, Database::Access::kRead);
+    check_store(*impl->database);
+    impl->header = read_header(*impl->database);
+    return StoreReader(std::move(impl));
+  });
+}
+
+const StoreHeader& StoreReader::header() const { return impl_->header; }
+
+/// In parts: of more at a time only the beginning is read.
+void StoreReader::read_ahead() const {
+#ifdef POSIX_FADV_WILLNEED
+  constexpr off_t kPart = 4 << 20;
+  const int file = ::open(impl_->file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return;  // who reads will tell
+  const off_t size = ::lseek(file, 0, SEEK_END);
+  for (off_t at = 0; at < size; at += kPart) ::posix_fadvise(file, at, kPart, POSIX_FADV_WILLNEED);
+  ::close(file);
+#endif
+}
+
+core::Result<std::vector<StoredMap>> StoreReader::load_each() const {
+  return guarded(impl_->file, ErrorKind::kInput, [&] { return read_maps(*impl_->database, impl_->header); });
+}
+
+core::Result<StoredMap> StoreReader::load() const {
+  auto maps = load_each();
+  if (!maps) return tl::unexpected<core::Error>(maps.error());
+  if (maps->size() == 1) return std::move(maps->front());
+  return core::input_error(impl_->file.string() + ": the maps of its " + std::to_string(maps->size()) +
+                           " robots are not one yet; go on with plumbline map --resume");
+}
+
+template <typename IdType>
+core::Result<std::vector<IdType>> StoreReader::Impl::ids(const char* sql) const {
+  return guarded(file, ErrorKind::kInput, [&] {
+    std::vector<IdType> ids;
+    Statement rows(*database, sql);
+    while (rows.step()) {
+      ids.push_back({static_cast<std::int32_t>(rows.integer(0)), static_cast<std::int32_t>(rows.integer(1))});
+    }
+    return ids;
+  });
+}
+
+core::Result<std::vector<KeyframeId>> StoreReader::cloud_ids() const {
+  return impl_->ids<KeyframeId>("SELECT robot, number FROM cloud ORDER BY robot, number");
+}
+
+core::Result<std::vector<FrameId>> StoreReader::frame_cloud_ids() const {
+  return impl_->ids<FrameId>("SELECT robot, number FROM frame_cloud ORDER BY robot, number");
+}
+
+template <typename IdType>
+core::Result<std::vector<std::uint8_t>> StoreReader::Impl::blob(const char* sql, IdType id,
+                                                                const std::string& what) const {
+  return guarded(file, ErrorKind::kInput, [&]() -> std::vector<std::uint8_t> {
+    Statement row(*database, sql);
+    if (row.bind(1, id.robot).bind(2, id.index).step()) return row.blob(0);
+    if (what.empty()) return {};
+    throw StoreFailure(ErrorKind::kInput, "has no cloud of " + what);
+  });
+}
+
+core::Result<cloud::CloudPtr> StoreReader::Impl::decode(const core::Result<std::vector<std::uint8_t>>& bytes,
+                                                        const std::string& what) const {
+  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  core::Result<cloud::CloudPtr> cloud = cloud::decode_cloud(bytes->data(), bytes->size());
+  if (cloud) return cloud;
+  return core::input_error(file.string() + ": " + what + ": " + cloud.error().message);
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::cloud_bytes(KeyframeId keyframe) const {
+  return impl_->blob("SELECT data FROM cloud WHERE robot = ? AND number = ?", keyframe,
+                     "keyframe " + name_of(keyframe));
+}
+
+core::Result<cloud::CloudPtr> StoreReader::cloud(KeyframeId keyframe) const {
+  return impl_->decode(cloud_bytes(keyframe), "keyframe " + name_of(keyframe));
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::cloud_bytes(FrameId frame) const {
+  return impl_->blob("SELECT data FROM frame_cloud WHERE robot = ? AND number = ?", frame,
+                     "frame " + name_of(frame));
+}
+
+core::Result<cloud::CloudPtr> StoreReader::cloud(FrameId frame) const {
+  return impl_->decode(cloud_bytes(frame), "frame " + name_of(frame));
+}
+
+core::Result<std::vector<std::uint8_t>> StoreReader::surface_bytes(KeyframeId keyframe) const {
+  return impl_->blob("SELECT data FROM surface WHERE robot = ? AND number = ?", keyframe, "");
+}
+
+core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes) {
+  try {
+    return decode_surface(unpack(bytes.data(), bytes.size()));
+  } catch (const BadBytes& bad) {
+    return core::input_error(std::string("stored surface: ") + bad.what() + "; it cannot be used");
+  }
+}
+
+core::Result<StoreContents> StoreReader::contents() const {
+  return guarded(impl_->file, ErrorKind::kInput, [&] {
+    Database& database = *impl_->database;
+    const Transaction moment(database, false);
+    const auto count = [&](const char* sql) { return static_cast<std::size_t>(database.number(sql)); };
+    StoreContents contents;
+    contents.complete = is_complete(database);
+    read_table(database, "map", [&](std::int64_t, std::int64_t, const Bytes& plain) {
+      const auto row = maps::decode<MapRow>(plain);
+      contents.keyframes += row.keyframes;
+      contents.points += row.points;
+      contents.lines += row.lines;
+      contents.edges += row.edges;
+      contents.loops += row.loops.size();
+      contents.frames += row.frames;
+    });
+    contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
+    contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
+    contents.cloud_bytes = count(
+        "SELECT (SELECT total(length(data)) FROM cloud)"
+        " + (SELECT total(length(data)) FROM frame_cloud)");
+    Statement names(database, "SELECT key FROM attachment ORDER BY key");
+    while (names.step()) contents.attachments.push_back(names.text(0));
+    return contents;
+  });
+}
+
+core::Result<std::optional<std::vector<std::uint8_t>>> StoreReader::attachment(
+    const std::string& name) const {
+  return guarded(impl_->file, ErrorKind::kInput, [&]() -> std::optional<std::vector<std::uint8_t>> {
+    Statement row(*impl_->database, "SELECT data FROM attachment WHERE key = ?");
+    if (!row.bind(1, name).step()) return std::nullopt;
+    return row.unpacked(0);
+  });
+}
+
+sensor::Camera camera_of(const std::vector<RobotInfo>& robots, std::int32_t robot) {
+  for (const RobotInfo& info : robots) {
+    if (info.number == robot) return info.camera;
+  }
+  return robots.empty() ? sensor::Camera() : robots.front().camera;
+}
+
+core::Result<bool> is_blank_store(const std::filesystem::path& file) {
+  return guarded(file, ErrorKind::kInput, [&] {
+    check_file(file);
+    Database database(file, Database::Access::kRead);
+    return is_blank(database);
+  });
+}
+
+core::Result<StoredMap> load_map(const std::filesystem::path& file) {
+  const core::Result<StoreReader> reader = StoreReader::open(file);
+  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  return reader->load();
+}
+
+}  // namespace plumbline::maps

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The copy of a store, row by row.
+#include "plumbline/maps/store_replica.hpp"
+
+#include <system_error>
+#include <utility>
+
+#include "plumbline/maps/store.hpp"
+#include "store/store_row.hpp"
+
+namespace plumbline::maps {
+namespace {
+
+using core::ErrorKind;
+
+std::vector<RobotInfo> read_robots(Database& database) {
+  Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
+  return robots.step() ? decode<std::vector<RobotInfo>>(robots.unpacked(0)) : std::vector<RobotInfo>();
+}
+
+int type_of(const RowTable& table, const std::string& key) {
+  if (std::string(table.name) != "header") return SQLITE_BLOB;
+  if (key == "complete") return SQLITE_INTEGER;
+  const bool text = key == "input" || key == "program" || key == "configuration";
+  return text ? SQLITE_TEXT : SQLITE_BLOB;
+}
+
+std::unique_ptr<Database> open_database(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const bool fresh = !std::filesystem::exists(file, ignored);
+  auto database =
+      std::make_unique<Database>(file, fresh ? Database::Access::kCreate : Database::Access::kWrite);
+  if (fresh || is_blank(*database)) {
+    database->run("PRAGMA page_size = 8192");
+    database->run("PRAGMA journal_mode = WAL");
+    Transaction whole(*database, true);
+    create_tables(*database);
+    whole.commit();
+  }
+  check_store(*database);
+  database->run("PRAGMA journal_mode = WAL");
+  // What was acknowledged is nowhere else for sure: it survives a power cut, too.
+  database->run("PRAGMA synchronous = FULL");
+  return database;
+}
+
+}  // namespace
+
+struct StoreReplica::Impl {
+  Impl(std::filesystem::path path, std::unique_ptr<Database> opened)
+      : file(std::move(path)), database(std::move(opened)) {
+    learn();
+  }
+  void learn() {
+    heads = read_heads(*database);
+    robots = read_robots(*database);
+    keyframes = static_cast<std::size_t>(database->number("SELECT count(*) FROM keyframe"));
+    complete = database->number("SELECT data FROM header WHERE key = 'complete'") == 1;
+  }
+  void forget() {
+    open.reset();
+    waiting.clear();
+    coming = {};
+  }
+  void take_row(const StoreRow& row);
+  void put(const RowTable& table, const StoreRow& row);
+  void count(const RowTable& table, std::size_t size);
+  /// `action`; when it fails the transaction is over.
+  template <typename Action>
+  core::Result<void> guard(const Action& action) {
+    core::Result<void> done = guarded(file, ErrorKind::kOutput, action);
+    if (!done) forget();
+    return done;
+  }
+
+  std::filesystem::path file;
+  std::unique_ptr<Database> database;
+  StoreHeads heads;
+  std::vector<RobotInfo> robots;
+  std::size_t keyframes = 0;
+  bool complete = false;
+  ReplicaBytes bytes;
+  // Of the transaction that was begun:
+  std::unique_ptr<Transaction> open;
+  StoreShare share = StoreShare::kMap;
+  std::int64_t number = 0;
+  Bytes waiting;        ///< the beginning of a row
+  ReplicaBytes coming;  ///< taken so far
+};
+
+void StoreReplica::Impl::count(const RowTable& table, std::size_t size) {
+  const std::string name = table.name;
+  if (table.share == StoreShare::kClouds) {
+    coming.cloud += size;
+  } else if (name == "keyframe" || name == "state") {
+    coming.place += size;
+  } else {
+    coming.map += size;
+  }
+}
+
+void StoreReplica::Impl::put(const RowTable& table, const StoreRow& row) {
+  const std::string name = table.name;
+  Statement put(
+      *database,
+      ("REPLACE INTO " + name + (table.named ? " VALUES (?, ?, ?)" : " VALUES (?, ?, ?, ?)")).c_str());
+  int place = 1;
+  if (table.named) {
+    put.bind(place++, row.name.key);
+  } else {
+    put.bind(place++, row.name.robot);
+    put.bind(place++, row.name.number);
+  }
+  put.bind(place++, number);
+  if (row.type == SQLITE_INTEGER) put.bind(place, row.integer);
+  if (row.type == SQLITE_TEXT) put.bind(place, row.text);
+  if (row.type == SQLITE_BLOB) put.bind(place, row.data);
+  put.run();
+}
+
+void StoreReplica::Impl::take_row(const StoreRow& row) {
+  const RowTable& table = kRowTables[row.name.place];
+  const std::string where =
+      std::string(table.name) + " " +
+      (table.named ? row.name.key : std::to_string(row.name.robot) + "/" + std::to_string(row.name.number));
+  try {
+    if (table.share != share) throw BadBytes("it belongs to the other share");
+    if (row.removed) {
+      if (table.named) throw BadBytes("rows of this table stay");
+      check_name(row.name);
+    } else {
+      if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
+      check_row(row.name, row.data, robots);
+    }
+  } catch (const BadBytes& bad) {
+    throw BadBytes(where + ": " + bad.what());
+  }
+  if (table.named) return put(table, row);
+  const auto by_key = [&](const char* sql, const std::string& name) {
+    Statement(*database, (sql + name + " AND robot = ? AND number = ?").c_str())
+        .bind(1, row.name.robot)
+        .bind(2, row.name.number)
+        .run();
+  };
+  const std::string place = std::to_string(row.name.place);
+  if (!row.removed) {
+    by_key("DELETE FROM removed WHERE place = ", place);
+    return put(table, row);
+  }
+  by_key("DELETE FROM ", std::string(table.name) + " WHERE 1");
+  Statement(*database, "REPLACE INTO removed VALUES (?, ?, ?, ?)")
+      .bind(1, static_cast<std::int64_t>(row.name.place))
+      .bind(2, row.name.robot)
+      .bind(3, row.name.number)
+      .bind(4, number)
+      .run();
+}
+
+StoreReplica::StoreReplica(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+StoreReplica::StoreReplica(StoreReplica&& other) noexcept = default;
+StoreReplica& StoreReplica::operator=(StoreReplica&& other) noexcept = default;
+StoreReplica::~StoreReplica() {
+  if (impl_ == nullptr) return;
+  impl_->forget();
+  const auto left =
+      guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA journal_mode = DELETE"); });
+  (void)left;  // somebody reads: file and log together are whole as well
+}
+
+core::Result<StoreReplica> StoreReplica::open(const std::filesystem::path& file) {
+  return guarded(file, ErrorKind::kOutput,
+                 [&] { return StoreReplica(std::make_unique<Impl>(file, open_database(file))); });
+}
+
+const StoreHeads& StoreReplica::heads() const { return impl_->heads; }
+std::size_t StoreReplica::keyframes() const { return impl_->keyframes; }
+bool StoreReplica::complete() const { return impl_->complete; }
+const ReplicaBytes& StoreReplica::bytes() const { return impl_->bytes; }
+void StoreReplica::forget() { impl_->forget(); }
+
+core::Result<void> StoreReplica::begin(StoreShare share, std::int64_t number) {
+  impl_->forget();
+  return impl_->guard([&] {
+    if (number <= impl_->heads[share]) throw BadBytes("transaction " + std::to_string(number) + " is old");
+    impl_->open = std::make_unique<Transaction>(*impl_->database, true);
+    impl_->share = share;
+    impl_->number = number;
+  });
+}
+
+core::Result<void> StoreReplica::take(const std::uint8_t* bytes, std::size_t size) {
+  return impl_->guard([&] {
+    if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
+    Bytes& waiting = impl_->waiting;
+    waiting.insert(waiting.end(), bytes, bytes + size);
+    take_rows(waiting, [&](const StoreRow& row, std::size_t length) {
+      impl_->take_row(row);
+      impl_->count(kRowTables[row.name.place], length);
+    });
+  });
+}
+
+core::Result<void> StoreReplica::commit() {
+  return impl_->guard([&] {
+    if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
+    if (!impl_->waiting.empty()) throw BadBytes("a row ends too early");
+    impl_->open->commit();
+    const ReplicaBytes taken = impl_->coming;
+    impl_->forget();
+    impl_->bytes.place += taken.place;
+    impl_->bytes.map += taken.map;
+    impl_->bytes.cloud += taken.cloud;
+    impl_->learn();
+  });
+}
+
+core::Result<void> StoreReplica::clear() {
+  forget();
+  return impl_->guard([&] {
+    Transaction whole(*impl_->database, true);
+    for (const RowTable& table : kRowTables) {
+      impl_->database->run("DELETE FROM " + std::string(table.name));
+    }
+    impl_->database->run("DELETE FROM removed");
+    whole.commit();
+    impl_->learn();
+  });
+}
+
+}  // namespace plumbline::maps

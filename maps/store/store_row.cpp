@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "store/store_row.hpp"
+
+#include <iterator>
+
+namespace plumbline::maps {
+namespace {
+
+template <typename Io>
+void row_fields(Io& io, StoreRow& row) {
+  constexpr std::uint8_t kRemoved = 0x80;
+  auto head = static_cast<std::uint8_t>(row.name.place | (row.removed ? kRemoved : 0));
+  io(head);
+  if constexpr (Io::kReads) {
+    row.removed = (head & kRemoved) != 0;
+    row.name.place = head & ~std::size_t{kRemoved};
+  }
+  io.check(row.name.place < std::size(kRowTables), "there is no such table");
+  if (kRowTables[row.name.place].named) {
+    io(row.name.key);
+  } else {
+    io(row.name.robot, row.name.number);
+  }
+  if (row.removed) return;
+  auto type = static_cast<std::uint8_t>(row.type);
+  io(type);
+  row.type = type;
+  if (type == SQLITE_INTEGER) {
+    io(row.integer);
+  } else if (type == SQLITE_TEXT) {
+    io(row.text);
+  } else {
+    io.check(type == SQLITE_BLOB, "its content has no known type");
+    io.rest(row.data);
+  }
+}
+
+}  // namespace
+
+void append(StoreRow row, ByteWriter& to) {
+  ByteWriter bytes;
+  row_fields(bytes, row);
+  to.number(static_cast<std::uint32_t>(bytes.bytes().size()));
+  to.raw(bytes.bytes());
+}
+
+void take_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::size_t)>& row) {
+  constexpr std::size_t kLength = sizeof(std::uint32_t);  // in front of each
+  const auto at = [&](std::size_t place) { return bytes.begin() + static_cast<std::ptrdiff_t>(place); };
+  std::size_t done = 0;
+  while (bytes.size() - done >= kLength) {
+    const auto length = decode<std::uint32_t>(Bytes(at(done), at(done + kLength)));
+    if (length > kMostRowBytes) throw BadBytes("a row is too large");
+    const std::size_t end = done + kLength + length;
+    if (bytes.size() < end) break;
+    const Bytes content(at(done + kLength), at(end));
+    ByteReader from(content);
+    StoreRow next;
+    row_fields(from, next);
+    from.expect_end();
+    row(next, end - done);
+    done = end;
+  }
+  bytes.erase(bytes.begin(), at(done));
+}
+
+}  // namespace plumbline::maps

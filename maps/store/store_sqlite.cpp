@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "store/store_sqlite.hpp"
+
+#include <sqlite3.h>
+
+namespace plumbline::maps {
+namespace {
+
+constexpr int kPatienceMs = 3000;
+
+int flags_of(Database::Access access) {
+  switch (access) {
+    case Database::Access::kRead:
+      return SQLite::OPEN_READONLY;
+    case Database::Access::kWrite:
+      return SQLite::OPEN_READWRITE;
+    case Database::Access::kCreate:
+      break;
+  }
+  return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
+}
+
+/// With a mutex: clouds are read by several threads. An absolute path is never taken for a URI or for an
+/// option.
+SQLite::Database opened(const std::filesystem::path& file, Database::Access access) {
+  try {
+    return SQLite::Database(std::filesystem::absolute(file).string(),
+                            flags_of(access) | SQLite::OPEN_FULLMUTEX, kPatienceMs);
+  } catch (const SQLite::Exception& error) {
+    const std::string why = error.getErrorStr();
+    if (access != Database::Access::kCreate) {
+      throw StoreFailure(core::ErrorKind::kInput,
+                         "cannot be opened (" + why + "); check path and permissions");
+    }
+    throw StoreFailure(core::ErrorKind::kOutput,
+                       "cannot be made (" + why + "); check folder and permissions");
+  }
+}
+
+std::string remedy_of(int code) {
+  switch (code & 0xff) {
+    case SQLITE_FULL:
+      return "the disk is full; what was stored before is safe: free some space and go on from there";
+    case SQLITE_IOERR:
+    case SQLITE_CANTOPEN:
+      return "cannot be read or written; what was stored before is safe: check disk, folder and permissions";
+    case SQLITE_READONLY:
+    case SQLITE_PERM:
+      return "may not be written; check the permissions of the file and its folder";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return "is in use by another program; wait until that is done";
+    case SQLITE_NOTADB:
+      return "is no map store; give the map.db of a result folder";
+    default:
+      return "damaged; use a copy of the file or map the recording again";
+  }
+}
+
+}  // namespace
+
+StoreFailure failure_of(const SQLite::Exception& error, core::ErrorKind kind) {
+  const int code = error.getErrorCode() & 0xff;
+  const bool content = code == SQLITE_NOTADB || code == SQLITE_CORRUPT;
+  return {content ? core::ErrorKind::kInput : kind, remedy_of(code) + " (SQLite: " + error.what() + ")"};
+}
+
+Database::Database(const std::filesystem::path& file, Access access)
+    : SQLite::Database(opened(file, access)) {}
+
+std::int64_t Database::number(const std::string& sql) {
+  Statement statement(*this, sql);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+bool Statement::step() {
+  try {
+    if (executeStep()) return true;
+  } catch (const SQLite::Exception&) {
+    tryReset();
+    throw;
+  }
+  reset();
+  return false;
+}
+
+Bytes Statement::blob(int column) const {
+  const SQLite::Column value = getColumn(column);
+  const auto* begin = static_cast<const std::uint8_t*>(value.getBlob());
+  return begin == nullptr ? Bytes() : Bytes(begin, begin + value.getBytes());
+}
+
+Bytes Statement::unpacked(int column) const {
+  const SQLite::Column value = getColumn(column);
+  const auto* begin = static_cast<const std::uint8_t*>(value.getBlob());
+  if (begin == nullptr) throw BadBytes("its bytes are missing");
+  return unpack(begin, static_cast<std::size_t>(value.getBytes()));
+}
+
+}  // namespace plumbline::maps

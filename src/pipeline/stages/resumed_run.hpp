@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What an interrupted run left in its store, for the stages of the run that goes on.
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/pipeline/data.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+
+namespace plumbline::pipeline {
+
+struct ResumedRun {
+  std::filesystem::path store;                   ///< its file; clouds are read from there
+  std::map<std::int32_t, maps::StoredMap> maps;  ///< each robot's own
+  std::optional<RobotMap> merged;  ///< or the map of all, when the run had done all but write its results
+  std::vector<FrameRow> rows;      ///< of the frames that are done and could be read
+  std::vector<bool> done;          ///< by frame: each robot's up to its last keyframe
+  std::size_t frames = 0;          ///< how many are done, the unreadable ones too
+  std::size_t keyframes = 0;
+};
+
+/// A row as a line of frames.csv.
+std::string to_line(const FrameRow& row);
+
+/// Opens the store of `folder`. None: no keyframe was stored, and what there is was removed. kUsage: it was
+/// begun with another configuration, recording or camera; the message says what differs. kInput: damaged.
+core::Result<std::optional<ResumedRun>> open_resumed(const std::filesystem::path& folder,
+                                                     const std::string& configuration,
+                                                     const std::string& input,
+                                                     const RobotRecordings& recordings);
+
+/// Keyframes in the store of `folder`; 0 when there is none that opens.
+std::size_t stored_keyframes(const std::filesystem::path& folder);
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/report/report.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/core/version.hpp"
+#include "report_sections.hpp"
+#include "report_style.hpp"
+
+namespace plumbline::report {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Whether a file is the report of an earlier call.
+bool is_report(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string head(512, '\0');
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head.rfind("<!DOCTYPE html>", 0) == 0 && head.find(kReportGenerator) != std::string::npos;
+}
+
+core::Result<void> check_output(const fs::path& file, bool replace) {
+  std::error_code ec;
+  if (fs::is_directory(file, ec)) {
+    return core::usage_error(
+        fmt::format("{}: is a folder; name a file, such as report.html in it", file.string()));
+  }
+  if (!fs::is_regular_file(file, ec)) return {};
+  if (!is_report(file)) {
+    return core::usage_error(fmt::format(
+        "{}: exists and is no report; name another file (only reports are ever replaced)", file.string()));
+  }
+  if (replace) return {};
+  return core::usage_error(fmt::format(
+      "{}: holds an earlier report; name another file with -o or add --force to replace it", file.string()));
+}
+
+}  // namespace
+
+core::Result<ReportSummary> write_report(const ReportRequest& request) {
+  const fs::path file = request.output.empty() ? request.result / "report.html" : request.output;
+  auto data = read_report_data(request.result);
+  if (!data) return tl::unexpected<core::Error>(data.error());
+  if (auto free = check_output(file, request.replace); !free)
+    return tl::unexpected<core::Error>(free.error());
+  if (!request.truth.empty()) {
+    if (auto added = add_truth(request.truth, *data); !added)
+      return tl::unexpected<core::Error>(added.error());
+  }
+  fs::path scratch = file;
+  scratch.replace_filename(fmt::format(".{}.{}.png", file.filename().string(), getpid()));
+  auto pictures = pictures_html(*data, scratch);  // first: damaged ones are told in the head
+  if (!pictures) return tl::unexpected<core::Error>(pictures.error());
+  const std::string page = page_html(
+      "Plumbline report: " + data->name, head_html(*data),
+      {{"pictures", "The map", std::move(*pictures)},
+       {"path", "The path", path_html(*data)},
+       {"tracking", "Tracking over time", tracking_html(*data)},
+       {"loops", "Loops", loops_html(*data)},
+       {"merges", "Merges of robots' maps", merges_html(*data)},
+       {"refinement", "Refinement of the whole", refinement_html(*data)},
+       {"cloud", "The cloud", cloud_html(*data)},
+       {"accuracy", "Accuracy", accuracy_html(*data)},
+       {"cost", "Time and memory", cost_html(*data)},
+       {"configuration", "Configuration", configuration_html(*data)},
+       {"files", "Files", files_html(*data, file)}},
+      fmt::format("Written by plumbline {} from the result folder {}.", core::version(), data->name));
+  core::OutputFile out(file);
+  out.write(page);
+  if (auto written = out.commit(); !written) return tl::unexpected<core::Error>(written.error());
+  return ReportSummary{file, page.size(), std::move(data->missing)};
+}
+
+}  // namespace plumbline::report

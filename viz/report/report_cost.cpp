@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What a run took: time, memory; its configuration and files.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "report_sections.hpp"
+
+namespace plumbline::report {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct TimedColumn {
+  std::string name;
+  std::vector<double> values;
+  double median = 0.0;
+};
+
+std::vector<double> values_of(const CsvTable& table, std::size_t column) {
+  std::vector<double> values;
+  for (std::size_t row = 0; row < table.rows(); ++row) values.push_back(table.number(row, column));
+  return values;
+}
+
+double quantile_or_zero(std::vector<double> values, double q) {
+  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
+               values.end());
+  if (values.empty()) return 0.0;
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+/// The stages that take most time of a frame.
+std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
+  constexpr std::size_t kMost = 5;
+  constexpr double kWorthShowing_ms = 0.5;
+  std::vector<TimedColumn> columns;
+  for (std::size_t c = 0; c < table.columns().size(); ++c) {
+    const std::string& name = table.columns()[c];
+    const bool stage =
+        name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
+    if (!stage) continue;
+    TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
+    column.median = quantile_or_zero(column.values, 0.5);
+    if (quantile_or_zero(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
+  }
+  const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
+  std::stable_sort(columns.begin(), columns.end(), slower);
+  if (columns.size() > kMost) columns.resize(kMost);
+  return columns;
+}
+
+std::string time_charts(const ReportData& data) {
+  if (!data.timing_table) return {};
+  const CsvTable& table = *data.timing_table;
+  std::vector<double> time_s = values_of(table, table.column("stamp"));
+  const double start_s = quantile_or_zero(time_s, 0.0);
+  for (double& t : time_s) t -= start_s;
+  viz::SvgChart chart;
+  chart.title = "Milliseconds of each stage per frame";
+  chart.y_label = "a frame (ms)";
+  chart.height_px = 180;
+  double usual = 0.0, most = 0.0;
+  for (TimedColumn& column : slowest_stages(table)) {
+    usual = std::max(usual, quantile_or_zero(column.values, 0.98));
+    most = std::max(most, quantile_or_zero(column.values, 1.0));
+    chart.lines.push_back({column.name, robot_kind(chart.lines.size()), time_s, std::move(column.values)});
+  }
+  std::string out;
+  if (most > 3.0 * usual) chart.y_range = viz::AxisRange{0.0, 2.0 * usual};
+  if (!chart.lines.empty()) out += svg_chart(chart);
+  if (chart.y_range)
+    out += note(fmt::format("Peaks are cut off; the highest is {}.", number_text(most, 0, "ms")));
+  viz::SvgChart memory;
+  memory.title = "Memory over time";
+  memory.x_label = "time (s)";
+  memory.y_label = "memory (MB)";
+  memory.lines.push_back(
+      {"memory held when a frame was done", "k5", time_s, values_of(table, table.column("rss_mb"))});
+  const bool known = quantile_or_zero(memory.lines[0].y, 1.0) > 0.0;
+  return known ? out + svg_chart(memory) : out;
+}
+
+std::string stages_table(const Json& summary) {
+  HtmlTable table({{"stage"},
+                   {"a frame, median (ms)", true},
+                   {"95 % of frames (ms)", true},
+                   {"at the end (ms)", true},
+                   {"times", true}});
+  for (const auto& [name, stage] : list_at(summary, "/timing/stages_ms").items()) {
+    table.row({name, number_text(number_at(stage, "/median"), 2), number_text(number_at(stage, "/p95"), 2),
+               number_text(number_at(stage, "/finish"), 0), ""});
+  }
+  for (const auto& [name, part] : list_at(summary, "/timing/parts_ms").items()) {
+    table.row({name, number_text(number_at(part, "/median"), 2), number_text(number_at(part, "/p95"), 2), "",
+               count_text(number_at(part, "/times"))},
+              "no");
+  }
+  return table.html();
+}
+
+/// What the files of a result are, by the end of their name.
+std::string what_is(const std::string& name) {
+  struct Known {
+    const char* name;
+    const char* what;
+  };
+  static constexpr std::array<Known, 14> kKnown{
+      {{"map.ply", "merged cloud: position, normal, colour, confidence, observations, sigma"},
+       {"map.pcd", "the same for PCL"},
+       {"map.db", "the map itself: for fuse, export, render and --resume"},
+       {"trajectory.txt", "camera poses of the tracked frames, TUM format"},
+       {"keyframes.txt", "camera poses of the keyframes, TUM format"},
+       {"keyframes.csv", "the same, how exactly they are known, and what holds them"},
+       {"lines.ply", "3D lines as edges"},
+       {"frames.csv", "one line a frame: what tracking saw and decided"},
+       {"timing.csv", "one line a frame: milliseconds by stage, memory"},
+       {"summary.json", "counts, times, evidence, whether to trust the result"},
+       {"config.yaml", "the effective configuration, itself a pipeline file"},
+       {".png", "picture"},
+       {".ply", "cloud"},
+       {".pcd", "cloud"}}};
+  for (const Known& known : kKnown) {
+    const std::string end = known.name;
+    if (name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
+      return known.what;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string cost_html(const ReportData& data) {
+  const Json& s = data.summary;
+  const auto seconds = [&](const char* place) { return number_text(number_at(s, place), 2, "s"); };
+  Facts facts{{"The whole run", seconds("/timing/wall_s")},
+              {"Mapping, first frame read to last change of the map",
+               fmt::format("{}: {} frames a second", seconds("/timing/map_s"),
+                           number_text(number_at(s, "/timing/fps"), 1))},
+              {"Clouds, pictures and tables", seconds("/timing/export_s")}};
+  if (number_at(s, "/timing/pace_hz") > 0.0) {
+    facts.emplace_back("Played at", fmt::format("{} a second; {} behind at most",
+                                                number_text(number_at(s, "/timing/pace_hz"), 1),
+                                                seconds("/timing/behind_s")));
+  }
+  facts.emplace_back("Threads", count_text(number_at(s, "/timing/threads")));
+  facts.emplace_back("Memory at most", number_text(number_at(s, "/memory/peak_rss_mb"), 0, "MB"));
+  if (number_at(s, "/frames/resumed") > 0.0) {
+    facts.emplace_back("Not counted",
+                       fmt::format("{} frames that an earlier run had mapped before it was interrupted",
+                                   count_text(number_at(s, "/frames/resumed"))));
+  }
+  return facts_html(facts) + stages_table(s) + time_charts(data);
+}
+
+std::string configuration_html(const ReportData& data) {
+  std::ifstream stream(data.folder / "config.yaml", std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (text.str().empty()) return note("config.yaml is empty.");
+  return note("Every option with its value, defaults included; itself a pipeline file for -p.") +
+         folded("config.yaml", "<pre>" + viz::markup_text(text.str()) + "</pre>\n");
+}
+
+std::string files_html(const ReportData& data, const fs::path& left_out) {
+  constexpr std::size_t kMost = 400;
+  std::vector<std::pair<std::string, double>> files;
+  std::error_code ec;
+  double all = 0.0;
+  for (fs::recursive_directory_iterator it(data.folder, ec), end; !ec && it != end; it.increment(ec)) {
+    std::error_code problem;
+    const std::string name = it->path().lexically_relative(data.folder).generic_string();
+    const bool hidden = it->path().filename().string().front() == '.' || name == "report.html";
+    if (hidden || !it->is_regular_file(problem) || fs::equivalent(it->path(), left_out, problem)) continue;
+    files.emplace_back(name, static_cast<double>(it->file_size(problem)));
+    all += files.back().second;
+  }
+  std::sort(files.begin(), files.end());
+  HtmlTable table({{"file"}, {"size", true}, {"bytes", true}, {"what it is"}});
+  for (std::size_t i = 0; i < std::min(kMost, files.size()); ++i) {
+    table.row(
+        {files[i].first, bytes_text(files[i].second), count_text(files[i].second), what_is(files[i].first)});
+  }
+  return table.html() +
+         note(fmt::format("{} files, {} in all{}.", files.size(), bytes_text(all),
+                          files.size() > kMost ? fmt::format("; the first {} are listed", kMost) : ""));
+}
+
+}  // namespace plumbline::report

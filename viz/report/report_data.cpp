@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "report_data.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <system_error>
+
+#include "plumbline/core/config.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "plumbline/maps/output_folder.hpp"
+#include "plumbline/maps/result_folder.hpp"
+#include "plumbline/maps/stored_maps.hpp"
+#include "plumbline/maps/stored_result.hpp"
+#include "report_cloud.hpp"
+
+namespace plumbline::report {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+core::Result<Json> read_summary(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  Json json = Json::parse(stream, nullptr, false);
+  if (json.is_object() && json.contains("frames") && json.contains("trustworthy")) return json;
+  return core::input_error(fmt::format("{}: is damaged or not of plumbline map; map again", file.string()));
+}
+
+/// The poses of a file, which is told as missing where they cannot be had.
+geometry::Trajectory poses_of(const fs::path& file, ReportData& data) {
+  const std::string name = file.lexically_relative(data.folder).string();
+  std::error_code ec;
+  if (!fs::exists(file, ec)) {
+    data.missing.push_back(name + " is not there");
+    return {};
+  }
+  auto poses = dataset::read_trajectory(file);
+  if (poses) return std::move(*poses);
+  std::string why = poses.error().message;
+  if (why.rfind(file.string(), 0) == 0) why = name + why.substr(file.string().size());
+  data.missing.push_back(why);
+  return {};
+}
+
+void add_path(const std::string& robot, const fs::path& folder, ReportData& data) {
+  ReportPath path;
+  path.robot = robot;
+  path.number = data.paths.size();
+  path.poses = poses_of(folder / "trajectory.txt", data);
+  path.keyframes = poses_of(folder / "keyframes.txt", data);
+  data.paths.push_back(std::move(path));
+}
+
+void add_paths(ReportData& data) {
+  std::vector<std::string> robots;
+  std::error_code ec;
+  for (fs::directory_iterator it(data.folder / "robots", ec), end; !ec && it != end; it.increment(ec)) {
+    if (it->is_directory(ec)) robots.push_back(it->path().filename().string());
+  }
+  std::sort(robots.begin(), robots.end());
+  for (const std::string& robot : robots) add_path(robot, data.folder / "robots" / robot, data);
+  if (robots.empty()) add_path("", data.folder, data);
+}
+
+/// Pairs of keyframes that loops, and merges of several robots' maps, tie together.
+void add_loops(const maps::StoredResult& stored, ReportData& data) {
+  std::map<core::KeyframeId, Eigen::Vector3d> places;
+  for (const maps::KeyframePose& k : stored.keyframes()) places[k.id] = k.world_from_camera.translation;
+  for (const maps::LoopEdge& loop : stored.stored().map.loops()) {
+    const auto a = places.find(loop.a);
+    const auto b = places.find(loop.b);
+    if (a != places.end() && b != places.end()) data.loops.emplace_back(a->second, b->second);
+  }
+}
+
+/// What only map.db knows: which robot has which number (of its points and of its colour), loops, how well
+/// all fits.
+void add_store(ReportData& data) {
+  const fs::path file = data.folder / "map.db";
+  std::error_code ec;
+  if (!fs::exists(file, ec)) {
+    const bool loops =
+        number_at(data.summary, "/loops/accepted") > 0.0 || !list_at(data.summary, "/merges").empty();
+    if (loops) data.missing.emplace_back("map.db is not there: loops are not drawn");
+    return;
+  }
+  const auto stored = maps::StoredResult::open(file);
+  if (!stored) {
+    data.missing.emplace_back("map.db is damaged: loops are not drawn");
+    return;
+  }
+  std::map<std::int32_t, sensor::Pinhole> cameras;
+  const std::vector<maps::RobotInfo>& robots = stored->stored().header.robots;
+  for (const maps::RobotInfo& robot : robots) {
+    cameras[robot.number] = robot.camera.color;
+    if (robots.size() > 1) data.robot_names[robot.number] = robot.name;
+    for (ReportPath& path : data.paths) {
+      if (path.robot == robot.name && robot.number >= 0) path.number = static_cast<std::size_t>(robot.number);
+    }
+  }
+  add_loops(*stored, data);
+  data.fit = fit_of(stored->stored().map, maps::camera_of(robots, 0).color, cameras);
+}
+
+/// Whether the folder is of plumbline fuse, whose results have no frames.
+bool fused_afterwards(const fs::path& folder) {
+  const auto config = core::read_yaml(folder / "config.yaml");
+  const core::ConfigNode* run = config ? config->find("run") : nullptr;
+  return run != nullptr && run->find("maps") != nullptr;
+}
+
+void add_cloud(ReportData& data) {
+  std::error_code ec;
+  const maps::ResultFolder result{data.folder};
+  if (!fs::exists(result.ply(), ec) && !fs::exists(result.pcd(), ec)) {
+    data.missing.emplace_back("map.ply is not there");
+    return;
+  }
+  data.cloud_file = fs::exists(result.ply(), ec) ? "map.ply" : "map.pcd";
+  auto cloud = maps::read_result_cloud(result);
+  if (cloud) {
+    data.cloud = std::move(*cloud);
+    data.extent = measure_extent(*data.cloud->cloud);
+  } else {
+    data.missing.push_back(data.cloud_file + " is damaged: its extent and plan are not shown");
+  }
+}
+
+}  // namespace
+
+double number_at(const Json& json, const std::string& place) {
+  const Json::json_pointer pointer(place);
+  if (!json.contains(pointer)) return kNaN;
+  const Json& value = json.at(pointer);
+  return value.is_number() ? value.get<double>() : kNaN;
+}
+
+std::string text_at(const Json& json, const std::string& place) {
+  const Json::json_pointer pointer(place);
+  if (!json.contains(pointer)) return {};
+  const Json& value = json.at(pointer);
+  return value.is_string() ? value.get<std::string>() : std::string();
+}
+
+const Json& list_at(const Json& json, const std::string& place) {
+  static const Json nothing = Json::array();
+  const Json::json_pointer pointer(place);
+  return json.contains(pointer) && json.at(pointer).is_structured() ? json.at(pointer) : nothing;
+}
+
+double ReportPath::length_m() const {
+  double length = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    length += (poses[i].world_from_camera.translation - poses[i - 1].world_from_camera.translation).norm();
+  }
+  return length;
+}
+
+core::Result<ReportData> read_report_data(const fs::path& folder) {
+  std::error_code ec;
+  const fs::path partial = maps::OutputFolder::partial_of(folder);
+  const bool interrupted = fs::exists(folder / ".plumbline-unfinished", ec) ||
+                           (!fs::exists(folder, ec) && fs::is_regular_file(partial / "map.db", ec));
+  if (interrupted) {
+    return core::input_error(fmt::format(
+        "{}: the run was interrupted; finish it with plumbline map --resume, then report", folder.string()));
+  }
+  const auto result = maps::open_result(folder);
+  if (!result) return tl::unexpected<core::Error>(result.error());
+  auto summary = read_summary(result->summary());
+  if (!summary) return tl::unexpected<core::Error>(summary.error());
+  ReportData data;
+  data.folder = folder;
+  const fs::path normal = fs::absolute(folder).lexically_normal();
+  data.name = (normal.has_filename() ? normal : normal.parent_path()).filename().string();
+  data.summary = std::move(*summary);
+  data.z_up = text_at(data.summary, "/frame/up") != "none";
+  add_paths(data);
+  data.fused_afterwards = fused_afterwards(folder);
+  add_frames(data);
+  add_store(data);
+  add_cloud(data);
+  return data;
+}
+
+}  // namespace plumbline::report

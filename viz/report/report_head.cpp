@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The head of a report: what it is and whether to trust it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "report_sections.hpp"
+
+namespace plumbline::report {
+namespace {
+
+std::string duration_text(double seconds) {
+  if (!(seconds >= 60.0)) return number_text(seconds, 1, "s");
+  const auto whole = static_cast<long>(std::lround(seconds));
+  return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+std::string banner(const char* kind, const std::string& title, const std::string& text) {
+  return fmt::format("<div class=\"verdict {}\"><b>{}</b>{}</div>\n", kind, viz::markup_text(title),
+                     text.empty() ? text : paragraph(text));
+}
+
+std::string verdict_html(const ReportData& data) {
+  const auto& s = data.summary;
+  const bool trusted =
+      s.contains("trustworthy") && s["trustworthy"].is_boolean() && s["trustworthy"].get<bool>();
+  const bool stopped = s.contains("stopped") && s["stopped"].is_boolean() && s["stopped"].get<bool>();
+  const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
+  std::string out;
+  if (!trusted) {
+    const std::string reason = text_at(s, "/reason");
+    out += banner("bad", "Not trustworthy (exit code 4)",
+                  reason.empty() ? "The run told no reason." : "Reason: " + reason + ".");
+  } else if (without > 0.0) {
+    out += banner(
+        "warn", "Trustworthy, with gaps (exit code 0)",
+        fmt::format("{} of {} frames have no pose; the longest loss is {} frames.", count_text(without),
+                    count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
+                    count_text(number_at(s, "/frames/longest_loss"))));
+  } else {
+    out += banner("good", "Trustworthy (exit code 0)", "Nothing the run found speaks against this result.");
+  }
+  if (stopped) {
+    out += banner("warn", "Stopped early",
+                  fmt::format("The run was ended after {} of {} frames; this is what was mapped by then.",
+                              count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
+                              count_text(number_at(s, "/frames/available"))));
+  }
+  if (!data.missing.empty()) {
+    std::string list;
+    for (const std::string& line : data.missing) list += "<li>" + viz::markup_text(line) + "</li>";
+    out += "<div class=\"verdict warn\"><b>Missing in this report</b><ul>" + list + "</ul></div>\n";
+  }
+  return out;
+}
+
+std::string extent_text(const ReportData& data) {
+  if (!data.extent) return number_text(NAN, 0);
+  const Eigen::Vector3d size = data.extent->central_size();
+  return fmt::format("{:.1f} × {:.1f} × {:.1f} m", size.x(), size.y(), size.z());
+}
+
+std::string figures_html(const ReportData& data) {
+  const auto& s = data.summary;
+  double length_m = 0.0;
+  for (const ReportPath& path : data.paths) length_m += path.length_m();
+  return tiles_html(
+      {{"of the frames tracked", number_text(number_at(s, "/frames/tracked_percent"), 1, "%")},
+       {"path", number_text(length_m, 2, "m")},
+       {"keyframes", count_text(number_at(s, "/keyframes"))},
+       {"cloud points", count_text(number_at(s, "/cloud/points"))},
+       {"extent of the cloud", extent_text(data)},
+       data.fused_afterwards
+           ? std::pair{std::string("to fuse"), number_text(number_at(s, "/timing/wall_s"), 1, "s")}
+           : std::pair{std::string("frames a second"), number_text(number_at(s, "/timing/fps"), 1)}});
+}
+
+std::string frames_text(const ReportData& data) {
+  const auto& s = data.summary;
+  std::string text =
+      fmt::format("{} of {} read, {} tracked", count_text(number_at(s, "/frames/read")),
+                  count_text(number_at(s, "/frames/available")), count_text(number_at(s, "/frames/tracked")));
+  if (number_at(s, "/frames/lost") > 0)
+    text += fmt::format(", {} lost", count_text(number_at(s, "/frames/lost")));
+  if (number_at(s, "/frames/unreadable") > 0)
+    text += fmt::format(", {} unreadable", count_text(number_at(s, "/frames/unreadable")));
+  if (number_at(s, "/frames/resumed") > 0)
+    text += fmt::format("; {} of them by the run that this one went on from",
+                        count_text(number_at(s, "/frames/resumed")));
+  return text;
+}
+
+std::string frame_of_results(const ReportData& data) {
+  const std::string up = text_at(data.summary, "/frame/up");
+  const std::string x =
+      text_at(data.summary, "/frame/yaw") == "walls" ? ", x along the walls; metres" : "; metres";
+  if (up == "floor") return "z up, 0 on the floor" + x;
+  if (up == "camera") return "z up as the cameras were held" + x;
+  return up.empty() ? up : "that of the first camera: x right, y down, z forward; metres";
+}
+
+/// Those in the result, and those that were mapped but left out.
+std::string robots_text(const ReportData& data) {
+  std::string in, out;
+  const auto is_in = [&](const std::string& name) {
+    return std::any_of(data.paths.begin(), data.paths.end(), [&](const auto& p) { return p.robot == name; });
+  };
+  for (const ReportPath& path : data.paths) in += (in.empty() ? "" : ", ") + path.robot;
+  for (const ReportFrames& frames : data.frames) {
+    if (!is_in(frames.robot)) out += (out.empty() ? "" : ", ") + frames.robot;
+  }
+  return out.empty() ? in : in + "; mapped, but not in the result: " + out;
+}
+
+std::string facts(const ReportData& data) {
+  const auto& s = data.summary;
+  return facts_html(
+      {{"Input", text_at(s, "/input")},
+       {"Robots", robots_text(data)},
+       {"Frames", frames_text(data)},
+       {"Duration of the recording", duration_text(data.end_s - data.start_s)},
+       {"Pipeline", text_at(s, "/pipeline")},
+       {"Frame of the results", frame_of_results(data)},
+       {"Landmarks", fmt::format("{} points, {} lines", count_text(number_at(s, "/landmarks/points")),
+                                 count_text(number_at(s, "/landmarks/lines")))},
+       {"Threads, seed", fmt::format("{}, {}", count_text(number_at(s, "/timing/threads")),
+                                     count_text(number_at(s, "/seed")))},
+       {"Version", "plumbline " + text_at(s, "/version")}});
+}
+
+}  // namespace
+
+std::string lost_html(const ReportData& data) {
+  constexpr std::size_t kMost = 20;
+  std::vector<LostStretch> stretches = data.lost;
+  const auto longer = [](const LostStretch& a, const LostStretch& b) {
+    return a.lost + a.unreadable > b.lost + b.unreadable;
+  };
+  std::stable_sort(stretches.begin(), stretches.end(), longer);
+  std::vector<Column> columns{{"from (s)", true},   {"to (s)", true},
+                              {"frames", true},     {"lost", true},
+                              {"unreadable", true}, {"between the poses around (m)", true}};
+  const bool several = data.frames.size() > 1;
+  if (several) columns.push_back({"robot"});
+  HtmlTable table(std::move(columns));
+  for (std::size_t i = 0; i < std::min(kMost, stretches.size()); ++i) {
+    const LostStretch& l = stretches[i];
+    const auto number = [](std::size_t n) { return count_text(static_cast<double>(n)); };
+    table.row({number_text(l.from_s, 2), number_text(l.to_s, 2), number(l.lost + l.unreadable),
+               number(l.lost), number(l.unreadable), number_text(l.gap_m, 3), l.robot});
+  }
+  std::string out = table.html();
+  if (stretches.size() > kMost)
+    out += note(fmt::format("The {} longest of {} stretches.", kMost, stretches.size()));
+  return out;
+}
+
+std::string head_html(const ReportData& data) {
+  std::string out =
+      "<header><p class=\"kicker\">Plumbline report</p><h1>" + viz::markup_text(data.name) + "</h1>\n";
+  out += verdict_html(data);
+  const std::string lost = lost_html(data);
+  if (!lost.empty()) out += "<h3>Stretches without a pose, the longest first</h3>\n" + lost;
+  return out + figures_html(data) + facts(data) + "</header>\n";
+}
+
+}  // namespace plumbline::report

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "report_html.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "report_style.hpp"
+
+namespace plumbline::report {
+namespace {
+
+using viz::markup_text;
+const char* const kUnknown = "\u2013";
+const char* const kThinSpace = "\u202F";
+
+}  // namespace
+
+std::string count_text(double count) {
+  if (!std::isfinite(count)) return kUnknown;
+  const std::string digits = fmt::format("{:.0f}", std::abs(count));
+  std::string out = count < -0.5 ? "-" : "";
+  for (std::size_t i = 0; i < digits.size(); ++i) {
+    if (i > 0 && (digits.size() - i) % 3 == 0) out += kThinSpace;
+    out += digits[i];
+  }
+  return out;
+}
+
+std::string number_text(double value, int decimals, std::string_view unit) {
+  if (!std::isfinite(value)) return kUnknown;
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  if (text.find_first_not_of("-0.") == std::string::npos && text[0] == '-') text.erase(0, 1);
+  return unit.empty() ? text : fmt::format("{}{}{}", text, kThinSpace, unit);
+}
+
+std::string bytes_text(double bytes) {
+  if (bytes < 1e3) return number_text(bytes, 0, "bytes");
+  if (bytes < 1e6) return number_text(bytes / 1e3, 1, "kB");
+  return bytes < 1e9 ? number_text(bytes / 1e6, 1, "MB") : number_text(bytes / 1e9, 2, "GB");
+}
+
+std::string base64(std::string_view bytes) {
+  static constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t three = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      three = three << 8U | (k < left ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      out += k <= left ? kDigits[three >> (18U - 6U * k) & 63U] : '=';
+    }
+  }
+  return out;
+}
+
+void HtmlTable::row(const std::vector<std::string>& cells, const std::string& kind) {
+  body_ += kind.empty() ? "<tr>" : "<tr class=\"" + kind + "\">";
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const std::string text = i < cells.size() ? markup_text(cells[i]) : std::string();
+    body_ += (columns_[i].number ? "<td class=\"n\">" : "<td>") + text + "</td>";
+  }
+  body_ += "</tr>\n";
+  ++rows_;
+}
+
+std::string HtmlTable::html() const {
+  if (rows_ == 0) return {};
+  std::string out = "<div class=\"scroll\"><table><thead><tr>";
+  for (const Column& column : columns_) {
+    out += (column.number ? "<th class=\"n\">" : "<th>") + markup_text(column.name) + "</th>";
+  }
+  return out + "</tr></thead>\n<tbody>" + body_ + "</tbody></table></div>\n";
+}
+
+void RobotTable::value(const std::string& name, const std::string& value) {
+  auto row = std::find_if(rows_.begin(), rows_.end(), [&](const auto& r) { return r.first == name; });
+  if (row == rows_.end()) row = rows_.insert(rows_.end(), {name, {}});
+  row->second.resize(names_.size());
+  row->second.back() = value;
+}
+
+std::string RobotTable::html() const {
+  if (names_.empty() || rows_.empty()) return {};
+  const bool named = names_.size() > 1 || !names_.front().empty();
+  std::string out = "<div class=\"scroll\"><table class=\"facts\">";
+  if (named) {
+    out += "<thead><tr><th></th>";
+    for (const std::string& name : names_) out += "<th class=\"n\">" + markup_text(name) + "</th>";
+    out += "</tr></thead>\n";
+  }
+  out += "<tbody>";
+  for (const auto& [name, values] : rows_) {
+    out += "<tr><th scope=\"row\">" + markup_text(name) + "</th>";
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      out += "<td class=\"n\">" + (i < values.size() ? markup_text(values[i]) : std::string()) + "</td>";
+    }
+    out += "</tr>\n";
+  }
+  return out + "</tbody></table></div>\n";
+}
+
+std::string facts_html(const Facts& facts) {
+  std::string out;
+  for (const auto& [name, value] : facts) {
+    if (value.empty()) continue;
+    out += "<tr><th scope=\"row\">" + markup_text(name) + "</th><td>" + markup_text(value) + "</td></tr>\n";
+  }
+  return out.empty() ? out : "<table class=\"facts\"><tbody>" + out + "</tbody></table>\n";
+}
+
+std::string tiles_html(const Facts& facts) {
+  std::string out;
+  for (const auto& [name, value] : facts) {
+    out += "<div><b>" + markup_text(value) + "</b><span>" + markup_text(name) + "</span></div>";
+  }
+  return "<div class=\"tiles\">" + out + "</div>\n";
+}
+
+std::string paragraph(const std::string& text) { return "<p>" + markup_text(text) + "</p>\n"; }
+std::string note(const std::string& text) { return "<p class=\"note\">" + markup_text(text) + "</p>\n"; }
+
+std::string folded(const std::string& title, const std::string& html, bool open) {
+  return (open ? "<details open=\"open\"><summary>" : "<details><summary>") + markup_text(title) +
+         "</summary>\n" + html + "</details>\n";
+}
+
+std::string page_html(const std::string& title, const std::string& head_html,
+                      const std::vector<Section>& sections, const std::string& foot) {
+  std::string contents, body;
+  for (const Section& section : sections) {
+    if (section.html.empty()) continue;
+    contents += fmt::format("<a href=\"#{}\">{}</a>", section.id, markup_text(section.title));
+    body += fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n", section.id,
+                        markup_text(section.title), section.html);
+  }
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\n"
+      "<meta name=\"generator\" content=\"{}\"/>\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
+      "<meta name=\"color-scheme\" content=\"light "
+      "dark\"/>\n<title>{}</title>\n<style>\n{}{}</style></head>\n"
+      "<body><main>\n{}<nav>{}</nav>\n{}<footer>{}</footer>\n</main></body></html>\n",
+      kReportGenerator, markup_text(title), report_style(), viz::svg_chart_style(), head_html, contents, body,
+      markup_text(foot));
+}
+
+}  // namespace plumbline::report

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Pieces of an HTML page. All text that is given is escaped here, but where it is called HTML.
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "plumbline/viz/svg_chart.hpp"
+
+namespace plumbline::report {
+
+/// "1 519 937"; a dash for what is not known (NaN), as all of these.
+std::string count_text(double count);
+/// With its unit: "12.3 ms".
+std::string number_text(double value, int decimals, std::string_view unit = {});
+/// "54.7 MB"
+std::string bytes_text(double bytes);
+
+std::string base64(std::string_view bytes);
+
+struct Column {
+  std::string name;     ///< with its unit
+  bool number = false;  ///< stands to the right
+};
+
+class HtmlTable {
+ public:
+  explicit HtmlTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
+  /// `kind`: CSS class of the row.
+  void row(const std::vector<std::string>& cells, const std::string& kind = {});
+  [[nodiscard]] std::size_t rows() const { return rows_; }
+  /// Empty when there are no rows.
+  [[nodiscard]] std::string html() const;
+
+ private:
+  std::vector<Column> columns_;
+  std::size_t rows_ = 0;
+  std::string body_;
+};
+
+/// What is told of each robot, a column each; without heads when there is one that needs no name.
+class RobotTable {
+ public:
+  /// A robot's column, to be filled from the top.
+  void robot(const std::string& name) { names_.push_back(name); }
+  /// A value of the robot that came last.
+  void value(const std::string& name, const std::string& value);
+  [[nodiscard]] std::string html() const;
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<std::pair<std::string, std::vector<std::string>>> rows_;
+};
+
+using Facts = std::vector<std::pair<std::string, std::string>>;
+/// Name and value, line by line; those without a value are left out.
+std::string facts_html(const Facts& facts);
+/// The same, large, side by side.
+std::string tiles_html(const Facts& facts);
+std::string paragraph(const std::string& text);
+std::string note(const std::string& text);
+/// Can be folded up to its title, and is unless `open`.
+std::string folded(const std::string& title, const std::string& html, bool open = false);
+
+/// A part of the page with its place in the table of contents.
+struct Section {
+  std::string id;
+  std::string title;
+  std::string html;  ///< empty: the part is left out
+};
+
+/// The whole page.
+std::string page_html(const std::string& title, const std::string& head_html,
+                      const std::vector<Section>& sections, const std::string& foot);
+
+}  // namespace plumbline::report

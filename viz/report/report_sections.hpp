@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The parts of a report, each from what was read of the result folder; empty where there is nothing to tell.
+#include <string>
+
+#include "report_data.hpp"
+#include "report_html.hpp"
+
+namespace plumbline::report {
+
+/// Verdict, key figures, what speaks against the result, input and settings.
+std::string head_html(const ReportData& data);
+/// The folder's snapshots; where it has none, drawn now. `scratch`: where a picture may be put meanwhile.
+core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
+/// The paths from above, over the plan of the cloud.
+std::string path_html(const ReportData& data);
+std::string tracking_html(const ReportData& data);
+std::string loops_html(const ReportData& data);
+std::string merges_html(const ReportData& data);
+std::string refinement_html(const ReportData& data);
+std::string cloud_html(const ReportData& data);
+std::string accuracy_html(const ReportData& data);
+std::string cost_html(const ReportData& data);
+std::string configuration_html(const ReportData& data);
+/// `left_out`: the report itself.
+std::string files_html(const ReportData& data, const std::filesystem::path& left_out);
+
+/// CSS classes of a robot's marks.
+inline std::string robot_kind(std::size_t robot) { return "k" + std::to_string(robot % 8); }
+/// A table of LostStretch, longest losses first; at most a screen full.
+std::string lost_html(const ReportData& data);
+
+}  // namespace plumbline::report
