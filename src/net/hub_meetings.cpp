@@ -13,13 +13,13 @@
 namespace plumbline::net {
 namespace {
 
+constexpr std::size_t kEntryHead = sizeof(std::uint32_t);  // bytes of the length in front of an entry
+
 void put_pose(const geometry::Rigid3& pose, std::array<double, 7>& to) {
   const Eigen::Quaterniond q = pose.quaternion();
   const Eigen::Vector3d& t = pose.translation;
   to = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
 }
-
-constexpr std::size_t kEntryHead = sizeof(std::uint32_t);  // bytes of the length in front of an entry
 
 Place told_place(const mapping::RobotPlace& from, const std::string& frame_of) {
   Place place;

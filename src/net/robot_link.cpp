@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kPieceBytes = 256U << 10U;  // what a bad link carries in a few seconds
 constexpr auto kSayEvery = 500ms;
 constexpr auto kLookEvery = 50ms;
+constexpr auto kPause = 10ms;    // whoever speaks without one: the tracker's time is not theirs
 constexpr auto kHubGone = 5s;    // without a word
 constexpr auto kOtherHub = 10s;  // until another hub is listened to
 constexpr auto kSilence = 10s;   // until silence is told
@@ -118,6 +119,7 @@ LinkStatus RobotLink::status() const {
 void RobotLink::run() {
   auto looked_at = Clock::time_point();
   while (!stop_) {
+    std::this_thread::sleep_for(kPause);
     bus_->wait(kLookEvery);
     for (const Word& word : bus_->hear()) take(word);
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A hub that speaks without a pause and never takes anything: flood_words INTERFACE ROBOT SECONDS. Prints how many
-// words it said.
+// A hub that speaks without a pause and never takes anything: flood_words INTERFACE ROBOT SECONDS. Prints how
+// many words it said.
 #include <fmt/format.h>
 
 #include <chrono>

@@ -4,7 +4,7 @@
 #include "fuzz_target.hpp"
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/store_replica.hpp"
-#include "store_row.hpp"
+#include "store/store_row.hpp"
 
 using namespace plumbline;
 

@@ -5,7 +5,7 @@
 Each runs in a network namespace, and does not see the others' folders. Whatever the link does, the hub's map has the
 bytes of `plumbline fuse` of the robots' folders.
 
-  cable   Ethernet (veth and a bridge); robot a has no cable for 12 s
+  cable   Ethernet (veth and a bridge); robot a has no cable for 12 s while it drives
   relay   three TUN devices and a relay between them: 5 % of the packets are lost, the others come 50 to 150 ms later
           and share 20 Mbit/s in each direction; no multicast
   slow    the same without loss at 2 Mbit/s
@@ -199,7 +199,8 @@ def main(program, work, case):
                         "10", "--interface", "net0", *more[end], *ROBOT])
             started[end] = network.run(end, command, open(work / f"{end}.log", "w"), hidden)
         if case == "cable":
-            time.sleep(4)
+            while not (folders["h"] / "out.partial/robots/a/map.db").exists() and time.monotonic() - began < LONG_S:
+                time.sleep(0.02)
             ip("-n", network.names["h"], "link", "set", "porta", "down")
             time.sleep(12)
             ip("-n", network.names["h"], "link", "set", "porta", "up")
@@ -224,6 +225,7 @@ def main(program, work, case):
     rows = {end: sum(told[end]["bytes"].values()) for end in "ab"}
     least = rows["a"] if case == "cable" else rows["a"] + rows["b"]
     assert crossed >= least, f"{least} bytes of rows, but {crossed} crossed the link: by which side door?"
+    assert case != "cable" or told["a"]["longest_break_s"] > 8, f"robot a was done before its cable was out: {told['a']}"
     print(f"{case}: {spent:.0f} s, rows {rows} bytes, over the link {crossed} bytes, "
           f"break {told['a']['longest_break_s']:.1f} s, lag {told['a']['lag_s']}, again {told['a']['sent_again_bytes']} bytes")
 
