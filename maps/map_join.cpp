@@ -26,6 +26,13 @@ std::vector<Observation> renamed(std::vector<Observation> seen, const RobotNumbe
   return seen;
 }
 
+template <typename Edge>
+Edge renamed_ends(Edge edge, const RobotNumbers& to) {
+  edge.a = renamed(edge.a, to);
+  edge.b = renamed(edge.b, to);
+  return edge;
+}
+
 /// Appends a map's parts, moved by `world_from_map`. Edges come after those that are there.
 class PartsCollector {
  public:
@@ -61,14 +68,9 @@ class PartsCollector {
     }
     const std::uint64_t first_edge = parts_.next.edge;
     for (const auto& [order, edge] : map.edges()) {
-      SurfaceEdge moved = edge;
-      moved.a = renamed(edge.a, to);
-      moved.b = renamed(edge.b, to);
-      parts_.edges.emplace_back(first_edge + order, moved);
+      parts_.edges.emplace_back(first_edge + order, renamed_ends(edge, to));
     }
-    for (const LoopEdge& loop : map.loops()) {
-      parts_.loops.push_back({renamed(loop.a, to), renamed(loop.b, to), loop.b_from_a, loop.information});
-    }
+    for (const LoopEdge& loop : map.loops()) parts_.loops.push_back(renamed_ends(loop, to));
     const NextIds next = map.next_ids();
     for (const KeyframeId id : next.keyframes) parts_.next.keyframes.push_back(renamed(id, to));
     for (const core::PointId id : next.points) parts_.next.points.push_back(renamed(id, to));

@@ -70,20 +70,17 @@ tl::unexpected<core::Error> another_run(const fs::path& partial) {
       fmt::format("{}: another run is writing there; wait or name another output folder", partial.string()));
 }
 
-tl::unexpected<core::Error> in_the_way(const fs::path& partial) {
-  return core::usage_error(
-      fmt::format("{}: is in the way; results are written there first. Remove it or name "
-                  "another output folder",
-                  partial.string()));
-}
-
-/// Removes what an interrupted run left, and nothing else.
-core::Result<void> clear_leftover(const fs::path& partial) {
+/// Removes what an interrupted run left, and nothing else; or only looks whether it is one's.
+core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
-    return in_the_way(partial);
+    return core::usage_error(
+        fmt::format("{}: is in the way; results are written there first. Remove it or name "
+                    "another output folder",
+                    partial.string()));
   }
+  if (takes_over) return {};
   const int lock = lock_marker(partial, O_RDONLY);
   if (lock < 0 && !fs::is_empty(partial, ec)) {
     return another_run(partial);
@@ -121,34 +118,26 @@ OutputFolder::~OutputFolder() {
 }
 
 core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, IsEarlier is_earlier) {
-  if (out.empty()) return core::usage_error("the output folder has no name");
-  const fs::path target = normal(out);
-  if (auto checked = check_target(target, replace, is_earlier); !checked)
-    return tl::unexpected<core::Error>(checked.error());
-  const fs::path partial = with_ending(target, ".partial");
-  if (auto cleared = clear_leftover(partial); !cleared) return tl::unexpected<core::Error>(cleared.error());
-  return open(target, partial, is_earlier);
+  return begin(out, replace, is_earlier, false);
 }
 
-fs::path OutputFolder::partial_of(const fs::path& out) { return with_ending(normal(out), ".partial"); }
-
 core::Result<OutputFolder> OutputFolder::resume(const fs::path& out, bool replace, IsEarlier is_earlier) {
-  if (out.empty()) return core::usage_error("the output folder has no name");
-  const fs::path target = normal(out);
-  if (auto checked = check_target(target, replace, is_earlier); !checked)
-    return tl::unexpected<core::Error>(checked.error());
-  const fs::path partial = with_ending(target, ".partial");
-  std::error_code ec;
-  if (fs::exists(partial, ec) && !fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
-    return in_the_way(partial);
-  }
-  auto folder = open(target, partial, is_earlier);
+  auto folder = begin(out, replace, is_earlier, true);
   if (folder) folder->keep();
   return folder;
 }
 
-core::Result<OutputFolder> OutputFolder::open(const fs::path& target, const fs::path& partial,
-                                              IsEarlier is_earlier) {
+fs::path OutputFolder::partial_of(const fs::path& out) { return with_ending(normal(out), ".partial"); }
+
+core::Result<OutputFolder> OutputFolder::begin(const fs::path& out, bool replace, IsEarlier is_earlier,
+                                               bool takes_over) {
+  if (out.empty()) return core::usage_error("the output folder has no name");
+  const fs::path target = normal(out);
+  if (auto checked = check_target(target, replace, is_earlier); !checked)
+    return tl::unexpected<core::Error>(checked.error());
+  const fs::path partial = with_ending(target, ".partial");
+  if (auto cleared = clear_leftover(partial, takes_over); !cleared)
+    return tl::unexpected<core::Error>(cleared.error());
   std::error_code ec;
   fs::create_directories(partial, ec);
   if (ec) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <system_error>
 
@@ -10,6 +11,18 @@
 #include "plumbline/maps/output_folder.hpp"
 
 namespace plumbline::maps {
+
+std::vector<std::filesystem::path> ResultFolder::robot_folders() const {
+  std::vector<std::filesystem::path> folders;
+  std::error_code ec;
+  for (std::filesystem::directory_iterator it(folder / "robots", ec), end; !ec && it != end;
+       it.increment(ec)) {
+    if (it->is_directory(ec)) folders.push_back(it->path());
+  }
+  std::sort(folders.begin(), folders.end());
+  if (folders.empty()) folders.push_back(folder);
+  return folders;
+}
 
 core::Result<ResultFolder> open_result(const std::filesystem::path& folder) {
   std::error_code ec;

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "plumbline/cloud/cloud_io.hpp"
-#include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/core/config.hpp"
 #include "plumbline/maps/fusion_state.hpp"
@@ -61,10 +60,10 @@ StoredResult::StoredResult(fs::path file, StoreReader reader, StoredMap map)
       reader_(std::make_unique<StoreReader>(std::move(reader))),
       map_(std::move(map)) {}
 
-core::Result<StoredResult> StoredResult::open(const fs::path& store) {
+core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::string& robot) {
   auto reader = StoreReader::open(store);
   if (!reader) return tl::unexpected<core::Error>(reader.error());
-  auto map = reader->load();
+  auto map = reader->load(robot);
   if (!map) return tl::unexpected<core::Error>(map.error());
   return StoredResult(store, std::move(*reader), std::move(*map));
 }
@@ -159,44 +158,14 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   auto fused = cloud::fuse_views(all, options, executor);
   if (!fused) return fused;
   if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);
-  const cloud::FilterChain filters = fusion_filters();
-  if (filters.size() == 0) return fused;
-  cloud::FusedCloud result;
-  cloud::FilterContext context;
-  context.executor = &executor;
-  context.spacing_m = options.voxels.voxel_m;
-  context.columns = &fused->columns;
-  context.made_columns = &result.columns;
-  auto filtered = filters.apply(std::move(fused->cloud), context);
-  if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-  result.cloud = std::move(*filtered);
-  return result;
+  return fusion_filters().apply(std::move(*fused), options.voxels.voxel_m, executor);
 }
 
 core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& folder) const {
-  std::error_code ec;
-  fs::create_directories(folder, ec);
-  if (ec) {
-    return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
-  }
   const auto stored = views();
   if (!stored) return tl::unexpected<core::Error>(stored.error());
-  std::size_t written = 0;
-  for (std::size_t i = 0; i < stored->size(); ++i) {
-    const core::KeyframeId id = stored->keyframes[i];
-    if (!id.valid()) continue;
-    const auto cloud = stored->read(i);
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-    cloud::transform(
-        **cloud, map_.result.output_from_map * stored->world_from_camera[i] * cloud::sensor_pose(**cloud));
-    const std::string name =
-        id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
-    if (auto done = cloud::write_ply(folder / name, **cloud); !done) {
-      return tl::unexpected<core::Error>(done.error());
-    }
-    ++written;
-  }
-  return written;
+  return maps::write_keyframe_clouds(folder, *stored, map_.result.output_from_map,
+                                     [&](std::size_t i) { return stored->read(i); });
 }
 
 core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core::Executor& executor) {
@@ -204,7 +173,7 @@ core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core:
   const bool written =
       place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));
   if (written || place.store.empty()) return read_result_cloud(*place.result);
-  const auto stored = StoredResult::open(place.store);
+  const auto stored = StoredResult::open(place);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   auto fused = stored->fused(stored->fusion_options(), executor);
   if (!fused) return tl::unexpected<core::Error>(fused.error());

@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/maps/stored_views.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 #include <system_error>
 #include <utility>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/cloud/transform.hpp"
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::maps {
 
@@ -49,6 +56,27 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     if (seen.count({frame.robot, pose.stamp}) == 0) add({}, frame, pose.stamp, pose.world_from_camera);
   }
   return views;
+}
+
+core::Result<std::size_t> write_keyframe_clouds(
+    const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,
+    const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read) {
+  if (auto made = core::make_folder(folder); !made) return tl::unexpected<core::Error>(made.error());
+  std::size_t written = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const core::KeyframeId id = views.keyframes[i];
+    if (!id.valid()) continue;
+    const auto cloud = read(i);
+    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    cloud::transform(**cloud, output_from_map * views.world_from_camera[i] * cloud::sensor_pose(**cloud));
+    const std::string name =
+        id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
+    if (auto done = cloud::write_ply(folder / name, **cloud); !done) {
+      return tl::unexpected<core::Error>(done.error());
+    }
+    ++written;
+  }
+  return written;
 }
 
 }  // namespace plumbline::maps

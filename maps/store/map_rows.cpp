@@ -150,7 +150,10 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
 std::vector<StoredMap> MapRows::maps() const {
   check_owners();
   std::vector<StoredMap> maps;
-  for (const auto& [key, row] : maps_) maps.push_back(map(key.first, row));
+  for (const auto& [key, row] : maps_) {
+    maps.push_back(map(key.first, row));
+    if (maps_.size() > 1) maps.back().robot = static_cast<std::int32_t>(key.first);
+  }
   if (maps_.empty()) maps.push_back(map(0, {}));  // nothing was added yet
   return maps;
 }

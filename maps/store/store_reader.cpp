@@ -15,8 +15,8 @@ namespace {
 
 using core::ErrorKind;
 
-/// Calls row(robot, number, bytes) for all rows of `table` by robot and number; what `row` dislikes is told
-/// with the row's name.
+/// Calls row(robot, number, bytes) for all rows of `table` by robot and number; what `row` dislikes is
+/// reported with the row's name.
 template <typename Row>
 void read_table(Database& database, const std::string& table, const Row& row) {
   Statement rows(database, ("SELECT robot, number, data FROM " + table + " ORDER BY robot, number").c_str());
@@ -108,12 +108,20 @@ core::Result<std::vector<StoredMap>> StoreReader::load_each() const {
   return guarded(impl_->file, ErrorKind::kInput, [&] { return read_maps(*impl_->database, impl_->header); });
 }
 
-core::Result<StoredMap> StoreReader::load() const {
+core::Result<StoredMap> StoreReader::load(const std::string& robot) const {
   auto maps = load_each();
   if (!maps) return tl::unexpected<core::Error>(maps.error());
   if (maps->size() == 1) return std::move(maps->front());
-  return core::input_error(impl_->file.string() + ": the maps of its " + std::to_string(maps->size()) +
-                           " robots are not one yet; go on with plumbline map --resume");
+  std::string names;
+  for (StoredMap& map : *maps) {
+    for (const RobotInfo& info : impl_->header.robots) {
+      if (info.number != map.robot) continue;
+      if (info.name == robot) return std::move(map);
+      names += (names.empty() ? "" : ", ") + info.name;
+    }
+  }
+  return core::input_error(impl_->file.string() + ": the maps of its robots (" + names +
+                           ") are not one yet; name one with --robot, or go on with plumbline map --resume");
 }
 
 template <typename IdType>

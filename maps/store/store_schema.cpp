@@ -146,6 +146,9 @@ void check_file(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file, ignored)) {
     throw StoreFailure(core::ErrorKind::kInput, "is no file; give the map.db of a result folder");
   }
+  constexpr std::uintmax_t kHeaderBytes = 100;  // of any SQLite file; a shorter one opens as an empty one
+  const std::uintmax_t bytes = std::filesystem::file_size(file, ignored);
+  if (bytes > 0 && bytes < kHeaderBytes) throw BadBytes("it ends before its header does");
 }
 
 }  // namespace plumbline::maps

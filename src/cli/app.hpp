@@ -14,7 +14,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/dataset/frame_source.hpp"
-#include "plumbline/pipeline/summary.hpp"
+#include "plumbline/pipeline/map_recording.hpp"
 
 namespace plumbline::cli {
 
@@ -50,6 +50,21 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
                       std::function<int()> run);
 /// --plugin FILE.so, for commands that use filters.
 void add_plugin_option(CLI::App& command, Session& session);
+/// -p, --set, --plugin and --force of a pipeline::MapRequest or FuseRequest.
+template <typename Request>
+void add_pipeline_options(CLI::App& command, Session& session, Request& request) {
+  command
+      .add_option("-p,--pipeline", request.pipeline,
+                  "Shipped pipeline or file (default: " + request.pipeline + ")")
+      ->type_name("PIPELINE");
+  command.add_option("--set", request.overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+  add_plugin_option(command, session);
+  command.add_flag("--force", request.replace, "Replace an earlier result");
+}
+/// What all commands that map a recording take besides.
+void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
 /// --from S and --to S, for commands that read recordings.
 void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 /// A word that only groups commands, like `evaluate`.

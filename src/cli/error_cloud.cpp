@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "plumbline/cloud/ply.hpp"
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/viz/color.hpp"
 #include "plumbline/viz/snapshot.hpp"
 
@@ -92,11 +93,7 @@ viz::Scene as_scene(const ErrorCloud& cloud) {
 
 core::Result<void> write_error_cloud(const ErrorCloud& cloud, const std::filesystem::path& folder,
                                      const std::string& name) {
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  if (problem) {
-    return core::output_error(fmt::format("cannot make folder {}: {}", folder.string(), problem.message()));
-  }
+  if (auto made = core::make_folder(folder); !made) return made;
   const double end_m = color_end_m(cloud.error_m);
   if (auto done = cloud::write_ply(folder / (name + ".ply"), as_ply(cloud, end_m)); !done) return done;
   viz::SnapshotOptions options;

@@ -103,6 +103,12 @@ Result<void> OutputFile::commit() {
   return output_error(problem_ + "; free space or choose another folder");
 }
 
+Result<void> make_folder(const std::filesystem::path& folder) {
+  std::error_code ec;
+  std::filesystem::create_directories(folder, ec);
+  return ec ? output_error(folder.string() + ": cannot be created (" + ec.message() + ")") : Result<void>();
+}
+
 Result<void> write_file(const std::filesystem::path& file, std::string_view bytes) {
   OutputFile out(file);
   out.write(bytes);

@@ -17,6 +17,8 @@ const std::vector<RenamedOption> kRenamedOptions{
     {"refine", "icp.floor", "icp.min_sigma"},
     {"refine", "icp.min_hold", "icp.min_information"},
     {"refine", "adjust.first_gate", "adjust.gate"},
+    {"refine", "adjust.aligned", "adjust.aligned_sigma"},
+    {"track", "bundle.aligned", "match.aligned_sigma"},
     {"track", "loops.agreeing", "loops.min_consistent"},
     {"track", "loops.max_rival", "loops.max_alternative"},
     {"track", "loops.max_apart", "loops.max_translation"},
@@ -52,12 +54,15 @@ const std::vector<RenamedOption> kRenamedOptions{
     {"features", "depth_ransac_rounds", "line.depth_ransac_rounds"},
     {"features", "depth_pixel_sigma", "line.depth_pixel_sigma"}};
 
+/// Options that another stage has now.
+constexpr RenamedOption kMovedOptions[] = {{"track", "points", "features.points"},
+                                           {"track", "lines", "features.lines"},
+                                           {"track", "photometric", "features.photometric"},
+                                           {"robots", "online", "merge.online"}};
+
 /// Stages that went, and options of theirs that another one has.
-constexpr RenamedOption kGoneStages[] = {{"robots", "merge.", "merge."},
-                                         {"robots", "online", "merge.online"},
-                                         {"robots", "", "track."},
-                                         {"maps", "", "merge."},
-                                         {"keep", "", "store."}};
+constexpr RenamedOption kGoneStages[] = {
+    {"robots", "merge.", "merge."}, {"robots", "", "track."}, {"maps", "", "merge."}, {"keep", "", "store."}};
 
 }  // namespace
 
@@ -70,14 +75,21 @@ std::string renamed_option(const std::string& stage, const std::string& key) {
   return key;
 }
 
+std::string moved_option(const std::string& stage, const std::string& key) {
+  for (const RenamedOption& option : kMovedOptions) {
+    if (stage == option.stage && key == option.before) return option.now;
+  }
+  return {};
+}
+
 std::string renamed_setting(const std::string& stage, const std::string& key) {
+  if (const std::string moved = moved_option(stage, key); !moved.empty()) return moved;
   for (const RenamedOption& gone : kGoneStages) {
     const std::string before = gone.before;
     if (stage != gone.stage || key.rfind(before, 0) != 0) continue;
     const std::string now = gone.now;
-    const std::string moved = before == "online" ? "" : key.substr(before.size());
     const std::string heir = now.substr(0, now.find('.'));
-    return moved.empty() ? now : heir + "." + renamed_option(heir, moved);
+    return renamed_setting(heir, key.substr(before.size()));
   }
   return stage + "." + renamed_option(stage, key);
 }

@@ -237,7 +237,7 @@ void check_characters(const std::string& text, const std::string& file) {
   }
 }
 
-/// Nothing sensible can be read: the problem is told, and no tree given.
+/// Nothing sensible can be read: the problem is reported, and no tree given.
 std::optional<ConfigNode> unreadable(const std::filesystem::path& file, const std::string& what,
                                      ConfigProblems& problems) {
   problems.push_back({{file.string(), 0, 0}, "", what});

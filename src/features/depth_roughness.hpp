@@ -13,7 +13,7 @@ namespace plumbline::features {
 /// opposite ones together. A huge number where too few were measured.
 float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step);
 
-/// What is rougher than this has a border: so many times as rough as most of the picture. A sensor may be
+/// What is rougher than this has a border: so many times as rough as most of the image. A sensor may be
 /// better or worse than its model. `roughness`: one number for each place that was asked, in any order.
 float roughness_limit(std::vector<float> roughness);
 

@@ -14,7 +14,7 @@
 namespace plumbline::features {
 namespace {
 
-/// Blurred small grey picture: blur and noise of the original hardly show in it.
+/// Blurred small grey image: blur and noise of the original hardly show in it.
 cv::Mat make_thumbnail(const cv::Mat& gray) {
   const cv::Size size(kThumbnailWidth, std::max(1, gray.rows * kThumbnailWidth / std::max(1, gray.cols)));
   cv::Mat small;
@@ -187,9 +187,9 @@ CornerDepth corner_depth(const cv::Mat& depth, float x, float y) {
 }
 
 void FeatureOptions::declare(core::OptionTable& table) {
-  table.boolean("points", points, "Extract ORB points");
-  table.boolean("lines", lines, "Extract lines");
-  table.boolean("photometric", photometric, "Keep pictures for direct alignment");
+  table.boolean("points", points, "ORB points: extract, track, and look for a lost place by them");
+  table.boolean("lines", lines, "Lines: extract and track");
+  table.boolean("photometric", photometric, "Align grey values with keyframes directly");
   orb.declare(table);
   line.declare(table);
 }
@@ -199,6 +199,7 @@ FeatureExtractor::FeatureExtractor(const FeatureOptions& options, const sensor::
 
 FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   FrameFeatures result;
+  result.extracted = options_.points || options_.lines;
   if (frame.gray.empty()) return result;
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));

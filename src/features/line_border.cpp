@@ -8,7 +8,7 @@ namespace plumbline::features {
 namespace {
 
 constexpr int kMaxSpread = 3;        // grey levels within one constant row (JPEG leaves a little noise)
-constexpr int kVisibleStep = 12;     // grey levels from the frame up to the picture
+constexpr int kVisibleStep = 12;     // grey levels from the frame up to the image
 constexpr double kStepShare = 0.25;  // of a side's pixels must show the step
 constexpr int kRaggedWidth = 3;      // px: a frame that is blended or covers a part of the side only
 

@@ -14,7 +14,7 @@ namespace plumbline::features {
 namespace {
 
 constexpr int kFastRadius = 3;
-constexpr int kEdge = 16;        // the patch of a corner 3 px further in must lie inside the picture
+constexpr int kEdge = 16;        // the patch of a corner 3 px further in must lie inside the image
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
 
 /// Which cell of a grid over a width x height area a corner lies in.
@@ -173,7 +173,7 @@ float OrbExtractor::sigma(int octave) const {
 
 namespace {
 
-/// Where corners of a level may lie, `region` being of the full picture.
+/// Where corners of a level may lie, `region` being of the full image.
 cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale) {
   const int x0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.x) / scale)) + 3);
   const int y0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.y) / scale)) + 3);
@@ -184,7 +184,7 @@ cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale
   return {x0, y0, x1 - x0, y1 - y0};
 }
 
-/// Where the middle of a level's pixel lies in the full picture: both show the same from edge to edge, and a
+/// Where the middle of a level's pixel lies in the full image: both show the same from edge to edge, and a
 /// level is a whole number of pixels wide, not quite its scale.
 Eigen::Vector2f in_full_picture(const Corner& corner, const cv::Size& level, const cv::Size& full) {
   const auto there = [](int at, int size, int full_size) {

@@ -11,7 +11,7 @@
 namespace plumbline::features {
 namespace {
 
-constexpr int kBorder = 3;  // pixels of a level without samples along the picture's edge
+constexpr int kBorder = 3;  // pixels of a level without samples along the image's edge
 constexpr std::array<int, kPhotometricLevels> kCell{3, 2};
 constexpr float kNearestSample_m = 0.25F;       // metres
 constexpr int kBox = 7;                         // pixels of a level
@@ -24,7 +24,7 @@ struct Surroundings {
 };
 
 /// Depth at a pixel, the mean over the surface near it; 0 where it is missing or jumps around it: what the
-/// picture holds of another surface, if only in the local mean, moves with that.
+/// image holds of another surface, if only in the local mean, moves with that.
 float continuous_depth(const cv::Mat& depth, int x, int y, const Surroundings& around) {
   const float here = depth.at<float>(y, x);
   if (!(here > kNearestSample_m)) return 0.0F;
@@ -62,6 +62,17 @@ float steepness(const cv::Mat& image, int x, int y) {
   const float gx = image.at<float>(y, x + 1) - image.at<float>(y, x - 1);
   const float gy = image.at<float>(y + 1, x) - image.at<float>(y - 1, x);
   return gx * gx + gy * gy;
+}
+
+Spot steepest(const cv::Mat& image, int left, int top, int cell) {
+  Spot best;
+  for (int y = top; y < top + cell; ++y) {
+    for (int x = left; x < left + cell; ++x) {
+      const float s = steepness(image, x, y);
+      if (s > best.steepness) best = {x, y, s};
+    }
+  }
+  return best;
 }
 
 float interpolated(const cv::Mat& image, float x, float y) {
@@ -136,13 +147,7 @@ PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::M
     std::vector<float> roughness;
     for (int cy = kBorder; cy + cell <= picture.rows - kBorder; cy += cell) {
       for (int cx = kBorder; cx + cell <= picture.cols - kBorder; cx += cell) {
-        Spot best;
-        for (int y = cy; y < cy + cell; ++y) {
-          for (int x = cx; x < cx + cell; ++x) {
-            const float s = steepness(picture, x, y);
-            if (s > best.steepness) best = {x, y, s};
-          }
-        }
+        const Spot best = steepest(picture, cx, cy, cell);
         const int full_x = static_cast<int>((static_cast<float>(best.x) + 0.5F) * per_x);
         const int full_y = static_cast<int>((static_cast<float>(best.y) + 0.5F) * per_y);
         const float z = continuous_depth(depth, full_x, full_y, around);

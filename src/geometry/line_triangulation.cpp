@@ -171,6 +171,17 @@ bool overlaps(const LineView& view, const Eigen::Vector3d& a, const Eigen::Vecto
   return e > s && common >= min_overlap * std::min(length, e - s);
 }
 
+/// None where a view is degenerate.
+std::optional<std::vector<Plane>> interpretation_planes(const std::vector<LineView>& views) {
+  std::vector<Plane> planes;
+  for (const LineView& view : views) {
+    const auto plane = interpretation_plane(view);
+    if (!plane || !std::isfinite(plane->offset)) return std::nullopt;
+    planes.push_back(*plane);
+  }
+  return planes;
+}
+
 /// In the frame of the first view, where numbers stay small however far away the world's origin is.
 TriangulatedLine triangulate_local(const std::vector<LineView>& views,
                                    const LineTriangulationOptions& options) {
@@ -179,16 +190,12 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
     result.status = status;
     return result;
   };
-  std::vector<Plane> planes;
-  for (const LineView& view : views) {
-    const auto plane = interpretation_plane(view);
-    if (!plane || !std::isfinite(plane->offset)) return refused(Status::kDegenerate);
-    planes.push_back(*plane);
-  }
-  result.angle_rad = largest_angle(planes);
+  const auto planes = interpretation_planes(views);
+  if (!planes) return refused(Status::kDegenerate);
+  result.angle_rad = largest_angle(*planes);
   if (result.angle_rad < options.min_angle_rad) return refused(Status::kTooLittleParallax);
 
-  const Fit fit = refine(views, to_orthonormal(meet(planes)));
+  const Fit fit = refine(views, to_orthonormal(meet(*planes)));
   if (!fit.valid) return refused(Status::kDegenerate);
   result.line = to_plucker(fit.line);
   const double redundant = 2.0 * static_cast<double>(views.size()) - 4.0;

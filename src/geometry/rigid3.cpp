@@ -41,10 +41,6 @@ Rigid3 Rigid3::operator*(const Rigid3& b) const {
   return {renormalised(rotation * b.rotation), rotation * b.translation + translation};
 }
 
-Rigid3 from_isometry(const Eigen::Isometry3d& transform) {
-  return {renormalised(transform.linear()), transform.translation()};
-}
-
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;

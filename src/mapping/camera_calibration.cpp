@@ -187,8 +187,7 @@ class Calibrator {
     for (const CameraUnknown u : group) {
       double mean = 0.0;
       for (const CameraChange& f : with.found) mean += f[u] / kParts;
-      if (u == optimize::kReadout && mean < 0.0)
-        return false;  // no camera reads a picture before it is taken
+      if (u == optimize::kReadout && mean < 0.0) return false;  // no camera reads an image before it is taken
       differs = differs || std::abs(mean - none[u]) > options_.least_sigmas * with.sigma(u);
     }
     return differs;

@@ -30,6 +30,7 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
 
 static ObservationNoise noise_of(const SlamOptions& options) {
   ObservationNoise noise = options.mapper.bundle_noise;
+  noise.aligned = options.tracker.association.aligned_sigma;
   noise.orb_scale_factor = options.tracker.association.scale_factor;
   return noise;
 }
@@ -38,7 +39,7 @@ static ObservationNoise noise_of(const SlamOptions& options) {
 static LocalMapperOptions mapper_of(const SlamOptions& options) {
   LocalMapperOptions mapper = options.mapper;
   mapper.triangulation.scale_factor = options.tracker.association.scale_factor;
-  mapper.triangulation.aligned = options.mapper.bundle_noise.aligned;
+  mapper.triangulation.aligned = options.tracker.association.aligned_sigma;
   mapper.edges = options.mapper.edges && options.tracker.depth;
   return mapper;
 }

@@ -106,7 +106,8 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
 
 /// Maps that can be fused; what cannot is named in `reason`.
 std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<RobotTraffic>& traffic,
-                                  const core::Executor& executor, core::Log& log, std::string& reason) {
+                                  std::size_t expected, const core::Executor& executor, core::Log& log,
+                                  std::string& reason) {
   std::vector<fs::path> maps;
   const auto leave_out = [&](const std::string& why) { reason += (reason.empty() ? "" : "; ") + why; };
   for (const RobotTraffic& t : traffic) {
@@ -123,7 +124,36 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
     log.warning(fmt::format("{}: is left out: {}", t.name, why));
     leave_out(t.name + " is left out: its map does not load");
   }
+  if (traffic.size() < expected) {
+    leave_out(fmt::format("{} of {} robots never came", expected - traffic.size(), expected));
+  }
   return maps;
+}
+
+/// What others could do who are on the network, in words for the log. Errors: the keys cannot be used.
+core::Result<void> warn_of_security(const NetworkOptions& options, core::Log& log) {
+  if (options.security.empty()) {
+    if (options.interface == "lo") return {};
+    log.warning(fmt::format("on {} without --security: whoever is there can read maps and send some",
+                            options.interface));
+    return {};
+  }
+  constexpr int kSoon = 30;
+  const auto days = days_of_keys(options);
+  if (!days) return tl::unexpected<core::Error>(days.error());
+  if (*days < kSoon)
+    log.warning(fmt::format("the keys in {} expire in {} days", options.security.string(), *days));
+  return {};
+}
+
+/// Why somebody with foreign keys gets nothing only the hub learns.
+core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& options, core::Log& log) {
+  const bool secured = !options.security.empty();
+  return open_hub_bus(options, [&log, secured, reported = 0](const std::string& line) mutable {
+    constexpr int kMostReported = 50;
+    const bool keys = secured && line.find("ertificate") != std::string::npos && ++reported <= kMostReported;
+    log.write(keys ? core::LogLevel::kWarning : core::LogLevel::kDebug, "DDS: " + line);
+  });
 }
 
 }  // namespace
@@ -142,24 +172,8 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   output->keep();
   const fs::path folder = output->path();
   LogFile log(folder / "hub.log", console);
-  if (options->interface != "lo" && options->security.empty()) {
-    log.warning(fmt::format("on {} without --security: whoever is there can read maps and send some",
-                            options->interface));
-  }
-  if (!options->security.empty()) {
-    constexpr int kSoon = 30;
-    const auto days = days_of_keys(*options);
-    if (!days) return fail(days.error());
-    if (*days < kSoon)
-      log.warning(fmt::format("the keys in {} expire in {} days", options->security.string(), *days));
-  }
-  // Why somebody with foreign keys gets nothing only the hub learns.
-  const bool secured = !options->security.empty();
-  auto bus = open_hub_bus(*options, [&log, secured, reported = 0](const std::string& line) mutable {
-    constexpr int kMostReported = 50;
-    const bool keys = secured && line.find("ertificate") != std::string::npos && ++reported <= kMostReported;
-    log.write(keys ? core::LogLevel::kWarning : core::LogLevel::kDebug, "DDS: " + line);
-  });
+  if (auto secure = warn_of_security(*options, log); !secure) return fail(secure.error());
+  auto bus = open_logged_bus(*options, log);
   if (!bus) return fail(bus.error());
   auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);
   if (!desk) return fail(desk.error());
@@ -171,20 +185,14 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   const std::vector<RobotTraffic> traffic = (*desk)->serve(stop, status);
   const Goodbye goodbye(**desk);
   std::string reason;
-  const std::vector<fs::path> maps = usable_maps(folder, traffic, executor, log, reason);
-  if (traffic.size() < request.robots) {
-    const std::size_t missing = request.robots - traffic.size();
-    reason +=
-        fmt::format("{}{} of {} robots never came", reason.empty() ? "" : "; ", missing, request.robots);
-  }
-  if (maps.empty()) {
+  pipeline::FuseRequest last = fuse;
+  last.maps = usable_maps(folder, traffic, request.robots, executor, log, reason);
+  if (last.maps.empty()) {
     return core::failure(
         core::ErrorKind::kUntrustworthy,
         fmt::format("no map came that could be fused{}; what came is in {}, --resume goes on",
                     reason.empty() ? "" : " (" + reason + ")", folder.string()));
   }
-  pipeline::FuseRequest last = fuse;
-  last.maps = maps;
   last.output = folder / "fused";
   last.replace = true;
   auto summary =

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/maps/store.hpp"
 
@@ -26,9 +27,8 @@ tl::unexpected<core::Error> refuse(const char* why) { return core::input_error(w
 
 core::Result<HubRobot> HubRobot::open(std::string name, const std::filesystem::path& file,
                                       std::uint64_t quota_bytes) {
-  std::error_code ec;
-  std::filesystem::create_directories(file.parent_path(), ec);
-  if (ec) return core::output_error(fmt::format("{}: cannot be made ({})", file.string(), ec.message()));
+  if (auto made = core::make_folder(file.parent_path()); !made)
+    return tl::unexpected<core::Error>(made.error());
   auto copy = maps::StoreReplica::open(file);
   if (!copy) return tl::unexpected<core::Error>(copy.error());
   HubRobot robot;

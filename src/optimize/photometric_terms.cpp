@@ -12,7 +12,7 @@ namespace {
 
 using geometry::Rigid3;
 
-/// Where a family's picture shows a point of the reference camera.
+/// Where a family's image shows a point of the reference camera.
 class Lookup {
  public:
   Lookup(const PhotometricFamily& family, const Rigid3& camera_from_world)
@@ -27,7 +27,7 @@ class Lookup {
     cx_ = static_cast<float>(family.camera.cx);
     cy_ = static_cast<float>(family.camera.cy);
   }
-  /// Grey value there, bilinear; false: not in the picture.
+  /// Grey value there, bilinear; false: not in the image.
   bool at(const Eigen::Vector3f& point, float& value) const {
     const Eigen::Vector3f p = rotation_ * point + translation_;
     if (!(p.z() > 0.1F)) return false;

@@ -87,7 +87,7 @@ void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolver
     if (rows < 3 || !options.depth_rows) continue;
     const Robust depth = huber(r(2) * r(2), options.plane_loss);
     cost += options.point_weight * depth.cost;
-    // A corner whose picture does not fit has no say about depth either.
+    // A corner whose image does not fit has no say about depth either.
     sums.add(j.row(2), r(2), options.point_weight * depth.weight * pixel.weight);
   }
 }

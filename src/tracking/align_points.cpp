@@ -13,7 +13,7 @@ struct Sight {
   const features::CornerPatch* patch = nullptr;
   int octave = 0;                    ///< of the patch
   double farther = 0.0;              ///< octaves by which the landmark is farther away now
-  Eigen::Matrix2f frame_from_patch;  ///< distances of pixels of the full pictures
+  Eigen::Matrix2f frame_from_patch;  ///< distances of pixels of the full images
 };
 
 /// None when the keyframe saw it from a direction or at a distance that is too different.
@@ -67,7 +67,7 @@ std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& poi
   return std::nullopt;
 }
 
-/// Where the picture shows what the patch stands for, pixels of the full picture; `start`: where it may be.
+/// Where the image shows what the patch stands for, pixels of the full image; `start`: where it may be.
 std::optional<Eigen::Vector2f> align(const Sight& sight, const std::vector<cv::Mat>& levels,
                                      const Eigen::Vector2f& start, double scale_factor) {
   const int last = static_cast<int>(levels.size()) - 1;

@@ -38,7 +38,7 @@ std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurfac
   const geometry::Rigid3 camera_from_depth = depth_from_camera.inverse();
   const geometry::Rigid3 world_from_depth = depth_from_world.inverse();
   terms.reserve(static_cast<std::size_t>(options.max_samples));
-  // Take every n-th sample, so that any number of them is spread over all keyframes and the whole picture.
+  // Take every n-th sample, so that any number of them is spread over all keyframes and the whole image.
   const std::size_t step = 1 + (surface.size() - 1) / static_cast<std::size_t>(options.max_samples);
   for (std::size_t i = 0; i < surface.size(); i += step) {
     const WorldSurface& s = surface[i];

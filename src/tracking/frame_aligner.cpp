@@ -145,7 +145,7 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
 }
 
 void FrameAligner::associate_intensity(const AlignmentRound& round) {
-  if (!in_.options.photometric) return;
+  if (!in_.options.photometric || in_.features.photometric == nullptr) return;
   const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
                      update_photometric(*problem_.photometric, result_.camera_from_world);
   if (!again) {

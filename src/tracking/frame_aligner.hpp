@@ -51,7 +51,9 @@ class FrameAligner {
   [[nodiscard]] bool contradicts_motion_prior();
   [[nodiscard]] geometry::Matrix6d trusted_information(bool by_features, bool by_surface);
   void judge();
-  [[nodiscard]] bool uses_features() const { return in_.options.points || in_.options.lines; }
+  [[nodiscard]] bool uses_features() const {
+    return in_.features.extracted && (in_.options.points || in_.options.lines);
+  }
   [[nodiscard]] int feature_inliers() const;
 
   const AlignmentInput& in_;

@@ -35,7 +35,7 @@ Tracker::PoseHypotheses Tracker::pose_hypotheses(const maps::Map& map, const sen
   }
   result.camera_from_world.push_back(predicted);
   result.camera_from_world.push_back(last);
-  if (options_.photometric)
+  if (options_.photometric && features.photometric != nullptr)
     rank_by_intensity(map, {features.photometric.get(), &frame.depth, {}, camera_}, result);
   return result;
 }
@@ -93,7 +93,8 @@ std::optional<TrackResult> Tracker::track_with_motion_model(const maps::Map& map
   if (motion_.expired()) return std::nullopt;
   const PoseHypotheses hypotheses = pose_hypotheses(map, frame, features);
   const auto tracked = [&](const TrackResult& attempt) {
-    return attempt.state == TrackState::kTracked && (!motion_.outdated() || passes_strict_check(attempt));
+    return attempt.state == TrackState::kTracked &&
+           (!motion_.outdated() || passes_strict_check(attempt, features));
   };
   std::optional<TrackResult> best;
   for (const Rigid3& hypothesis : hypotheses.camera_from_world) {
@@ -118,7 +119,7 @@ std::vector<Tracker::PlaceHypothesis> Tracker::place_hypotheses(
   std::vector<LookAlike> alike;
   if (options_.thumbnails) alike = look_alikes(map, map.keyframe_ids(), features, kLookAlikes);
   std::vector<PlaceHypothesis> hypotheses;
-  if (options_.points) {
+  if (options_.points && !features.points.empty()) {
     std::vector<core::KeyframeId> candidates;
     const auto add = [&candidates](core::KeyframeId id) {
       if (std::find(candidates.begin(), candidates.end(), id) == candidates.end()) candidates.push_back(id);
@@ -146,7 +147,7 @@ std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const senso
     local_map_ = build_local_map(map, place.keyframe, options_.local_map);
     TrackResult attempt = align(map, frame, features, place.camera_from_world, place.coarse ? 24.0 : 10.0);
     if (attempt.state != TrackState::kTracked || attempt.dead_reckoned) continue;
-    if (place.coarse && !passes_strict_check(attempt)) continue;
+    if (place.coarse && !passes_strict_check(attempt, features)) continue;
     if (is_place_ && !is_place_(frame, features, place.keyframe, attempt.camera_from_world)) continue;
     attempt.relocalised = true;
     motion_.reset();
@@ -158,14 +159,14 @@ std::optional<TrackResult> Tracker::relocalise(const maps::Map& map, const senso
 
 /// Places can look alike: what only the thumbnail suggested must be confirmed by every family that is in use
 /// and has something to say there.
-bool Tracker::passes_strict_check(const TrackResult& result) const {
+bool Tracker::passes_strict_check(const TrackResult& result, const features::FrameFeatures& features) const {
   constexpr double kMostOfTheFeatures = 0.4;  // of the landmarks that should be seen
   if (result.degenerate_directions > 0) return false;
   if (options_.depth &&
       (result.estimate.planes.inliers < options_.min_surface || result.surface_share < kMostOfTheSurface)) {
     return false;
   }
-  if (!options_.points && !options_.lines) return true;
+  if (!features.extracted || (!options_.points && !options_.lines)) return true;
   const auto found = static_cast<double>(result.points.size() + 2 * result.lines.size());
   const auto expected = static_cast<double>(result.visible_points.size() + 2 * result.visible_lines.size());
   return found >= options_.min_inliers && found >= kMostOfTheFeatures * expected;

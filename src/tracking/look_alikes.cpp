@@ -21,8 +21,8 @@ cv::Mat coarse(const cv::Mat& thumbnail) {
   return half;
 }
 
-/// Best normalised correlation of the current picture's middle with the other, over shifts of a fifth of the
-/// picture.
+/// Best normalised correlation of the current image's middle with the other, over shifts of a fifth of the
+/// image.
 double correlation(const cv::Mat& current, const cv::Mat& other) {
   const cv::Rect middle(current.cols / 5, current.rows / 5, current.cols - 2 * (current.cols / 5),
                         current.rows - 2 * (current.rows / 5));

@@ -8,7 +8,7 @@
 namespace plumbline::tracking {
 namespace {
 
-/// Image of a 3D segment, cut off at the near plane; false when it is not in the picture.
+/// Image of a 3D segment, cut off at the near plane; false when it is not in the image.
 bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_from_world,
                      const sensor::Pinhole& camera, features::LineSegment& segment) {
   constexpr double kNear = 0.1;  // metres

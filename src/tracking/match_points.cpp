@@ -8,7 +8,7 @@
 namespace plumbline::tracking {
 namespace {
 
-/// A landmark as it should appear in the picture.
+/// A landmark as it should appear in the image.
 struct Prediction {
   float u = 0.0F;
   float v = 0.0F;
@@ -32,7 +32,7 @@ bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_wo
   return true;
 }
 
-/// How far the picture has turned about its own axis since a keyframe, degrees; asked for many points in
+/// How far the image has turned about its own axis since a keyframe, degrees; asked for many points in
 /// turn.
 class Roll {
  public:

@@ -56,7 +56,7 @@ void draw_residual(cv::Mat& image, const Pixel& measured, const Pixel& predicted
   stroke(image, measured, measured + kResidualZoom * error, residual_color(error.norm()), 2);
 }
 
-/// The picture, dimmed so that colours on it stand out.
+/// The image, dimmed so that colours on it stand out.
 cv::Mat canvas(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera) {
   cv::Mat image;
   if (!frame.color.empty()) {

@@ -97,7 +97,7 @@ int straight_base(const HalfDepth& depth, int x, int y, int dx, int dy) {
 
 struct SurfaceCandidate {
   maps::SurfaceSample sample;
-  int cell = 0;  ///< of the picture
+  int cell = 0;  ///< of the image
   int bin = 0;   ///< of the directions
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the tracker does about pictures whose parts were not taken at the same moment.
+// What the tracker does about images whose parts were not taken at the same moment.
 #include "frame_aligner.hpp"
 #include "plumbline/features/depth_delay.hpp"
 #include "plumbline/features/rolling_shutter.hpp"
@@ -20,7 +20,7 @@ Rigid3 Tracker::depth_from_camera(const sensor::RgbdFrame& frame) const {
   return motion_.motion_within(dt);
 }
 
-/// Features as if all rows of the picture, and the depth image, had been taken at the colour image's stamp.
+/// Features as if all rows of the image, and the depth image, had been taken at the colour image's stamp.
 Tracker::Features Tracker::synchronised(const sensor::RgbdFrame& frame, const Features& features,
                                         const Eigen::Vector3d& angular_velocity) const {
   const Rigid3 to_depth = depth_from_camera(frame);

@@ -33,10 +33,7 @@ const char* to_string(TrackState state) {
 }
 
 void TrackerOptions::declare(core::OptionTable& table) {
-  table.boolean("points", points, "Track ORB points, and look for a lost place by them");
-  table.boolean("lines", lines, "Track lines");
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
-  table.boolean("photometric", photometric, "Align grey values with keyframes directly");
   table.boolean("align_stamps", align_stamps,
                 "Bring colour and depth stamped apart together with the motion model");
   table.boolean("thumbnails", thumbnails, "Small pictures tell where the camera may be");

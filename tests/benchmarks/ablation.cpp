@@ -3,7 +3,7 @@
 // each alone.
 //   ablation [--csv] [--only "no depth"]... [--threads N] [--set key=value]... INPUT...
 // INPUT: a recording's folder with truth, or synth:SCENE?... A set also goes without the features it does not
-// track, as `plumbline map --set track.points=off --set features.points=off` does. Milliseconds are processor
+// track, as `plumbline map --set features.points=off` does. Milliseconds are processor
 // time of one thread, median over the frames; everything else is the same on every run.
 #include <CLI/CLI.hpp>
 #include <algorithm>

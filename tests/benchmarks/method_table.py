@@ -19,10 +19,10 @@ import subprocess
 import sys
 
 OFF = {
-    'points': 'features.points=off track.points=off',
-    'lines': 'features.lines=off track.lines=off',
+    'points': 'features.points=off',
+    'lines': 'features.lines=off',
     'depth': 'track.depth=off track.edges=off track.verify.align=off refine.icp=off refine.adjust.surface_weight=0',
-    'grey values': 'features.photometric=off track.photometric=off track.edges.photometric=off',
+    'grey values': 'features.photometric=off track.edges.photometric=off',
 }
 CONES = 'track.keyframe.rule=cone track.landmark.depth_normals=on track.keyframe.urgent=nearly_lost'
 TABLES = {

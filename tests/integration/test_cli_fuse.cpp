@@ -83,6 +83,8 @@ TEST_F(Fuse, TwoMapsOfOneRoomInAnyOrder) {
 
   // What was fused is a map again.
   EXPECT_EQ(run("info ab").code, 0);
+  const Outcome drawn = run("render ab --size 200x150 -o ab.png");
+  EXPECT_EQ(drawn.code, 0) << "the path of each robot is in its own folder\n" << drawn;
   // A robot of several may leave refinement and cloud to the fusion.
   const Outcome c = run("map world/robot0 -o c -p robot --from 2.5 -q --set cloud.filters=[]");
   ASSERT_EQ(c.code, 0) << c;

@@ -127,7 +127,16 @@ TEST_F(ResumeCommand, SeveralRobotsGoOnAsWell) {
     ASSERT_GT(stored_rows, 0U);
     EXPECT_EQ(run("info " + out).code, 0);
     const bool apart = left->size() > 1;
-    EXPECT_EQ(run("export " + out + " -o left.ply").code, apart ? 3 : 0) << "they are not one yet";
+    const Outcome left_cloud = run("export " + out + " -o left.ply");
+    EXPECT_EQ(left_cloud.code, apart ? 3 : 0) << "they are not one yet";
+    if (apart) {
+      EXPECT_TRUE(left_cloud.told("--robot")) << left_cloud;
+      EXPECT_EQ(run("export " + out + " --robot wall -o left.ply").code, 0);
+      EXPECT_EQ(run("export " + out + " --robot other --what trajectory -o left.txt").code, 0);
+      EXPECT_FALSE(lines_of(path("left.txt")).empty());
+      EXPECT_EQ(run("render " + out + " --robot wall --size 200x150 -o left.png").code, 0);
+      EXPECT_EQ(run("render " + out + " --robot nobody -o left.png").code, 3);
+    }
 
     const Outcome resumed = run("map " + two + " --resume -o " + out + cheap);
     ASSERT_EQ(resumed.code, 0) << resumed;

@@ -368,9 +368,7 @@ core::Result<void> write_trajectory_plots(const std::vector<TrajectoryComparison
     with_errors = with_errors || !errors_of(comparison).empty();
   }
   if (comparisons.empty()) return core::usage_error("trajectory plots: no estimate to draw");
-  std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
-  if (problem) return core::output_error("cannot make folder " + folder.string() + ": " + problem.message());
+  if (auto made = core::make_folder(folder); !made) return made;
   if (auto done = core::write_file(folder / "path.svg", svg_document(path_charts(comparisons), 2)); !done)
     return done;
   if (auto done = core::write_file(folder / "poses.svg", svg_document(pose_charts(comparisons), 2)); !done)

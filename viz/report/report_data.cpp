@@ -30,7 +30,7 @@ core::Result<Json> read_summary(const fs::path& file) {
   return core::input_error(fmt::format("{}: is damaged or not of plumbline map; map again", file.string()));
 }
 
-/// The poses of a file, which is told as missing where they cannot be had.
+/// The poses of a file, which is reported as missing where they cannot be had.
 geometry::Trajectory poses_of(const fs::path& file, ReportData& data) {
   const std::string name = file.lexically_relative(data.folder).string();
   std::error_code ec;
@@ -46,24 +46,15 @@ geometry::Trajectory poses_of(const fs::path& file, ReportData& data) {
   return {};
 }
 
-void add_path(const std::string& robot, const fs::path& folder, ReportData& data) {
-  ReportPath path;
-  path.robot = robot;
-  path.number = data.paths.size();
-  path.poses = poses_of(folder / "trajectory.txt", data);
-  path.keyframes = poses_of(folder / "keyframes.txt", data);
-  data.paths.push_back(std::move(path));
-}
-
 void add_paths(ReportData& data) {
-  std::vector<std::string> robots;
-  std::error_code ec;
-  for (fs::directory_iterator it(data.folder / "robots", ec), end; !ec && it != end; it.increment(ec)) {
-    if (it->is_directory(ec)) robots.push_back(it->path().filename().string());
+  for (const fs::path& folder : maps::ResultFolder{data.folder}.robot_folders()) {
+    ReportPath path;
+    if (folder != data.folder) path.robot = folder.filename().string();
+    path.number = data.paths.size();
+    path.poses = poses_of(folder / "trajectory.txt", data);
+    path.keyframes = poses_of(folder / "keyframes.txt", data);
+    data.paths.push_back(std::move(path));
   }
-  std::sort(robots.begin(), robots.end());
-  for (const std::string& robot : robots) add_path(robot, data.folder / "robots" / robot, data);
-  if (robots.empty()) add_path("", data.folder, data);
 }
 
 /// Pairs of keyframes that loops, and merges of several robots' maps, tie together.

@@ -41,7 +41,7 @@ class HtmlTable {
   std::string body_;
 };
 
-/// What is told of each robot, a column each; without heads when there is one that needs no name.
+/// What is reported of each robot, a column each; without heads when there is one that needs no name.
 class RobotTable {
  public:
   /// A robot's column, to be filled from the top.

@@ -53,7 +53,11 @@ std::string kind_of_reason(const std::string& reason) {
 }
 
 std::string merge_evidence(const Json& m) {
-  const auto count = [&](const char* place) { return count_text(number_at(m, place)); };
+  const auto count = [&](const std::string& place) { return count_text(number_at(m, place)); };
+  const auto overlay = [&](const std::string& at) {
+    return fmt::format("{} expected, {} found again ({} by chance), {} seen through", count(at + "/expected"),
+                       count(at + "/matched"), count(at + "/chance"), count(at + "/seen_through"));
+  };
   Facts facts{
       {"Decision", is_true(m, "accepted") ? "merged" : "not merged: " + text_at(m, "/reason")},
       {"Keyframes that look alike", fmt::format("{}; {} verified or refused, {} show the same place",
@@ -62,10 +66,7 @@ std::string merge_evidence(const Json& m) {
        fmt::format("{}; {} in the best other answer", count("/agreeing"), count("/alternative"))},
       {"Asked for confirmation",
        fmt::format("{}, of which {} confirmed", count("/expected"), count("/confirmed"))},
-      {"Landmarks laid over each other",
-       fmt::format("{} expected, {} found again ({} by chance), {} seen through",
-                   count("/laid_over/expected"), count("/laid_over/matched"), count("/laid_over/chance"),
-                   count("/laid_over/seen_through"))},
+      {"Landmarks laid over each other", overlay("/overlay")},
       {"Matches", fmt::format("{} by descriptor; {} points and lines fit, rms {}", count("/matches"),
                               count("/inliers"), number_text(number_at(m, "/rms"), 2, "σ"))},
       {"Surfaces overlap", percent(number_at(m, "/overlap"))},
@@ -76,12 +77,8 @@ std::string merge_evidence(const Json& m) {
       {"Pairs of the pose graph",
        fmt::format("{}, of which {} were taken for wrong", count("/pairs"), count("/rejected"))}};
   if (number_at(m, "/alternative_m") > 0.0) {
-    facts.emplace_back(
-        "Best other answer",
-        fmt::format("{} off; {} landmarks expected, {} found again, {} seen through",
-                    number_text(number_at(m, "/alternative_m"), 2, "m"),
-                    count("/alternative_overlay/expected"), count("/alternative_overlay/matched"),
-                    count("/alternative_overlay/seen_through")));
+    facts.emplace_back("Best other answer", number_text(number_at(m, "/alternative_m"), 2, "m") + " off; " +
+                                                overlay("/alternative_overlay"));
   }
   if (number_at(m, "/time_s") >= 0.0) {
     facts.emplace_back("Certain after", number_text(number_at(m, "/time_s"), 1, "s of the recordings"));
@@ -209,7 +206,7 @@ std::string merges_html(const ReportData& data) {
     const auto count = [&](const char* place) { return count_text(number_at(m, place)); };
     overview.row({names, accepted ? "merged" : "not merged", count("/candidates"), count("/verified"),
                   count("/agreeing"), count("/confirmed") + " of " + count("/expected"),
-                  count("/laid_over/matched") + " of " + count("/laid_over/expected"), text_at(m, "/reason")},
+                  count("/overlay/matched") + " of " + count("/overlay/expected"), text_at(m, "/reason")},
                  accepted ? "yes" : "bad");
     details +=
         folded("Evidence: " + names, merge_evidence(m) + refused_pairs(m), list.size() <= kShownMerges);

@@ -10,7 +10,6 @@
 #include <vtkContext2D.h>
 #include <vtkContextActor.h>
 #include <vtkFloatArray.h>
-#include <vtkIdTypeArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
@@ -190,15 +189,9 @@ vtkSmartPointer<vtkActor> point_actor(const Scene& scene, const std::vector<std:
     *to_rgb++ = colors[k].g;
     *to_rgb++ = colors[k].b;
   }
-  vtkNew<vtkIdTypeArray> ids;
-  ids->SetNumberOfValues(count);
-  for (vtkIdType i = 0; i < count; ++i) ids->SetValue(i, i);
-  vtkNew<vtkIdTypeArray> offsets;
-  offsets->SetNumberOfValues(2);
-  offsets->SetValue(0, 0);
-  offsets->SetValue(1, count);
   vtkNew<vtkCellArray> vertices;  // one cell of all points
-  vertices->SetData(offsets, ids);
+  vertices->InsertNextCell(static_cast<int>(count));
+  for (vtkIdType i = 0; i < count; ++i) vertices->InsertCellPoint(i);
   vtkNew<vtkPoints> vtk_points;
   vtk_points->SetData(xyz);
   vtkNew<vtkPolyData> data;

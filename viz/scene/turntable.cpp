@@ -10,6 +10,7 @@
 #include <system_error>
 #include <vector>
 
+#include "plumbline/core/output_file.hpp"
 #include "scene/view_frame.hpp"
 
 namespace plumbline::viz {
@@ -58,9 +59,7 @@ SceneExtent extent_of(const Scene& scene) {
 core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
                                     const std::filesystem::path& folder, const TurntableProgress& progress) {
   if (pictures < 2) return core::usage_error("turntable: at least 2 pictures make one turn");
-  std::error_code ec;
-  std::filesystem::create_directories(folder, ec);
-  if (ec) return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  if (auto made = core::make_folder(folder); !made) return made;
   SnapshotOptions view = options;
   const SceneAxes axes = scene_axes(scene, options);
   const SceneExtent extent = extent_of(scene);

@@ -111,20 +111,23 @@ Eigen::Vector3d Projection::to_viewer(const Eigen::Vector3d& p) const {
   return orthographic ? Eigen::Vector3d(-forward) : Eigen::Vector3d((eye - p).normalized());
 }
 
+/// From above and beside: to the left, unless that shows the backs of what the cameras saw.
+static Eigen::Vector3d iso_forward(const SceneAxes& axes) {
+  const double side = axes.heading.dot(axes.right) > kHeadsRight ? 1.0 : -1.0;
+  return std::cos(kIsoPitch) *
+             (std::cos(kIsoAzimuth) * axes.forward + side * std::sin(kIsoAzimuth) * axes.right) -
+         std::sin(kIsoPitch) * axes.up;
+}
+
 Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes) {
   Projection view;
   view.up = axes.up;
   view.orthographic = options.view != View::kIso && options.view != View::kExplicit;
   double field_of_view = kIsoFieldOfView;
   switch (options.view) {
-    case View::kIso: {
-      // To the left, unless that shows the backs of what the cameras saw.
-      const double side = axes.heading.dot(axes.right) > kHeadsRight ? 1.0 : -1.0;
-      view.forward = std::cos(kIsoPitch) *
-                         (std::cos(kIsoAzimuth) * axes.forward + side * std::sin(kIsoAzimuth) * axes.right) -
-                     std::sin(kIsoPitch) * axes.up;
+    case View::kIso:
+      view.forward = iso_forward(axes);
       break;
-    }
     case View::kTop:
       view.forward = -axes.up;
       view.up = axes.forward;

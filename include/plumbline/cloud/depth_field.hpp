@@ -2,9 +2,9 @@
 #pragma once
 
 // What a depth camera gets wrong the same way every time. Structured light has errors that change smoothly
-// over the picture and grow with the square of the distance (Herrera, Kannala, Heikkila, PAMI 34, 2012):
-// walls bend, and one wall seen at the middle and at the rim of two pictures comes out double. Views of a run
-// that see the same surface at different places of their pictures tell how much (after Teichman, Miller,
+// over the image and grow with the square of the distance (Herrera, Kannala, Heikkila, PAMI 34, 2012):
+// walls bend, and one wall seen at the middle and at the rim of two images comes out double. Views of a run
+// that see the same surface at different places of their images tell how much (after Teichman, Miller,
 // Thrun, RSS 2013).
 #include <Eigen/Core>
 #include <cstddef>
@@ -21,7 +21,7 @@
 namespace plumbline::cloud {
 
 /// 1 / z = 1 / z_measured + beta(x, y) along the ray (x, y, 1), x = (u - cx) / fx: beta is a polynomial in x
-/// and y of the degrees 2 to 4, in 1/m. Depth is right in the middle of the picture: what a constant or a
+/// and y of the degrees 2 to 4, in 1/m. Depth is right in the middle of the image: what a constant or a
 /// slope would change are the scale of the map and the tilt of its walls, and of these the poses know more
 /// than the clouds do. The default corrects nothing.
 class DepthField {

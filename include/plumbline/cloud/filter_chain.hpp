@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "plumbline/cloud/filter.hpp"
+#include "plumbline/cloud/voxel_map.hpp"
 #include "plumbline/core/config.hpp"
 
 namespace plumbline::cloud {
@@ -35,7 +36,7 @@ using ChainProgress = std::function<void(std::size_t done, std::size_t total, co
 /// Filters in the order they are applied. Cheap to copy; const use from several threads is safe.
 class FilterChain {
  public:
-  /// All problems of the file are told at once as file:line:column (kUsage).
+  /// All problems of the file are reported at once as file:line:column (kUsage).
   static core::Result<FilterChain> load(const std::filesystem::path& file, const FilterRegistry& registry);
   /// The same from a parsed tree, e.g. a chain inside a pipeline; `path` is the dotted path of `node`.
   static FilterChain parse(const core::ConfigNode& node, const std::string& path,
@@ -63,6 +64,9 @@ class FilterChain {
   core::Result<CloudPtr> apply(CloudConstPtr input, const FilterContext& context = {},
                                std::vector<FilterReport>* reports = nullptr,
                                const ChainProgress& progress = {}) const;
+  /// The same for a fused cloud and its columns; an empty chain hands them on.
+  core::Result<FusedCloud> apply(FusedCloud fused, double spacing_m, const core::Executor& executor,
+                                 std::vector<FilterReport>* reports = nullptr) const;
 
  private:
   [[nodiscard]] core::Error at(std::size_t step, const core::Error& error) const;

@@ -19,7 +19,7 @@ namespace plumbline::cloud {
 
 /// Removes both of two neighbouring points whose distance along the ray is more than the depth noise and the
 /// steepest allowed surface explain, and points that few neighbours share a surface with. A method of this
-/// program's own over the sensor's noise (docs/method/features.md); one pass over the picture.
+/// program's own over the sensor's noise (docs/method/features.md); one pass over the image.
 ///
 /// For organised clouds, metres; filter() throws pcl::UnorganizedPointCloudException for others that have
 /// points. Neighbours are looked at among all points, indices given or not.

@@ -14,7 +14,7 @@
 
 namespace plumbline::cloud {
 
-/// A small depth picture of a view: the nearest measured depth within cells of 4 x 4 pixels.
+/// A small depth image of a view: the nearest measured depth within cells of 4 x 4 pixels.
 struct DepthRaster {
   static constexpr int kCell_px = 4;
   int width = 0;
@@ -45,7 +45,7 @@ class DepthLimits {
  public:
   explicit DepthLimits(const DepthRaster& raster);
   /// `point`: metres, frame of the camera, which took the view. Free: all cells around (3 x 3, at least 7
-  /// measured) lie further away than the sensor's noise and 3 cm explain. kNone outside of the picture or
+  /// measured) lie further away than the sensor's noise and 3 cm explain. kNone outside of the image or
   /// where too little was measured.
   [[nodiscard]] Evidence evidence(const Eigen::Vector3f& point) const;
 

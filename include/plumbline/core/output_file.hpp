@@ -45,6 +45,9 @@ class OutputFile {
   std::string problem_;
 };
 
+/// With all folders above it; one that is there is as good. Errors (kOutput).
+Result<void> make_folder(const std::filesystem::path& folder);
+
 /// A whole file at once.
 Result<void> write_file(const std::filesystem::path& file, std::string_view bytes);
 

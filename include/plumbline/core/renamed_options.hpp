@@ -17,6 +17,9 @@ const std::vector<RenamedOption>& renamed_options();
 /// What `key` of a stage of type `stage` is called now; else the key itself.
 std::string renamed_option(const std::string& stage, const std::string& key);
 
+/// "stage.key" of the option that another stage has now instead; empty: none has.
+std::string moved_option(const std::string& stage, const std::string& key);
+
 /// The same for "stage.key" of --set, with the stages that are gone.
 std::string renamed_setting(const std::string& stage, const std::string& key);
 

@@ -74,7 +74,7 @@ struct TrajectoryReport {
 };
 
 /// `frame_stamps`: stamps of the recording's colour frames (seconds), empty when unknown.
-/// Errors (kInput): an empty side, a value that is not finite, no overlap in time (both ranges are told),
+/// Errors (kInput): an empty side, a value that is not finite, no overlap in time (both ranges are reported),
 /// fewer than 3 matched poses (1 unless align is kSe3). kUsage: an option out of range.
 core::Result<TrajectoryReport> evaluate_trajectory(const geometry::Trajectory& estimate,
                                                    const geometry::Trajectory& truth,

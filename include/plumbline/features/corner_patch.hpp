@@ -2,7 +2,7 @@
 #pragma once
 
 // What a corner looks like, to find it again to a tenth of a pixel. FAST answers to whole pixels of an
-// octave: the same corner lies half a pixel of its octave off from picture to picture, in x and in y.
+// octave: the same corner lies half a pixel of its octave off from image to image, in x and in y.
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -17,8 +17,8 @@ struct CornerPatch {
   static constexpr int kReach = 4;              ///< what is aligned reaches so far from the middle
   static constexpr int kSide = 2 * kReach + 3;  ///< one more on each side, for gradients
   static constexpr int kPixels = kSide * kSide;
-  Eigen::Vector2f middle = Eigen::Vector2f::Zero();  ///< where it was cut out, full picture as it was taken
-  /// From there to what the feature stands for, pixels of the full picture: zero for the corner itself; where
+  Eigen::Vector2f middle = Eigen::Vector2f::Zero();  ///< where it was cut out, full image as it was taken
+  /// From there to what the feature stands for, pixels of the full image: zero for the corner itself; where
   /// a known landmark was aligned, to where that is.
   Eigen::Vector2f offset = Eigen::Vector2f::Zero();
   /// All zero: none, as at borders of depth (FeatureExtractor): nothing is aligned with it.
@@ -34,7 +34,7 @@ CornerPatch cut_patch(const cv::Mat& level, int x, int y, const Eigen::Vector2f&
 
 /// Where the middle of `patch` lies in `level` (CV_8UC1), pixels of the level: least squares over its
 /// position, gain and offset of the grey values (inverse compositional: Baker and Matthews 2004), from
-/// `start`. `level_from_patch` carries distances of pixels. None when it leaves the picture or two pixels
+/// `start`. `level_from_patch` carries distances of pixels. None when it leaves the image or two pixels
 /// around `start`, does not settle, has no texture in two directions, or is not alike (correlation under
 /// 0.8).
 std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::Mat& level,

@@ -8,7 +8,7 @@
 namespace plumbline::features {
 
 /// Reads the depth of points anew where the depth camera, `depth_from_camera` beside the colour camera, saw
-/// them, and carries it back: as if both pictures had been taken at once. `depth` (CV_32FC1, metres) is an
+/// them, and carries it back: as if both images had been taken at once. `depth` (CV_32FC1, metres) is an
 /// image of `camera`. Points without depth stay without; one that loses it there has none afterwards.
 void undo_point_depth_delay(FrameFeatures& features, const cv::Mat& depth, const sensor::Pinhole& camera,
                             const geometry::Rigid3& depth_from_camera);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Everything the tracker and the map need to know of one picture; the picture itself is kept only until the
+// Everything the tracker and the map need to know of one image; the image itself is kept only until the
 // frame is tracked.
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -37,7 +37,7 @@ struct FrameFeatures {
   std::vector<PointFeature> points;
   std::vector<Descriptor256> descriptors;  ///< of points
   std::vector<CornerPatch> patches;        ///< of points; no elements: not known
-  std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave; empty once the frame is tracked
+  std::vector<cv::Mat> levels;  ///< CV_8UC1, the image in each octave; empty once the frame is tracked
   std::shared_ptr<const PhotometricImage> photometric;  ///< for direct alignment; null once it is tracked
   /// Of points: how the surface slants, change of the inverse depth per pixel (1/m). No elements: not known;
   /// keyframes give theirs up once all of their corners lie where they belong.
@@ -46,6 +46,7 @@ struct FrameFeatures {
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
+  bool extracted = true;    ///< points or lines were looked for
 
   /// Depth of point `i`'s surface `shift` pixels beside it, metres; 0 where there is none.
   [[nodiscard]] float depth_beside(std::size_t i, const Eigen::Vector2f& shift) const {

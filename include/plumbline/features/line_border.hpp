@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Frames of constant colour around a picture (TUM's fr3 recordings have a black one, 1-3 px wide, at the
+// Frames of constant colour around an image (TUM's fr3 recordings have a black one, 1-3 px wide, at the
 // right and bottom): every detector takes them for edges.
 #include <opencv2/core/mat.hpp>
 
 namespace plumbline::features {
 
-/// Rectangle of real picture content in `gray` (CV_8UC1). Cut off at each side: rows or columns of one
+/// Rectangle of real image content in `gray` (CV_8UC1). Cut off at each side: rows or columns of one
 /// colour, at most `max_width`, that end in a visible step; then up to 3 more that are clearly darker than
-/// what is inside of them along at least a quarter of the side (frames of rectified pictures fade out towards
-/// the corners). A dark or white scene without such a step is kept whole, as is an empty or constant picture.
+/// what is inside of them along at least a quarter of the side (frames of rectified images fade out towards
+/// the corners). A dark or white scene without such a step is kept whole, as is an empty or constant image.
 cv::Rect valid_region(const cv::Mat& gray, int max_width = 16);
 
 }  // namespace plumbline::features

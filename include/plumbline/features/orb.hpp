@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// ORB points spread evenly over the picture (docs/method/features.md).
+// ORB points spread evenly over the image (docs/method/features.md).
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -32,16 +32,16 @@ struct OrbOptions {
   /// the stronger one, squared. On an edge a point matches as well a few pixels further along it, so that it
   /// holds a direction that it does not know. 0: all are kept.
   double min_corner = 0.03;
-  bool spread = true;  ///< evenly over the picture; off: the strongest, wherever they are
+  bool spread = true;  ///< evenly over the image; off: the strongest, wherever they are
   void declare(core::OptionTable& table);
 };
 
-/// Points and descriptors of one picture, same order; deterministic.
+/// Points and descriptors of one image, same order; deterministic.
 struct OrbFeatures {
   std::vector<PointFeature> points;
   std::vector<Descriptor256> descriptors;
   std::vector<CornerPatch> patches;
-  std::vector<cv::Mat> levels;  ///< CV_8UC1, the picture in each octave
+  std::vector<cv::Mat> levels;  ///< CV_8UC1, the image in each octave
 };
 
 /// FAST corners on a pyramid; in every cell of a grid the strongest are kept, with a lower threshold where a

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pictures for direct alignment: what is left of the grey values once everything wider than a few pixels is
+// Images for direct alignment: what is left of the grey values once everything wider than a few pixels is
 // taken away (exposure, vignetting, shading), and where on the surfaces it was seen. A painted wall has no
 // corners, but thousands of pixels of faint grain, which together hold a camera to a fraction of a pixel.
 #include <array>
@@ -13,29 +13,29 @@
 
 namespace plumbline::features {
 
-/// Half of the picture's size, and a quarter.
+/// Half of the image's size, and a quarter.
 constexpr std::size_t kPhotometricLevels = 2;
 
-/// CV_32FC1, grey values less their mean around the pixel; no levels: no picture.
+/// CV_32FC1, grey values less their mean around the pixel; no levels: no image.
 using PhotometricImage = std::array<cv::Mat, kPhotometricLevels>;
 
 /// `gray`: CV_8UC1.
 PhotometricImage make_photometric_image(const cv::Mat& gray);
 
-/// The camera that would take a level's picture; level 0 has half of the picture's size.
+/// The camera that would take a level's image; level 0 has half of the image's size.
 sensor::Pinhole photometric_camera(const sensor::Pinhole& camera, std::size_t level);
 
-/// A place on a surface and what the picture shows there.
+/// A place on a surface and what the image shows there.
 struct PhotometricSample {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();     ///< camera frame, metres
-  float value = 0.0F;                                  ///< of the level's picture
+  float value = 0.0F;                                  ///< of the level's image
   Eigen::Vector2f gradient = Eigen::Vector2f::Zero();  ///< per pixel of the level
 };
 using PhotometricSamples = std::array<std::vector<PhotometricSample>, kPhotometricLevels>;
 
-/// Of each cell of a level's picture the pixel with the steepest gradient, where depth is continuous.
-/// `depth`: CV_32FC1, metres, 0 = none, of the picture's size, registered to it; `camera_from_depth` carries
-/// the depth camera to where the picture was taken (they are stamped apart).
+/// Of each cell of a level's image the pixel with the steepest gradient, where depth is continuous.
+/// `depth`: CV_32FC1, metres, 0 = none, of the image's size, registered to it; `camera_from_depth` carries
+/// the depth camera to where the image was taken (they are stamped apart).
 PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::Mat& depth,
                                       const sensor::Pinhole& camera,
                                       const geometry::Rigid3& camera_from_depth);

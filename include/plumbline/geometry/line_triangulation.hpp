@@ -11,7 +11,7 @@
 namespace plumbline::geometry {
 
 /// A segment seen by one camera. Its ends are normalised image coordinates, (u - cx) / fx and (v - cy) / fy
-/// of an undistorted picture: the camera sees it in the directions (x, y, 1).
+/// of an undistorted image: the camera sees it in the directions (x, y, 1).
 struct LineView {
   Rigid3 camera_from_world;
   Eigen::Vector2d start = Eigen::Vector2d::Zero();

@@ -29,8 +29,6 @@ struct Rigid3 {
   Rigid3 operator*(const Rigid3& b) const;  ///< chained products are renormalised
 };
 
-Rigid3 from_isometry(const Eigen::Isometry3d& transform);
-
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);  ///< [v]x, so that skew(v) * u == v.cross(u)
 
 /// Exponential map, xi = (rho, phi): metres, radians. Left perturbation T <- Exp(xi) T.

@@ -15,7 +15,7 @@ namespace plumbline::mapping {
 
 /// Looks for `landmarks`, just made from corners of the newest keyframe, in `older` keyframes (the nearest
 /// first), among corners that see nothing yet. Where it finds one, that corner's patch is aligned with the
-/// newest keyframe's picture (`levels`); the landmark becomes what the older keyframe saw, and both see it
+/// newest keyframe's image (`levels`); the landmark becomes what the older keyframe saw, and both see it
 /// exactly. The newest keyframe's corner and its patch's offset follow in `newest`, which must be the
 /// features of that keyframe. Corners found must lie off their landmarks' projections all alike, by how much
 /// does not matter much: the older pose is not known better. Returns how many landmarks were found.

@@ -66,7 +66,7 @@ struct KeyframeDecision {
 };
 
 /// Plain: enough parallax, rotation or loss of common features and surface; never so rarely that the map
-/// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the picture; where next
+/// starves. Cone: a candidate whose landmarks are seen from other sides, evenly over the image; where next
 /// to no landmark knows its normal, as on what is lit but not measured, the plain rule speaks. Both: at once
 /// when tracking gets thin, and when depth is back after a keyframe that had none.
 class KeyframeRule {

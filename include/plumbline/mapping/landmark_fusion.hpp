@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// One thing in the world, one landmark: landmarks are looked for in the pictures of keyframes that should see
+// One thing in the world, one landmark: landmarks are looked for in the images of keyframes that should see
 // them and did not (docs/method/mapping.md).
 #include <cstdint>
 #include <map>
@@ -28,7 +28,7 @@ struct FusionSummary {
 };
 
 /// Landmarks of `keyframe` are projected into each of `neighbours`, and the neighbours' landmarks into
-/// `keyframe`. Where one meets a feature that looks like it and lies where it lies, in the picture and in
+/// `keyframe`. Where one meets a feature that looks like it and lies where it lies, in the image and in
 /// depth: a feature that sees nothing yet becomes an observation; one that sees another landmark shows that
 /// both are one, and the less seen is merged into the other. Two landmarks that one keyframe sees at
 /// different places never merge.

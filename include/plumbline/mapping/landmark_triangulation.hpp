@@ -20,7 +20,7 @@ struct TriangulationOptions {
   double max_depth_m = 40.0;
   double min_line_angle_rad = 0.03;  ///< between the interpretation planes that differ most
   int min_line_views = 3;      ///< two planes always meet: only a third one can say that they should not
-  double max_angle_rad = 0.5;  ///< between orientations after the roll between the pictures is undone
+  double max_angle_rad = 0.5;  ///< between orientations after the roll between the images is undone
   double scale_factor = 1.2;   ///< of the ORB pyramid
   double aligned = 0.3;        ///< standard deviation of aligned corners, over that of others
 
@@ -29,7 +29,7 @@ struct TriangulationOptions {
 
 /// What the newest keyframe's corners are aligned in.
 struct NewestImage {
-  const std::vector<cv::Mat>& levels;  ///< the newest keyframe's picture in each octave
+  const std::vector<cv::Mat>& levels;  ///< the newest keyframe's image in each octave
   features::FrameFeatures& newest;     ///< its features, those that the map holds
 };
 
@@ -38,7 +38,7 @@ struct NewestImage {
 /// clearly better than the second best; kept when both rays meet within the pixel noise, in front of both
 /// cameras, at a known depth. Corners are found to a pixel, which needs a long way to tell depth: with
 /// `picture` the newest corner is aligned with the older one's patch and then says it after a third of that;
-/// it moves to where it was found, and both see their landmark exactly. Those whose pictures do not agree
+/// it moves to where it was found, and both see their landmark exactly. Those whose images do not agree
 /// are taken as they are. Returns the new landmarks, which both keyframes observe.
 std::vector<core::PointId> triangulate_points(maps::Map& map, core::KeyframeId keyframe,
                                               const std::vector<core::KeyframeId>& neighbours,

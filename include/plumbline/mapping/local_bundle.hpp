@@ -51,7 +51,7 @@ using MapCorrection = std::map<core::KeyframeId, geometry::Rigid3>;
 /// made after the take keep their pose relative to their parent in the spanning tree; landmarks that were not
 /// part of the bundle move with the keyframe that saw them first. Nothing is done when a keyframe's pose is
 /// not the one that was taken: somebody else has moved the map, and knew more.
-/// Nor when it contradicts what the tracker measured (tracked_path.hpp), which is told then.
+/// Nor when it contradicts what the tracker measured (tracked_path.hpp), which is reported then.
 std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map,
                                       std::optional<Contradiction>* refused = nullptr);
 

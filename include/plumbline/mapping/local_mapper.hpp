@@ -22,7 +22,7 @@ namespace plumbline::mapping {
 struct LocalMapperOptions {
   double max_landmark_depth_m = 8.0;
   double max_landmark_turn_rate =
-      0.6;  ///< rad/s; pictures taken while turning faster make and merge no landmarks
+      0.6;  ///< rad/s; images taken while turning faster make and merge no landmarks
   LandmarkCullingOptions culling;
   bool depth_normals = false;  ///< landmarks' normals from the depth image, not from surface samples
   bool triangulate = true;
@@ -56,7 +56,7 @@ class LocalMapper {
   void restore(const maps::Map& map, core::KeyframeId newest) { culler_.restore(map, newest); }
 
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older
-  /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its picture;
+  /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its image;
   /// empty: none.
   core::KeyframeId insert(maps::Map& map, const sensor::RgbdFrame& frame, const tracking::TrackResult& track,
                           const std::vector<cv::Mat>& levels);
@@ -65,7 +65,7 @@ class LocalMapper {
   void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
 
   /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
-  /// image and the picture of the new one; what they say about its pose stays in the map as edges.
+  /// image and the image of the new one; what they say about its pose stays in the map as edges.
   void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
                          const tracking::TrackResult& track, const tracking::PhotometricKeyframes& pictures,
                          const std::vector<core::KeyframeId>& neighbours);

@@ -58,7 +58,7 @@ struct Loop {
 /// One candidate that was verified, and what became of it.
 struct LoopTrial {
   Loop loop;
-  double score = 0.0;         ///< of the pictures
+  double score = 0.0;         ///< of the images
   double correction_m = 0.0;  ///< how far closing it would move the query; 0 when there is no pose
   double correction_rad = 0.0;
   double path_m = 0.0;  ///< from the match to the query, along the keyframes
@@ -91,7 +91,7 @@ class LoopCloser {
   /// As an edge of the pose graph: where the query lies relative to the match.
   static PoseEdge to_edge(const Loop& loop);
 
-  /// Keyframes of the map that a picture looks like, best first; for a tracker that is lost.
+  /// Keyframes of the map that an image looks like, best first; for a tracker that is lost.
   [[nodiscard]] std::vector<core::KeyframeId> look_alikes(const maps::Map& map,
                                                           const features::FrameFeatures& picture,
                                                           std::size_t count) const;

@@ -74,7 +74,7 @@ class MergeServer {
   };
   /// All that is known of two robots.
   struct RobotPair {
-    MeetingStep step = MeetingStep::kNone;  ///< the farthest that was told
+    MeetingStep step = MeetingStep::kNone;  ///< the farthest that was reported
     bool met = false;
     std::vector<VerifiedPair> verified;
     std::size_t decided_pairs = 0;  ///< when it was decided last

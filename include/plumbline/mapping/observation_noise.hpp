@@ -17,8 +17,8 @@ struct ObservationNoise {
   double aligned = 0.3;           ///< to so much of it where they were aligned (maps::Observation)
   double line_sigma_px = 0.25;    ///< of a line's ends, across it
   double depth_factor = 2.0;      ///< of the depth noise, for the depth of corners and lines
-  bool depth_rows = true;         ///< off: corners and lines say nothing but where they are in the picture
-  /// rad/s. Pictures taken while turning are distorted by the rolling shutter of common sensors, and their
+  bool depth_rows = true;         ///< off: corners and lines say nothing but where they are in the image
+  /// rad/s. Images taken while turning are distorted by the rolling shutter of common sensors, and their
   /// depth is stamped apart: what they say counts for half at this rate and fades with the fourth power of
   /// it.
   double turn_rate = 0.4;

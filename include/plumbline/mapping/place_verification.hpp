@@ -18,7 +18,7 @@ struct VerificationOptions {
   int min_inliers = 30;             ///< points, and lines counted twice
   double min_found = 0.15;          ///< share of the landmarks in view that are found where they should be
   double min_evidence = 10.0;       ///< inliers times that share: few must be most, many may be some
-  int min_cells = 5;                ///< of a 4 x 4 grid of the picture, with inliers
+  int min_cells = 5;                ///< of a 4 x 4 grid of the image, with inliers
   double min_overlap = 0.5;         ///< share of the surface in view that is confirmed
   double max_contradiction = 0.05;  ///< share of it that lies where the other camera saw free space
   int rounds = 600;                 ///< of RANSAC, at most

@@ -67,7 +67,7 @@ class Slam {
   /// places known, as the map tells. A map without keyframes is no place to go on from: nothing happens.
   void restore(maps::Map map, std::vector<maps::FramePose> frames);
 
-  /// As Tracker::set_shutter(). Turns distort no picture of a global shutter: keyframes count however fast
+  /// As Tracker::set_shutter(). Turns distort no image of a global shutter: keyframes count however fast
   /// the camera turned.
   void set_shutter(std::optional<double> readout_s) { tracker_.set_shutter(readout_s); }
 
@@ -85,7 +85,7 @@ class Slam {
   [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
   /// Keyframes by what they look like; empty without loops.
   [[nodiscard]] const places::Database& places() const { return closer_.database(); }
-  /// What the tracker said about the last frame; for pictures of it.
+  /// What the tracker said about the last frame; for images of it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.
   [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_.poses(); }

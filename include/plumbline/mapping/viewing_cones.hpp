@@ -3,7 +3,7 @@
 
 // The terms of the photogrammetric keyframe rule (docs/method/mapping.md; after Azimi, Ahmadabadian,
 // Remondino, ISPRS J. 191, 2022): how many landmarks are seen from another side than at the last keyframe,
-// and whether these are spread over the picture. Plain functions of counts; keyframe_rule.hpp puts them
+// and whether these are spread over the image. Plain functions of counts; keyframe_rule.hpp puts them
 // together.
 #include <array>
 
@@ -40,10 +40,10 @@ struct ConeThreshold {
 ConeThreshold cone_threshold(const ConeCounts& now, const ConeCounts& first, double epsilon = 1.0,
                              bool scaled = false);
 
-/// Points by cell of a 3 x 3 grid over the picture, row by row.
+/// Points by cell of a 3 x 3 grid over the image, row by row.
 using GridCounts = std::array<int, 9>;
 
-/// Adds a point at `pixel` of a picture of this size.
+/// Adds a point at `pixel` of an image of this size.
 void count_in_grid(const Eigen::Vector2d& pixel, int width, int height, GridCounts& grid);
 
 struct GridBalance {

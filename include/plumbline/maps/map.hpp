@@ -45,7 +45,7 @@ struct Keyframe {
   double reference_sigma_m =
       0.0;  ///< standard deviation of that where it is known worst; half as much in radians
   std::shared_ptr<const features::FrameFeatures> features;
-  std::vector<SurfaceSample> surface;  ///< well spread over directions and over the picture
+  std::vector<SurfaceSample> surface;  ///< well spread over directions and over the image
 };
 
 /// Feature `feature` of keyframe `keyframe`.
@@ -70,8 +70,8 @@ struct MapPoint {
   PointId id;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();         ///< world, metres
   features::Descriptor256 descriptor{};                       ///< the most typical of its observations
-  float angle = 0.0F;                                         ///< of that observation, degrees in its picture
-  KeyframeId angle_keyframe;                                  ///< whose picture
+  float angle = 0.0F;                                         ///< of that observation, degrees in its image
+  KeyframeId angle_keyframe;                                  ///< whose image
   Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< world, unit, of the surface it lies on, towards the
                                                      ///< camera that measured it; zero: unknown

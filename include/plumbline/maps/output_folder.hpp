@@ -40,8 +40,8 @@ class OutputFolder {
   void keep() { kept_ = true; }
 
  private:
-  static core::Result<OutputFolder> open(const std::filesystem::path& target,
-                                         const std::filesystem::path& partial, IsEarlier is_earlier);
+  static core::Result<OutputFolder> begin(const std::filesystem::path& out, bool replace,
+                                          IsEarlier is_earlier, bool takes_over);
   OutputFolder(std::filesystem::path target, std::filesystem::path partial, int lock, IsEarlier is_earlier);
   std::filesystem::path target_;
   std::filesystem::path partial_;  ///< empty: nothing to clean up

@@ -17,6 +17,9 @@ struct ResultFolder {
   std::filesystem::path folder;
   [[nodiscard]] std::filesystem::path ply() const { return folder / "map.ply"; }
   [[nodiscard]] std::filesystem::path pcd() const { return folder / "map.pcd"; }
+  /// Where trajectory.txt and keyframes.txt are: of several robots in a folder each, by name, else the
+  /// folder.
+  [[nodiscard]] std::vector<std::filesystem::path> robot_folders() const;
   [[nodiscard]] std::filesystem::path trajectory() const { return folder / "trajectory.txt"; }
   [[nodiscard]] std::filesystem::path keyframes() const { return folder / "keyframes.txt"; }
   [[nodiscard]] std::filesystem::path lines() const { return folder / "lines.ply"; }

@@ -51,7 +51,8 @@ struct ResultFrame {
 /// Everything of a store but clouds; of robots whose maps are not one yet, of one robot.
 struct StoredMap {
   StoreHeader header;
-  bool complete = false;  ///< save_final was the last thing that happened
+  bool complete = false;    ///< save_final was the last thing that happened
+  std::int32_t robot = -1;  ///< whose own map this is; -1: the map is the only one
   Map map;
   std::vector<FramePose> frames;  ///< by robot, in order
   std::vector<std::string> log;   ///< a line a frame of the run, as frames.csv has it, by robot
@@ -158,9 +159,9 @@ class StoreReader {
   /// Tells the system that all of the file will be wanted soon: it is read from disk ahead.
   void read_ahead() const;
   /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
-  /// pictures of the camera's size. Errors (kInput): damaged, or there are maps of several robots that are
-  /// not one yet.
-  [[nodiscard]] core::Result<StoredMap> load() const;
+  /// images of the camera's size. `robot`: whose map, where those of several are not one yet. Errors
+  /// (kInput): damaged, or there are several maps and none of that name.
+  [[nodiscard]] core::Result<StoredMap> load(const std::string& robot = {}) const;
   /// The same of each map that there is: of robots whose maps are not one yet, by robot.
   [[nodiscard]] core::Result<std::vector<StoredMap>> load_each() const;
   /// Errors (kInput): damaged.

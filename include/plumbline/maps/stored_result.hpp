@@ -23,6 +23,7 @@ struct StoredViews;
 struct MapPlace {
   std::optional<ResultFolder> result;  ///< of a run that came to its end
   std::filesystem::path store;  ///< its map.db, or that of a run that was interrupted; empty: there is none
+  std::string robot = {};       ///< whose map, where those of several robots are not one yet
 };
 
 /// `input`: a result folder, map.db itself, or OUT where a run was interrupted and left OUT.partial. Errors
@@ -34,7 +35,8 @@ core::Result<MapPlace> find_map(const std::filesystem::path& input);
 class StoredResult {
  public:
   /// Errors (kInput) as StoreReader.
-  static core::Result<StoredResult> open(const std::filesystem::path& store);
+  static core::Result<StoredResult> open(const std::filesystem::path& store, const std::string& robot = {});
+  static core::Result<StoredResult> open(const MapPlace& place) { return open(place.store, place.robot); }
 
   [[nodiscard]] const StoredMap& stored() const { return map_; }
   [[nodiscard]] geometry::Trajectory trajectory() const;      ///< tracked frames, by robot, then time

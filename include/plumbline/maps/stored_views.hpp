@@ -4,6 +4,7 @@
 // Views that clouds are laid down from: poses of a map, and clouds that lie in a store.
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -33,5 +34,11 @@ using Arrivals = std::map<FrameId, std::size_t>;
 /// of a dense cloud are rounded as they come. Errors (kInput): damaged.
 core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
                                    const Arrivals& arrivals = {});
+
+/// The cloud of each keyframe as FOLDER/<number, six digits>.ply, laid by `output_from_map`; makes the
+/// folder. `read`: a view's cloud. Returns how many. Errors (kOutput), those of `read`.
+core::Result<std::size_t> write_keyframe_clouds(
+    const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,
+    const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read);
 
 }  // namespace plumbline::maps

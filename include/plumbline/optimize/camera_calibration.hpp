@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Bundle adjustment with the camera among the unknowns: poses, points, and what all pictures share (Zhang,
+// Bundle adjustment with the camera among the unknowns: poses, points, and what all images share (Zhang,
 // PAMI 22, 2000; readout as in Hedborg, Forssen, Felsberg, Ringaby, CVPR 2012). Plain structs in and out;
 // Ceres inside. Deterministic: one thread, fixed order.
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 
 namespace plumbline::optimize {
 
-/// What all pictures share, as a change of the camera that was given.
+/// What all images share, as a change of the camera that was given.
 enum CameraUnknown : std::size_t {
   kFocal,    ///< fx and fy are longer by this share
   kReadout,  ///< seconds, from the first row to the last: the value itself, not a change
@@ -34,7 +34,7 @@ struct CalibrationPose {
   bool fixed = false;
 };
 
-/// Pose `pose` sees point `point` at `pixel` of the picture as the lens shows it, not undistorted.
+/// Pose `pose` sees point `point` at `pixel` of the image as the lens shows it, not undistorted.
 struct CalibrationObservation {
   int pose = -1;
   int point = -1;
@@ -56,7 +56,7 @@ struct CalibrationProblem {
   std::vector<CalibrationObservation> observations;
 };
 
-/// Pixel of the picture, distortion and all, of the undistorted pixel.
+/// Pixel of the image, distortion and all, of the undistorted pixel.
 Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vector2d& undistorted);
 
 /// The given camera, changed.

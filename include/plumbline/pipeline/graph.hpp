@@ -54,7 +54,7 @@ struct Graph {
 
 /// Reads and checks a whole pipeline file and what it includes; nothing is started. `overrides` are
 /// "stage.key=value" texts of the command line, later ones win; their problems read "--set stage.key: ...".
-/// All problems are told at once.
+/// All problems are reported at once.
 core::Result<Graph> load_graph(const std::filesystem::path& file, const StageRegistry& registry,
                                const std::filesystem::path& pipelines_folder,
                                const std::vector<std::string>& overrides = {});

@@ -48,7 +48,7 @@ class Recogniser {
                                    const features::FrameFeatures& picture, core::KeyframeId neighbour,
                                    const std::function<bool(core::KeyframeId)>& allowed,
                                    const Neighbours& neighbours);
-  /// The same with what `database.query` said of the picture.
+  /// The same with what `database.query` said of the image.
   std::vector<Candidate> recognise(const Database::Scores& scores, core::KeyframeId query,
                                    core::KeyframeId neighbour,
                                    const std::function<bool(core::KeyframeId)>& allowed,

@@ -44,12 +44,12 @@ struct Camera {
   Distortion distortion{};      ///< of the colour image; all 0 = none
   double depth_scale = 5000.0;  ///< raw units per metre
   double fps = 30.0;
-  /// Rolling shutter: from the first row of a colour picture to the last, seconds; 0: all rows at once.
+  /// Rolling shutter: from the first row of a colour image to the last, seconds; 0: all rows at once.
   std::optional<double> readout_s;  ///< none: not known
   /// When present, depth is not registered to colour: the reader does that.
   std::optional<geometry::Rigid3> color_from_depth;
   std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
-  /// What depth gets wrong across the picture, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
+  /// What depth gets wrong across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
   /// ray (x, y, 1) of the undistorted colour camera. A depth camera whose axis is not where its maker thinks.
   std::array<double, 2> depth_slope{};
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Undistortion and depth registration: what turns a raw pair into pictures of one pinhole camera.
+// Undistortion and depth registration: what turns a raw pair into images of one pinhole camera.
 #include <memory>
 #include <opencv2/core/mat.hpp>
 

@@ -10,15 +10,15 @@
 namespace plumbline::tracking {
 
 /// Sets `shift` and `aligned` of those matches whose landmark a keyframe saw from nearly the same side and
-/// distance, oldest first, and where the pictures agree (features::align_patch); clears those of the others.
+/// distance, oldest first, and where the images agree (features::align_patch); clears those of the others.
 /// `frame` needs its levels.
 void align_points(const maps::Map& map, const features::FrameFeatures& frame, const sensor::Pinhole& camera,
                   const geometry::Rigid3& camera_from_world, double scale_factor,
                   std::vector<PointMatch>& matches);
 
-/// Where a picture (`levels`, of `camera_from_world`) shows the corner that a keyframe saw of what lies at
-/// `position`, pixels of the full picture; `start`: where it should be, to two pixels of the corner's octave.
-/// None when the keyframe saw it too differently, or the pictures do not agree.
+/// Where an image (`levels`, of `camera_from_world`) shows the corner that a keyframe saw of what lies at
+/// `position`, pixels of the full image; `start`: where it should be, to two pixels of the corner's octave.
+/// None when the keyframe saw it too differently, or the images do not agree.
 std::optional<Eigen::Vector2f> align_observation(const maps::Map& map, const maps::Observation& seen,
                                                  const Eigen::Vector3d& position,
                                                  const std::vector<cv::Mat>& levels,

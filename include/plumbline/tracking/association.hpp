@@ -61,7 +61,7 @@ struct SurfaceAssociationOptions {
 
 /// Projective association of surface samples with `depth` (CV_32FC1, metres): the sample is projected, the
 /// depth measured there is the point that should lie on its tangent plane. `depth_from_camera` carries the
-/// camera of the colour picture to that of the depth picture (they are stamped apart); the measured points
+/// camera of the colour image to that of the depth image (they are stamped apart); the measured points
 /// come back in the colour camera's frame. `in_view` receives how many samples face the camera and have a
 /// measured depth where they should be seen, whether it fits or not.
 std::vector<optimize::PlaneTerm> associate_surface(const std::vector<WorldSurface>& surface,

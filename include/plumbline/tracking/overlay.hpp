@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the tracker sees, drawn onto the picture: for eyes, not for estimation.
+// What the tracker sees, drawn onto the image: for eyes, not for estimation.
 #include <opencv2/core/mat.hpp>
 
 #include "plumbline/features/frame_features.hpp"
@@ -15,14 +15,14 @@ namespace plumbline::tracking {
 /// How many times longer than in truth residuals are drawn.
 constexpr double kResidualZoom = 8.0;
 
-/// CV_8UC3 BGR picture of the frame's size with
+/// CV_8UC3 BGR image of the frame's size with
 ///  * tracked points: measured (ring), predicted from the map (dot), residual as a stroke from the measured
 ///    position, kResidualZoom times its length, green at 0 px through yellow to red at 3 px and more;
 ///  * tracked lines: measured segment, projected map line, residual strokes at both measured ends;
 ///  * features that nothing in the map explains, faint; lines without depth (2D only) in another colour;
 ///  * state, inliers and rms of each family, weak directions, legend.
 /// `features` and `track` must be of `frame`; landmarks that are no longer in `map` have no residual. A frame
-/// without colour is drawn on its grey picture, one without either on black. Same input, same bytes.
+/// without colour is drawn on its grey image, one without either on black. Same input, same bytes.
 cv::Mat draw_overlay(const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                      const TrackResult& track, const maps::Map& map, const sensor::Pinhole& camera);
 

@@ -17,15 +17,15 @@
 
 namespace plumbline::tracking {
 
-/// A picture to align, and the depth image that came with it.
+/// An image to align, and the depth image that came with it.
 struct PhotometricView {
   const features::PhotometricImage* image = nullptr;
   const cv::Mat* depth = nullptr;  ///< CV_32FC1, metres
   geometry::Rigid3 depth_from_camera;
-  sensor::Pinhole camera;  ///< of the full picture
+  sensor::Pinhole camera;  ///< of the full image
 };
 
-/// The samples of a level that the view shows from a pose: in the picture, and not hidden by what its depth
+/// The samples of a level that the view shows from a pose: in the image, and not hidden by what its depth
 /// image measured. None when there are fewer than kMinPhotometric. Gain and noise are those found at the
 /// pose.
 std::optional<optimize::PhotometricFamily> associate_photometric(const features::PhotometricSamples& samples,
@@ -56,14 +56,14 @@ class PhotometricKeyframes {
 /// A term weighs less the further an error of its depth would move it across its gradient.
 bool update_photometric(optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
 
-/// Whether the picture is the expected one, as far as that can be told at a pose.
+/// Whether the image is the expected one, as far as that can be told at a pose.
 bool photometric_agrees(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
 
 struct ShiftedPose {
   geometry::Rigid3 camera_from_world;
   double correlation = -1.0;
 };
-/// The pose, up to six pixels of the family's picture to the side of this one, at which the picture fits
+/// The pose, up to six pixels of the family's image to the side of this one, at which the image fits
 /// best.
 ShiftedPose search_shift(const optimize::PhotometricFamily& family,
                          const geometry::Rigid3& camera_from_world);

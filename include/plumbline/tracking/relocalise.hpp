@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pose from nothing but what the picture looks like: descriptors against keyframes, then P3P in RANSAC; or,
-// without any feature, the small picture against those of the keyframes.
+// Pose from nothing but what the image looks like: descriptors against keyframes, then P3P in RANSAC; or,
+// without any feature, the small image against those of the keyframes.
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -27,14 +27,14 @@ std::optional<Relocalisation> relocalise(const maps::Map& map,
                                          const features::FrameFeatures& features,
                                          const sensor::Pinhole& camera, int min_inliers);
 
-/// A keyframe and how much the picture as a whole looks like it: normalised correlation of the thumbnails,
-/// best over shifts of up to a fifth of the picture (compare Klein & Murray, ECCV 2008).
+/// A keyframe and how much the image as a whole looks like it: normalised correlation of the thumbnails,
+/// best over shifts of up to a fifth of the image (compare Klein & Murray, ECCV 2008).
 struct LookAlike {
   core::KeyframeId keyframe;
   double correlation = 0.0;
 };
 
-/// Those of `candidates` that the picture looks like, most alike first, at most `count`. A picture without
+/// Those of `candidates` that the image looks like, most alike first, at most `count`. An image without
 /// contrast looks like nothing.
 std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
                                    const features::FrameFeatures& features, int count);

@@ -19,7 +19,7 @@ struct SurfaceSamplerOptions {
   void declare(core::OptionTable& table);
 };
 
-/// Samples of `depth` (CV_32FC1, metres, 0 = none), half of them spread evenly over the picture, half evenly
+/// Samples of `depth` (CV_32FC1, metres, 0 = none), half of them spread evenly over the image, half evenly
 /// over the directions of the normals (normal-space sampling, Rusinkiewicz & Levoy 2001), so that all six
 /// degrees of freedom are held wherever the scene allows. Normals have the wide base that structured-light
 /// depth needs. Deterministic.

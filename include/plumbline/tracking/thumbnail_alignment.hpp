@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Direct alignment of two small blurred pictures: a guess of the motion that needs no feature and that blur
+// Direct alignment of two small blurred images: a guess of the motion that needs no feature and that blur
 // does not hurt (compare Klein & Murray, ECCV 2008, and Kerl et al., ICRA 2013).
 #include <opencv2/core/mat.hpp>
 
@@ -19,7 +19,7 @@ struct ThumbnailAlignment {
 };
 
 /// `previous`, `current`: CV_32FC1 thumbnails; `previous_depth`: the same size, metres, 0 = none; `camera`:
-/// of the full picture. A change of overall brightness is estimated along.
+/// of the full image. A change of overall brightness is estimated along.
 ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& previous_depth,
                                     const cv::Mat& current, const sensor::Pinhole& camera,
                                     const geometry::Rigid3& guess);

@@ -37,10 +37,10 @@ struct TrackerOptions {
   bool depth = true;
   bool photometric = true;
   bool align_stamps = true;
-  bool thumbnails = true;    ///< small pictures tell where the camera may be
+  bool thumbnails = true;    ///< small images tell where the camera may be
   bool motion_prior = true;  ///< the motion model holds what measurements leave open
   bool pnp_start = false;  ///< every frame begins with PnP, where there are matches enough (METHOD section 2)
-  /// Time from the first to the last row of a picture, s; 0: all at once. What it shears is put right before
+  /// Time from the first to the last row of an image, s; 0: all at once. What it shears is put right before
   /// a frame is tracked (features::undo_rolling_shutter), with the motion model's turn, and again with the
   /// turn that was found where that differs.
   double readout_s = 0.0;
@@ -82,8 +82,7 @@ struct TrackResult {
   geometry::Matrix6d onto_degenerate = geometry::Matrix6d::Zero();
   bool motion_contradicted = false;  ///< surfaces are all but alone, and speak against the motion model
   bool relocalised = false;
-  double turn_rate =
-      0.0;  ///< since the frame before, rad/s, where that distorts a picture; 0: global shutter
+  double turn_rate = 0.0;  ///< since the frame before, rad/s, where that distorts an image; 0: global shutter
   std::shared_ptr<const features::PhotometricImage> photometric;  ///< of the frame; null: none was made
   /// The frame's features, freed of the rolling shutter, points with the depth of the colour image's stamp:
   /// what was matched, and what a keyframe should keep.
@@ -114,12 +113,12 @@ class Tracker {
   /// of camera_from_world per second.
   void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Vector6d& velocity);
 
-  /// Who knows which keyframes of the map look like a picture, best first. Asked when tracking is lost,
+  /// Who knows which keyframes of the map look like an image, best first. Asked when tracking is lost,
   /// beside what the tracker finds by itself.
   using PlaceFinder = std::function<std::vector<core::KeyframeId>(const features::FrameFeatures&)>;
   void set_place_finder(PlaceFinder finder) { find_places_ = std::move(finder); }
 
-  /// Who can tell whether a pose that was found by appearance, near `keyframe`, is where the picture was
+  /// Who can tell whether a pose that was found by appearance, near `keyframe`, is where the image was
   /// taken and not a place that looks the same. Asked before such a pose is believed; without one it is
   /// believed.
   using PlaceJudge =
@@ -135,7 +134,7 @@ class Tracker {
  private:
   struct PoseHypotheses {
     std::vector<geometry::Rigid3> camera_from_world;  ///< the likeliest first
-    bool searched = false;  ///< the first was searched for in the picture: it may be a look-alike
+    bool searched = false;  ///< the first was searched for in the image: it may be a look-alike
   };
   struct PlaceHypothesis {
     core::KeyframeId keyframe;
@@ -148,7 +147,7 @@ class Tracker {
   /// From where the camera should be by now; none when nothing there can be trusted.
   [[nodiscard]] std::optional<TrackResult> track_with_motion_model(
       const maps::Map& map, const sensor::RgbdFrame& frame, const features::FrameFeatures& features) const;
-  /// From what the picture looks like; the local map moves there.
+  /// From what the image looks like; the local map moves there.
   [[nodiscard]] std::optional<TrackResult> relocalise(const maps::Map& map, const sensor::RgbdFrame& frame,
                                                       const features::FrameFeatures& features);
   void record(const sensor::RgbdFrame& frame, TrackResult& result);
@@ -164,7 +163,8 @@ class Tracker {
                                   double search_radius_px) const;
   [[nodiscard]] bool jumps(double stamp, const geometry::Rigid3& camera_from_world) const;
   [[nodiscard]] double support(const TrackResult& result) const;
-  [[nodiscard]] bool passes_strict_check(const TrackResult& result) const;
+  [[nodiscard]] bool passes_strict_check(const TrackResult& result,
+                                         const features::FrameFeatures& features) const;
 
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] Features synchronised(const sensor::RgbdFrame& frame, const Features& features,

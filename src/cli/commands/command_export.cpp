@@ -20,6 +20,7 @@ namespace {
 struct ExportRequest {
   std::filesystem::path input;
   std::filesystem::path output;
+  std::string robot;
   std::string what = "cloud";
   bool trajectory = false;
   bool lines = false;
@@ -41,7 +42,7 @@ core::Result<geometry::Trajectory> path_of(const maps::MapPlace& place, bool key
   const maps::ResultFolder folder = place.result.value_or(maps::ResultFolder{});
   const std::filesystem::path file = keyframes ? folder.keyframes() : folder.trajectory();
   if (written(place, file)) return dataset::read_trajectory(file);
-  const auto stored = maps::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   return keyframes ? stored->keyframe_trajectory() : stored->trajectory();
 }
@@ -66,7 +67,7 @@ core::Result<void> export_lines(const maps::MapPlace& place, const std::filesyst
     if (!lines) return tl::unexpected<core::Error>(lines.error());
     return maps::write_lines_ply(to, *lines);
   }
-  const auto stored = maps::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   return maps::write_lines_ply(to, stored->lines());
 }
@@ -90,7 +91,7 @@ core::Result<cloud::CloudFile> cloud_of(const maps::MapPlace& place, const Expor
         "--voxel: {} has no map.db to lay the cloud down from; map again without store.enabled=off",
         request.input.string()));
   }
-  const auto stored = maps::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place);
   if (!stored) return fail(stored.error());
   const double voxel_m = options.voxels.voxel_m;
   options = stored->fusion_options();
@@ -109,7 +110,7 @@ core::Result<void> export_keyframes(const maps::MapPlace& place, const ExportReq
         "--keyframes: {} has no map.db with the clouds of keyframes; map again without store.enabled=off",
         request.input.string()));
   }
-  const auto stored = maps::StoredResult::open(place.store);
+  const auto stored = maps::StoredResult::open(place);
   if (!stored) return tl::unexpected<core::Error>(stored.error());
   const auto count = stored->write_keyframe_clouds(request.keyframes);
   if (!count) return tl::unexpected<core::Error>(count.error());
@@ -136,8 +137,9 @@ core::Result<void> run_export(const ExportRequest& request, const core::Executor
   if (request.output.empty() && request.keyframes.empty()) {
     return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
   }
-  const auto place = maps::find_map(request.input);
+  auto place = maps::find_map(request.input);
   if (!place) return tl::unexpected<core::Error>(place.error());
+  place->robot = request.robot;
   if (!request.keyframes.empty()) {
     auto done = export_keyframes(*place, request);
     if (!done || request.output.empty()) return done;
@@ -174,6 +176,8 @@ void add_export(CLI::App& app, Session& session) {
   command
       ->add_option("--voxel", request->voxel, "Lay the cloud down anew from map.db, with voxels of this size")
       ->type_name("LENGTH");
+  command->add_option("--robot", request->robot, "Whose map, of an interrupted run of several robots")
+      ->type_name("NAME");
   CLI::Option* what = command->add_option("--what", request->what, "What to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));
   CLI::Option* trajectory =

@@ -44,7 +44,7 @@ core::Result<cloud::FilterChain> load_chain(const std::string& name, const Sessi
   return cloud::FilterChain::load(*file, *registry);
 }
 
-/// What is wrong with the output is told before anything is read.
+/// What is wrong with the output is reported before anything is read.
 core::Result<void> check_output(const fs::path& output, const cloud::FilterChain& chain) {
   const auto extension = output.extension();
   if (extension != ".ply" && extension != ".pcd") {

@@ -41,17 +41,11 @@ void add_fuse(CLI::App& app, Session& session) {
       ->required()
       ->expected(2, 255);
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
-  command->add_option("-p,--pipeline", request->pipeline, "Shipped pipeline or file (default: fuse)")
-      ->type_name("PIPELINE");
   command
       ->add_option("--anchor", request->anchor,
                    "Robot whose frame the maps are laid into (default: that of the largest map)")
       ->type_name("NAME");
-  command->add_option("--set", request->overrides, "Set an option of a stage; may be repeated")
-      ->type_name("stage.key=value")
-      ->allow_extra_args(false);
-  add_plugin_option(*command, session);
-  command->add_flag("--force", request->replace, "Replace an earlier result in OUT");
+  add_pipeline_options(*command, session, *request);
 }
 
 }  // namespace plumbline::cli

@@ -63,16 +63,10 @@ void add_hub(CLI::App& app, Session& session) {
   command->add_option("--quota", *quota_gb, "Disk that the map of one robot may take, GB (default: 20)")
       ->type_name("GB")
       ->check(CLI::PositiveNumber);
-  command->add_option("-p,--pipeline", request->fuse.pipeline, "Shipped pipeline or file (default: fuse)")
-      ->type_name("PIPELINE");
   command->add_option("--anchor", request->fuse.anchor, "Robot whose frame the maps are laid into")
       ->type_name("NAME");
-  command->add_option("--set", request->fuse.overrides, "Set an option of a stage; may be repeated")
-      ->type_name("stage.key=value")
-      ->allow_extra_args(false);
   command->add_flag("--resume", request->resume, "Go on with what an interrupted hub left in OUT.partial");
-  add_plugin_option(*command, session);
-  command->add_flag("--force", request->fuse.replace, "Replace an earlier result in OUT");
+  add_pipeline_options(*command, session, request->fuse);
 }
 
 }  // namespace plumbline::cli

@@ -42,6 +42,27 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
 
 }  // namespace
 
+void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request) {
+  command.add_option("--camera", request.open.camera, "Shipped calibration or file")->type_name("NAME|FILE");
+  command.add_option("--format", request.open.format, "Layout of INPUT (default: auto)")
+      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
+  add_time_range(command, request.open);
+  command.add_option("--every", request.open.every, "Use every N-th frame")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000));
+  command
+      .add_option(
+          "--pace", request.pace_hz,
+          "Play recordings as a live camera would: so many frames a second, at most (default: as fast "
+          "as that goes)")
+      ->type_name("HZ")
+      ->check(CLI::Range(0.0, 1000.0));
+  command.add_flag("--resume", request.resume,
+                   "Go on from what a run that was interrupted left in OUT.partial; input and settings must "
+                   "be those of that run");
+  add_pipeline_options(command, session, request);
+}
+
 void add_map(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto inputs = std::make_shared<std::vector<std::string>>();
@@ -53,35 +74,11 @@ void add_map(CLI::App& app, Session& session) {
                    "several: recordings of as many robots, fused into one map")
       ->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
-  command->add_option("-p,--pipeline", request->pipeline, "Shipped pipeline or file (default: rgbd)")
-      ->type_name("PIPELINE");
-  command->add_option("--camera", request->open.camera, "Shipped calibration or file")
-      ->type_name("NAME|FILE");
-  command->add_option("--set", request->overrides, "Set an option of a stage; may be repeated")
-      ->type_name("stage.key=value")
-      ->allow_extra_args(false);
-  command->add_option("--format", request->open.format, "Layout of INPUT (default: auto)")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
-  add_time_range(*command, request->open);
-  command->add_option("--every", request->open.every, "Use every N-th frame")
-      ->type_name("N")
-      ->check(CLI::Range(1, 100000));
-  command
-      ->add_option(
-          "--pace", request->pace_hz,
-          "Play recordings as a live camera would: so many frames a second, at most (default: as fast "
-          "as that goes)")
-      ->type_name("HZ")
-      ->check(CLI::Range(0.0, 1000.0));
+  add_map_options(*command, session, *request);
   command
       ->add_option("--debug-video", request->debug_video,
                    "Also write a picture of every frame with what the tracker sees")
       ->type_name("DIR");
-  command->add_flag("--resume", request->resume,
-                    "Go on from what a run that was interrupted left in OUT.partial; input and settings must "
-                    "be those of that run");
-  add_plugin_option(*command, session);
-  command->add_flag("--force", request->replace, "Replace an earlier result in OUT, and in DIR");
 }
 
 }  // namespace plumbline::cli

@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 struct RenderRequest {
   fs::path input;
   fs::path output;
+  std::string robot;
   std::string size;
   bool lines = false;
   int turntable = 0;  ///< pictures all round; 0: one picture
@@ -52,7 +53,7 @@ core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& opt
 }
 
 /// The map that `input` is, or is map.ply or map.pcd of; none: a cloud by itself.
-core::Result<std::optional<maps::MapPlace>> map_of(const fs::path& input) {
+core::Result<std::optional<maps::MapPlace>> map_of(const fs::path& input, const std::string& robot) {
   std::error_code ec;
   const std::string name = input.filename().string();
   if (fs::is_regular_file(input, ec) && input.extension() != ".db") {
@@ -62,16 +63,16 @@ core::Result<std::optional<maps::MapPlace>> map_of(const fs::path& input) {
   }
   auto place = maps::find_map(input);
   if (!place) return tl::unexpected<core::Error>(place.error());
+  place->robot = robot;
   return std::move(*place);
 }
 
 core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene& scene) {
-  viz::CameraPath path;
   std::vector<maps::LineSegment3> segments;
-  if (place.result) {
-    auto trajectory = dataset::read_trajectory(place.result->trajectory());
+  for (const fs::path& folder : place.result ? place.result->robot_folders() : std::vector<fs::path>{}) {
+    auto trajectory = dataset::read_trajectory(folder / "trajectory.txt");
     if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
-    path.trajectory = std::move(*trajectory);
+    scene.paths.emplace_back().trajectory = std::move(*trajectory);
   }
   std::error_code ec;
   const bool has_lines = place.result && (fs::exists(place.result->lines(), ec) || place.store.empty());
@@ -81,12 +82,11 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     segments = std::move(*read);
   }
   if (!place.result || (lines && !has_lines)) {
-    const auto stored = maps::StoredResult::open(place.store);
+    const auto stored = maps::StoredResult::open(place);
     if (!stored) return tl::unexpected<core::Error>(stored.error());
-    if (!place.result) path.trajectory = stored->trajectory();
+    if (!place.result) scene.paths.emplace_back().trajectory = stored->trajectory();
     if (lines) segments = stored->lines();
   }
-  scene.paths.push_back(std::move(path));
   for (const auto& [a, b] : segments) scene.segments.push_back({a, b});
   return {};
 }
@@ -159,7 +159,7 @@ core::Result<void> render(RenderRequest& request, Session& session) {
     if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
   }
   if (auto checked = check_output(request); !checked) return checked;
-  const auto found = map_of(request.input);
+  const auto found = map_of(request.input, request.robot);
   if (!found) return tl::unexpected<core::Error>(found.error());
   const std::optional<maps::MapPlace>& place = *found;
   std::error_code ec;
@@ -196,6 +196,8 @@ void add_render(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->output, "Picture to write")
       ->required()
       ->type_name("FILE.png|DIR|.gif|.mp4");
+  command->add_option("--robot", request->robot, "Whose map, of an interrupted run of several robots")
+      ->type_name("NAME");
   command->add_option("--size", request->size, "Size of the picture, like 1600x1200")->type_name("WxH");
   command
       ->add_option("--turntable", request->turntable,

@@ -93,27 +93,7 @@ void add_robot(CLI::App& app, Session& session) {
                    "For a hub that was heard, since it acknowledged something (default: 600)")
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("-p,--pipeline", request->map.pipeline, "Shipped pipeline or file (default: robot)")
-      ->type_name("PIPELINE");
-  command->add_option("--camera", request->map.open.camera, "Shipped calibration or file")
-      ->type_name("NAME|FILE");
-  command->add_option("--set", request->map.overrides, "Set an option of a stage; may be repeated")
-      ->type_name("stage.key=value")
-      ->allow_extra_args(false);
-  command->add_option("--format", request->map.open.format, "Layout of INPUT (default: auto)")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
-  add_time_range(*command, request->map.open);
-  command->add_option("--every", request->map.open.every, "Use every N-th frame")
-      ->type_name("N")
-      ->check(CLI::Range(1, 100000));
-  command
-      ->add_option("--pace", request->map.pace_hz, "Play the recording at so many frames a second, at most")
-      ->type_name("HZ")
-      ->check(CLI::Range(0.0, 1000.0));
-  command->add_flag("--resume", request->map.resume,
-                    "Go on from what a run that was interrupted left in OUT.partial");
-  add_plugin_option(*command, session);
-  command->add_flag("--force", request->map.replace, "Replace an earlier result in OUT");
+  add_map_options(*command, session, request->map);
 }
 
 }  // namespace plumbline::cli

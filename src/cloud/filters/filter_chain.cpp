@@ -219,4 +219,20 @@ std::string to_table(const std::vector<FilterReport>& reports) {
   return text;
 }
 
+core::Result<FusedCloud> FilterChain::apply(FusedCloud fused, double spacing_m,
+                                            const core::Executor& executor,
+                                            std::vector<FilterReport>* reports) const {
+  if (filters_.empty()) return fused;
+  FusedCloud result;
+  FilterContext context;
+  context.executor = &executor;
+  context.spacing_m = spacing_m;
+  context.columns = &fused.columns;
+  context.made_columns = &result.columns;
+  auto filtered = apply(std::move(fused.cloud), context, reports);
+  if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+  result.cloud = std::move(*filtered);
+  return result;
+}
+
 }  // namespace plumbline::cloud

@@ -132,7 +132,7 @@ DepthField fitted(const std::vector<const Rows*>& use, const sensor::Pinhole& ca
     Matrix h = Matrix::Zero();
     DepthField::Terms g = DepthField::Terms::Zero();
   };
-  // Monomials at the rim of the picture: a coefficient is held near zero by what it does there.
+  // Monomials at the rim of the image: a coefficient is held near zero by what it does there.
   const DepthField::Terms rim =
       DepthField::monomials(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy);
   DepthField::Terms c = DepthField::Terms::Zero();

@@ -63,7 +63,7 @@ std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Ri
   for (const Point& p : camera_cloud.points) {
     const Eigen::Vector3f at = turn * p.getVector3fMap() + shift;
     if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
-    // Neighbours in a picture mostly share their cell.
+    // Neighbours in an image mostly share their cell.
     const std::uint64_t key = pack_cell(at.array().floor().cast<int>());
     if (last == nullptr || last->cell != key) last = &sums[key];
     last->cell = key;

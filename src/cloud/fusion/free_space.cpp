@@ -41,7 +41,7 @@ struct NearViews {
 NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRaster>& rasters,
                      const std::vector<std::uint8_t>& is_depth_view,
                      const std::vector<geometry::Rigid3>& world_from_camera) {
-  constexpr double kWidest = 1.5;  // distance over depth at the picture's corners, at most
+  constexpr double kWidest = 1.5;  // distance over depth at the image's corners, at most
   NearViews views;
   for (std::size_t v = 0; v < rasters.size(); ++v) {
     const double distance = box.exteriorDistance(world_from_camera[v].translation);

@@ -22,7 +22,7 @@ int base_cells(float w, float sigma, float at_2m, int stride, int longest) {
   return std::clamp(static_cast<int>(std::lround(pixels / static_cast<float>(stride))), 2, longest);
 }
 
-/// How far this picture's depth may be smoothed, 0 to 1: its noise over that of the sensor model, from bends
+/// How far this image's depth may be smoothed, 0 to 1: its noise over that of the sensor model, from bends
 /// of the inverse depth, which is straight on planes. 1 from half the model's noise on; below, details of the
 /// surface soon outweigh it. Exact depth stays as it is.
 float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
@@ -101,7 +101,7 @@ class PointMaker {
 
  private:
   /// The inverse depth that gives the points' positions: means over what a plane explains, the wider the
-  /// noisier the depth. No point moves further than the noise that the picture shows.
+  /// noisier the depth. No point moves further than the noise that the image shows.
   [[nodiscard]] Grid positions(const KeyframeCloudOptions& options) const {
     constexpr float kWanted_m = 0.0015F;
     Grid means = grid_;

@@ -151,7 +151,7 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
 }
 
 VoxelSide& VoxelMap::side_at(std::uint64_t key) {
-  // Neighbours in a picture mostly share their voxel.
+  // Neighbours in an image mostly share their voxel.
   if (!sides_.empty() && last_.first == key) return sides_[last_.second];
   const auto [found, fresh] = places_.try_emplace(key, static_cast<std::uint32_t>(sides_.size()));
   last_ = {key, found->second};

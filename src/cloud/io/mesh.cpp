@@ -70,10 +70,24 @@ std::vector<Eigen::Vector3f> vertices_of(const pcl::PolygonMesh& mesh) {
   return vertices;
 }
 
+constexpr std::uint32_t kGone = 0xFFFFFFFFU;
+
+/// The triangles none of whose vertices has gone, by the vertices' new numbers.
+std::vector<std::array<std::uint32_t, 3>> triangles_of(const pcl::PolygonMesh& mesh,
+                                                       const std::vector<std::uint32_t>& number) {
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (const pcl::Vertices& polygon : mesh.polygons) {
+    std::array<std::uint32_t, 3> corners{};
+    if (polygon.vertices.size() != corners.size()) continue;
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = number[static_cast<std::size_t>(polygon.vertices[k])];
+    if (std::find(corners.begin(), corners.end(), kGone) == corners.end()) triangles.push_back(corners);
+  }
+  return triangles;
+}
+
 /// Vertices near points get these points' colour and normal; the others go, and the triangles that need them.
 PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::PolygonMesh& mesh,
                 const std::shared_ptr<Cloud>& cloud, double reach_m) {
-  constexpr std::uint32_t kGone = 0xFFFFFFFFU;
   constexpr int kNeighbours = 4;
   pcl::KdTreeFLANN<Point> tree;
   tree.setInputCloud(cloud);
@@ -108,14 +122,7 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
   for (std::size_t k = 0; k < 6; ++k) result.add(names[k], std::move(xyz_normal[k]));
   const std::array<const char*, 3> channels{"red", "green", "blue"};
   for (std::size_t k = 0; k < 3; ++k) result.add(channels[k], std::move(rgb[k]));
-  for (const pcl::Vertices& polygon : mesh.polygons) {
-    std::array<std::uint32_t, 3> corners{};
-    if (polygon.vertices.size() != corners.size()) continue;
-    for (std::size_t k = 0; k < 3; ++k) corners[k] = number[static_cast<std::size_t>(polygon.vertices[k])];
-    if (std::none_of(corners.begin(), corners.end(), [](std::uint32_t c) { return c == kGone; })) {
-      result.triangles.push_back(corners);
-    }
-  }
+  result.triangles = triangles_of(mesh, number);
   return result;
 }
 

@@ -216,7 +216,7 @@ void drop_outliers(const GlobalBundle& bundle, maps::Map& map) {
   }
 }
 
-/// Whether the poses may be put into the map; told if not.
+/// Whether the poses may be put into the map; reported if not.
 bool may_move(const maps::Map& map, const KeyframePoses& poses, GlobalAdjustmentSummary& summary) {
   const auto wrong = contradiction(map, poses);
   if (!wrong) return true;
@@ -336,6 +336,8 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
                "Observations further off than so many standard deviations, and 0.8 px, where the pose graph "
                "has put the keyframes wait for the second round: those that caused a drift would restore it; "
                "0: none");
+  table.number("adjust.aligned_sigma", noise.aligned, {0.01, 1.0}, "",
+               "Standard deviation of corners that were aligned, over that of others");
   noise.declare(table, "adjust.");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");

@@ -101,7 +101,7 @@ class Builder {
     for (core::LineId id : lines) add_line(id);
   }
 
-  /// A distorted picture's depth is distorted, too: its surfaces say as little about where it was as its
+  /// A distorted image's depth is distorted, too: its surfaces say as little about where it was as its
   /// corners.
   void add_edges() {
     for (KeyframeId id : std::vector<KeyframeId>(bundle_.keyframes)) {

@@ -10,9 +10,6 @@
 namespace plumbline::mapping {
 
 void ObservationNoise::declare(core::OptionTable& table, const std::string& prefix) {
-  table.number(
-      prefix + "aligned", aligned, {0.01, 1.0}, "",
-      "Standard deviation of corners that were aligned with their landmark's patch, over that of others");
   table.number(prefix + "line_sigma", line_sigma_px, {0.01, 10.0}, "px",
                "Standard deviation of a line's ends across it");
   table.number(

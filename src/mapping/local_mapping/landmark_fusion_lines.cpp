@@ -41,7 +41,7 @@ double distance(const Eigen::Vector3d& p, const maps::MapLine& line) {
   return (p - geometry::nearest_point(geometry::line_through(line.start, line.end), p)).norm();
 }
 
-/// Do both measured ends lie on the landmark, in the picture and in space?
+/// Do both measured ends lie on the landmark, in the image and in space?
 bool fits(const maps::MapLine& line, const features::LineFeature& f,
           const geometry::Rigid3& camera_from_world, const sensor::Pinhole& camera) {
   const geometry::PluckerLine in_camera =
@@ -61,7 +61,7 @@ bool fits(const maps::MapLine& line, const features::LineFeature& f,
   return true;
 }
 
-/// Does the landmark lie where each of the other's keyframes saw it? Two edges may meet in one picture by
+/// Does the landmark lie where each of the other's keyframes saw it? Two edges may meet in one image by
 /// chance.
 bool fits_all(const maps::Map& map, const maps::MapLine& line, const maps::MapLine& other,
               const std::map<std::int32_t, sensor::Pinhole>& cameras) {

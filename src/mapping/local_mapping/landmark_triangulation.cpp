@@ -16,7 +16,7 @@ using geometry::Rigid3;
 constexpr double kReprojectionGate = 5.99;  // chi-square, 2 degrees of freedom, 95 %
 constexpr double kEpipolarGate_px = 2.0;    // at octave 0
 constexpr double kAlternative_px = 3.0;     // corners of several octaves at one place are one corner
-constexpr double kMaxScaleChange = 1.8;     // of a corner's size in space, between its two pictures
+constexpr double kMaxScaleChange = 1.8;     // of a corner's size in space, between its two images
 
 /// One keyframe with what the search needs of it.
 struct FreeCorners {
@@ -53,7 +53,7 @@ class PairSearch {
     roll_deg_ = std::atan2(b_from_a_.rotation(1, 0), b_from_a_.rotation(0, 0)) * 180.0 / M_PI;
   }
 
-  /// The corner of the second picture that corner `i` of the first is; -1: none that is clearly best.
+  /// The corner of the second image that corner `i` of the first is; -1: none that is clearly best.
   [[nodiscard]] int partner(int i) const {
     const features::PointFeature& f = a_.features.points[static_cast<std::size_t>(i)];
     const Eigen::Vector3d line = fundamental_ * f.pixel.cast<double>().homogeneous();
@@ -83,7 +83,7 @@ class PairSearch {
     return clear ? best : -1;
   }
 
-  /// Where the rays of corner `f` of the first picture and of corner `g` of the second meet, in the first
+  /// Where the rays of corner `f` of the first image and of corner `g` of the second meet, in the first
   /// camera's frame; none when they do not, or too far away to say where. `noise`: of both, over that of
   /// corners as they are found.
   [[nodiscard]] std::optional<Eigen::Vector3d> meet(const features::PointFeature& f,

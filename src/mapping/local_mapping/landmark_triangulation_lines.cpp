@@ -32,7 +32,7 @@ LineView view_of(const maps::Map& map, const maps::Observation& o, const sensor:
 }
 
 /// The line of `other` that looks like line `feature` of `keyframe`: of the same direction after the roll
-/// between the pictures is undone, and clearly the most alike; -1: none.
+/// between the images is undone, and clearly the most alike; -1: none.
 int partner(const maps::Map& map, const maps::Observation& line, KeyframeId other, double max_measured_m,
             const TriangulationOptions& options) {
   const features::LineFeature& f =

@@ -183,7 +183,7 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
   }
 }
 
-/// Pictures taken while turning fast are distorted: their rays lie, and what they show does not lie where it
+/// Images taken while turning fast are distorted: their rays lie, and what they show does not lie where it
 /// seems to.
 bool LocalMapper::distorted(const maps::Map& map, core::KeyframeId id) const {
   return map.keyframe(id).turn_rate > options_.max_landmark_turn_rate;

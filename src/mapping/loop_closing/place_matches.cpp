@@ -48,7 +48,7 @@ PLUMBLINE_CLONES std::uint32_t take_nearest(const std::uint32_t* distances, std:
 
 std::size_t index_of(std::uint32_t key) { return key & ((1U << kIndexBits) - 1U); }
 
-/// Whether nothing at another place of the picture is nearly as near as `best`.
+/// Whether nothing at another place of the image is nearly as near as `best`.
 bool clearly_nearest(const FrameFeatures& picture, const std::uint32_t* distances, std::size_t step,
                      std::size_t best) {
   const double limit = distances[best * step] / kRatio;

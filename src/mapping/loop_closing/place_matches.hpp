@@ -9,8 +9,8 @@
 
 namespace plumbline::mapping {
 
-/// Points of two pictures that look like each other and like no other: each is the other's nearest by
-/// descriptor, clearly nearer than whatever lies at another place of its picture. By index in `a`.
+/// Points of two images that look like each other and like no other: each is the other's nearest by
+/// descriptor, clearly nearer than whatever lies at another place of its image. By index in `a`.
 std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const features::FrameFeatures& a,
                                                                  const features::FrameFeatures& b);
 

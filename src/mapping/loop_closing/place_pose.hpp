@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Pose of one picture from matches with another that have depth: P3P, or two lines in space, in RANSAC.
+// Pose of one image from matches with another that have depth: P3P, or two lines in space, in RANSAC.
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>

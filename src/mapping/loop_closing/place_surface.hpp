@@ -20,7 +20,7 @@ struct SurfaceVotes {
   [[nodiscard]] double contradiction() const;  ///< contradicted, of those not hidden
 };
 
-/// `samples` of a keyframe against the small depth picture (FrameFeatures::thumbnail_depth) of another one.
+/// `samples` of a keyframe against the small depth image (FrameFeatures::thumbnail_depth) of another one.
 /// Whatever lies between the depths of neighbouring small pixels is confirmed, so that borders and slopes do
 /// not count against.
 SurfaceVotes vote_surface(const std::vector<maps::SurfaceSample>& samples,

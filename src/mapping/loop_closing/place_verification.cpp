@@ -103,7 +103,7 @@ std::vector<KeyframeId> surroundings(const PlaceView& match, int neighbours) {
   return result;
 }
 
-/// Landmarks of the surroundings found in the query's picture, and the pose that follows.
+/// Landmarks of the surroundings found in the query's image, and the pose that follows.
 class Growth {
  public:
   Growth(const PlaceView& query, const PlaceView& match, const VerificationOptions& options,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Where nothing but pictures says how two maps lie: a corridor or a lone wall slides along itself, and what
+// Where nothing but images says how two maps lie: a corridor or a lone wall slides along itself, and what
 // looks alike may stand there again and again.
 #include <Eigen/Core>
 #include <vector>

@@ -70,15 +70,13 @@ Alignment mean_alignment(const PartPair& maps, const std::vector<PlacePair>& pai
       weights += weight;
     }
     step /= weights;
-    estimate =
-        Rigid3(geometry::exp_so3(step.tail<3>()) * estimate.rotation, estimate.translation + step.head<3>());
+    estimate.rotation = geometry::exp_so3(step.tail<3>()) * estimate.rotation;
+    estimate.translation += step.head<3>();
   }
   Matrix6d scatter = Matrix6d::Zero();
   double spread2 = 0.0;
-  for (const Vector6d& error : errors) {
-    scatter += error * error.transpose();
-    spread2 += error.head<3>().squaredNorm();
-  }
+  for (const Vector6d& error : errors) scatter += error * error.transpose();
+  for (const Vector6d& error : errors) spread2 += error.head<3>().squaredNorm();
   mean.covariance = scatter / (n * std::max(1.0, n - 1.0));
   mean.covariance.diagonal().head<3>().array() += kFloor_m * kFloor_m;
   mean.covariance.diagonal().tail<3>().array() += kFloor_rad * kFloor_rad;

@@ -2,7 +2,7 @@
 #pragma once
 
 // Does one map fit when it is laid over another one, and would it fit elsewhere as well? Where things repeat
-// (doors along a corridor, desks of one kind) the same pictures allow several answers; an answer is worth
+// (doors along a corridor, desks of one kind) the same images allow several answers; an answer is worth
 // believing when the others are contradicted by what was seen. Landmarks that look alike a fixed step apart
 // tell of a repetition even where no keyframe stands at both of its ends: cameras see farther than they go.
 #include <cstddef>

@@ -212,7 +212,7 @@ void MergeServer::take_back(const Robots& robots, const MergeEvidence& evidence,
                             const NewKeyframe& keyframe) {
   RobotPair& pair = work_.pairs[robots];
   pair.met = false;
-  if (pair.step != MeetingStep::kMet) return;  // nobody was told
+  if (pair.step != MeetingStep::kMet) return;  // no robot was told
   pair.step = MeetingStep::kLocalMapAsked;
   work_.events.push_back(
       {MeetingStep::kTakenBack, robots.first, robots.second, keyframe.frame, keyframe.id, evidence, nullptr});

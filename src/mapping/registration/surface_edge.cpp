@@ -15,7 +15,7 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-/// Of all grey values: what one pair of pictures says goes into the bundle, where others bear it out.
+/// Of all grey values: what one pair of images says goes into the bundle, where others bear it out.
 constexpr double kPhotometricWeight = 0.02;
 constexpr double kHeld = 2500.0;  // information of a standard deviation of 2 cm: less is no hold
 

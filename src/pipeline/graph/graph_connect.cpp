@@ -64,7 +64,7 @@ class Connector {
     for (const Port& port : ports) {
       if (!port.required || (inputs != nullptr && inputs->find(port.name) != nullptr)) continue;
       if (std::find(meant_.begin(), meant_.end(), port.name) != meant_.end())
-        continue;  // told as a typing error
+        continue;  // reported as a typing error
       problems_.push_back(
           {inputs != nullptr ? inputs->mark : spec.mark, path,
            fmt::format("the input {} is missing ({})", port.name, givers(specs_, port.type))});
@@ -105,7 +105,7 @@ class Connector {
     }
     spec.reads_from.push_back(giver);
     const StageType* type = specs_[giver].node.type;
-    if (type == nullptr) return;  // told already
+    if (type == nullptr) return;  // reported already
     const auto output =
         fitting_output(*type, dot == std::string::npos ? "" : from.scalar.substr(dot + 1), port->type);
     if (output) {

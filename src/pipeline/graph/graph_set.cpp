@@ -43,7 +43,7 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems,
   const std::size_t equals = text.find('=');
   const std::size_t dot = text.find('.');
   if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals) {
-    return refuse(text, "write it as stage.key=value, e.g. --set track.points=off");
+    return refuse(text, "write it as stage.key=value, e.g. --set features.points=off");
   }
   const std::string path = text.substr(0, equals);
   const std::string stage = text.substr(0, dot);
@@ -59,7 +59,7 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems,
   if (key == "type" || key == "inputs") {
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }
-  if (specs[target].node.type == nullptr) return;  // told already
+  if (specs[target].node.type == nullptr) return;  // reported already
   if (is_retired(key)) return warnings.push_back(fmt::format("--set {}: has no effect", path));
   specs[target].node.options.set(key, *value, stage, problems);
   specs[target].set.push_back(key);

@@ -73,7 +73,7 @@ void check_sources(const StageSpecs& specs, ConfigProblems& problems) {
 }
 
 void check_uses(const StageSpecs& specs, ConfigProblems& problems) {
-  // One wrong word leaves the stage that was meant without reader; the word alone is told.
+  // One wrong word leaves the stage that was meant without reader; the word alone is reported.
   const auto unclear = [](const StageSpec& spec) { return spec.dangling || spec.node.type == nullptr; };
   if (std::any_of(specs.begin(), specs.end(), unclear)) return;
   std::set<std::size_t> used;

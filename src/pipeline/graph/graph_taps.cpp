@@ -14,7 +14,7 @@ using core::ConfigNode;
 using core::ConfigProblems;
 using Kind = ConfigNode::Kind;
 
-/// The port that "stage" or "stage.port" means; none: told.
+/// The port that "stage" or "stage.port" means; none: reported.
 std::optional<OutputRef> find_port(const StageSpecs& specs, const ConfigNode& port, const std::string& path,
                                    ConfigProblems& problems) {
   const auto refuse = [&](std::string what) {
@@ -29,7 +29,7 @@ std::optional<OutputRef> find_port(const StageSpecs& specs, const ConfigNode& po
         fmt::format("there is no stage '{}'{}", name.substr(0, 40), core::hint(name, names_of(specs))));
   }
   const StageType* type = specs[giver].node.type;
-  if (type == nullptr) return std::nullopt;  // told already
+  if (type == nullptr) return std::nullopt;  // reported already
   std::vector<std::string> ports;
   for (const Port& p : type->outputs) ports.push_back(p.name);
   if (ports.empty()) return refuse(fmt::format("'{}' gives nothing that could be written", name));

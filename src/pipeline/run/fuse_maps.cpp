@@ -34,6 +34,32 @@ std::string names_of(const maps::StoredMaps& maps) {
   return names;
 }
 
+core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
+  const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
+  if (!file) return tl::unexpected<core::Error>(file.error());
+  StageRegistry registry;
+  register_stages(registry);
+  registry.filters() = request.filters;
+  auto graph = load_graph(*file, registry, request.pipelines_folder, request.overrides);
+  if (!graph) return graph;
+  for (const std::string& warning : graph->warnings) log.warning(warning);
+  if (graph->source().type->name == "maps") return graph;
+  return core::usage_error(
+      fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "
+                  "begins with a maps stage",
+                  file->string(), graph->source().type->name));
+}
+
+core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& request,
+                                                          const core::Executor& executor) {
+  if (request.maps.empty()) return core::usage_error("name a map");
+  auto maps = maps::StoredMaps::open(request.maps, executor);
+  if (!maps || request.anchor.empty()) return maps;
+  if (const auto part = (*maps)->find_part(request.anchor); !part)
+    return tl::unexpected<core::Error>(part.error());
+  return maps;
+}
+
 }  // namespace
 
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
@@ -43,27 +69,11 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
   std::unique_ptr<maps::StoredMaps> maps;  // goes last: stages may still be at work on it
-  const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
-  if (!pipeline_file) return fail(pipeline_file.error());
-  StageRegistry registry;
-  register_stages(registry);
-  registry.filters() = request.filters;
-  auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
+  auto graph = load_fusion(request, log);
   if (!graph) return fail(graph.error());
-  for (const std::string& warning : graph->warnings) log.warning(warning);
-  if (graph->source().type->name != "maps") {
-    return core::usage_error(
-        fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "
-                    "begins with a maps stage",
-                    pipeline_file->string(), graph->source().type->name));
-  }
-  if (request.maps.empty()) return core::usage_error("name a map");
-  auto opened = maps::StoredMaps::open(request.maps, executor);
+  auto opened = open_maps(request, executor);
   if (!opened) return fail(opened.error());
   maps = std::move(*opened);
-  if (!request.anchor.empty()) {
-    if (const auto part = maps->find_part(request.anchor); !part) return fail(part.error());
-  }
   auto output = maps::OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
 

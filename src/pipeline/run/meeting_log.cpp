@@ -131,9 +131,7 @@ core::Result<void> MeetingLog::write(const MeetingEvent& event, const std::vecto
   const RunSummary::Meeting& meeting = meetings_.back();
   const std::filesystem::path folder =
       output_ / "meetings" / fmt::format("{:04}_{}_{}", meeting.number, meeting.a, meeting.b);
-  std::error_code ec;
-  std::filesystem::create_directories(folder, ec);
-  if (ec) return core::output_error(fmt::format("{}: cannot be made ({})", folder.string(), ec.message()));
+  if (auto made = core::make_folder(folder); !made) return made;
   for (const std::size_t robot : event.preview->parts) {
     auto written = dataset::write_trajectory(folder / (names[robot] + ".txt"),
                                              keyframe_poses(event.preview->map, robot));

@@ -25,7 +25,7 @@ class Pace {
   void wait_for(std::size_t frame, const core::StopToken& stop);
   /// Whether it may be handed out. The clock starts with the first frame that is asked for.
   bool is_due(std::size_t frame);
-  /// Frames are told when all is done with them.
+  /// Frames are reported when all is done with them.
   void done(std::size_t frame);
   /// How long after it was due the latest frame was done, seconds; 0 without a pace.
   [[nodiscard]] double behind_s() const { return behind_s_; }

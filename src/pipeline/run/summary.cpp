@@ -173,7 +173,7 @@ nlohmann::ordered_json merges_of(const RunSummary& summary) {
                                     {"refused", refused},
                                     {"agreeing", e.consistency.agreeing},
                                     {"alternative", e.ambiguity.alternative},
-                                    {"laid_over", laid(e.ambiguity.overlap)},
+                                    {"overlay", laid(e.ambiguity.overlap)},
                                     {"expected", e.validation.expected},
                                     {"confirmed", e.validation.confirmed},
                                     {"pairs", e.pairs.size()},

@@ -18,9 +18,9 @@ class ChainOption {
   void declare(core::OptionTable& table, const std::string& help) {
     table.text_or_list("filters", value_, "filters", help);
   }
-  /// Reads the chain; its problems are told among those of the pipeline, each in the file it stands in; so
-  /// are files that its filters need and do not find. From then on the option's value is the list with every
-  /// option spelt out.
+  /// Reads the chain; its problems are reported among those of the pipeline, each in the file it stands in;
+  /// so are files that its filters need and do not find. From then on the option's value is the list with
+  /// every option spelt out.
   void check(const CheckContext& context, const std::string& path, core::ConfigProblems& problems);
   [[nodiscard]] const cloud::FilterChain& chain() const { return chain_; }
   /// Files that the filters write, absolute.

@@ -69,9 +69,7 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
     return result;
   }
   result.path_ = out_path / relative;
-  std::error_code ec;
-  fs::create_directories(result.path_, ec);
-  if (ec) return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
+  if (auto made = core::make_folder(result.path_); !made) return tl::unexpected<core::Error>(made.error());
   return result;
 }
 

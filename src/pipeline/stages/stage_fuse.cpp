@@ -17,7 +17,6 @@
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/depth_field.hpp"
-#include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/stored_maps.hpp"
@@ -83,33 +82,42 @@ class FuseStage : public Stage {
     if (!fused) return tl::unexpected<core::Error>(fused.error());
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
-    frame_ = find_up(up_, yaw_, fused->cloud, map->trajectory);
-    dense->output_from_map = frame_.output_from_map;
-    dense->upright = frame_.up != "none";
+    report_.frame = find_up(up_, yaw_, fused->cloud, map->trajectory);
+    dense->output_from_map = report_.frame.output_from_map;
+    dense->upright = report_.frame.up != "none";
     dense->state = state_;
-    if (dense->upright) cloud::transform(*fused->cloud, frame_.output_from_map);
+    if (dense->upright) cloud::transform(*fused->cloud, report_.frame.output_from_map);
     if (keyframe_clouds_) {
-      if (auto written = write_keyframes(*views); !written) return written;
+      const auto written = maps::write_keyframe_clouds(
+          context_->output_folder / "keyframes", *views, report_.frame.output_from_map,
+          [&](std::size_t i) { return read_corrected(*views, i); });
+      if (!written) return tl::unexpected<core::Error>(written.error());
     }
     clouds_->clear();
-    if (auto done = filter(std::move(*fused), *dense); !done) return done;
-    points_ = dense->cloud->size();
+    auto filtered =
+        filters_.chain().apply(std::move(*fused), dense->voxel_m, *context_->executor, &report_.filters);
+    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!report_.filters.empty())
+      context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(report_.filters));
+    dense->cloud = std::move(filtered->cloud);
+    dense->columns = std::move(filtered->columns);
+    report_.points = dense->cloud->size();
     for (const auto& column : dense->columns.others) {
-      if (column.name == cloud::kSigmaColumn) sigma_ = sigma_of(column.values);
+      if (column.name == cloud::kSigmaColumn) report_.sigma = sigma_of(column.values);
     }
     io.output<DenseCloud>("cloud", dense);
     return {};
   }
 
   void summarise(RunSummary& summary) const override {
-    add_left_out(reports_, summary);
-    summary.cloud_points = points_;
+    add_left_out(report_.filters, summary);
+    summary.cloud_points = report_.points;
     summary.voxel_m = options_.voxels.voxel_m;
-    summary.cloud_sigma_m = sigma_;
-    summary.up = frame_.up;
-    summary.yaw = frame_.yaw;
-    summary.output_from_map = frame_.output_from_map;
-    summary.depth_fields = reported_fields_;
+    summary.cloud_sigma_m = report_.sigma;
+    summary.up = report_.frame.up;
+    summary.yaw = report_.frame.yaw;
+    summary.output_from_map = report_.frame.output_from_map;
+    summary.depth_fields = report_.depth_fields;
   }
 
  private:
@@ -165,7 +173,7 @@ class FuseStage : public Stage {
       for (const RobotInfo& info : map.robots) {
         if (info.number == robot) name = info.name;
       }
-      reported_fields_.push_back({name, report, *field});
+      report_.depth_fields.push_back({name, report, *field});
       context_->log->debug(fmt::format(
           "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
           "explains: {}",
@@ -175,7 +183,7 @@ class FuseStage : public Stage {
     return {};
   }
 
-  /// Of finished maps, what cannot be used is told with the name of its own file.
+  /// Of finished maps, what cannot be used is reported with the name of its own file.
   [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
     if (cloud || context_->stored_maps == nullptr) return cloud;
@@ -189,45 +197,6 @@ class FuseStage : public Stage {
     return cloud;
   }
 
-  /// The largest thing in memory is not copied when there is nothing to filter.
-  core::Result<void> filter(cloud::FusedCloud fused, DenseCloud& dense) {
-    if (filters_.chain().size() == 0) {
-      dense.cloud = std::move(fused.cloud);
-      dense.columns = std::move(fused.columns);
-      return {};
-    }
-    cloud::FilterContext context;
-    context.executor = context_->executor;
-    context.spacing_m = options_.voxels.voxel_m;
-    context.columns = &fused.columns;
-    context.made_columns = &dense.columns;
-    auto filtered = filters_.chain().apply(std::move(fused.cloud), context, &reports_);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
-    context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
-    dense.cloud = std::move(*filtered);
-    return {};
-  }
-
-  core::Result<void> write_keyframes(const maps::StoredViews& views) const {
-    const std::filesystem::path folder = context_->output_folder / "keyframes";
-    std::error_code ec;
-    std::filesystem::create_directories(folder, ec);
-    if (ec)
-      return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const core::KeyframeId id = views.keyframes[i];
-      if (!id.valid()) continue;
-      const auto cloud = read_corrected(views, i);
-      if (!cloud) return tl::unexpected<core::Error>(cloud.error());
-      cloud::transform(**cloud,
-                       frame_.output_from_map * views.world_from_camera[i] * cloud::sensor_pose(**cloud));
-      const std::string name = id.robot == 0 ? fmt::format("{:06}.ply", id.index)
-                                             : fmt::format("{}_{:06}.ply", id.robot, id.index);
-      if (auto written = cloud::write_ply(folder / name, **cloud); !written) return written;
-    }
-    return {};
-  }
-
   const RunContext* context_ = nullptr;
   cloud::DenseFusionOptions options_;
   Up up_ = Up::kFloor;
@@ -238,11 +207,15 @@ class FuseStage : public Stage {
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;
   std::shared_ptr<maps::FusionState> state_ = std::make_shared<maps::FusionState>();
-  std::vector<RunSummary::DepthField> reported_fields_;
-  std::vector<cloud::FilterReport> reports_;  ///< of the merged cloud's filters
-  UpFrame frame_;
-  std::size_t points_ = 0;
-  Sigma sigma_;
+  /// What the summary says.
+  struct Report {
+    std::vector<RunSummary::DepthField> depth_fields;
+    std::vector<cloud::FilterReport> filters;  ///< of the merged cloud
+    UpFrame frame;
+    std::size_t points = 0;
+    Sigma sigma;
+  };
+  Report report_;
 };
 
 }  // namespace

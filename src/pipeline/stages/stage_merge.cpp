@@ -118,7 +118,7 @@ class MergeStage : public Stage {
   }
 
  private:
-  /// Events that are told with a frame of the run.
+  /// Events that are reported with a frame of the run.
   core::Result<void> note(const std::vector<mapping::MeetingEvent>& events, std::size_t frame) {
     for (const mapping::MeetingEvent& event : events) {
       const double time_s = context_->recordings->time_of(frame);

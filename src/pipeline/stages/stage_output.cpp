@@ -118,16 +118,9 @@ class OutputStage : public Stage {
     return map;
   }
 
-  static core::Result<void> make_folder(const std::filesystem::path& folder) {
-    std::error_code ec;
-    std::filesystem::create_directories(folder, ec);
-    if (!ec) return {};
-    return core::output_error(fmt::format("{}: cannot be created ({})", folder.string(), ec.message()));
-  }
-
   core::Result<void> write_levels(const std::filesystem::path& folder, const DenseCloud& dense) const {
     if (levels_ == 0) return {};
-    if (auto made = make_folder(folder); !made) return made;
+    if (auto made = core::make_folder(folder); !made) return made;
     double voxel_m = dense.voxel_m;
     for (int level = 0; level < levels_; ++level) {
       voxel_m *= 2.0;
@@ -157,7 +150,7 @@ class OutputStage : public Stage {
     }
     for (const RobotInfo& robot : map.robots) {
       const std::filesystem::path own = folder / "robots" / robot.name;
-      if (auto made = make_folder(own); !made) return made;
+      if (auto made = core::make_folder(own); !made) return made;
       auto written = dataset::write_trajectory(own / "trajectory.txt", trajectory_of(map, robot.number));
       if (!written) return written;
       written = dataset::write_trajectory(own / "keyframes.txt", keyframe_trajectory(map, robot.number));
@@ -209,7 +202,7 @@ class OutputStage : public Stage {
   core::Result<void> write_snapshots(const std::filesystem::path& folder, const MapResult& map,
                                      const DenseCloud& dense) const {
     if (chosen_.empty()) return {};
-    if (auto made = make_folder(folder); !made) return made;
+    if (auto made = core::make_folder(folder); !made) return made;
     viz::Scene scene;
     scene.cloud = dense.cloud;
     scene.title = context_->source->name();

@@ -142,7 +142,7 @@ class TrackStage : public Stage {
   const RobotRecordings* recordings_ = nullptr;
   mapping::SlamOptions options_;
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
-  std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were told
+  std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were reported
   std::vector<FrameRow> rows_;
   std::map<mapping::KeyframeCause, std::size_t> causes_;  ///< of the keyframes
   std::vector<float> bundle_wait_ms_;                     ///< by frame; NaN: no bundle was put back

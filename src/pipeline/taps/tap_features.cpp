@@ -11,21 +11,11 @@
 namespace plumbline::pipeline {
 namespace {
 
-class FeaturesTap : public Stage {
+class FeaturesTap : public Tap {
  public:
-  void declare(core::OptionTable& table) override {
-    file_.declare(table);
-    table.integer("every", every_, {1, 100000}, "", "Every n-th frame");
-  }
-  void check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
-             core::ConfigProblems& problems) override {
-    file_.check(mark, path, problems);
-  }
-  [[nodiscard]] std::vector<std::string> files() const override { return {file_.name()}; }
-  core::Result<void> start(const RunContext& context) override { return file_.start(context); }
-
+  FeaturesTap() : Tap(TapFile::Count::kFrames, {".csv"}) {}
   core::Result<void> process(StageIo& io) override {
-    if (io.frame() % static_cast<std::size_t>(every_) != 0) return {};
+    if (file_.skips(io.frame())) return {};
     const auto features = io.input<features::FrameFeatures>("in");
     core::OutputFile out(file_.path(io.frame()));
     out.write(
@@ -51,10 +41,6 @@ class FeaturesTap : public Stage {
     }
     return out.commit();
   }
-
- private:
-  TapFile file_{TapFile::Count::kMany, {".csv"}};
-  int every_ = 1;
 };
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "plumbline/core/output_file.hpp"
+
 namespace plumbline::pipeline {
 
 namespace fs = std::filesystem;
@@ -17,12 +19,13 @@ void TapFile::declare(core::OptionTable& table) {
                  ? fmt::format("Below the result folder; ends with {}", fmt::join(endings_, " or "))
                  : fmt::format("Below the result folder, with a * for the number; ends with {}",
                                fmt::join(endings_, " or ")));
+  if (count_ == Count::kFrames) table.integer("every", every_, {1, 100000}, "", "Every n-th frame");
 }
 
 void TapFile::check(const core::ConfigMark& mark, const std::string& path,
                     core::ConfigProblems& problems) const {
   const auto refuse = [&](std::string what) { problems.push_back({mark, path + ".file", std::move(what)}); };
-  const std::string example = (count_ == Count::kMany ? "tap/*" : "tap") + endings_[0];
+  const std::string example = (count_ != Count::kOne ? "tap/*" : "tap") + endings_[0];
   if (file_.empty()) return refuse(fmt::format("a tap needs a file, e.g. file: {}", example));
   const fs::path normal = fs::path(file_).lexically_normal();
   const bool outside = normal.is_absolute() || (!normal.empty() && *normal.begin() == "..");
@@ -39,7 +42,7 @@ void TapFile::check(const core::ConfigMark& mark, const std::string& path,
   }
   const auto stars = std::count(file_.begin(), file_.end(), '*');
   if (count_ == Count::kOne && stars != 0) refuse(file_ + ": one file is written here; leave out the *");
-  if (count_ == Count::kMany && (stars != 1 || normal.filename().string().find('*') == std::string::npos)) {
+  if (count_ != Count::kOne && (stars != 1 || normal.filename().string().find('*') == std::string::npos)) {
     refuse(fmt::format("{}: many files are written here; put one * into the name for the number, e.g. {}",
                        file_, example));
   }
@@ -52,11 +55,7 @@ std::string TapFile::with(const std::string& middle) const {
 
 core::Result<void> TapFile::start(const RunContext& context) {
   result_folder_ = context.output_folder;
-  std::error_code ec;
-  fs::create_directories(folder(), ec);
-  if (ec)
-    return core::output_error(fmt::format("{}: cannot be created ({})", folder().string(), ec.message()));
-  return {};
+  return core::make_folder(folder());
 }
 
 fs::path TapFile::path(std::size_t number, const std::string& middle) const {

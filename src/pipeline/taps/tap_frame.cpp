@@ -24,16 +24,9 @@ core::Result<void> write_png(const std::filesystem::path& file, const cv::Mat& i
   return out.commit();
 }
 
-class FrameTap : public Stage {
+class FrameTap : public Tap {
  public:
-  void declare(core::OptionTable& table) override {
-    file_.declare(table);
-    table.integer("every", every_, {1, 100000}, "", "Every n-th frame");
-  }
-  void check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
-             core::ConfigProblems& problems) override {
-    file_.check(mark, path, problems);
-  }
+  FrameTap() : Tap(TapFile::Count::kFrames, {".png"}) {}
   [[nodiscard]] std::vector<std::string> files() const override {
     return {file_.with(".color"), file_.with(".depth"), camera_name()};
   }
@@ -51,7 +44,7 @@ class FrameTap : public Stage {
   }
 
   core::Result<void> process(StageIo& io) override {
-    if (io.frame() % static_cast<std::size_t>(every_) != 0) return {};
+    if (file_.skips(io.frame())) return {};
     const auto frame = io.input<sensor::RgbdFrame>("in");
     if (auto written = write_png(file_.path(io.frame(), ".color"), frame->color); !written) return written;
     constexpr double kLargest = 65534.0;  // 65535 means no measurement
@@ -72,8 +65,6 @@ class FrameTap : public Stage {
     return (std::filesystem::path(file_.name()).parent_path() / "camera.yaml").string();
   }
 
-  TapFile file_{TapFile::Count::kMany, {".png"}};
-  int every_ = 1;
   double depth_scale_ = 5000.0;
 };
 

@@ -14,23 +14,6 @@
 namespace plumbline::pipeline {
 namespace {
 
-/// What all of these have in common: one option.
-class Tap : public Stage {
- public:
-  Tap(TapFile::Count count, std::vector<std::string> endings) : file_(count, std::move(endings)) {}
-  void declare(core::OptionTable& table) override { file_.declare(table); }
-  void check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
-             core::ConfigProblems& problems) override {
-    file_.check(mark, path, problems);
-  }
-  [[nodiscard]] std::vector<std::string> files() const override { return {file_.name()}; }
-  core::Result<void> start(const RunContext& context) override { return file_.start(context); }
-  core::Result<void> process(StageIo& /*io*/) override { return {}; }
-
- protected:
-  TapFile file_;
-};
-
 class TrackTap : public Tap {
  public:
   TrackTap() : Tap(TapFile::Count::kOne, {".csv"}) {}

@@ -19,14 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using core::Result;
 
-Result<void> make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error)
-    return core::output_error(fmt::format("{}: cannot be made ({})", folder.string(), error.message()));
-  return {};
-}
-
 std::string write_png(const fs::path& file, const cv::Mat& image) {
   constexpr int kQuick = 1;
   const auto bytes = dataset::encode_png(image, kQuick);
@@ -86,7 +78,7 @@ struct Job {
 Result<std::size_t> write_frames(const Job& job, const core::Executor& executor, const core::StopToken& stop,
                                  const Progress& progress) {
   for (const char* sub : {"rgb", "depth"}) {
-    if (auto ok = make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
+    if (auto ok = core::make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
   }
   const std::size_t batch = static_cast<std::size_t>(executor.threads()) * 4;
   std::size_t done = 0;
@@ -139,6 +131,22 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"events", o.events}};
 }
 
+nlohmann::json describe_world(const Scene& scene, const SynthOptions& options, const WriteSummary& summary,
+                              const nlohmann::json& robots) {
+  return {{"scene", scene.name},
+          {"scene_file", scene.file.filename().string()},
+          {"description", scene.description},
+          {"version", core::version()},
+          {"options", describe_options(options)},
+          {"robots", robots},
+          {"reference",
+           {{"file", "reference.ply"},
+            {"spacing_m", summary.reference_spacing_m},
+            {"samples", summary.reference_samples},
+            {"visible", summary.reference_visible}}},
+          {"complete", !summary.stopped}};
+}
+
 std::string folder_name(int robot) { return fmt::format("robot{}", robot); }
 
 Result<void> check_free(const fs::path& output) {
@@ -172,7 +180,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (!world) return fail(world.error());
   auto sources = open_all(*world);
   if (!sources) return fail(sources.error());
-  if (auto ok = make_folder(output); !ok) return fail(ok.error());
+  if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
   WriteSummary summary;
   summary.robots = options.robots;
@@ -205,19 +213,8 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     summary.reference_visible = counts->visible;
   }
   summary.stopped = stop.stop_requested();
-  const nlohmann::json json = {{"scene", scene.name},
-                               {"scene_file", scene.file.filename().string()},
-                               {"description", scene.description},
-                               {"version", core::version()},
-                               {"options", describe_options(options)},
-                               {"robots", robots},
-                               {"reference",
-                                {{"file", "reference.ply"},
-                                 {"spacing_m", summary.reference_spacing_m},
-                                 {"samples", summary.reference_samples},
-                                 {"visible", summary.reference_visible}}},
-                               {"complete", !summary.stopped}};
-  if (auto ok = core::write_file(output / "scene.json", json.dump(2) + "\n"); !ok) return fail(ok.error());
+  const std::string json = describe_world(scene, options, summary, robots).dump(2) + "\n";
+  if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));

@@ -126,8 +126,7 @@ bool Visibility::seen(std::size_t face, double u, double v) const {
   const Grid& g = grids_[face];
   const int i = std::clamp(static_cast<int>((u - g.u0) / block_), 0, g.columns - 1);
   const int j = std::clamp(static_cast<int>((v - g.v0) / block_), 0, g.rows - 1);
-  return flags_[g.first + static_cast<std::size_t>(j) * static_cast<std::size_t>(g.columns) +
-                static_cast<std::size_t>(i)] != 0;
+  return flags_[g.at(i, j)] != 0;
 }
 
 void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::Pinhole& camera) {
@@ -158,9 +157,7 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     const Bounds b = bounds(face);
     for (int j = 0; j < g.rows; ++j) {
       for (int i = 0; i < g.columns; ++i) {
-        std::atomic<std::uint8_t>& flag =
-            flags_[g.first + static_cast<std::size_t>(j) * static_cast<std::size_t>(g.columns) +
-                   static_cast<std::size_t>(i)];
+        std::atomic<std::uint8_t>& flag = flags_[g.at(i, j)];
         if (flag.load(std::memory_order_relaxed) != 0) continue;
         const double ua = g.u0 + i * block_, va = g.v0 + j * block_;
         const double ub = std::min(ua + block_, b.hi.x()), vb = std::min(va + block_, b.hi.y());

@@ -29,6 +29,10 @@ class Visibility {
     double u0, v0;
     int columns, rows;
     std::size_t first;  ///< index of its first block
+    [[nodiscard]] std::size_t at(int column, int row) const {
+      return first + static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+             static_cast<std::size_t>(column);
+    }
   };
   void mark(const geometry::Rigid3& world_from_camera, const sensor::Pinhole& camera);
   std::shared_ptr<const World> world_;

@@ -63,7 +63,7 @@ class ObjectReader {
     return *this;
   }
 
-  /// Whether everything was well; problems are told otherwise.
+  /// Whether everything was well; problems are reported otherwise.
   bool read(const std::vector<std::string>& reserved = {}) {
     if (node_.kind != ConfigNode::Kind::kMap) {
       problem(node_.mark, "needs keys and values in braces or below it");

@@ -150,7 +150,7 @@ TEST(LoopCloser, LoopsOfTheMapHoldWhoeverClosedThem) {
   EXPECT_EQ(other.loops()[3].a, (core::KeyframeId{3, 4}));
   EXPECT_EQ(other.loops()[3].b, (core::KeyframeId{3, 35}));
   EXPECT_EQ(other.loops()[3].b_from_a.translation, ring.map.loops()[3].b_from_a.translation);
-  const maps::Map both = joined({&ring.map, &other}, {Rigid3{}, Rigid3{}});
+  const maps::Map both = maps::joined({&ring.map, &other}, {Rigid3{}, Rigid3{}});
   EXPECT_EQ(both.loops().size(), 8U);
 }
 

@@ -203,6 +203,10 @@ TEST(StoreSteps, RobotsHaveMapsOfTheirOwnUntilTheyAreOne) {
   const auto two = load_map(folder.file());
   EXPECT_EQ(two.error().kind, core::ErrorKind::kInput);
   EXPECT_NE(two.error().message.find("are not one yet"), std::string::npos) << two.error().message;
+  const auto second = StoreReader::open(folder.file())->load("b");
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_TRUE(equal(second->map, worlds[1].map));
+  EXPECT_FALSE(StoreReader::open(folder.file())->load("c"));
   StoreWorld both(29);
   both.other_robot = 1;
   for (int i = 0; i < 6; ++i) both.step();

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "keyframe_memory.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/map.hpp"
-#include "plumbline/maps/memory.hpp"
 #include "random_world.hpp"
 
 namespace plumbline::maps {
@@ -94,7 +94,8 @@ TEST(FramePoses, MoveWithTheirKeyframes) {
   const Rigid3 pose = random.pose(1.0, 2.0);
   const Rigid3 frame_from_keyframe = random.pose(0.3, 0.2);
   const KeyframeId id = add_keyframe(map, pose);
-  const std::vector<FramePose> frames{{1.1, id, frame_from_keyframe, true, {}, 0.0}, {1.2, id, {}, false, {}, 0.0}};
+  const std::vector<FramePose> frames{{1.1, id, frame_from_keyframe, true, {}, 0.0},
+                                      {1.2, id, {}, false, {}, 0.0}};
   const Rigid3 correction = random.pose(0.5, 1.0);  // of the world
   map.set_pose(id, pose * correction);
   const geometry::Trajectory path = trajectory(frames, map);
@@ -189,7 +190,7 @@ TEST(MapMemory, AFullKeyframeWithItsShareOfLandmarksStaysBelowAQuarterOfAMegabyt
     }
   }
   for (KeyframeId id : keyframes) {
-    const KeyframeMemory memory = memory_of(map, id);
+    const tests::KeyframeMemory memory = tests::memory_of(map, id);
     EXPECT_LE(memory.total(), 250000U);
     EXPECT_GT(memory.features, 100000U) << "an estimate that forgets the features proves nothing";
     EXPECT_GT(memory.surface, 40000U);

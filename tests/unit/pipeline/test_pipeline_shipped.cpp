@@ -162,6 +162,16 @@ TEST(Shipped, EarlierNamesOfOptionsStillServe) {
   EXPECT_EQ(good->warnings[1], "--set robots.merge.min_pairs: is called merge.min_pairs now");
   EXPECT_NE(to_yaml(*good).find("plane_projection: off"), std::string::npos);
   EXPECT_NE(to_yaml(*good).find("line.detector: edlines"), std::string::npos);
+  std::ofstream(file)
+      << "description: x\ninclude: rgbd.yaml\nstages:\n  track: {lines: off, thumbnails: off}\n";
+  const auto moved = load_graph(file, registry, kShipped, {"track.photometric=off"});
+  ASSERT_TRUE(moved) << moved.error().message;
+  ASSERT_EQ(moved->warnings.size(), 2U);
+  EXPECT_EQ(moved->warnings[0], file.string() + ":4: track.lines is called features.lines now");
+  const std::string text = to_yaml(*moved);
+  for (const char* option : {"\n    lines: off", "\n    photometric: off", "\n    thumbnails: off"}) {
+    EXPECT_NE(text.find(option), std::string::npos) << option;
+  }
   fs::remove(file);
 }
 

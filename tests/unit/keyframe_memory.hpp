@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plumbline/maps/memory.hpp"
+#pragma once
 
+// What a keyframe costs in memory.
 #include <algorithm>
+#include <cstddef>
 
-namespace plumbline::maps {
-namespace {
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::tests {
+
+using namespace maps;
 
 template <typename T>
 std::size_t bytes(const std::vector<T>& v) {
   return v.capacity() * sizeof(T);
 }
 
-std::size_t bytes(const cv::Mat& image) { return image.total() * image.elemSize(); }
+inline std::size_t bytes(const cv::Mat& image) { return image.total() * image.elemSize(); }
 
 constexpr std::size_t kGridCells = 3200;  // of the look-up grid at 640 x 480
 constexpr std::size_t kTreeNode = 40;     // pointers and colour of a std::map's node, rounded up
@@ -23,9 +28,18 @@ std::size_t part(const Landmark& landmark) {
   return whole / std::max<std::size_t>(1, landmark.observations.size());
 }
 
-}  // namespace
+struct KeyframeMemory {
+  std::size_t features = 0;   ///< corners, lines, descriptors, look-up grid, small pictures
+  std::size_t surface = 0;    ///< samples
+  std::size_t links = 0;      ///< who sees what, who shares with whom, edges, tree
+  std::size_t landmarks = 0;  ///< each divided among the keyframes that see it
 
-KeyframeMemory memory_of(const Map& map, KeyframeId id) {
+  [[nodiscard]] std::size_t total() const { return features + surface + links + landmarks; }
+};
+
+/// Bytes on the heap that are there because of keyframe `id`; an estimate that leaves out what the allocator
+/// adds.
+inline KeyframeMemory memory_of(const Map& map, KeyframeId id) {
   KeyframeMemory memory;
   const Keyframe& keyframe = map.keyframe(id);
   memory.surface = bytes(keyframe.surface);
@@ -49,4 +63,4 @@ KeyframeMemory memory_of(const Map& map, KeyframeId id) {
   return memory;
 }
 
-}  // namespace plumbline::maps
+}  // namespace plumbline::tests
