@@ -28,7 +28,7 @@ using optimize::kCameraUnknowns;
 constexpr int kParts = 4;
 constexpr int kRounds = 3;  // of linearising where the last one led
 constexpr int kLeastKeyframes = 8;
-constexpr int kLeastViews = 3;
+constexpr int kLeastViews = 2;
 constexpr int kLeastObservations = 300;
 
 using Parts = std::array<CalibrationProblem, kParts>;
@@ -239,7 +239,7 @@ class Calibrator {
 };
 
 /// None: some part tells nothing.
-std::optional<std::vector<CameraEvidence>> evidence_of(Parts& parts, const CameraChange& change,
+std::optional<std::vector<CameraEvidence>> evidence_of(const Parts& parts, const CameraChange& change,
                                                        const core::Executor& executor) {
   std::array<std::optional<CameraEvidence>, kParts> each;
   executor.parallel_for(kParts, [&](std::size_t i) { each[i] = camera_evidence(parts[i], change); });

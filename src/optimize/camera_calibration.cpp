@@ -150,7 +150,7 @@ bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::
   solver.linear_solver_type = ceres::DENSE_SCHUR;
   solver.linear_solver_ordering.reset(ordering);
   solver.num_threads = 1;  // sums in a fixed order
-  solver.max_num_iterations = 15;
+  solver.max_num_iterations = 50;
   solver.function_tolerance = 1e-5;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -198,18 +198,6 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
   return evidence;
 }
 
-void write_back(CalibrationProblem& problem, CameraUnknowns& unknowns) {
-  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
-    if (problem.poses[i].fixed) continue;
-    const Eigen::Map<const geometry::Vector6d> step(unknowns.step(static_cast<int>(i)));
-    geometry::Rigid3& pose = problem.poses[i].camera_from_world;
-    pose = {Eigen::Quaterniond(geometry::exp_so3(step.head<3>()) * pose.rotation),
-            pose.translation + step.tail<3>()};
-  }
-  for (std::size_t i = 0; i < problem.points.size(); ++i)
-    std::copy_n(unknowns.point(static_cast<int>(i)), 3, problem.points[i].data());
-}
-
 }  // namespace
 
 Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vector2d& undistorted) {
@@ -240,7 +228,7 @@ double CameraEvidence::cost_of(const CameraChange& change) const {
   return cost + gradient.dot(d) + 0.5 * d.dot(information * d);
 }
 
-std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change) {
+std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem, const CameraChange& change) {
   if (problem.observations.empty()) return std::nullopt;
   CameraUnknowns unknowns(problem, change);
   ceres::Problem::Options options;
@@ -250,9 +238,7 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   ceres::Problem ceres_problem(options);
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
-  const std::optional<CameraEvidence> evidence = eliminated(problem, unknowns, ceres_problem);
-  if (evidence) write_back(problem, unknowns);
-  return evidence;
+  return eliminated(problem, unknowns, ceres_problem);
 }
 
 CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,

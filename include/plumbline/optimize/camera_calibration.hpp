@@ -79,9 +79,9 @@ Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vecto
 /// The given camera, changed.
 sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& change);
 
-/// Adjusts the points and the poses that are not fixed to the camera that `change` makes of the given one,
-/// and says how the cost hangs on the camera from there. None: it could not be solved.
-std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change);
+/// The evidence of a problem around the camera that `change` makes of the given one, poses (those that are
+/// not fixed) and points being adjusted to that. None: it could not be solved.
+std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem, const CameraChange& change);
 
 /// What all the evidence and the prior say together. Unknowns that are not free have the prior's mean.
 CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,

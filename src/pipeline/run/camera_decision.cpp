@@ -81,14 +81,15 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
   said.push_back(std::move(camera));
 }
 
-core::Result<void> CameraDecision::settle() {
+core::Result<void> CameraDecision::settle(const RunContext& context) {
   if (std::exchange(made, true)) return {};
   if (again) return core::failure(core::ErrorKind::kInternal, "the run begins again with a better camera");
-  return settled();
+  return write_cameras(context.output_folder, *context.recordings, *this);
 }
 
-std::filesystem::path camera_file(const std::filesystem::path& folder, const RobotRecordings& recordings,
-                                  std::int32_t robot) {
+/// OUT/camera.yaml, or that of one of several robots.
+static std::filesystem::path camera_file(const std::filesystem::path& folder,
+                                         const RobotRecordings& recordings, std::int32_t robot) {
   if (recordings.robots().size() == 1) return folder / "camera.yaml";
   return folder / "robots" / recordings.robot(robot).name / "camera.yaml";
 }

@@ -3,9 +3,6 @@
 
 // Whether a run's cameras are what their files say: asked once, of the run's own maps.
 #include <filesystem>
-#include <functional>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
@@ -13,6 +10,7 @@
 #include "plumbline/core/log.hpp"
 #include "plumbline/mapping/camera_calibration.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/stage.hpp"
 #include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::pipeline {
@@ -23,20 +21,16 @@ struct CameraDecision {
   std::vector<sensor::Camera> given;     ///< by robot
   std::vector<sensor::Camera> used;      ///< by robot
   std::vector<RunSummary::Camera> said;  ///< by robot; empty: nobody asked
-  std::function<core::Result<void>()>
-      settled;  ///< called once, when the cameras of this run are those it keeps
 
   /// Asks one robot's map; of all robots in order.
   void ask(const RobotInfo& robot, const mapping::CalibrationRun& run, const core::Executor& executor,
            core::Log& log);
-  /// After all were asked, or nobody is to be. An error ends the run: it is to begin again.
-  core::Result<void> settle();
+  /// After all were asked, or nobody is to be: writes what is used. An error ends the run: it is to begin
+  /// again.
+  core::Result<void> settle(const RunContext& context);
 };
 
-/// OUT/camera.yaml, or that of one of several robots.
-std::filesystem::path camera_file(const std::filesystem::path& folder, const RobotRecordings& recordings,
-                                  std::int32_t robot);
-
+/// OUT/camera.yaml, of several robots OUT/robots/NAME/camera.yaml.
 core::Result<void> write_cameras(const std::filesystem::path& folder, const RobotRecordings& recordings,
                                  const CameraDecision& decision);
 

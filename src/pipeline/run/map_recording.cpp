@@ -171,10 +171,9 @@ class MapRun {
   core::Result<void> open() {
     const auto file = find_pipeline(request_.pipeline, request_.pipelines_folder);
     if (!file) return tl::unexpected<core::Error>(file.error());
-    StageRegistry registry;
-    register_stages(registry);
-    registry.filters() = request_.filters;
-    auto graph = load_graph(*file, registry, request_.pipelines_folder, request_.overrides);
+    register_stages(registry_);
+    registry_.filters() = request_.filters;
+    auto graph = load_graph(*file, registry_, request_.pipelines_folder, request_.overrides);
     if (!graph) return tl::unexpected<core::Error>(graph.error());
     graph_ = std::make_shared<Graph>(std::move(*graph));
     if (!cameras_.made) {
@@ -189,20 +188,15 @@ class MapRun {
                                Clock::time_point began) {
     const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
     if (auto prepared = prepare(); !prepared) return fail(prepared.error());
-    cameras_.settled = [this]() -> core::Result<void> {
-      if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok) return ok;
-      if (request_.prepared) request_.prepared(output_->path());
-      return {};
-    };
     RunContext context = context_of(stop);
     if (cameras_.made || context.cameras == nullptr) {
-      cameras_.made = true;
-      if (auto ok = cameras_.settled(); !ok) return fail(ok.error());
+      if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok) return fail(ok.error());
     }
+    if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(*graph_, context, progress);
     if (cameras_.again) return fail(report.error());
     if (!report) return fail(with_what_is_kept(report.error(), *output_));
-    if (auto ok = cameras_.settle(); !ok) return fail(ok.error());
+    if (auto ok = cameras_.settle(context); !ok) return fail(ok.error());
     RunSummary summary = summary_of(*report);
     if (auto written = write(summary, *report, began); !written)
       return fail(with_what_is_kept(written.error(), *output_));
@@ -281,7 +275,8 @@ class MapRun {
     summary.cameras = cameras_.said;
     for (const RobotInfo& robot : source_->robots()) {
       if (robot.camera.guess && cameras_.said.empty())
-        summary.cameras.push_back({robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess"});
+        summary.cameras.push_back(
+            {robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess"});
     }
     add_report(report, summary);
     for (const Node& node : graph_->nodes) node.stage->summarise(summary);
@@ -302,6 +297,7 @@ class MapRun {
   const core::Executor& executor_;
   core::Log& log_;
   CameraDecision& cameras_;
+  StageRegistry registry_;  ///< what the graph's nodes are of
   std::shared_ptr<Graph> graph_;
   std::unique_ptr<RobotRecordings> source_;
   std::optional<OutputFolder> output_;

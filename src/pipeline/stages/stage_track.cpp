@@ -20,6 +20,10 @@
 namespace plumbline::pipeline {
 namespace {
 
+// What a map has seen when it is asked for its camera: keyframes or seconds.
+constexpr std::size_t kCameraKeyframes = 40;
+constexpr double kCamera_s = 10.0;
+
 class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
@@ -39,7 +43,7 @@ class TrackStage : public Stage {
     }
     revisions_.resize(slams_.size());
     if (refine_ == "off" && context.cameras != nullptr) {
-      if (auto settled = context.cameras->settle(); !settled) return settled;
+      if (auto settled = context.cameras->settle(context); !settled) return settled;
     }
     if (context.resumed == nullptr) return {};
     rows_ = context.resumed->rows;
@@ -147,11 +151,9 @@ class TrackStage : public Stage {
   }
   /// Of the cameras: all have seen enough, or it is time.
   [[nodiscard]] bool knows_enough(std::size_t frame) const {
-    constexpr double kTime_s = 10.0;
-    constexpr std::size_t kKeyframes = 40;
-    return recordings_->time_of(frame) - recordings_->time_of(0) >= kTime_s ||
+    return recordings_->time_of(frame) - recordings_->time_of(0) >= kCamera_s ||
            std::all_of(slams_.begin(), slams_.end(),
-                       [](const auto& slam) { return slam->map().keyframe_count() >= kKeyframes; });
+                       [](const auto& slam) { return slam->map().keyframe_count() >= kCameraKeyframes; });
   }
   core::Result<void> decide_cameras() {
     if (context_->cameras == nullptr || context_->cameras->made) return {};
@@ -162,7 +164,7 @@ class TrackStage : public Stage {
       context_->cameras->ask(robot, {&slam.map(), &slam.frame_poses(), undone_s}, *context_->executor,
                              *context_->log);
     }
-    return context_->cameras->settle();
+    return context_->cameras->settle(*context_);
   }
   void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
     if (!bundle.keyframe.valid()) return;
