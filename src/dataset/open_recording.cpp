@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <optional>
 #include <utility>
 
 #include "depth_statistics.hpp"
 #include "folder_source.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/image_io.hpp"
 #include "plumbline/dataset/summary.hpp"
 
 namespace plumbline::dataset {
@@ -22,17 +25,65 @@ constexpr std::size_t kDepthSamples = 5;
 constexpr double kSensorReach_m = 10.0;
 constexpr double kMaxShareBeyondReach = 0.1;
 
+constexpr std::array<const char*, 3> kCameraFiles = {"camera.yaml", "camera_intrinsic.json",
+                                                     "intrinsic.json"};
+
+bool has_camera_file(const fs::path& folder) {
+  std::error_code ignored;
+  return std::any_of(kCameraFiles.begin(), kCameraFiles.end(),
+                     [&](const char* name) { return fs::exists(folder / name, ignored); });
+}
+
 core::Result<sensor::Camera> choose_camera(const fs::path& folder, const OpenOptions& options) {
+  if (options.known) return *options.known;
   if (!options.camera.empty()) return sensor::find_camera(options.camera, options.cameras_folder);
   std::error_code ignored;
-  if (fs::exists(folder / "camera.yaml", ignored)) return sensor::read_camera(folder / "camera.yaml");
-  for (const char* name : {"camera_intrinsic.json", "intrinsic.json"}) {
-    if (fs::exists(folder / name, ignored)) return sensor::read_open3d_camera(folder / name);
+  for (const char* name : kCameraFiles) {
+    if (!fs::exists(folder / name, ignored)) continue;
+    return name == kCameraFiles.front() ? sensor::read_camera(folder / name)
+                                        : sensor::read_open3d_camera(folder / name);
   }
   return core::usage_error(fmt::format(
       "{}: no camera.yaml in the folder; put one there or name a calibration with --camera (shipped: "
       "tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file)",
       folder.string()));
+}
+
+/// Typical values of the devices that take pictures of this size, in the unit of depth that the layout's own
+/// recordings have. Nothing better is known without a file.
+std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
+  struct Device {
+    const char* name;
+    int width;
+    int height;
+    double focal_px;
+  };
+  constexpr std::array<Device, 4> kDevices = {{
+      {"Kinect or Xtion", 640, 480, 525.0},  // as their drivers and 7-Scenes, TUM and Redwood assume
+      {"RealSense D400", 1280, 720, 920.0},  // 69 x 42 degrees by its data sheet
+      {"RealSense D400", 848, 480, 610.0},   // the same, scaled
+      {"Kinect v2", 960, 540, 540.0},        // libfreenect2's default of 1081 px at 1920 x 1080, halved
+  }};
+  for (const PairInfo& pair : layout.pairs) {
+    const auto image = read_image(pair.color_file);
+    if (!image) continue;
+    for (const Device& device : kDevices) {
+      if (image->cols != device.width || image->rows != device.height) continue;
+      sensor::Camera camera;
+      camera.name = device.name;
+      camera.color = {image->cols,
+                      image->rows,
+                      device.focal_px,
+                      device.focal_px,
+                      0.5 * (image->cols - 1),
+                      0.5 * (image->rows - 1)};
+      camera.depth_scale = layout.format == "tum" ? 5000.0 : 1000.0;
+      camera.guess = true;
+      return camera;
+    }
+    break;
+  }
+  return std::nullopt;
 }
 
 /// Looks one level down: a scene's folder is easily given in place of one of its sequences.
@@ -158,10 +209,18 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   }
   // A missing camera must not hide that there is no recording; a layout without stamps needs the camera's
   // fps.
-  const auto camera = choose_camera(folder, options);
+  auto camera = choose_camera(folder, options);
   const LayoutOptions layout_options{options.max_pair_gap_s, camera ? camera->fps : 30.0};
   auto layout = read_layout(folder, options.format, layout_options, log);
   if (!layout) return tl::unexpected(layout.error());
+  const bool none_is_there = !camera && options.camera.empty() && !has_camera_file(folder);
+  if (const auto guess = none_is_there ? guessed_camera(*layout) : std::nullopt) {
+    log.warning(
+        fmt::format("{}: no camera.yaml; taken for a {} by the size of its pictures, with fx = fy = {:g}: "
+                    "a guess; put a camera.yaml there or name one with --camera",
+                    folder.string(), guess->name, guess->color.fx));
+    camera = *guess;
+  }
   if (!camera) return tl::unexpected(camera.error());
   if (auto selected = select(options, folder.string(), layout->pairs); !selected)
     return tl::unexpected(selected.error());

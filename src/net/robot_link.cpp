@@ -88,11 +88,13 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
   std::error_code ignored;
   const auto heads = fs::exists(store, ignored) ? maps::store_heads(store) : maps::StoreHeads();
   const std::lock_guard<std::mutex> lock(mutex_);
+  const bool anew = following_ && known->empty();  // the next incarnation of this run, with an empty store
   hello_.run = text("run").empty() ? fresh_ : text("run");
-  hello_.began = numbers_of(text("began"));
+  if (!anew) hello_.began = numbers_of(text("began"));
   hello_.began.push_back(heads ? static_cast<std::uint64_t>(heads->last()) : 0);
   const std::vector<std::uint64_t> incarnation = numbers_of(text("incarnation"));
-  hello_.incarnation = (incarnation.empty() ? 0 : incarnation.front()) + 1;
+  if (!anew) hello_.incarnation = incarnation.empty() ? 0 : incarnation.front();
+  ++hello_.incarnation;
   if (hello_.began.size() > kMostBegan) hello_.began.erase(hello_.began.begin());
   const auto put = ledger.put({{"run", hello_.run},
                                {"name", name_},
@@ -100,7 +102,12 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
                                {"incarnation", std::to_string(hello_.incarnation)}});
   if (!put) return put;
   store_ = store;
+  store_size_ = 0;
   following_ = true;
+  hello_.map_head = hello_.clouds_head = 0;
+  word_ = {};
+  sending_.reset();
+  noticed_.clear();
   return {};
 }
 

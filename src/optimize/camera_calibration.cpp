@@ -4,8 +4,9 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <limits>
 
 namespace plumbline::optimize {
 namespace {
@@ -32,11 +33,12 @@ class RowPoint {
     T still[3];
     ceres::AngleAxisRotatePoint(step, turned, still);
     for (int i = 0; i < 3; ++i) still[i] += pose_.camera_from_world.translation(i) + step[3 + i];
-    const T seconds = change[kReadout] * share_;
+    const T moved_s = change[kReadout] * share_;
+    const T turned_s = (change[kReadout] - pose_.undone_s) * share_;
     const geometry::Vector6d& v = pose_.velocity;
-    p[0] = still[0] + seconds * (v(0) + v(4) * still[2] - v(5) * still[1]);
-    p[1] = still[1] + seconds * (v(1) + v(5) * still[0] - v(3) * still[2]);
-    p[2] = still[2] + seconds * (v(2) + v(3) * still[1] - v(4) * still[0]);
+    p[0] = still[0] + moved_s * v(0) + turned_s * (v(4) * still[2] - v(5) * still[1]);
+    p[1] = still[1] + moved_s * v(1) + turned_s * (v(5) * still[0] - v(3) * still[2]);
+    p[2] = still[2] + moved_s * v(2) + turned_s * (v(3) * still[1] - v(4) * still[0]);
   }
 
  private:
@@ -93,29 +95,15 @@ class DepthCost {
   RowPoint in_camera_;
 };
 
-class PriorCost {
- public:
-  PriorCost(const CameraChange& mean, const CameraChange& sigma) : mean_(mean), sigma_(sigma) {}
-  template <typename T>
-  bool operator()(const T* change, T* residual) const {
-    for (std::size_t i = 0; i < kCameraUnknowns; ++i) residual[i] = (change[i] - mean_[i]) / sigma_[i];
-    return true;
-  }
-
- private:
-  CameraChange mean_;
-  CameraChange sigma_;
-};
-
 constexpr std::size_t kStep = 6;  // turn, then shift
-using ResidualIds = std::vector<ceres::ResidualBlockId>;
 
 /// All unknowns in one buffer, for the order of Ceres' sums hangs on addresses.
 class CameraUnknowns {
  public:
-  explicit CameraUnknowns(const CalibrationProblem& problem) : poses_(problem.poses.size()) {
+  CameraUnknowns(const CalibrationProblem& problem, const CameraChange& change)
+      : poses_(problem.poses.size()) {
     numbers_.assign(kCameraUnknowns + kStep * poses_ + 3 * problem.points.size(), 0.0);
-    std::copy(problem.change.begin(), problem.change.end(), numbers_.begin());
+    std::copy_n(change.data(), kCameraUnknowns, numbers_.data());
     for (std::size_t i = 0; i < problem.points.size(); ++i)
       std::copy_n(problem.points[i].data(), 3, point(static_cast<int>(i)));
   }
@@ -130,11 +118,8 @@ class CameraUnknowns {
   std::vector<double> numbers_;
 };
 
-/// Observations and what their residual blocks are called.
-ResidualIds add_observations(const CalibrationProblem& problem, CameraUnknowns& unknowns,
-                             ceres::LossFunction* pixel_loss, ceres::LossFunction* depth_loss,
-                             ceres::Problem& to) {
-  ResidualIds ids;
+void add_observations(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                      ceres::LossFunction* pixel_loss, ceres::LossFunction* depth_loss, ceres::Problem& to) {
   const double height = problem.camera.color.height;
   for (const CalibrationObservation& o : problem.observations) {
     const CalibrationPose& pose = problem.poses[static_cast<std::size_t>(o.pose)];
@@ -143,42 +128,74 @@ ResidualIds add_observations(const CalibrationProblem& problem, CameraUnknowns& 
     double* point = unknowns.point(o.point);
     auto* pixel = new ceres::AutoDiffCostFunction<PixelCost, 2, kCameraUnknowns, kStep, 3>(
         new PixelCost(o, in_camera, problem.camera));
-    ids.push_back(to.AddResidualBlock(pixel, pixel_loss, unknowns.change(), step, point));
+    to.AddResidualBlock(pixel, pixel_loss, unknowns.change(), step, point);
+    if (pose.fixed) to.SetParameterBlockConstant(step);
     if (!(o.depth > 0.0)) continue;
     auto* depth =
         new ceres::AutoDiffCostFunction<DepthCost, 1, kCameraUnknowns, kStep, 3>(new DepthCost(o, in_camera));
-    ids.push_back(to.AddResidualBlock(depth, depth_loss, unknowns.change(), step, point));
+    to.AddResidualBlock(depth, depth_loss, unknowns.change(), step, point);
   }
-  return ids;
 }
 
-void hold(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::Problem& to) {
-  std::vector<int> held;
-  for (std::size_t i = 0; i < kCameraUnknowns; ++i) {
-    if (!problem.free[i]) held.push_back(static_cast<int>(i));
+/// Poses and points to the camera as it is.
+bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::Problem& ceres_problem) {
+  auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
+  for (const CalibrationObservation& o : problem.observations) {
+    ordering->AddElementToGroup(unknowns.point(o.point), 0);
+    ordering->AddElementToGroup(unknowns.step(o.pose), 1);
   }
-  if (held.size() == kCameraUnknowns) {
-    to.SetParameterBlockConstant(unknowns.change());
-  } else if (!held.empty()) {
-    to.SetManifold(unknowns.change(), new ceres::SubsetManifold(static_cast<int>(kCameraUnknowns), held));
-  }
+  ordering->AddElementToGroup(unknowns.change(), 1);
+  ceres_problem.SetParameterBlockConstant(unknowns.change());
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  solver.linear_solver_ordering.reset(ordering);
+  solver.num_threads = 1;  // sums in a fixed order
+  solver.max_num_iterations = 50;
+  solver.function_tolerance = 1e-5;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &ceres_problem, &summary);
+  ceres_problem.SetParameterBlockVariable(unknowns.change());
+  return summary.IsSolutionUsable();
+}
+
+/// The cost around where the unknowns are, poses and points eliminated.
+std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, CameraUnknowns& unknowns,
+                                         ceres::Problem& ceres_problem) {
+  ceres::Problem::EvaluateOptions order;
+  order.parameter_blocks.push_back(unknowns.change());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     double* step = unknowns.step(static_cast<int>(i));
-    if (problem.poses[i].fixed && to.HasParameterBlock(step)) to.SetParameterBlockConstant(step);
+    if (!problem.poses[i].fixed && ceres_problem.HasParameterBlock(step))
+      order.parameter_blocks.push_back(step);
   }
-}
-
-void write_back(CalibrationProblem& problem, CameraUnknowns& unknowns) {
-  std::copy_n(unknowns.change(), kCameraUnknowns, problem.change.begin());
-  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
-    if (problem.poses[i].fixed) continue;
-    const Eigen::Map<const geometry::Vector6d> step(unknowns.step(static_cast<int>(i)));
-    geometry::Rigid3& pose = problem.poses[i].camera_from_world;
-    pose = {Eigen::Quaterniond(geometry::exp_so3(step.head<3>()) * pose.rotation),
-            pose.translation + step.tail<3>()};
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    double* point = unknowns.point(static_cast<int>(i));
+    if (ceres_problem.HasParameterBlock(point)) order.parameter_blocks.push_back(point);
   }
-  for (std::size_t i = 0; i < problem.points.size(); ++i)
-    std::copy_n(unknowns.point(static_cast<int>(i)), 3, problem.points[i].data());
+  CameraEvidence evidence;
+  evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
+  std::vector<double> gradient;
+  ceres::CRSMatrix crs;
+  if (!ceres_problem.Evaluate(order, &evidence.cost, nullptr, &gradient, &crs)) return std::nullopt;
+  const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+      crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
+      crs.values.data());
+  constexpr int kCamera = kCameraUnknowns;
+  const int others = crs.num_cols - kCamera;
+  const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(others);
+  const Eigen::MatrixXd by_camera = jacobian.leftCols(kCamera);
+  Eigen::SparseMatrix<double> normal = by_others.transpose() * by_others;
+  normal.diagonal() *= 1.0 + 1e-9;  // a point may be seen along one ray only
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::MatrixXd coupling = by_others.transpose() * by_camera;
+  const Eigen::MatrixXd answered = factor.solve(coupling);
+  const Eigen::Map<const Eigen::VectorXd> all(gradient.data(), crs.num_cols);
+  evidence.information = by_camera.transpose() * by_camera - coupling.transpose() * answered;
+  evidence.gradient = all.head<kCamera>() - answered.transpose() * all.tail(others);
+  if (!evidence.information.allFinite() || !evidence.gradient.allFinite()) return std::nullopt;
+  return evidence;
 }
 
 }  // namespace
@@ -206,42 +223,41 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
   return camera;
 }
 
-double adjust_with_camera(CalibrationProblem& problem, int max_iterations) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  if (problem.observations.empty()) return kNone;
-  CameraUnknowns unknowns(problem);
+double CameraEvidence::cost_of(const CameraChange& change) const {
+  const CameraChange d = change - at;
+  return cost + gradient.dot(d) + 0.5 * d.dot(information * d);
+}
+
+std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem, const CameraChange& change) {
+  if (problem.observations.empty()) return std::nullopt;
+  CameraUnknowns unknowns(problem, change);
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::HuberLoss pixel_loss(1.0);
   ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of what is behind
   ceres::Problem ceres_problem(options);
-  ceres_problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost, kCameraUnknowns, kCameraUnknowns>(
-                                     new PriorCost(problem.prior_mean, problem.prior_sigma)),
-                                 nullptr, unknowns.change());
-  const ResidualIds ids = add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
-  hold(problem, unknowns, ceres_problem);
-  auto* ordering = new ceres::ParameterBlockOrdering;  // owned by the solver's options
-  ordering->AddElementToGroup(unknowns.change(), 1);
-  for (const CalibrationObservation& o : problem.observations) {
-    ordering->AddElementToGroup(unknowns.point(o.point), 0);
-    ordering->AddElementToGroup(unknowns.step(o.pose), 1);
+  add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
+  if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
+  return eliminated(problem, unknowns, ceres_problem);
+}
+
+CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,
+                         const CameraPrior& prior) {
+  Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns> information =
+      prior.sigma.array().square().inverse().matrix().asDiagonal();
+  CameraChange gradient = CameraChange::Zero();  // at the prior's mean
+  for (const CameraEvidence& e : evidence) {
+    information += e.information;
+    gradient += e.gradient + e.information * (prior.mean - e.at);
   }
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_SCHUR;
-  solver.linear_solver_ordering.reset(ordering);
-  solver.num_threads = 1;  // sums in a fixed order
-  solver.max_num_iterations = max_iterations;
-  solver.function_tolerance = 1e-6;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &ceres_problem, &summary);
-  if (!summary.IsSolutionUsable()) return kNone;
-  ceres::Problem::EvaluateOptions all;
-  all.residual_blocks = ids;
-  double cost = kNone;
-  if (!ceres_problem.Evaluate(all, &cost, nullptr, nullptr, nullptr)) return kNone;
-  write_back(problem, unknowns);
-  return cost;
+  for (int i = 0; i < static_cast<int>(kCameraUnknowns); ++i) {
+    if (free[static_cast<std::size_t>(i)]) continue;
+    information.row(i).setZero();
+    information.col(i).setZero();
+    information(i, i) = 1.0;
+    gradient(i) = 0.0;
+  }
+  return prior.mean - information.ldlt().solve(gradient);
 }
 
 }  // namespace plumbline::optimize

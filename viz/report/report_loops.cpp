@@ -214,13 +214,29 @@ std::string merges_html(const ReportData& data) {
   return overview.html() + details;
 }
 
+/// What the maps told about their cameras; empty: nobody asked, or nothing was found out.
+static std::string cameras_html(const Json& s) {
+  HtmlTable table(
+      {{"camera of"}, {"number"}, {"given", true}, {"found", true}, {"±", true}, {"gain", true}, {""}});
+  for (const Json& camera : list_at(s, "/camera")) {
+    for (const Json& n : list_at(camera, "/numbers")) {
+      const auto number = [&](const char* place) { return fmt::format("{:.5g}", number_at(n, place)); };
+      table.row({text_at(camera, "/robot"), text_at(n, "/name"), number("/given"), number("/found"),
+                 fmt::format("{:.2g}", number_at(n, "/sigma")),
+                 number_text(100.0 * number_at(n, "/gain"), 1, "%"),
+                 is_true(n, "used") ? "used" : "not used"});
+    }
+  }
+  return table.rows() > 0 ? "<h3>Cameras</h3>\n" + table.html() : "";
+}
+
 std::string refinement_html(const ReportData& data) {
   const Json& s = data.summary;
   const double maps = number_at(s, "/refine/local_maps");
   if (!(maps > 0.0) && !(number_at(s, "/refine/max_shift_m") > 0.0)) {
     return paragraph(
                "The map was not refined as a whole: there was nothing to align, or the stage was off.") +
-           fit_html(data);
+           cameras_html(s) + fit_html(data);
   }
   const auto count = [&](const char* place) { return count_text(number_at(s, place)); };
   std::string out = facts_html(
@@ -248,7 +264,7 @@ std::string refinement_html(const ReportData& data) {
                number_text(number_at(d, "/after"), 3), number_text(1e3 * number_at(d, "/most_at_2m"), 1)});
   }
   if (depth.rows() > 0) out += "<h3>Systematic error of the depth cameras</h3>\n" + depth.html();
-  return out + fit_html(data);
+  return out + cameras_html(s) + fit_html(data);
 }
 
 }  // namespace plumbline::report

@@ -40,8 +40,9 @@ class FrameSource {
 };
 
 struct OpenOptions {
-  std::string format = "auto";  ///< auto, tum, 7scenes, redwood
-  std::string camera;           ///< shipped name or file; "" = camera.yaml in the folder
+  std::string format = "auto";          ///< auto, tum, 7scenes, redwood
+  std::string camera;                   ///< shipped name or file; "" = camera.yaml in the folder
+  std::optional<sensor::Camera> known;  ///< in the place of any file
   std::filesystem::path cameras_folder;
   double max_pair_gap_s = 0.02;  ///< colour and depth further apart are no pair
   double from_s = 0.0;           ///< seconds after the first pair
@@ -49,9 +50,10 @@ struct OpenOptions {
   int every = 1;                 ///< every n-th pair
 };
 
-/// Opens a folder. Checks camera, lists and the depth scale (median depth of some frames outside
-/// 0.35-20 m: error; outside 0.7-7 m, or a tenth of the depths beyond the 10 m that depth cameras reach:
-/// warning; both name the depth_scale that would fit).
+/// Opens a folder. Without a camera file the camera is a guess by the size of the pictures (Camera::guess;
+/// a warning), kUsage when no common device takes such. Checks camera, lists and the depth scale (median
+/// depth of some frames outside 0.35-20 m: error; outside 0.7-7 m, or a tenth of the depths beyond the 10 m
+/// that depth cameras reach: warning; both name the depth_scale that would fit).
 core::Result<std::unique_ptr<FrameSource>> open_recording(const std::filesystem::path& folder,
                                                           const OpenOptions& options, core::Log& log);
 

@@ -16,11 +16,12 @@
 
 namespace plumbline::mapping {
 
-/// A map of one recording whose features were taken as the given camera shows them, rolling shutter not
-/// undone. Both must outlive the call.
+/// A map of one recording, made with the given camera. Both must outlive the call.
 struct CalibrationRun {
   const maps::Map* map = nullptr;
   const std::vector<maps::FramePose>* frames = nullptr;  ///< every frame: how fast the camera moved
+  double undone_s =
+      0.0;  ///< the readout that was undone in its features; 0: they are as the camera showed them
 };
 
 struct CalibrationOptions {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Bundle adjustment with the camera among the unknowns: poses, points, and what all images share (Zhang,
-// PAMI 22, 2000; readout as in Hedborg, Forssen, Felsberg, Ringaby, CVPR 2012). Plain structs in and out;
-// Ceres inside. Deterministic: one thread, fixed order.
+// Bundle adjustment with the camera among the unknowns: poses, points, and what all pictures share (Zhang,
+// PAMI 22, 2000; readout as in Hedborg, Forssen, Felsberg, Ringaby, CVPR 2012). Poses and points are
+// eliminated: what is left is a quadratic function of the camera, which answers any question about it at
+// once. Plain structs in and out; Ceres inside. Deterministic: one thread, fixed order.
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
@@ -25,12 +27,14 @@ enum CameraUnknown : std::size_t {
   kK2,
   kCameraUnknowns
 };
-using CameraChange = std::array<double, kCameraUnknowns>;
+using CameraChange = Eigen::Matrix<double, kCameraUnknowns, 1>;
+using FreeUnknowns = std::array<bool, kCameraUnknowns>;
 
 struct CalibrationPose {
   geometry::Rigid3 camera_from_world;  ///< when the middle row was read
   /// (m/s, rad/s): camera_from_world(t + dt) = Exp(velocity dt) camera_from_world(t).
   geometry::Vector6d velocity = geometry::Vector6d::Zero();
+  double undone_s = 0.0;  ///< the readout whose turns are no longer in the pixels
   bool fixed = false;
 };
 
@@ -47,23 +51,40 @@ struct CalibrationObservation {
 
 struct CalibrationProblem {
   sensor::Camera camera;  ///< as given
-  CameraChange change{};
-  CameraChange prior_mean{};
-  CameraChange prior_sigma{};                ///< > 0
-  std::array<bool, kCameraUnknowns> free{};  ///< others keep the value they have in `change`
   std::vector<CalibrationPose> poses;
   std::vector<Eigen::Vector3d> points;  ///< world, metres
   std::vector<CalibrationObservation> observations;
 };
 
-/// Pixel of the image, distortion and all, of the undistorted pixel.
+/// What a problem says of its camera, poses and points being the best for each: half the squared standard
+/// deviations, a quadratic function of the change.
+struct CameraEvidence {
+  CameraChange at = CameraChange::Zero();  ///< where it was linearised
+  double cost = 0.0;                       ///< there
+  CameraChange gradient = CameraChange::Zero();
+  Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns> information =
+      Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns>::Zero();
+
+  [[nodiscard]] double cost_of(const CameraChange& change) const;
+};
+
+struct CameraPrior {
+  CameraChange mean = CameraChange::Zero();
+  CameraChange sigma = CameraChange::Ones();  ///< > 0
+};
+
+/// Pixel of the picture, distortion and all, of the undistorted pixel.
 Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vector2d& undistorted);
 
 /// The given camera, changed.
 sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& change);
 
-/// Updates poses that are not fixed, points and what is free of the camera. Returns the robust cost, half the
-/// squared standard deviations, without the prior; NaN when it could not be solved.
-double adjust_with_camera(CalibrationProblem& problem, int max_iterations = 25);
+/// The evidence of a problem around the camera that `change` makes of the given one, poses (those that are
+/// not fixed) and points being adjusted to that. None: it could not be solved.
+std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem, const CameraChange& change);
+
+/// What all the evidence and the prior say together. Unknowns that are not free have the prior's mean.
+CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,
+                         const CameraPrior& prior);
 
 }  // namespace plumbline::optimize

@@ -31,8 +31,8 @@ struct MapRequest {
   bool resume = false;   ///< go on from what an interrupted run left in OUT.partial
   double pace_hz = 0.0;  ///< play each recording at so many frames a second, at most; 0: as fast as that goes
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
-  /// Called before the first frame with the folder that the run writes into, where map.db will be; may be
-  /// empty.
+  /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
+  /// when the run begins anew with another camera: nothing of before is there then. May be empty.
   std::function<void(const std::filesystem::path&)> prepared;
   std::function<void(maps::Map&)>
       alter_map;  ///< for tests: changes the map when tracking has ended; may be empty

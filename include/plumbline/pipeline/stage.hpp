@@ -39,6 +39,7 @@ class StoredMaps;
 
 namespace plumbline::pipeline {
 
+struct CameraDecision;
 struct ResumedRun;
 struct RunSummary;
 class RobotRecordings;
@@ -131,6 +132,7 @@ struct RunContext {
   std::function<void(maps::Map&)>
       alter_map;                        ///< for tests: changes the map when tracking has ended; may be empty
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
+  CameraDecision* cameras = nullptr;    ///< what a track stage asks its maps; null: nothing is asked
 };
 
 /// What a stage may look at while the graph is checked.

@@ -13,6 +13,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/mapping/camera_calibration.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "plumbline/maps/frame_pose.hpp"
@@ -83,6 +84,15 @@ struct RunSummary {
     optimize::BundleFits before;  ///< how well all fits where the pose graph had put it; zeros: not known
     optimize::BundleFits after;   ///< when all was adjusted
   } refine;
+  /// What a robot's own map told about its camera.
+  struct Camera {
+    std::string robot;
+    std::vector<mapping::CameraFinding> findings;
+    double gain = 0.0;  ///< share of what was left unexplained, where it was not looked for
+    std::string note;   ///< why nothing was found; empty: it was looked for
+    std::string doubt;  ///< why the camera must not be trusted; empty: nothing speaks against it
+  };
+  std::vector<Camera> cameras;
   /// What was found of a depth camera's systematic error.
   struct DepthField {
     std::string robot;  ///< empty: the only one

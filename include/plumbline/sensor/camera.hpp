@@ -52,6 +52,7 @@ struct Camera {
   /// What depth gets wrong across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
   /// ray (x, y, 1) of the undistorted colour camera. A depth camera whose axis is not where its maker thinks.
   std::array<double, 2> depth_slope{};
+  bool guess = false;  ///< typical values, of no file
 
   [[nodiscard]] bool distorted() const {
     for (double k : distortion) {

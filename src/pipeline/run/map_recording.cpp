@@ -18,6 +18,7 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "stages/camera_decision.hpp"
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
 #include "stages/waiting_clouds.hpp"
@@ -82,22 +83,52 @@ MapRequest in_order(MapRequest request) {
   return request;
 }
 
+/// `cameras`: by robot, in the place of files; empty: as the recordings say.
 core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& request,
+                                                           const std::vector<sensor::Camera>& cameras,
                                                            const core::Executor& executor, core::Log& log) {
   const std::filesystem::path scenes = request.pipelines_folder / "scenes";
   std::vector<std::string> inputs{request.input};
   inputs.insert(inputs.end(), request.others.begin(), request.others.end());
   std::vector<std::unique_ptr<dataset::FrameSource>> all;
-  for (const std::string& input : inputs) {
-    auto recording = open_input(input, request.open, scenes, executor, log);
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    dataset::OpenOptions open = request.open;
+    if (!cameras.empty()) open.known = cameras[i];
+    auto recording = open_input(inputs[i], open, scenes, executor, log);
     if (!recording) return tl::unexpected<core::Error>(recording.error());
     all.push_back(std::move(*recording));
   }
   return std::make_unique<RobotRecordings>(std::move(all));
 }
 
-core::Result<void> can_resume(const MapRequest& request, bool keeps, const std::filesystem::path& pipeline) {
-  if (!keeps) {
+bool tracks(const Graph& graph) {
+  return std::any_of(graph.nodes.begin(), graph.nodes.end(),
+                     [](const Node& node) { return node.type->name == "track"; });
+}
+
+bool keeps_map(const Graph& graph) {
+  return std::any_of(graph.nodes.begin(), graph.nodes.end(),
+                     [](const Node& node) { return node.stage->keeps_map(); });
+}
+
+/// Whether the pipeline can do what is asked of it.
+core::Result<void> fits(const Graph& graph, const MapRequest& request,
+                        const std::filesystem::path& pipeline) {
+  if (!request.debug_video.empty() && !tracks(graph)) {
+    return core::usage_error(fmt::format(
+        "{}: has no track stage whose work could be drawn; leave out --debug-video", pipeline.string()));
+  }
+  if (graph.source().type->name == "maps") {
+    return core::usage_error(
+        fmt::format("{}: begins with finished maps; it is run by plumbline fuse", pipeline.string()));
+  }
+  return {};
+}
+
+core::Result<void> can_resume(const Graph& graph, const MapRequest& request,
+                              const std::filesystem::path& pipeline) {
+  if (!request.resume) return {};
+  if (!keeps_map(graph) || !tracks(graph)) {
     return core::usage_error(
         fmt::format("{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave "
                     "out --resume",
@@ -128,6 +159,152 @@ core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
   return error;
 }
 
+/// A recording once from its first frame to its last; a better camera that is found on the way asks for
+/// another one.
+class MapRun {
+ public:
+  using Clock = std::chrono::steady_clock;
+  MapRun(const MapRequest& request, const core::Executor& executor, core::Log& log, CameraDecision& cameras)
+      : request_(request), executor_(executor), log_(log), cameras_(cameras) {}
+
+  /// Everything is checked, nothing begun.
+  core::Result<void> open() {
+    const auto file = find_pipeline(request_.pipeline, request_.pipelines_folder);
+    if (!file) return tl::unexpected<core::Error>(file.error());
+    register_stages(registry_);
+    registry_.filters() = request_.filters;
+    auto graph = load_graph(*file, registry_, request_.pipelines_folder, request_.overrides);
+    if (!graph) return tl::unexpected<core::Error>(graph.error());
+    graph_ = std::make_shared<Graph>(std::move(*graph));
+    if (!cameras_.made) {
+      for (const std::string& warning : graph_->warnings) log_.warning(warning);
+    }
+    if (auto can = fits(*graph_, request_, *file); !can) return can;
+    if (auto opened = open_source(); !opened) return opened;
+    return can_resume(*graph_, request_, *file);
+  }
+
+  core::Result<RunSummary> run(const core::StopToken& stop, const Progress& progress,
+                               Clock::time_point began) {
+    const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+    if (auto prepared = prepare(); !prepared) return fail(prepared.error());
+    RunContext context = context_of(stop);
+    if (cameras_.made || context.cameras == nullptr) {
+      if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok) return fail(ok.error());
+    }
+    if (request_.prepared) request_.prepared(output_->path());
+    const auto report = run_graph(*graph_, context, progress);
+    if (cameras_.again) return fail(report.error());
+    if (!report) return fail(with_what_is_kept(report.error(), *output_));
+    if (auto ok = cameras_.settle(context); !ok) return fail(ok.error());
+    RunSummary summary = summary_of(*report);
+    if (auto written = write(summary, *report, began); !written)
+      return fail(with_what_is_kept(written.error(), *output_));
+    if (debug_) {
+      if (auto committed = debug_->commit(); !committed) return fail(committed.error());
+    }
+    return summary;
+  }
+
+  [[nodiscard]] std::shared_ptr<void> remains() const { return graph_; }
+
+ private:
+  core::Result<void> open_source() {
+    auto source = open_inputs(request_, cameras_.used, executor_, log_);
+    if (!source) return tl::unexpected<core::Error>(source.error());
+    source_ = std::move(*source);
+    if (cameras_.made) return {};
+    for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
+    if (!request_.resume) return {};
+    cameras_.used = decided_cameras(maps::OutputFolder::partial_of(request_.output), *source_);
+    cameras_.made = !cameras_.used.empty();
+    return cameras_.made ? open_source() : core::Result<void>();
+  }
+
+  /// The folders that are written into, and what lies there already.
+  core::Result<void> prepare() {
+    auto output = request_.resume ? maps::OutputFolder::resume(request_.output, request_.replace)
+                                  : maps::OutputFolder::prepare(request_.output, request_.replace);
+    if (!output) return tl::unexpected<core::Error>(output.error());
+    output_.emplace(std::move(*output));
+    if (request_.resume) {
+      auto opened =
+          open_resumed(output_->path(), config_text(request_, *graph_, 0), input_text(*source_), *source_);
+      if (!opened) return tl::unexpected<core::Error>(opened.error());
+      resumed_ = std::move(*opened);
+      report_resumed(output_->path(), resumed_, log_);
+    }
+    const std::string config = config_text(request_, *graph_, executor_.threads());
+    if (auto written = core::write_file(output_->path() / "config.yaml", config); !written) return written;
+    if (request_.debug_video.empty()) return {};
+    auto debug =
+        DebugFolder::prepare(request_.debug_video, request_.output, output_->path(), request_.replace);
+    if (!debug) return tl::unexpected<core::Error>(debug.error());
+    debug_.emplace(std::move(*debug));
+    return {};
+  }
+
+  RunContext context_of(const core::StopToken& stop) {
+    RunContext context;
+    context.source = source_.get();
+    context.recordings = source_.get();
+    context.robots = &source_->robots();
+    context.executor = &executor_;
+    context.log = &log_;
+    context.stop = stop;
+    context.output_folder = output_->path();
+    if (debug_) context.debug_folder = debug_->path();
+    context.configuration = config_text(request_, *graph_, 0);
+    context.input = input_text(*source_);
+    context.pace_hz = request_.pace_hz;
+    context.keeps_map = keeps_map(*graph_);
+    context.keeps_clouds = keeps_clouds(*graph_);
+    context.alter_map = request_.alter_map;
+    if (resumed_) context.resumed = &*resumed_;
+    if (tracks(*graph_) && source_->format() != "synth") context.cameras = &cameras_;  // no lens, no error
+    return context;
+  }
+
+  [[nodiscard]] RunSummary summary_of(const RunReport& report) const {
+    RunSummary summary;
+    summary.input = request_.input;
+    for (const std::string& other : request_.others) summary.input += " " + other;
+    summary.pipeline = request_.pipeline;
+    summary.threads = executor_.threads();
+    summary.pace_hz = request_.pace_hz;
+    summary.cameras = cameras_.said;
+    for (const RobotInfo& robot : source_->robots()) {
+      if (robot.camera.guess && cameras_.said.empty())
+        summary.cameras.push_back(
+            {robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess"});
+    }
+    add_report(report, summary);
+    for (const Node& node : graph_->nodes) node.stage->summarise(summary);
+    judge(summary);
+    return summary;
+  }
+
+  core::Result<void> write(RunSummary& summary, const RunReport& report, Clock::time_point began) {
+    const std::filesystem::path& folder = output_->path();
+    if (auto ok = write_timing(folder / "timing.csv", report, summary.parts, *source_); !ok) return ok;
+    summary.peak_rss_mb = peak_rss_mb();
+    summary.wall_s = std::chrono::duration<double>(Clock::now() - began).count();
+    if (auto ok = write_summary(folder / "summary.json", summary); !ok) return ok;
+    return output_->commit();
+  }
+
+  const MapRequest& request_;
+  const core::Executor& executor_;
+  core::Log& log_;
+  CameraDecision& cameras_;
+  StageRegistry registry_;  ///< what the graph's nodes are of
+  std::shared_ptr<Graph> graph_;
+  std::unique_ptr<RobotRecordings> source_;
+  std::optional<maps::OutputFolder> output_;
+  std::optional<ResumedRun> resumed_;
+  std::optional<DebugFolder> debug_;
+};
+
 }  // namespace
 
 bool is_finished(const std::filesystem::path& out) {
@@ -138,107 +315,19 @@ bool is_finished(const std::filesystem::path& out) {
 core::Result<RunSummary> map_recording(const MapRequest& given, const core::Executor& executor,
                                        core::Log& log, const core::StopToken& stop, const Progress& progress,
                                        DeferredDestruction* deferred_destruction) {
-  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
-  const auto start = std::chrono::steady_clock::now();
-  const MapRequest request = in_order(given);
-
-  const auto pipeline_file = find_pipeline(request.pipeline, request.pipelines_folder);
-  if (!pipeline_file) return fail(pipeline_file.error());
-  StageRegistry registry;
-  register_stages(registry);
-  registry.filters() = request.filters;
-  auto graph = load_graph(*pipeline_file, registry, request.pipelines_folder, request.overrides);
-  if (!graph) return fail(graph.error());
-  for (const std::string& warning : graph->warnings) log.warning(warning);
-  const bool tracks = std::any_of(graph->nodes.begin(), graph->nodes.end(),
-                                  [](const Node& node) { return node.type->name == "track"; });
-  if (!request.debug_video.empty() && !tracks) {
-    return core::usage_error(
-        fmt::format("{}: has no track stage whose work could be drawn; leave out --debug-video",
-                    pipeline_file->string()));
+  const auto began = MapRun::Clock::now();
+  MapRequest request = in_order(given);
+  CameraDecision cameras;
+  while (true) {
+    MapRun run(request, executor, log, cameras);
+    if (auto opened = run.open(); !opened) return tl::unexpected<core::Error>(opened.error());
+    auto summary = run.run(stop, progress, began);
+    if (!std::exchange(cameras.again, false)) {
+      if (summary && deferred_destruction != nullptr) deferred_destruction->push_back(run.remains());
+      return summary;
+    }
+    request.resume = false;  // what is there was made with another camera
   }
-  if (graph->source().type->name == "maps") {
-    return core::usage_error(
-        fmt::format("{}: begins with finished maps; it is run by plumbline fuse", pipeline_file->string()));
-  }
-  const auto source = open_inputs(request, executor, log);
-  if (!source) return fail(source.error());
-  const bool keeps = std::any_of(graph->nodes.begin(), graph->nodes.end(),
-                                 [](const Node& node) { return node.stage->keeps_map(); });
-  if (request.resume) {
-    if (auto can = can_resume(request, keeps && tracks, *pipeline_file); !can) return fail(can.error());
-  }
-  auto output = request.resume ? maps::OutputFolder::resume(request.output, request.replace)
-                               : maps::OutputFolder::prepare(request.output, request.replace);
-  if (!output) return fail(output.error());
-  std::optional<ResumedRun> resumed;
-  if (request.resume) {
-    auto opened =
-        open_resumed(output->path(), config_text(request, *graph, 0), input_text(**source), **source);
-    if (!opened) return fail(opened.error());
-    resumed = std::move(*opened);
-    report_resumed(output->path(), resumed, log);
-  }
-  if (auto written =
-          core::write_file(output->path() / "config.yaml", config_text(request, *graph, executor.threads()));
-      !written) {
-    return fail(written.error());
-  }
-
-  std::optional<DebugFolder> debug;
-  if (!request.debug_video.empty()) {
-    auto prepared =
-        DebugFolder::prepare(request.debug_video, request.output, output->path(), request.replace);
-    if (!prepared) return fail(prepared.error());
-    debug.emplace(std::move(*prepared));
-  }
-
-  RunContext context;
-  context.source = source->get();
-  context.recordings = source->get();
-  context.robots = &(*source)->robots();
-  context.executor = &executor;
-  context.log = &log;
-  context.stop = stop;
-  context.output_folder = output->path();
-  if (debug) context.debug_folder = debug->path();
-  context.configuration = config_text(request, *graph, 0);
-  context.input = input_text(**source);
-  context.pace_hz = request.pace_hz;
-  context.keeps_map = keeps;
-  context.keeps_clouds = keeps_clouds(*graph);
-  context.alter_map = request.alter_map;
-  if (resumed) context.resumed = &*resumed;
-  if (request.prepared) request.prepared(output->path());
-  const auto report = run_graph(*graph, context, progress);
-  if (!report) return fail(with_what_is_kept(report.error(), *output));
-
-  RunSummary summary;
-  summary.input = request.input;
-  for (const std::string& other : request.others) summary.input += " " + other;
-  summary.pipeline = request.pipeline;
-  summary.threads = executor.threads();
-  summary.pace_hz = request.pace_hz;
-  add_report(*report, summary);
-  for (const Node& node : graph->nodes) node.stage->summarise(summary);
-  judge(summary);
-  if (auto written = write_timing(output->path() / "timing.csv", *report, summary.parts, **source);
-      !written) {
-    return fail(with_what_is_kept(written.error(), *output));
-  }
-  summary.peak_rss_mb = peak_rss_mb();
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (auto written = write_summary(output->path() / "summary.json", summary); !written)
-    return fail(with_what_is_kept(written.error(), *output));
-  if (auto committed = output->commit(); !committed) {
-    return fail(with_what_is_kept(committed.error(), *output));
-  }
-  if (debug) {
-    if (auto committed = debug->commit(); !committed) return fail(committed.error());
-  }
-  if (deferred_destruction != nullptr)
-    deferred_destruction->push_back(std::make_shared<Graph>(std::move(*graph)));
-  return summary;
 }
 
 }  // namespace plumbline::pipeline

@@ -123,6 +123,27 @@ nlohmann::ordered_json fits_of(const optimize::BundleFits& fits) {
   return all;
 }
 
+nlohmann::ordered_json cameras_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::Camera& camera : summary.cameras) {
+    nlohmann::ordered_json numbers = nlohmann::ordered_json::array();
+    for (const mapping::CameraFinding& f : camera.findings) {
+      numbers.push_back({{"name", f.name},
+                         {"given", f.given},
+                         {"found", f.found},
+                         {"sigma", f.sigma},
+                         {"gain", rounded(f.gain)},
+                         {"used", f.used}});
+    }
+    list.push_back({{"robot", camera.robot},
+                    {"gain", rounded(camera.gain)},
+                    {"numbers", numbers},
+                    {"note", camera.note},
+                    {"doubt", camera.doubt}});
+  }
+  return list;
+}
+
 nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::DepthField& found : summary.depth_fields) {
@@ -338,6 +359,9 @@ void judge(RunSummary& summary) {
   } else {
     summary.reason = summary.unconnected;
   }
+  for (const RunSummary::Camera& camera : summary.cameras) {
+    if (summary.reason.empty()) summary.reason = camera.doubt;
+  }
 }
 
 core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& s) {
@@ -359,6 +383,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"robots", robots_of(s)},
       {"cloud", cloud_of(s)},
       {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
+      {"camera", cameras_of(s)},
       {"depth_fields", depth_fields_of(s)},
       {"timing", timing_of(s)},
       {"memory", {{"peak_rss_mb", rounded(s.peak_rss_mb)}}},

@@ -11,6 +11,7 @@
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "stages/camera_decision.hpp"
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
@@ -19,9 +20,18 @@
 namespace plumbline::pipeline {
 namespace {
 
+// What a map has seen when it is asked for its camera: keyframes or seconds.
+constexpr std::size_t kCameraKeyframes = 40;
+constexpr double kCamera_s = 10.0;
+
 class TrackStage : public Stage {
  public:
-  void declare(core::OptionTable& table) override { options_.declare(table); }
+  void declare(core::OptionTable& table) override {
+    options_.declare(table);
+    table.choice("camera.refine", refine_, {"auto", "off"},
+                 "Whether the recording begins anew with a better camera when its map knows one, after 40 "
+                 "keyframes, 10 s or at its end");
+  }
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
@@ -32,6 +42,9 @@ class TrackStage : public Stage {
       slams_.back()->set_shutter(robot.camera.readout_s);
     }
     revisions_.resize(slams_.size());
+    if (refine_ == "off" && context.cameras != nullptr) {
+      if (auto settled = context.cameras->settle(context); !settled) return settled;
+    }
     if (context.resumed == nullptr) return {};
     rows_ = context.resumed->rows;
     for (const auto& [robot, map] : context.resumed->maps) {
@@ -72,6 +85,9 @@ class TrackStage : public Stage {
       }
     }
     io.output<TrackedFrame>("track", tracked);
+    if (knows_enough(io.frame())) {
+      if (auto decided = decide_cameras(); !decided) return decided;
+    }
     if (context_->debug_folder.empty()) return {};
     return write_debug_picture(context_->debug_folder, io.frame(), *frame, *features, slam, report,
                                robot.camera.color);
@@ -89,9 +105,12 @@ class TrackStage : public Stage {
       io.output<RobotMaps>("maps", result);
       return {};
     }
+    for (const auto& slam : slams_) slam->finish();
+    if (!context_->stop.stop_requested()) {
+      if (auto decided = decide_cameras(); !decided) return decided;
+    }
     for (const RobotInfo& robot : recordings_->robots()) {
       mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
-      slam.finish();
       if (several() && slam.map().keyframe_count() == 0) {
         return core::input_error(
             fmt::format("{}: no frame could begin a map; leave this recording out", robot.name));
@@ -130,6 +149,23 @@ class TrackStage : public Stage {
     const auto found = causes_.find(cause);
     return found != causes_.end() ? found->second : 0;
   }
+  /// Of the cameras: all have seen enough, or it is time.
+  [[nodiscard]] bool knows_enough(std::size_t frame) const {
+    return recordings_->time_of(frame) - recordings_->time_of(0) >= kCamera_s ||
+           std::all_of(slams_.begin(), slams_.end(),
+                       [](const auto& slam) { return slam->map().keyframe_count() >= kCameraKeyframes; });
+  }
+  core::Result<void> decide_cameras() {
+    if (context_->cameras == nullptr || context_->cameras->made) return {};
+    for (const RobotInfo& robot : recordings_->robots()) {
+      const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
+      const double told = options_.tracker.readout_s;
+      const double undone_s = told > 0.0 ? told : robot.camera.readout_s.value_or(0.0);
+      context_->cameras->ask(robot, {&slam.map(), &slam.frame_poses(), undone_s}, *context_->executor,
+                             *context_->log);
+    }
+    return context_->cameras->settle(*context_);
+  }
   void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
     if (!bundle.keyframe.valid()) return;
     bundle_wait_ms_.resize(frame + 1, std::numeric_limits<float>::quiet_NaN());
@@ -141,6 +177,7 @@ class TrackStage : public Stage {
   const RunContext* context_ = nullptr;
   const RobotRecordings* recordings_ = nullptr;
   mapping::SlamOptions options_;
+  std::string refine_ = "auto";
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
   std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were reported
   std::vector<FrameRow> rows_;

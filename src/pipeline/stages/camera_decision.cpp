@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stages/camera_decision.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "plumbline/core/hash.hpp"
+#include "plumbline/core/output_file.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
+
+/// The first line of a camera.yaml: what it was made of.
+std::string made_of(const sensor::Camera& given) {
+  core::Hash hash;
+  const std::string text = sensor::to_yaml(given);
+  hash.bytes(text.data(), text.size());
+  return fmt::format("# what the run used; was given: {:016x}", hash.value());
+}
+
+std::string found_text(const std::vector<mapping::CameraFinding>& findings) {
+  std::string text;
+  for (const mapping::CameraFinding& f : findings) {
+    if (f.used)
+      text += fmt::format("{}{} {:.5g} +- {:.2g} in place of {:.5g}", text.empty() ? "" : ", ", f.name,
+                          f.found, f.sigma, f.given);
+  }
+  return text;
+}
+
+/// Why typical values in the place of a camera file are no camera; empty: the recording agrees.
+std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
+  const std::string file = "no camera file was given, and the camera is a guess";
+  if (!found) return fmt::format("{} that the recording cannot confirm: {}", file, found.error().message);
+  const auto& findings = found->findings;
+  const auto fx =
+      std::find_if(findings.begin(), findings.end(), [](const auto& f) { return f.name == "fx"; });
+  if (fx->sigma < kGuessedFocalSigma * fx->given) return "";
+  return fmt::format("{}: the recording tells fx to {:.0f} px only ({:.1f} % would do)", file, fx->sigma,
+                     100.0 * kGuessedFocalSigma);
+}
+
+}  // namespace
+
+void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& run,
+                         const core::Executor& executor, core::Log& log) {
+  mapping::CalibrationOptions options;
+  if (robot.camera.guess) {
+    options.focal_prior = 0.1;
+    options.centre_prior_px = 20.0;
+  }
+  const auto found = mapping::calibrate_camera({run}, robot.camera, options, executor);
+  RunSummary::Camera camera;
+  camera.robot = robot.name;
+  if (robot.camera.guess) camera.doubt = doubt_of(found);
+  used.push_back(robot.camera);
+  if (!found) {
+    camera.note = found.error().message;
+    log.debug(fmt::format("{}: the camera is as given: {}", robot.name, camera.note));
+  } else {
+    camera.findings = found->findings;
+    camera.gain = found->gain;
+    const std::string text = found_text(found->findings);
+    again = again || !text.empty();
+    if (!text.empty()) {
+      used.back() = found->camera;
+      used.back().guess = false;
+      log.info(
+          fmt::format("{}: the camera is better with {}: {:.1f} % less is left unexplained where it was "
+                      "not looked for; beginning again with it",
+                      robot.name, text, 100.0 * found->gain));
+    }
+  }
+  said.push_back(std::move(camera));
+}
+
+core::Result<void> CameraDecision::settle(const RunContext& context) {
+  if (std::exchange(made, true)) return {};
+  if (again) return core::failure(core::ErrorKind::kInternal, "the run begins again with a better camera");
+  return write_cameras(context.output_folder, *context.recordings, *this);
+}
+
+/// OUT/camera.yaml, or that of one of several robots.
+static std::filesystem::path camera_file(const std::filesystem::path& folder,
+                                         const RobotRecordings& recordings, std::int32_t robot) {
+  if (recordings.robots().size() == 1) return folder / "camera.yaml";
+  return folder / "robots" / recordings.robot(robot).name / "camera.yaml";
+}
+
+core::Result<void> write_cameras(const std::filesystem::path& folder, const RobotRecordings& recordings,
+                                 const CameraDecision& decision) {
+  for (const RobotInfo& robot : recordings.robots()) {
+    const std::filesystem::path file = camera_file(folder, recordings, robot.number);
+    std::error_code ignored;
+    std::filesystem::create_directories(file.parent_path(), ignored);
+    const sensor::Camera& given = decision.given[static_cast<std::size_t>(robot.number)];
+    if (auto ok = core::write_file(file, made_of(given) + "\n" + sensor::to_yaml(robot.camera)); !ok)
+      return ok;
+  }
+  return {};
+}
+
+std::vector<sensor::Camera> decided_cameras(const std::filesystem::path& folder,
+                                            const RobotRecordings& recordings) {
+  std::vector<sensor::Camera> cameras;
+  for (const RobotInfo& robot : recordings.robots()) {
+    const std::filesystem::path file = camera_file(folder, recordings, robot.number);
+    std::ifstream in(file);
+    std::string first;
+    std::getline(in, first);
+    const auto camera = sensor::read_camera(file);
+    if (first != made_of(robot.camera) || !camera) return {};
+    cameras.push_back(*camera);
+    cameras.back().guess = robot.camera.guess && sensor::to_yaml(*camera) == sensor::to_yaml(robot.camera);
+  }
+  return cameras;
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Whether a run's cameras are what their files say: asked once, of the run's own maps.
+#include <filesystem>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/mapping/camera_calibration.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+#include "plumbline/pipeline/stage.hpp"
+#include "plumbline/pipeline/summary.hpp"
+
+namespace plumbline::pipeline {
+
+struct CameraDecision {
+  bool made = false;
+  bool again = false;                    ///< the run is to begin anew, with `used`
+  std::vector<sensor::Camera> given;     ///< by robot
+  std::vector<sensor::Camera> used;      ///< by robot
+  std::vector<RunSummary::Camera> said;  ///< by robot; empty: nobody asked
+
+  /// Asks one robot's map; of all robots in order.
+  void ask(const RobotInfo& robot, const mapping::CalibrationRun& run, const core::Executor& executor,
+           core::Log& log);
+  /// After all were asked, or nobody is to be: writes what is used. An error ends the run: it is to begin
+  /// again.
+  core::Result<void> settle(const RunContext& context);
+};
+
+/// OUT/camera.yaml, of several robots OUT/robots/NAME/camera.yaml.
+core::Result<void> write_cameras(const std::filesystem::path& folder, const RobotRecordings& recordings,
+                                 const CameraDecision& decision);
+
+/// What an interrupted run used in place of these recordings' cameras; empty: it had not decided, or it was
+/// given others.
+std::vector<sensor::Camera> decided_cameras(const std::filesystem::path& folder,
+                                            const RobotRecordings& recordings);
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A camera that is not what its file says: a run finds out and begins again.
+#include <regex>
+#include <string>
+
+#include "program.hpp"
+#include "wall_recording.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+const char* const kCheap = " --set output.views= --set output.pcd=off --set fuse.voxel=20mm";
+
+/// A generated room on disk, made once; each test has its own copy of the file that it makes wrong.
+class CameraRefinement : public ProgramTest {
+ protected:
+  static void SetUpTestSuite() {
+    world_ = fs::path(testing::TempDir()) / ("plumbline_camera_world." + std::to_string(getpid()));
+    fs::remove_all(world_);
+    const std::string command = std::string(PLUMBLINE_PROGRAM) + " synth room -o " + world_.string() +
+                                " --frames 90 --fps 15 --reference-spacing 10cm -q";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    true_fx_ = fx_of(world_ / "robot0/camera.yaml");
+  }
+  static void TearDownTestSuite() { fs::remove_all(world_); }
+  static double fx_of(const fs::path& file) {
+    const std::string text = slurp(file);
+    std::smatch found;
+    return std::regex_search(text, found, std::regex("\nfx: ([0-9.]+)")) ? std::stod(found[1]) : 0.0;
+  }
+  static std::string recording() { return (world_ / "robot0").string(); }
+
+  /// The true camera with longer focal lengths.
+  void write_camera(const std::string& name, double factor) const {
+    std::string text = slurp(world_ / "robot0/camera.yaml");
+    for (const std::string key : {"fx", "fy"}) {
+      std::smatch found;
+      ASSERT_TRUE(std::regex_search(text, found, std::regex("\n" + key + ": ([0-9.]+)")));
+      const std::string number = std::to_string(factor * std::stod(found[1]));
+      text = std::string(found.prefix()) + "\n" + key + ": " + number + std::string(found.suffix());
+    }
+    write(name, text);
+  }
+  [[nodiscard]] Outcome map(const std::string& more) const { return run("map " + more + kCheap); }
+  [[nodiscard]] nlohmann::json cameras(const std::string& out) const {
+    return read_json(path(out) / "summary.json")["camera"];
+  }
+
+  static inline fs::path world_;
+  static inline double true_fx_ = 0.0;
+};
+
+TEST_F(CameraRefinement, AWrongFocalLengthIsFoundAndTheRunBeginsAgain) {
+  write_camera("long.yaml", 1.02);
+  const std::string wrong = recording() + " --camera long.yaml";
+  const Outcome o = map(wrong + " -o out");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("beginning again")) << o;
+  EXPECT_NEAR(fx_of(path("out/camera.yaml")), true_fx_, 0.005 * true_fx_);
+  bool used = false;
+  const nlohmann::json told = cameras("out");
+  for (const auto& n : told[0]["numbers"]) used = used || (n["name"] == "fx" && n["used"]);
+  EXPECT_TRUE(used) << told;
+  // Whoever begins with what was found gets the same, whatever the number of threads.
+  for (const char* threads : {"1", "3"}) {
+    const std::string again = std::string("again") + threads;
+    ASSERT_EQ(map(wrong + " -q -o " + again + " --threads " + threads).code, 0);
+    EXPECT_EQ(slurp(path(again + "/camera.yaml")), slurp(path("out/camera.yaml")));
+    EXPECT_EQ(slurp(path(again + "/trajectory.txt")), slurp(path("out/trajectory.txt")));
+  }
+  ASSERT_EQ(map(recording() + " -q --set track.camera.refine=off -o same --camera out/camera.yaml").code, 0);
+  EXPECT_EQ(slurp(path("same/map.ply")), slurp(path("out/map.ply")));
+  EXPECT_TRUE(cameras("same").empty());
+}
+
+TEST_F(CameraRefinement, ARightCameraIsLeftAlone) {
+  const Outcome o = map(recording() + " -o out");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_FALSE(o.told("beginning again")) << o;
+  ASSERT_EQ(map(recording() + " -o off --set track.camera.refine=off").code, 0);
+  for (const char* file : {"map.ply", "trajectory.txt", "frames.csv", "camera.yaml"})
+    EXPECT_EQ(slurp(path("out") / file), slurp(path("off") / file)) << file;
+  EXPECT_EQ(cameras("out").size(), 1U);
+  EXPECT_TRUE(cameras("off").empty());
+}
+
+TEST_F(CameraRefinement, ResumingKeepsWhatWasDecided) {
+  write_camera("long.yaml", 1.02);
+  const std::string wrong = recording() + " -q --camera long.yaml";
+  ASSERT_EQ(map(wrong + " -o whole").code, 0);
+  // What a run leaves that is ended between its decision and its result.
+  fs::create_directories(path("out.partial"));
+  fs::copy(path("whole/camera.yaml"), path("out.partial/camera.yaml"));
+  write("out.partial/.plumbline-unfinished", "");
+  const Outcome o = run("map " + recording() + " --camera long.yaml --resume -o out" + kCheap);
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_FALSE(o.told("beginning again")) << o;
+  EXPECT_EQ(slurp(path("out/trajectory.txt")), slurp(path("whole/trajectory.txt")));
+  EXPECT_EQ(slurp(path("out/camera.yaml")), slurp(path("whole/camera.yaml")));
+}
+
+TEST_F(CameraRefinement, WithoutAFileTheCameraIsAGuessThatTheRecordingConfirms) {
+  fs::copy(recording(), path("bare"), fs::copy_options::recursive);
+  fs::remove(path("bare/camera.yaml"));
+  const Outcome o = map("bare -o out");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("no camera.yaml; taken for a Kinect")) << o;
+  EXPECT_NEAR(fx_of(path("out/camera.yaml")), true_fx_, 0.01 * true_fx_);
+  const Outcome off = map("bare -o off --set track.camera.refine=off");
+  EXPECT_EQ(off.code, 4) << off;
+  EXPECT_TRUE(off.told("the camera is a guess")) << off;
+  const Outcome few = map("bare -o few --to 0.5");
+  EXPECT_EQ(few.code, 4) << few;
+  EXPECT_TRUE(few.told("the recording cannot confirm")) << few;
+}
+
+TEST_F(CameraRefinement, EachRobotHasItsOwn) {
+  fs::copy(recording(), path("long"), fs::copy_options::recursive);
+  fs::copy(recording(), path("right"), fs::copy_options::recursive);
+  write_camera("long/camera.yaml", 1.02);
+  const Outcome o = map("long right -o out");
+  ASSERT_TRUE(o.code == 0 || o.code == 4) << o;
+  EXPECT_NEAR(fx_of(path("out/robots/long/camera.yaml")), true_fx_, 0.005 * true_fx_);
+  EXPECT_EQ(fx_of(path("out/robots/right/camera.yaml")), true_fx_);
+  EXPECT_EQ(cameras("out")[0]["robot"], "long");
+}
+
+}  // namespace
+}  // namespace plumbline::integration
