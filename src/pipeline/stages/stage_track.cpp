@@ -15,7 +15,6 @@
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
-#include "stages/track_rows.hpp"
 
 namespace plumbline::pipeline {
 namespace {

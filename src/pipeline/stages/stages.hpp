@@ -2,10 +2,15 @@
 #pragma once
 
 // The stage types of this library, one file each: stage_<name>.cpp. registry.cpp lists them.
+#include <string>
 #include <vector>
 
 #include "plumbline/pipeline/data.hpp"
 #include "plumbline/pipeline/stage.hpp"
+
+namespace plumbline::mapping {
+struct FrameReport;
+}
 
 namespace plumbline::pipeline {
 
@@ -35,5 +40,9 @@ StageType cloud_tap();
 
 /// Counts tracked and lost frames and the longest run of lost ones.
 void count_frames(const std::vector<FrameRow>& rows, RunSummary& summary);
+
+/// What frames.csv says of a tracked frame, and the names of these columns, comma-separated.
+std::string row_columns(const mapping::FrameReport& report);
+extern const char* const kRowColumns;
 
 }  // namespace plumbline::pipeline

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/track_rows.hpp"
-
 #include <fmt/format.h>
+
+#include "plumbline/mapping/slam.hpp"
+#include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
 namespace {
