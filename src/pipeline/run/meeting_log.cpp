@@ -52,7 +52,6 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
     add(point.position, point.normal, id.robot);
   }
   scene.cloud = cloud;
-  scene.robot_names = names;
   for (const std::size_t robot : preview.parts) {
     viz::CameraPath path;
     path.name = names[robot];
