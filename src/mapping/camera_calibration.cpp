@@ -62,7 +62,7 @@ CalibrationObservation observation_of(const features::PointFeature& feature, boo
   return seen;
 }
 
-/// Each part has the keyframes of its stretch, and what three of them see.
+/// Each part has the keyframes of its stretch, and what two of them see.
 void add_run(const CalibrationRun& run, int wanted, const sensor::Camera& camera, Parts& parts) {
   const geometry::Trajectory path = maps::trajectory(*run.frames, *run.map);
   std::map<core::KeyframeId, std::pair<std::size_t, int>> index;  // part, pose
@@ -271,10 +271,10 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   for (int round = 0; round < kRounds; ++round) {
     const auto evidence = evidence_of(parts, change, executor);
     if (!evidence || result.keyframes < kLeastKeyframes || result.observations < kLeastObservations) {
-      return core::input_error(fmt::format(
-          "{} keyframes with {} observations of points that three or more of them share are too little "
-          "to tell the camera by; film a place with texture for 10 s or more, turning and moving",
-          result.keyframes, result.observations));
+      return core::input_error(
+          fmt::format("{} keyframes with {} observations of points that several of them share are too little "
+                      "to tell the camera by; film a place with texture for 10 s or more, turning and moving",
+                      result.keyframes, result.observations));
     }
     const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
     if (change == before) break;

@@ -15,6 +15,7 @@
 namespace plumbline::pipeline {
 namespace {
 
+constexpr double kLeastGain = 0.01;  // beginning again is worth more than the last few parts in a thousand
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
 /// The first line of a camera.yaml: what it was made of.
@@ -52,6 +53,7 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
 void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& run,
                          const core::Executor& executor, core::Log& log) {
   mapping::CalibrationOptions options;
+  options.least_gain = kLeastGain;
   if (robot.camera.guess) {
     options.focal_prior = 0.1;
     options.centre_prior_px = 20.0;
