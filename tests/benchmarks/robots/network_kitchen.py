@@ -19,7 +19,7 @@ import threading
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "integration"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "integration"))
 from network_links import ENDS, Network, Relay, ip  # noqa: E402
 
 SAME = ["map.ply", "map.pcd", "lines.ply", "robots/a/trajectory.txt", "robots/b/trajectory.txt", "robots/a/keyframes.txt",
