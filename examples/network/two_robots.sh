@@ -13,7 +13,7 @@ cd "$folder"
 "$plumbline" synth room -o world --frames 50 --fps 10 --width 320 --height 240 -q
 network="--interface lo --domain $domain"
 
-"$plumbline" hub -o both --robots 2 $network -q --set maps.min_pairs=3 --set output.views= &
+"$plumbline" hub -o both --robots 2 $network -q --set merge.min_pairs=3 --set output.views= &
 hub=$!
 "$plumbline" robot world/robot0 --to 3 --name r0 $network -q &
 robot=$!
@@ -22,6 +22,6 @@ wait $robot
 wait $hub
 
 # What came over the network is what the robots have.
-"$plumbline" fuse r0 r1 -o again -q --set maps.min_pairs=3 --set output.views=
+"$plumbline" fuse r0 r1 -o again -q --set merge.min_pairs=3 --set output.views=
 cmp both/map.ply again/map.ply
 echo "the hub's map is that of plumbline fuse: $PWD/both/map.ply"

@@ -199,7 +199,6 @@ FeatureExtractor::FeatureExtractor(const FeatureOptions& options, const sensor::
 
 FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
   FrameFeatures result;
-  result.extracted = options_.points || options_.lines;
   if (frame.gray.empty()) return result;
   if (options_.points) {
     OrbFeatures orb = orb_.extract(frame.gray, valid_region(frame.gray));
@@ -215,7 +214,8 @@ FrameFeatures FeatureExtractor::extract(const sensor::RgbdFrame& frame) const {
     result.patches = std::move(orb.patches);
     result.levels = std::move(orb.levels);
   }
-  result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
+  if (options_.points || options_.lines)
+    result.grid = PointGrid(result.points, frame.gray.cols, frame.gray.rows);
   if (options_.lines) result.lines = lines_.extract(frame.gray, frame.depth, camera_);
   if (options_.photometric)
     result.photometric = std::make_shared<const PhotometricImage>(make_photometric_image(frame.gray));

@@ -52,7 +52,7 @@ class FrameAligner {
   [[nodiscard]] geometry::Matrix6d trusted_information(bool by_features, bool by_surface);
   void judge();
   [[nodiscard]] bool uses_features() const {
-    return in_.features.extracted && (in_.options.points || in_.options.lines);
+    return in_.features.extracted() && (in_.options.points || in_.options.lines);
   }
   [[nodiscard]] int feature_inliers() const;
 

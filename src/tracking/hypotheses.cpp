@@ -166,7 +166,7 @@ bool Tracker::passes_strict_check(const TrackResult& result, const features::Fra
       (result.estimate.planes.inliers < options_.min_surface || result.surface_share < kMostOfTheSurface)) {
     return false;
   }
-  if (!features.extracted || (!options_.points && !options_.lines)) return true;
+  if (!features.extracted() || (!options_.points && !options_.lines)) return true;
   const auto found = static_cast<double>(result.points.size() + 2 * result.lines.size());
   const auto expected = static_cast<double>(result.visible_points.size() + 2 * result.visible_lines.size());
   return found >= options_.min_inliers && found >= kMostOfTheFeatures * expected;

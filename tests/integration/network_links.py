@@ -31,7 +31,7 @@ from pathlib import Path
 LONG_S = 200
 SAME = ["map.ply", "lines.ply", "robots/a/trajectory.txt", "robots/b/trajectory.txt"]
 ROBOT = ["-q", "--set", "cloud.filters=[]"]
-FUSE = ["--set", "output.pcd=off", "--set", "fuse.voxel=3cm", "--set", "output.views=", "--set", "maps.min_pairs=3"]
+FUSE = ["--set", "output.pcd=off", "--set", "fuse.voxel=3cm", "--set", "output.views=", "--set", "merge.min_pairs=3"]
 PARTS = {"a": ["--to", "3"], "b": ["--from", "1.5"]}
 ENDS = {"h": "10.91.0.1", "a": "10.91.0.2", "b": "10.91.0.3"}
 

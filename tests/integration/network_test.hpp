@@ -88,7 +88,7 @@ class NetworkTest : public ProgramTest {
   static constexpr double kLong_s = 120.0;  // for a busy machine
   static constexpr const char* kRobot = " -q --set cloud.filters=[]";
   static constexpr const char* kFuse =
-      " --set output.pcd=off --set fuse.voxel=3cm --set output.views= --set maps.min_pairs=3";
+      " --set output.pcd=off --set fuse.voxel=3cm --set output.views= --set merge.min_pairs=3";
 
   static void SetUpTestSuite() {
     world_ = fs::path(testing::TempDir()) / ("plumbline_network_world." + std::to_string(getpid()));

@@ -24,6 +24,7 @@ class PointGrid {
   /// Appends the indices of points within `radius` pixels of (x, y), in a fixed order.
   void within(const std::vector<PointFeature>& points, float x, float y, float radius,
               std::vector<int>& indices) const;
+  [[nodiscard]] bool made() const { return columns_ > 0; }
 
  private:
   static constexpr int kCell = 20;  ///< pixels
@@ -46,7 +47,9 @@ struct FrameFeatures {
   std::vector<LineFeature> lines;
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
-  bool extracted = true;    ///< points or lines were looked for
+
+  /// Points or lines were looked for.
+  [[nodiscard]] bool extracted() const { return grid.made(); }
 
   /// Depth of point `i`'s surface `shift` pixels beside it, metres; 0 where there is none.
   [[nodiscard]] float depth_beside(std::size_t i, const Eigen::Vector2f& shift) const {

@@ -34,10 +34,10 @@ std::string names_of(const maps::StoredMaps& maps) {
   return names;
 }
 
-core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
+/// `registry` must outlive the graph, whose nodes point to their types there.
+core::Result<Graph> load_fusion(const FuseRequest& request, StageRegistry& registry, core::Log& log) {
   const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
   if (!file) return tl::unexpected<core::Error>(file.error());
-  StageRegistry registry;
   register_stages(registry);
   registry.filters() = request.filters;
   auto graph = load_graph(*file, registry, request.pipelines_folder, request.overrides);
@@ -69,7 +69,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto start = std::chrono::steady_clock::now();
   std::unique_ptr<maps::StoredMaps> maps;  // goes last: stages may still be at work on it
-  auto graph = load_fusion(request, log);
+  StageRegistry registry;
+  auto graph = load_fusion(request, registry, log);
   if (!graph) return fail(graph.error());
   auto opened = open_maps(request, executor);
   if (!opened) return fail(opened.error());
