@@ -17,11 +17,11 @@
 #include <string>
 #include <vector>
 
+#include "../slam_overrides.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/alignment.hpp"
 #include "plumbline/mapping/merge_server.hpp"
 #include "plumbline/mapping/slam.hpp"
-#include "slam_overrides.hpp"
 
 namespace {
 
