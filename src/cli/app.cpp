@@ -55,6 +55,16 @@ int Session::fail(const core::Error& error) {
   return static_cast<int>(error.kind);
 }
 
+core::Result<void> Session::equip(pipeline::RunRequest& request) const {
+  const auto pipelines = pipelines_folder();
+  if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+  const auto all_filters = filters();
+  if (!all_filters) return tl::unexpected<core::Error>(all_filters.error());
+  request.pipelines_folder = *pipelines;
+  request.filters = *all_filters;
+  return {};
+}
+
 int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output) {
   if (!summary) return fail(summary.error());
   if (!quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), output.string());
@@ -81,6 +91,18 @@ void add_plugin_option(CLI::App& command, Session& session) {
   command.add_option("--plugin", session.plugins, "Shared object with filters of your own; may be repeated")
       ->type_name("FILE.so")
       ->allow_extra_args(false);
+}
+
+void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request) {
+  command
+      .add_option("-p,--pipeline", request.pipeline,
+                  "Shipped pipeline or file (default: " + request.pipeline + ")")
+      ->type_name("PIPELINE");
+  command.add_option("--set", request.overrides, "Set an option of a stage; may be repeated")
+      ->type_name("stage.key=value")
+      ->allow_extra_args(false);
+  add_plugin_option(command, session);
+  command.add_flag("--force", request.replace, "Replace an earlier result");
 }
 
 void add_time_range(CLI::App& command, dataset::OpenOptions& open) {

@@ -31,6 +31,8 @@ struct Session {
   [[nodiscard]] core::Result<std::filesystem::path> pipelines_folder() const;
   /// The built-in filters and those of the plugins.
   [[nodiscard]] core::Result<cloud::FilterRegistry> filters() const;
+  /// Where a run finds pipelines and filters.
+  core::Result<void> equip(pipeline::RunRequest& request) const;
   /// Made on first use: messages and progress on stderr.
   Console& console();
   /// Made on first use.
@@ -50,19 +52,8 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
                       std::function<int()> run);
 /// --plugin FILE.so, for commands that use filters.
 void add_plugin_option(CLI::App& command, Session& session);
-/// -p, --set, --plugin and --force of a pipeline::MapRequest or FuseRequest.
-template <typename Request>
-void add_pipeline_options(CLI::App& command, Session& session, Request& request) {
-  command
-      .add_option("-p,--pipeline", request.pipeline,
-                  "Shipped pipeline or file (default: " + request.pipeline + ")")
-      ->type_name("PIPELINE");
-  command.add_option("--set", request.overrides, "Set an option of a stage; may be repeated")
-      ->type_name("stage.key=value")
-      ->allow_extra_args(false);
-  add_plugin_option(command, session);
-  command.add_flag("--force", request.replace, "Replace an earlier result");
-}
+/// -p, --set, --plugin and --force.
+void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request);
 /// What all commands that map a recording take besides.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
 /// --from S and --to S, for commands that read recordings.

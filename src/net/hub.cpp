@@ -160,8 +160,7 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
 
 core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
                                            core::Log& console, const core::StopToken& stop,
-                                           const Status& status, const pipeline::Progress& progress,
-                                           pipeline::DeferredDestruction* deferred_destruction) {
+                                           const Status& status, const pipeline::Progress& progress) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto options = checked(request.network, true);
   if (!options) return fail(options.error());
@@ -195,8 +194,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   }
   last.output = folder / "fused";
   last.replace = true;
-  auto summary =
-      pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress, deferred_destruction);
+  auto summary = pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
   if (!summary) return fail(summary.error());
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;

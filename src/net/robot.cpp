@@ -133,8 +133,7 @@ core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& 
 
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
                                      core::Log& log, const core::StopToken& stop, const Status& status,
-                                     const pipeline::Progress& progress,
-                                     pipeline::DeferredDestruction* deferred_destruction) {
+                                     const pipeline::Progress& progress) {
   auto link = open_link(request, log);
   if (!link) return tl::unexpected<core::Error>(link.error());
   pipeline::MapRequest map = request.map;
@@ -148,7 +147,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
     if (progress) progress(done, total);
     if (status) status(line_of(now, rate(now.sent_bytes)));
   };
-  auto summary = pipeline::map_recording(map, executor, log, stop, frames, deferred_destruction);
+  auto summary = pipeline::map_recording(map, executor, log, stop, frames);
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   std::error_code ec;
   const fs::path store = request.map.output / kStore;

@@ -49,10 +49,9 @@ using Status = std::function<void(const std::string&)>;
 /// Collects until all robots are done or `stop` is asked for, then fuses what is there. The summary's
 /// `reason` names robots that are missing. Errors as pipeline::fuse_stored_maps; (kUsage) options, another
 /// hub in the domain; (kUntrustworthy) stopped with no map to fuse: what came is kept. What came stays in
-/// OUT.partial whatever happens. `status` and `progress` may be empty, `deferred_destruction` null.
+/// OUT.partial whatever happens. `status` and `progress` may be empty.
 core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
                                            core::Log& log, const core::StopToken& stop, const Status& status,
-                                           const pipeline::Progress& progress,
-                                           pipeline::DeferredDestruction* deferred_destruction = nullptr);
+                                           const pipeline::Progress& progress);
 
 }  // namespace plumbline::net

@@ -40,11 +40,10 @@ std::filesystem::path earlier_run(const std::string& input);
 /// The map is a function of recording, camera and configuration, whatever the network does: nothing of it is
 /// waited for before the last frame. Errors as pipeline::map_recording; (kUsage) options, a hub that refuses
 /// this robot; (kUntrustworthy) a hub was there and has not got everything: the message has the command.
-/// `status` and `progress` may be empty, `deferred_destruction` null.
+/// `status` and `progress` may be empty.
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
                                      core::Log& log, const core::StopToken& stop, const Status& status,
-                                     const pipeline::Progress& progress,
-                                     pipeline::DeferredDestruction* deferred_destruction = nullptr);
+                                     const pipeline::Progress& progress);
 
 /// Sends the map of an earlier run: `folder` as earlier_run gives it. As run_robot.
 core::Result<RobotOutcome> hand_in(const RobotRequest& request, const std::filesystem::path& folder,

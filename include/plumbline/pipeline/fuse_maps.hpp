@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/log.hpp"
@@ -16,23 +15,16 @@
 
 namespace plumbline::pipeline {
 
-struct FuseRequest {
+struct FuseRequest : RunRequest {
+  FuseRequest() { pipeline = "fuse"; }
   std::vector<std::filesystem::path> maps;  ///< result folders, or files map.db
-  std::filesystem::path output;             ///< the result folder
-  std::string pipeline = "fuse";            ///< shipped name or file
   std::string anchor;                       ///< robot or map whose frame all are laid into; empty: by content
-  std::vector<std::string> overrides;       ///< stage.key=value
-  std::filesystem::path pipelines_folder;
-  cloud::FilterRegistry filters = cloud::builtin_filters();
-  bool replace = false;  ///< replace an earlier result
 };
 
 /// The order of `maps` changes nothing; one alone is refined and laid down as it is. Errors as map_recording;
 /// when maps do not connect, those that do are in the result, and the summary's `reason` names the others.
-/// `deferred_destruction` may be null.
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
-                                          const Progress& progress,
-                                          DeferredDestruction* deferred_destruction = nullptr);
+                                          const Progress& progress);
 
 }  // namespace plumbline::pipeline

@@ -33,8 +33,8 @@ struct OutputRef {
 };
 
 struct Node {
-  std::string name;                 ///< of a tap: "tap:stage.port"
-  const StageType* type = nullptr;  ///< owned by the registry, which outlives the graph
+  std::string name;  ///< of a tap: "tap:stage.port"
+  StageTypePtr type;
   std::unique_ptr<Stage> stage;
   core::OptionTable options;
   std::vector<std::optional<OutputRef>> inputs;  ///< one per input port; none = optional and left open
@@ -44,6 +44,7 @@ struct Node {
 /// Checked: every stage type known, every required input connected to a port of its type, no cycle, one
 /// source, nothing unused, every option in range, every file written once.
 struct Graph {
+  std::filesystem::path file;  ///< that it was read from
   std::string description;
   std::vector<Node> nodes;            ///< each after all it reads from; otherwise in file order, taps last
   std::vector<std::string> warnings;  ///< to be told: options under names of earlier versions

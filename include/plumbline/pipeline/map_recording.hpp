@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/filter.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/log.hpp"
@@ -18,17 +17,12 @@
 
 namespace plumbline::pipeline {
 
-struct MapRequest {
-  std::string input;                       ///< folder or synth:...
-  std::vector<std::string> others;         ///< further recordings, each of a robot of its own
-  std::filesystem::path output;            ///< the result folder
-  std::string pipeline = "rgbd";           ///< shipped name or file
-  std::vector<std::string> overrides;      ///< stage.key=value
-  std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
-  cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
-  dataset::OpenOptions open;                                 ///< format, camera, from, to, every
-  bool replace = false;                                      ///< replace an earlier result
-  bool resume = false;   ///< go on from what an interrupted run left in OUT.partial
+struct MapRequest : RunRequest {
+  MapRequest() { pipeline = "rgbd"; }
+  std::string input;                ///< folder or synth:...
+  std::vector<std::string> others;  ///< further recordings, each of a robot of its own
+  dataset::OpenOptions open;        ///< format, camera, from, to, every
+  bool resume = false;              ///< go on from what an interrupted run left in OUT.partial
   double pace_hz = 0.0;  ///< play each recording at so many frames a second, at most; 0: as fast as that goes
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
   /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
@@ -42,14 +36,12 @@ struct MapRequest {
 bool is_finished(const std::filesystem::path& out);
 
 /// Robots are numbered by the names of their folders (where these are alike, by the folders that they lie
-/// in): the order of `input` and `others` changes nothing. With `others`, `rgbd` stands for the shipped
-/// pipeline for several robots, `robots`. Checks everything first (pipeline: kUsage, recording: kInput,
-/// output folder: kOutput), then maps. When the result is written but should not be trusted, the summary's
-/// `reason` says why. Errors leave an earlier result untouched; what a run that failed on the way had stored
-/// stays in OUT.partial. `resume` with another input or configuration than that run's is kUsage. `progress`
-/// may be empty, `deferred_destruction` null.
+/// in): the order of `input` and `others` changes nothing. Checks everything first (pipeline: kUsage,
+/// recording: kInput, output folder: kOutput), then maps. When the result is written but should not be
+/// trusted, the summary's `reason` says why. Errors leave an earlier result untouched; what a run that failed
+/// on the way had stored stays in OUT.partial. `resume` with another input or configuration than that run's
+/// is kUsage. `progress` may be empty.
 core::Result<RunSummary> map_recording(const MapRequest& request, const core::Executor& executor,
-                                       core::Log& log, const core::StopToken& stop, const Progress& progress,
-                                       DeferredDestruction* deferred_destruction = nullptr);
+                                       core::Log& log, const core::StopToken& stop, const Progress& progress);
 
 }  // namespace plumbline::pipeline

@@ -2,6 +2,7 @@
 #pragma once
 
 // Runs a checked graph on oneTBB.
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -12,6 +13,16 @@
 #include "plumbline/pipeline/graph.hpp"
 
 namespace plumbline::pipeline {
+
+/// What `map` and `fuse` are both asked for.
+struct RunRequest {
+  std::filesystem::path output;            ///< the result folder
+  std::string pipeline;                    ///< shipped name or file
+  std::vector<std::string> overrides;      ///< stage.key=value
+  std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
+  cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
+  bool replace = false;                                      ///< replace an earlier result
+};
 
 /// Times of one stage, milliseconds.
 struct StageTiming {
@@ -33,10 +44,6 @@ struct RunReport {
   std::vector<StageTiming> stages;  ///< in graph order
   std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };
-
-/// What is left of a run when all is written: taking maps apart landmark by landmark takes a while, which
-/// whoever ends next can do without. In the order in which it is to be taken apart.
-using DeferredDestruction = std::vector<std::shared_ptr<void>>;
 
 /// Called in frame order, from one thread at a time.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;

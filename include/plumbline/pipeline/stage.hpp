@@ -195,28 +195,29 @@ struct StageType {
   /// Gives frames without taking any.
   [[nodiscard]] bool is_source() const;
 };
+using StageTypePtr = std::shared_ptr<const StageType>;
 
 /// The stage types a pipeline file may name, how its taps write the values of ports, and the filters of its
 /// chains.
 class StageRegistry {
  public:
   void add(StageType type);  ///< throws std::logic_error for a name that is taken
-  [[nodiscard]] const StageType* find(const std::string& name) const;
-  [[nodiscard]] std::vector<std::string> names() const;       ///< sorted
-  [[nodiscard]] std::vector<const StageType*> types() const;  ///< as added
+  [[nodiscard]] StageTypePtr find(const std::string& name) const;                  ///< null: there is none
+  [[nodiscard]] std::vector<std::string> names() const;                            ///< sorted
+  [[nodiscard]] const std::vector<StageTypePtr>& types() const { return types_; }  ///< as added
 
   /// A tap is a stage with one input and no output; throws std::logic_error when its port type has one.
   void add_tap(StageType type);
-  [[nodiscard]] const StageType* find_tap(const PortType& type) const;  ///< null: cannot be tapped
-  [[nodiscard]] std::vector<const StageType*> taps() const;             ///< as added
+  [[nodiscard]] StageTypePtr find_tap(const PortType& type) const;               ///< null: cannot be tapped
+  [[nodiscard]] const std::vector<StageTypePtr>& taps() const { return taps_; }  ///< as added
 
   /// The built-in filters and what plugins add.
   [[nodiscard]] const cloud::FilterRegistry& filters() const { return filters_; }
   cloud::FilterRegistry& filters() { return filters_; }
 
  private:
-  std::vector<std::unique_ptr<const StageType>> types_;
-  std::vector<std::unique_ptr<const StageType>> taps_;
+  std::vector<StageTypePtr> types_;
+  std::vector<StageTypePtr> taps_;
   cloud::FilterRegistry filters_ = cloud::builtin_filters();
 };
 

@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "app.hpp"
-#include "deferred_destruction.hpp"
 #include "plumbline/pipeline/fuse_maps.hpp"
 #include "signals.hpp"
 
@@ -11,19 +10,13 @@ namespace plumbline::cli {
 namespace {
 
 int fuse(Session& session, pipeline::FuseRequest request) {
-  const auto pipelines = session.pipelines_folder();
-  if (!pipelines) return session.fail(pipelines.error());
-  request.pipelines_folder = *pipelines;
-  const auto filters = session.filters();
-  if (!filters) return session.fail(filters.error());
-  request.filters = *filters;
+  if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   const core::StopToken stop;
   stop_on_signals(stop);
   Console& console = session.console();
   const auto summary = pipeline::fuse_stored_maps(
       request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); },
-      &deferred_destruction());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
   console.end_progress();
   return session.finish(summary, request.output);
 }

@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "app.hpp"
-#include "deferred_destruction.hpp"
 #include "network_options.hpp"
 #include "plumbline/net/hub.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
@@ -21,12 +20,7 @@ const char* const kTwoTerminals =
     "Hub and robots may start in any order; docs/guide/network.md has more.";
 
 int hub(Session& session, net::HubRequest request, double quota_gb) {
-  const auto pipelines = session.pipelines_folder();
-  if (!pipelines) return session.fail(pipelines.error());
-  request.fuse.pipelines_folder = *pipelines;
-  const auto filters = session.filters();
-  if (!filters) return session.fail(filters.error());
-  request.fuse.filters = *filters;
+  if (auto equipped = session.equip(request.fuse); !equipped) return session.fail(equipped.error());
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
   if (request.resume && pipeline::is_finished(request.fuse.output)) {
@@ -38,8 +32,7 @@ int hub(Session& session, net::HubRequest request, double quota_gb) {
   Console& console = session.console();
   const auto summary = net::run_hub(
       request, session.executor(), console, stop, [&](const std::string& line) { console.status(line); },
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); },
-      &deferred_destruction());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
   console.end_progress();
   return session.finish(summary, request.fuse.output);
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "app.hpp"
-#include "deferred_destruction.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
 #include "signals.hpp"
 
@@ -17,13 +16,7 @@ namespace {
 int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs) {
   request.input = inputs.front();
   request.others.assign(inputs.begin() + 1, inputs.end());
-  const auto pipelines = session.pipelines_folder();
-  if (!pipelines) return session.fail(pipelines.error());
-  request.pipelines_folder = *pipelines;
-  request.open.cameras_folder = *pipelines / "cameras";
-  const auto filters = session.filters();
-  if (!filters) return session.fail(filters.error());
-  request.filters = *filters;
+  if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   if (request.resume && pipeline::is_finished(request.output)) {
     if (!session.quiet)
       fmt::print("{}: is finished; there is nothing to go on with\n", request.output.string());
@@ -34,8 +27,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
   Console& console = session.console();
   const auto summary = pipeline::map_recording(
       request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); },
-      &deferred_destruction());
+      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
   console.end_progress();
   return session.finish(summary, request.output);
 }

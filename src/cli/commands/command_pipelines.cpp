@@ -45,9 +45,9 @@ core::Result<pipeline::Graph> load(const PipelinesRequest& request, const pipeli
   return pipeline::load_graph(*file, registry, *folder, request.overrides);
 }
 
-core::Result<const pipeline::StageType*> find_stage(const std::string& name,
-                                                    const pipeline::StageRegistry& registry) {
-  const pipeline::StageType* type = registry.find(name);
+core::Result<pipeline::StageTypePtr> find_stage(const std::string& name,
+                                                const pipeline::StageRegistry& registry) {
+  pipeline::StageTypePtr type = registry.find(name);
   if (type != nullptr) return type;
   return core::usage_error(fmt::format("there is no stage '{}'{}", name, core::hint(name, registry.names())));
 }
@@ -63,7 +63,7 @@ int list(Session& session) {
     fmt::print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
   }
   fmt::print("stages:\n");
-  for (const pipeline::StageType* type : registry->types())
+  for (const pipeline::StageTypePtr& type : registry->types())
     fmt::print("  {:<14} {}\n", type->name, type->help);
   return 0;
 }

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "app.hpp"
-#include "deferred_destruction.hpp"
 #include "network_options.hpp"
 #include "plumbline/net/robot.hpp"
 #include "signals.hpp"
@@ -27,13 +26,7 @@ int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
 }
 
 int robot(Session& session, net::RobotRequest request) {
-  const auto pipelines = session.pipelines_folder();
-  if (!pipelines) return session.fail(pipelines.error());
-  request.map.pipelines_folder = *pipelines;
-  request.map.open.cameras_folder = *pipelines / "cameras";
-  const auto filters = session.filters();
-  if (!filters) return session.fail(filters.error());
-  request.map.filters = *filters;
+  if (auto equipped = session.equip(request.map); !equipped) return session.fail(equipped.error());
   request.fresh_id = fresh_id();
   request.hand_in = fmt::format("--name {}{}", request.name, network_arguments(request.network));
   if (request.map.output.empty()) request.map.output = request.name;
@@ -50,10 +43,9 @@ int robot(Session& session, net::RobotRequest request) {
     console.end_progress();
     return finish(session, outcome, earlier);
   }
-  const auto outcome = net::run_robot(
-      request, session.executor(), console, stop, status,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); },
-      &deferred_destruction());
+  const auto outcome =
+      net::run_robot(request, session.executor(), console, stop, status,
+                     [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
   console.end_progress();
   return finish(session, outcome, request.map.output);
 }

@@ -62,6 +62,7 @@ core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesy
   const auto refuse = [&] { return tl::unexpected<core::Error>(core::to_error(problems)); };
   if (!own) return refuse();
   Graph graph;
+  graph.file = file;
   const auto root = with_includes(std::move(*own), file, pipelines_folder, problems, graph.warnings);
   if (!root) return refuse();
   read_description(*root, graph, problems);

@@ -104,7 +104,7 @@ class Connector {
                                             core::hint(stage_name, names_of(specs_))));
     }
     spec.reads_from.push_back(giver);
-    const StageType* type = specs_[giver].node.type;
+    const StageTypePtr& type = specs_[giver].node.type;
     if (type == nullptr) return;  // reported already
     const auto output =
         fitting_output(*type, dot == std::string::npos ? "" : from.scalar.substr(dot + 1), port->type);

@@ -79,7 +79,7 @@ void check_uses(const StageSpecs& specs, ConfigProblems& problems) {
   std::set<std::size_t> used;
   for (const StageSpec& spec : specs) used.insert(spec.reads_from.begin(), spec.reads_from.end());
   for (std::size_t d = 0; d < specs.size(); ++d) {
-    const StageType* type = specs[d].node.type;
+    const StageTypePtr& type = specs[d].node.type;
     if (type == nullptr || type->outputs.empty() || used.count(d) != 0) continue;
     problems.push_back(
         {specs[d].mark, specs[d].path, "nothing reads from this stage; connect it or remove it"});

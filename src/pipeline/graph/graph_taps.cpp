@@ -28,7 +28,7 @@ std::optional<OutputRef> find_port(const StageSpecs& specs, const ConfigNode& po
     return refuse(
         fmt::format("there is no stage '{}'{}", name.substr(0, 40), core::hint(name, names_of(specs))));
   }
-  const StageType* type = specs[giver].node.type;
+  const StageTypePtr& type = specs[giver].node.type;
   if (type == nullptr) return std::nullopt;  // reported already
   std::vector<std::string> ports;
   for (const Port& p : type->outputs) ports.push_back(p.name);

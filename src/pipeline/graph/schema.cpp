@@ -81,7 +81,7 @@ Json taps_schema(const StageRegistry& registry) {
   properties["port"] = {{"type", "string"},
                         {"pattern", kPortPattern},
                         {"description", "stage or stage.port whose values are written"}};
-  for (const StageType* tap : registry.taps()) {
+  for (const StageTypePtr& tap : registry.taps()) {
     const std::unique_ptr<Stage> stage = tap->make();
     const core::OptionTable table = options_of(*tap, stage);
     for (const core::OptionSpec& spec : table.specs()) {
@@ -116,7 +116,7 @@ Json with_or_without_include() {
 
 Json definitions(const StageRegistry& registry) {
   Json all = cloud::filter_definitions(registry.filters());
-  for (const StageType* type : registry.types()) {
+  for (const StageTypePtr& type : registry.types()) {
     all["stage." + type->name] = stage_body(*type, true);
     all["change." + type->name] = stage_body(*type, false);
   }

@@ -38,39 +38,27 @@ bool StageType::is_source() const {
 
 void StageRegistry::add(StageType type) {
   if (find(type.name) != nullptr) throw std::logic_error("stage type registered twice: " + type.name);
-  types_.push_back(std::make_unique<const StageType>(std::move(type)));
+  types_.push_back(std::make_shared<const StageType>(std::move(type)));
 }
 
-const StageType* StageRegistry::find(const std::string& name) const {
+StageTypePtr StageRegistry::find(const std::string& name) const {
   for (const auto& type : types_) {
-    if (type->name == name) return type.get();
+    if (type->name == name) return type;
   }
   return nullptr;
-}
-
-std::vector<const StageType*> StageRegistry::types() const {
-  std::vector<const StageType*> types;
-  for (const auto& type : types_) types.push_back(type.get());
-  return types;
 }
 
 void StageRegistry::add_tap(StageType type) {
   if (type.inputs.size() != 1 || !type.outputs.empty()) throw std::logic_error("not a tap: " + type.name);
   if (find_tap(type.inputs[0].type) != nullptr) throw std::logic_error("tapped twice: " + type.name);
-  taps_.push_back(std::make_unique<const StageType>(std::move(type)));
+  taps_.push_back(std::make_shared<const StageType>(std::move(type)));
 }
 
-const StageType* StageRegistry::find_tap(const PortType& type) const {
+StageTypePtr StageRegistry::find_tap(const PortType& type) const {
   for (const auto& tap : taps_) {
-    if (tap->inputs[0].type == type) return tap.get();
+    if (tap->inputs[0].type == type) return tap;
   }
   return nullptr;
-}
-
-std::vector<const StageType*> StageRegistry::taps() const {
-  std::vector<const StageType*> taps;
-  for (const auto& tap : taps_) taps.push_back(tap.get());
-  return taps;
 }
 
 std::vector<std::string> StageRegistry::names() const {

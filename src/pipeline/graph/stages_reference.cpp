@@ -77,9 +77,9 @@ std::string stage_reference(const StageType& type, bool all) {
 
 std::string stages_reference(const StageRegistry& registry, bool all) {
   std::string text = kIntroduction;
-  for (const StageType* type : registry.types()) text += "\n" + stage_reference(*type, all);
+  for (const StageTypePtr& type : registry.types()) text += "\n" + stage_reference(*type, all);
   text += kTaps;
-  for (const StageType* tap : registry.taps()) text += tap_row(*tap);
+  for (const StageTypePtr& tap : registry.taps()) text += tap_row(*tap);
   text += "\nTaps of frames and features take `every: N` as well: each N-th frame only.\n";
   return text;
 }

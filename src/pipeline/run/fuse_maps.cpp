@@ -3,14 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-#include <utility>
-
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
-#include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
-#include "plumbline/pipeline/graph.hpp"
+#include "run/result.hpp"
 #include "stages/waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
@@ -34,20 +30,15 @@ std::string names_of(const maps::StoredMaps& maps) {
   return names;
 }
 
-/// `registry` must outlive the graph, whose nodes point to their types there.
-core::Result<Graph> load_fusion(const FuseRequest& request, StageRegistry& registry, core::Log& log) {
-  const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
-  if (!file) return tl::unexpected<core::Error>(file.error());
-  register_stages(registry);
-  registry.filters() = request.filters;
-  auto graph = load_graph(*file, registry, request.pipelines_folder, request.overrides);
+core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
+  auto graph = load_pipeline(request);
   if (!graph) return graph;
   for (const std::string& warning : graph->warnings) log.warning(warning);
   if (graph->source().type->name == "maps") return graph;
   return core::usage_error(
       fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "
                   "begins with a maps stage",
-                  file->string(), graph->source().type->name));
+                  graph->file.string(), graph->source().type->name));
 }
 
 core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& request,
@@ -60,58 +51,44 @@ core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& req
   return maps;
 }
 
+RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph,
+                      const std::filesystem::path& folder) {
+  RunContext context;
+  context.source = &maps;
+  context.stored_maps = &maps;
+  context.robots = &maps.robots();
+  context.keeps_clouds = keeps_clouds(graph);
+  context.anchor = request.anchor;
+  context.output_folder = folder;
+  context.configuration = config_text(request, maps, graph);
+  context.input = names_of(maps);
+  return context;
+}
+
 }  // namespace
 
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
-                                          const Progress& progress,
-                                          DeferredDestruction* deferred_destruction) {
+                                          const Progress& progress) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
-  const auto start = std::chrono::steady_clock::now();
-  std::unique_ptr<maps::StoredMaps> maps;  // goes last: stages may still be at work on it
-  StageRegistry registry;
-  auto graph = load_fusion(request, registry, log);
+  const auto began = RunClock::now();
+  auto graph = load_fusion(request, log);
   if (!graph) return fail(graph.error());
-  auto opened = open_maps(request, executor);
-  if (!opened) return fail(opened.error());
-  maps = std::move(*opened);
+  const auto maps = open_maps(request, executor);
+  if (!maps) return fail(maps.error());
   auto output = maps::OutputFolder::prepare(request.output, request.replace);
   if (!output) return fail(output.error());
-
-  RunContext context;
-  context.source = maps.get();
-  context.stored_maps = maps.get();
-  context.robots = &maps->robots();
-  context.keeps_clouds = keeps_clouds(*graph);
-  context.anchor = request.anchor;
+  RunContext context = context_of(request, **maps, *graph, output->path());
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
-  context.output_folder = output->path();
-  context.configuration = config_text(request, *maps, *graph);
-  context.input = names_of(*maps);
-  if (auto written = core::write_file(output->path() / "config.yaml", context.configuration); !written) {
-    return fail(written.error());
-  }
+  if (auto ok = core::write_file(output->path() / "config.yaml", context.configuration); !ok)
+    return fail(ok.error());
   const auto report = run_graph(*graph, context, progress);
   if (!report) return fail(report.error());
-
-  RunSummary summary;
+  RunSummary summary = summary_of_run(*graph, *report, request, executor);
   summary.input = context.input;
-  summary.pipeline = request.pipeline;
-  summary.threads = executor.threads();
-  add_report(*report, summary);
-  for (const Node& node : graph->nodes) node.stage->summarise(summary);
-  judge(summary);
-  summary.peak_rss_mb = peak_rss_mb();
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (auto written = write_summary(output->path() / "summary.json", summary); !written)
-    return fail(written.error());
-  if (auto committed = output->commit(); !committed) return fail(committed.error());
-  if (deferred_destruction != nullptr) {
-    deferred_destruction->push_back(std::make_shared<Graph>(std::move(*graph)));
-    deferred_destruction->push_back(std::shared_ptr<maps::StoredMaps>(std::move(maps)));
-  }
+  if (auto ok = commit_result(summary, *output, began); !ok) return fail(ok.error());
   return summary;
 }
 

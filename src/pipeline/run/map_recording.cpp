@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 #include <system_error>
 #include <tuple>
@@ -18,6 +17,7 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "run/result.hpp"
 #include "stages/camera_decision.hpp"
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
@@ -93,6 +93,7 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
   std::vector<std::unique_ptr<dataset::FrameSource>> all;
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     dataset::OpenOptions open = request.open;
+    open.cameras_folder = request.pipelines_folder / "cameras";
     if (!cameras.empty()) open.known = cameras[i];
     auto recording = open_input(inputs[i], open, scenes, executor, log);
     if (!recording) return tl::unexpected<core::Error>(recording.error());
@@ -112,27 +113,25 @@ bool keeps_map(const Graph& graph) {
 }
 
 /// Whether the pipeline can do what is asked of it.
-core::Result<void> fits(const Graph& graph, const MapRequest& request,
-                        const std::filesystem::path& pipeline) {
+core::Result<void> fits(const Graph& graph, const MapRequest& request) {
   if (!request.debug_video.empty() && !tracks(graph)) {
     return core::usage_error(fmt::format(
-        "{}: has no track stage whose work could be drawn; leave out --debug-video", pipeline.string()));
+        "{}: has no track stage whose work could be drawn; leave out --debug-video", graph.file.string()));
   }
   if (graph.source().type->name == "maps") {
     return core::usage_error(
-        fmt::format("{}: begins with finished maps; it is run by plumbline fuse", pipeline.string()));
+        fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));
   }
   return {};
 }
 
-core::Result<void> can_resume(const Graph& graph, const MapRequest& request,
-                              const std::filesystem::path& pipeline) {
+core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
   if (!request.resume) return {};
   if (!keeps_map(graph) || !tracks(graph)) {
     return core::usage_error(
         fmt::format("{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave "
                     "out --resume",
-                    pipeline.string()));
+                    graph.file.string()));
   }
   if (!request.debug_video.empty()) {
     return core::usage_error(
@@ -163,29 +162,24 @@ core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
 /// another one.
 class MapRun {
  public:
-  using Clock = std::chrono::steady_clock;
   MapRun(const MapRequest& request, const core::Executor& executor, core::Log& log, CameraDecision& cameras)
       : request_(request), executor_(executor), log_(log), cameras_(cameras) {}
 
   /// Everything is checked, nothing begun.
   core::Result<void> open() {
-    const auto file = find_pipeline(request_.pipeline, request_.pipelines_folder);
-    if (!file) return tl::unexpected<core::Error>(file.error());
-    register_stages(registry_);
-    registry_.filters() = request_.filters;
-    auto graph = load_graph(*file, registry_, request_.pipelines_folder, request_.overrides);
+    auto graph = load_pipeline(request_);
     if (!graph) return tl::unexpected<core::Error>(graph.error());
-    graph_ = std::make_shared<Graph>(std::move(*graph));
+    graph_ = std::move(*graph);
     if (!cameras_.made) {
-      for (const std::string& warning : graph_->warnings) log_.warning(warning);
+      for (const std::string& warning : graph_.warnings) log_.warning(warning);
     }
-    if (auto can = fits(*graph_, request_, *file); !can) return can;
+    if (auto can = fits(graph_, request_); !can) return can;
     if (auto opened = open_source(); !opened) return opened;
-    return can_resume(*graph_, request_, *file);
+    return can_resume(graph_, request_);
   }
 
   core::Result<RunSummary> run(const core::StopToken& stop, const Progress& progress,
-                               Clock::time_point began) {
+                               RunClock::time_point began) {
     const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
     if (auto prepared = prepare(); !prepared) return fail(prepared.error());
     RunContext context = context_of(stop);
@@ -193,20 +187,20 @@ class MapRun {
       if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok) return fail(ok.error());
     }
     if (request_.prepared) request_.prepared(output_->path());
-    const auto report = run_graph(*graph_, context, progress);
+    const auto report = run_graph(graph_, context, progress);
     if (cameras_.again) return fail(report.error());
     if (!report) return fail(with_what_is_kept(report.error(), *output_));
     if (auto ok = cameras_.settle(context); !ok) return fail(ok.error());
     RunSummary summary = summary_of(*report);
-    if (auto written = write(summary, *report, began); !written)
-      return fail(with_what_is_kept(written.error(), *output_));
+    if (auto ok = write_timing(output_->path() / "timing.csv", *report, summary.parts, *source_); !ok)
+      return fail(with_what_is_kept(ok.error(), *output_));
+    if (auto ok = commit_result(summary, *output_, began); !ok)
+      return fail(with_what_is_kept(ok.error(), *output_));
     if (debug_) {
       if (auto committed = debug_->commit(); !committed) return fail(committed.error());
     }
     return summary;
   }
-
-  [[nodiscard]] std::shared_ptr<void> remains() const { return graph_; }
 
  private:
   core::Result<void> open_source() {
@@ -229,12 +223,12 @@ class MapRun {
     output_.emplace(std::move(*output));
     if (request_.resume) {
       auto opened =
-          open_resumed(output_->path(), config_text(request_, *graph_, 0), input_text(*source_), *source_);
+          open_resumed(output_->path(), config_text(request_, graph_, 0), input_text(*source_), *source_);
       if (!opened) return tl::unexpected<core::Error>(opened.error());
       resumed_ = std::move(*opened);
       report_resumed(output_->path(), resumed_, log_);
     }
-    const std::string config = config_text(request_, *graph_, executor_.threads());
+    const std::string config = config_text(request_, graph_, executor_.threads());
     if (auto written = core::write_file(output_->path() / "config.yaml", config); !written) return written;
     if (request_.debug_video.empty()) return {};
     auto debug =
@@ -254,23 +248,21 @@ class MapRun {
     context.stop = stop;
     context.output_folder = output_->path();
     if (debug_) context.debug_folder = debug_->path();
-    context.configuration = config_text(request_, *graph_, 0);
+    context.configuration = config_text(request_, graph_, 0);
     context.input = input_text(*source_);
     context.pace_hz = request_.pace_hz;
-    context.keeps_map = keeps_map(*graph_);
-    context.keeps_clouds = keeps_clouds(*graph_);
+    context.keeps_map = keeps_map(graph_);
+    context.keeps_clouds = keeps_clouds(graph_);
     context.alter_map = request_.alter_map;
     if (resumed_) context.resumed = &*resumed_;
-    if (tracks(*graph_) && source_->format() != "synth") context.cameras = &cameras_;  // no lens, no error
+    if (tracks(graph_) && source_->format() != "synth") context.cameras = &cameras_;  // no lens, no error
     return context;
   }
 
   [[nodiscard]] RunSummary summary_of(const RunReport& report) const {
-    RunSummary summary;
+    RunSummary summary = summary_of_run(graph_, report, request_, executor_);
     summary.input = request_.input;
     for (const std::string& other : request_.others) summary.input += " " + other;
-    summary.pipeline = request_.pipeline;
-    summary.threads = executor_.threads();
     summary.pace_hz = request_.pace_hz;
     summary.cameras = cameras_.said;
     for (const RobotInfo& robot : source_->robots()) {
@@ -278,27 +270,14 @@ class MapRun {
         summary.cameras.push_back(
             {robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess"});
     }
-    add_report(report, summary);
-    for (const Node& node : graph_->nodes) node.stage->summarise(summary);
-    judge(summary);
     return summary;
-  }
-
-  core::Result<void> write(RunSummary& summary, const RunReport& report, Clock::time_point began) {
-    const std::filesystem::path& folder = output_->path();
-    if (auto ok = write_timing(folder / "timing.csv", report, summary.parts, *source_); !ok) return ok;
-    summary.peak_rss_mb = peak_rss_mb();
-    summary.wall_s = std::chrono::duration<double>(Clock::now() - began).count();
-    if (auto ok = write_summary(folder / "summary.json", summary); !ok) return ok;
-    return output_->commit();
   }
 
   const MapRequest& request_;
   const core::Executor& executor_;
   core::Log& log_;
   CameraDecision& cameras_;
-  StageRegistry registry_;  ///< what the graph's nodes are of
-  std::shared_ptr<Graph> graph_;
+  Graph graph_;
   std::unique_ptr<RobotRecordings> source_;
   std::optional<maps::OutputFolder> output_;
   std::optional<ResumedRun> resumed_;
@@ -313,19 +292,16 @@ bool is_finished(const std::filesystem::path& out) {
 }
 
 core::Result<RunSummary> map_recording(const MapRequest& given, const core::Executor& executor,
-                                       core::Log& log, const core::StopToken& stop, const Progress& progress,
-                                       DeferredDestruction* deferred_destruction) {
-  const auto began = MapRun::Clock::now();
+                                       core::Log& log, const core::StopToken& stop,
+                                       const Progress& progress) {
+  const auto began = RunClock::now();
   MapRequest request = in_order(given);
   CameraDecision cameras;
   while (true) {
     MapRun run(request, executor, log, cameras);
     if (auto opened = run.open(); !opened) return tl::unexpected<core::Error>(opened.error());
     auto summary = run.run(stop, progress, began);
-    if (!std::exchange(cameras.again, false)) {
-      if (summary && deferred_destruction != nullptr) deferred_destruction->push_back(run.remains());
-      return summary;
-    }
+    if (!std::exchange(cameras.again, false)) return summary;
     request.resume = false;  // what is there was made with another camera
   }
 }

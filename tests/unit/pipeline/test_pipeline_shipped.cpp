@@ -110,7 +110,7 @@ TEST(Shipped, EveryStageIsUsedByAPipelineOrAnExampleOfThePage) {
 TEST(Shipped, EveryPortCanBeTapped) {
   StageRegistry registry;
   register_stages(registry);
-  for (const StageType* type : registry.types()) {
+  for (const StageTypePtr& type : registry.types()) {
     for (const Port& port : type->outputs) {
       EXPECT_NE(registry.find_tap(port.type), nullptr)
           << type->name << "." << port.name << ": add a tap of " << port.type.name;
@@ -132,7 +132,7 @@ TEST(Shipped, WhatIsWrittenOutReadsBackTheSame) {
 }
 
 bool has_option(const StageRegistry& registry, const std::string& stage, const std::string& key) {
-  const StageType* type = registry.find(stage);
+  const StageTypePtr type = registry.find(stage);
   if (type == nullptr) return false;
   const auto made = type->make();
   core::OptionTable table;
@@ -182,7 +182,7 @@ TEST(Shipped, LevelsNameOptionsThatAreThere) {
   for (const auto& [stage, key] : levelled_options()) {
     EXPECT_TRUE(has_option(registry, stage, key)) << stage << "." << key;
   }
-  for (const StageType* type : registry.types()) {
+  for (const StageTypePtr& type : registry.types()) {
     const auto made = type->make();
     core::OptionTable table;
     made->declare(table);

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "run/result.hpp"
+
+namespace plumbline::pipeline {
+
+core::Result<Graph> load_pipeline(const RunRequest& request) {
+  const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
+  if (!file) return tl::unexpected<core::Error>(file.error());
+  StageRegistry registry;
+  register_stages(registry);
+  registry.filters() = request.filters;
+  return load_graph(*file, registry, request.pipelines_folder, request.overrides);
+}
+
+RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,
+                          const core::Executor& executor) {
+  RunSummary summary;
+  summary.pipeline = request.pipeline;
+  summary.threads = executor.threads();
+  add_report(report, summary);
+  for (const Node& node : graph.nodes) node.stage->summarise(summary);
+  return summary;
+}
+
+core::Result<void> commit_result(RunSummary& summary, maps::OutputFolder& output,
+                                 RunClock::time_point began) {
+  judge(summary);
+  summary.peak_rss_mb = peak_rss_mb();
+  summary.wall_s = std::chrono::duration<double>(RunClock::now() - began).count();
+  if (auto ok = write_summary(output.path() / "summary.json", summary); !ok) return ok;
+  return output.commit();
+}
+
+}  // namespace plumbline::pipeline

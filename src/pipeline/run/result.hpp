@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// How `map` and `fuse` begin and end: a pipeline that is checked whole, a result folder with summary.json.
+#include <chrono>
+
+#include "plumbline/maps/output_folder.hpp"
+#include "plumbline/pipeline/summary.hpp"
+
+namespace plumbline::pipeline {
+
+using RunClock = std::chrono::steady_clock;
+
+/// The pipeline that is asked for. Errors: kUsage.
+core::Result<Graph> load_pipeline(const RunRequest& request);
+
+/// What the stages know about the run.
+RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,
+                          const core::Executor& executor);
+
+/// Judges the result, writes summary.json and makes the folder the result. Errors: kOutput.
+core::Result<void> commit_result(RunSummary& summary, maps::OutputFolder& output, RunClock::time_point began);
+
+}  // namespace plumbline::pipeline
