@@ -16,8 +16,8 @@
 #include "plumbline/mapping/camera_calibration.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/mapping/refinement.hpp"
 #include "plumbline/maps/frame_pose.hpp"
-#include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/pipeline/run.hpp"
 
 namespace plumbline::pipeline {
@@ -71,19 +71,9 @@ struct RunSummary {
     std::size_t rejected = 0;  ///< of the verified, taken for wrong by the pose graph
     std::vector<mapping::LoopTrial> trials;
   } loops;
-  struct Refine {
-    std::size_t local_maps = 0;
-    std::size_t tried = 0;      ///< alignments of two local maps
-    std::size_t accepted = 0;   ///< of these, used
-    std::size_t rejected = 0;   ///< of the accepted, taken for wrong by the pose graph
-    double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
-    double mean_shift_m = 0.0;  ///< how far keyframes moved
-    double max_shift_m = 0.0;
-    Sigma sigma_position_m;  ///< of keyframes beside the first one
-    Sigma sigma_rotation_rad;
-    optimize::BundleFits before;  ///< how well all fits where the pose graph had put it; zeros: not known
-    optimize::BundleFits after;   ///< when all was adjusted
-  } refine;
+  mapping::RefinementSummary refine;
+  Sigma sigma_position_m;  ///< of keyframes beside the first one
+  Sigma sigma_rotation_rad;
   /// What a robot's own map told about its camera.
   struct Camera {
     std::string robot;

@@ -262,7 +262,8 @@ nlohmann::ordered_json loops_of(const RunSummary& summary) {
           {"list", trials_of(summary)}};
 }
 
-nlohmann::ordered_json refine_of(const RunSummary::Refine& refine) {
+nlohmann::ordered_json refine_of(const RunSummary& s) {
+  const mapping::RefinementSummary& refine = s.refine;
   return {{"local_maps", refine.local_maps},
           {"tried", refine.tried},
           {"accepted", refine.accepted},
@@ -270,8 +271,8 @@ nlohmann::ordered_json refine_of(const RunSummary::Refine& refine) {
           {"mean_rms", rounded(refine.mean_rms)},
           {"mean_shift_m", rounded(refine.mean_shift_m)},
           {"max_shift_m", rounded(refine.max_shift_m)},
-          {"sigma_position_m", sigma_json(refine.sigma_position_m)},
-          {"sigma_rotation_rad", sigma_json(refine.sigma_rotation_rad)},
+          {"sigma_position_m", sigma_json(s.sigma_position_m)},
+          {"sigma_rotation_rad", sigma_json(s.sigma_rotation_rad)},
           {"before", fits_of(refine.before)},
           {"after", fits_of(refine.after)}};
 }
@@ -376,7 +377,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"keyframe_causes", {{"cone", s.causes.cone}, {"urgent", s.causes.urgent}, {"plain", s.causes.plain}}},
       {"landmarks", {{"points", s.points}, {"lines", s.lines}}},
       {"loops", loops_of(s)},
-      {"refine", refine_of(s.refine)},
+      {"refine", refine_of(s)},
       {"path", path_of(s)},
       {"merges", merges_of(s)},
       {"meetings", meetings_of(s)},
