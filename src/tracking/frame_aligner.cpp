@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "observable_directions.hpp"
+#include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/align_points.hpp"
 
@@ -12,14 +13,13 @@ namespace {
 
 using geometry::Rigid3;
 
-constexpr AlignmentRound kCoarseToFine[] = {
+constexpr AlignmentRound kCoarse[] = {
     // search, plane, samples, level, rematch, reject outliers
     {0.0, 0.15, 500, 1, true, false},
-    {0.0, 0.08, 700, 1, false, false},
-    {kFineRadius_px, 0.05, 1200, 0, true, true},
-    {kFineRadius_px, 0.03, 2400, 0, false, true},
-    {kFineRadius_px, 0.03, 2400, 0, false, false}};
-constexpr std::size_t kFine = 2;  // the first of the fine rounds
+    {0.0, 0.08, 700, 1, false, false}};
+constexpr AlignmentRound kFine[] = {{kFineRadius_px, 0.05, 1200, 0, true, true},
+                                    {kFineRadius_px, 0.03, 2400, 0, false, true},
+                                    {kFineRadius_px, 0.03, 2400, 0, false, false}};
 
 constexpr int kIterations = 4;      // of a round; the next one associates anew
 constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
@@ -95,11 +95,14 @@ FrameAligner::FrameAligner(const AlignmentInput& input, const Rigid3& hypothesis
 }
 
 TrackResult FrameAligner::run() {
-  for (std::size_t i = search_radius_px_ > 0.0 ? 0 : kFine; i < std::size(kCoarseToFine); ++i)
-    align(kCoarseToFine[i]);
+  if (search_radius_px_ > 0.0) {
+    for (const AlignmentRound& round : kCoarse) align(round);
+    correct_rolling_shutter();
+  }
+  for (const AlignmentRound& round : kFine) align(round);
   if (contradicts_motion_prior()) {
     use_motion_prior_ = false;
-    for (std::size_t i = kFine; i < std::size(kCoarseToFine); ++i) align(kCoarseToFine[i]);
+    for (const AlignmentRound& round : kFine) align(round);
   }
   judge();
   return std::move(result_);
@@ -114,6 +117,24 @@ void FrameAligner::align(const AlignmentRound& round) {
   if (round.reject_outliers) reject_outliers();  // chi-square gates
 }
 
+/// The motion model, by which the features were freed of the rolling shutter, lags behind a turn that
+/// changes. Now that the pose is roughly known, so is the turn.
+void FrameAligner::correct_rolling_shutter() {
+  constexpr double kVisible_px = 1.0;  // at the first and the last row
+  const double readout_s = in_.options.readout_s;
+  const double dt = in_.frame.stamp - in_.motion.last_stamp();
+  if (readout_s == 0.0 || !in_.motion.continuous() || dt < 1e-4 || dt > 0.5) return;
+  const Rigid3 step = result_.camera_from_world * in_.motion.camera_from_world().inverse();
+  const Eigen::Vector3d mean = geometry::log_so3(step.rotation) / dt;
+  // Both are means of their steps: half a step on.
+  const Eigen::Vector3d before = in_.motion.angular_velocity();
+  const Eigen::Vector3d change = before.isZero(0.0) ? mean : Eigen::Vector3d(1.5 * (mean - before));
+  if (change.norm() * 0.5 * readout_s * in_.camera.fx < kVisible_px) return;
+  auto corrected = std::make_shared<features::FrameFeatures>(in_.features);
+  features::undo_rolling_shutter(*corrected, in_.camera, change, readout_s);
+  result_.features = std::move(corrected);
+}
+
 void FrameAligner::match_landmarks(const AlignmentRound& round) {
   const double radius = round.search_radius_px > 0.0 ? round.search_radius_px : search_radius_px_;
   const AssociationOptions& how = in_.options.association;
@@ -121,16 +142,16 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   result_.visible_points.clear();
   result_.visible_lines.clear();
   if (in_.options.points) {
-    result_.points = match_points(in_.map, in_.local_map.points, in_.features, in_.camera, pose, radius, how,
+    result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
                                   &result_.visible_points);
     if (how.align && round.reject_outliers)
-      align_points(in_.map, in_.features, in_.camera, pose, how.scale_factor, result_.points);
-    problem_.points = point_terms(in_.map, result_.points, in_.features, how);
+      align_points(in_.map, features(), in_.camera, pose, how.scale_factor, result_.points);
+    problem_.points = point_terms(in_.map, result_.points, features(), how);
   }
   if (in_.options.lines) {
-    result_.lines = match_lines(in_.map, in_.local_map.lines, in_.features, in_.camera, pose, radius, how,
+    result_.lines = match_lines(in_.map, in_.local_map.lines, features(), in_.camera, pose, radius, how,
                                 &result_.visible_lines);
-    problem_.lines = line_terms(in_.map, result_.lines, in_.features);
+    problem_.lines = line_terms(in_.map, result_.lines, features());
   }
 }
 
@@ -145,13 +166,13 @@ void FrameAligner::associate_surface(const AlignmentRound& round) {
 }
 
 void FrameAligner::associate_intensity(const AlignmentRound& round) {
-  if (!in_.options.photometric || in_.features.photometric == nullptr) return;
+  if (!in_.options.photometric || features().photometric == nullptr) return;
   const bool again = intensity_level_ == round.pyramid_level && problem_.photometric &&
                      update_photometric(*problem_.photometric, result_.camera_from_world);
   if (!again) {
     problem_.photometric = in_.photometric.associate(
         in_.map, in_.local_map.keyframes, round.pyramid_level,
-        {in_.features.photometric.get(), &in_.frame.depth, in_.depth_from_camera, in_.camera},
+        {features().photometric.get(), &in_.frame.depth, in_.depth_from_camera, in_.camera},
         result_.camera_from_world);
   }
   intensity_level_ = round.pyramid_level;

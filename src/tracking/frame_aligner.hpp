@@ -42,6 +42,7 @@ class FrameAligner {
 
  private:
   void align(const AlignmentRound& round);
+  void correct_rolling_shutter();
   void match_landmarks(const AlignmentRound& round);
   void associate_surface(const AlignmentRound& round);
   void associate_intensity(const AlignmentRound& round);
@@ -51,8 +52,11 @@ class FrameAligner {
   [[nodiscard]] bool contradicts_motion_prior();
   [[nodiscard]] geometry::Matrix6d trusted_information(bool by_features, bool by_surface);
   void judge();
+  [[nodiscard]] const features::FrameFeatures& features() const {
+    return result_.features != nullptr ? *result_.features : in_.features;
+  }
   [[nodiscard]] bool uses_features() const {
-    return in_.features.extracted() && (in_.options.points || in_.options.lines);
+    return features().extracted() && (in_.options.points || in_.options.lines);
   }
   [[nodiscard]] int feature_inliers() const;
 
@@ -60,7 +64,7 @@ class FrameAligner {
   double search_radius_px_;
   geometry::Rigid3 predicted_;
   optimize::PoseProblem problem_;
-  TrackResult result_;                          ///< its camera_from_world is the estimate so far
+  TrackResult result_;  ///< its camera_from_world is the estimate so far; features: where they were corrected
   std::optional<std::size_t> intensity_level_;  ///< what problem_.photometric was made for
   bool use_motion_prior_;
   bool surface_only_ = false;  ///< nothing else has a say

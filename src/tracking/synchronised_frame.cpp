@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the tracker does about images whose parts were not taken at the same moment.
-#include "frame_aligner.hpp"
 #include "plumbline/features/depth_delay.hpp"
 #include "plumbline/features/rolling_shutter.hpp"
+#include "plumbline/tracking/tracker.hpp"
 
 namespace plumbline::tracking {
 
@@ -31,27 +31,6 @@ Tracker::Features Tracker::synchronised(const sensor::RgbdFrame& frame, const Fe
   if (delayed) features::undo_point_depth_delay(*result, frame.depth, camera_, to_depth);
   if (distorted) features::undo_rolling_shutter(*result, camera_, angular_velocity, options_.readout_s);
   return result;
-}
-
-/// The motion model lags behind a turn that changes. Now that the pose is known, so is the turn: where the
-/// difference can be seen, the pose is estimated once more.
-void Tracker::refine_rolling_shutter(const maps::Map& map, const sensor::RgbdFrame& frame,
-                                     const Features& features, TrackResult& result) const {
-  constexpr double kVisible_px = 1.0;  // at the first and the last row
-  const double dt = frame.stamp - motion_.last_stamp();
-  if (options_.readout_s == 0.0 || !motion_.continuous() || dt < 1e-4 || dt > 0.5) return;
-  const Eigen::Vector3d mean =
-      geometry::log_so3((result.camera_from_world * motion_.camera_from_world().inverse()).rotation) / dt;
-  // Both are means of their steps: half a step on.
-  const Eigen::Vector3d before = motion_.angular_velocity();
-  const Eigen::Vector3d now = before.isZero(0.0) ? mean : Eigen::Vector3d(mean + 0.5 * (mean - before));
-  if ((now - before).norm() * 0.5 * options_.readout_s * camera_.fx < kVisible_px) return;
-  const Features synced = synchronised(frame, features, now);
-  TrackResult again = align(map, frame, *synced, result.camera_from_world, kFineRadius_px);
-  if (again.state != TrackState::kTracked) return;
-  again.relocalised = result.relocalised;
-  again.features = synced;
-  result = std::move(again);
 }
 
 }  // namespace plumbline::tracking

@@ -64,8 +64,7 @@ TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame,
   if (!result)
     result = outdated ? track_with_motion_model(map, frame, *synced) : relocalise(map, frame, *synced);
   if (!result) return lost(frame);
-  result->features = synced;
-  refine_rolling_shutter(map, frame, features, *result);
+  if (result->features == nullptr) result->features = synced;
   record(frame, *result);
   return *std::move(result);
 }

@@ -169,8 +169,6 @@ class Tracker {
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] Features synchronised(const sensor::RgbdFrame& frame, const Features& features,
                                       const Eigen::Vector3d& angular_velocity) const;
-  void refine_rolling_shutter(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features,
-                              TrackResult& result) const;
 
   TrackerOptions options_;
   sensor::Pinhole camera_;
