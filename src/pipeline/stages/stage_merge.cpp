@@ -26,21 +26,76 @@ namespace {
 
 constexpr const char* kMeetings = "meetings";
 
-/// When the fifth keyframe of those that agree was there on both sides, or the last of fewer.
-double evident_s(const mapping::MergeEvidence& merge, const std::map<core::KeyframeId, double>& times) {
-  constexpr std::size_t kEnough = 5;
-  std::map<std::int32_t, std::set<double>> sides;
-  for (const mapping::VerifiedPair& pair : merge.pairs) {
-    for (const core::KeyframeId id : {pair.query, pair.match}) {
-      if (const auto made = times.find(id); made != times.end()) sides[id.robot].insert(made->second);
+/// What robots that are mapped side by side find of each other meanwhile.
+class LiveMeetings {
+ public:
+  LiveMeetings(const mapping::MapFusionOptions& options, int lag, const RunContext& context)
+      : recordings_(*context.recordings),
+        server_(options, lag, *context.executor),
+        log_(context.output_folder, *context.log) {
+    for (const RobotInfo& robot : recordings_.robots()) {
+      server_.join({{robot.number, robot.camera.color}});
+      names_.push_back(robot.name);
     }
   }
-  double latest = -1.0;
-  for (const auto& [robot, made] : sides)
-    latest = std::max(
-        latest, *std::next(made.begin(), static_cast<std::ptrdiff_t>(std::min(kEnough, made.size()) - 1)));
-  return latest;
-}
+
+  /// `track`: null for a frame without a pose.
+  core::Result<void> add(const TrackedFrame* track, std::size_t frame) {
+    const auto number = static_cast<std::int64_t>(frame);
+    if (track != nullptr && track->map != nullptr) {
+      made_s_[track->keyframe] = recordings_.time_of(frame);
+      server_.add(track->map, track->keyframe, number);
+    }
+    return note(server_.commit(number), frame);
+  }
+  core::Result<void> finish(bool pictures) {
+    if (auto noted = note(server_.finish(), recordings_.size() - 1); !noted) return noted;
+    return pictures ? log_.draw() : core::Result<void>();
+  }
+
+  [[nodiscard]] const std::vector<RunSummary::Meeting>& meetings() const { return log_.meetings(); }
+  /// When robots that were merged in the end met, and when they could have.
+  void date(RunSummary::Merge& merge) const {
+    const auto when = met_s_.find({merge.evidence.a, merge.evidence.b});
+    if (when != met_s_.end()) merge.time_s = when->second;
+    merge.evident_s = evident_s(merge.evidence);
+  }
+
+ private:
+  /// Events that are reported with a frame of the run.
+  core::Result<void> note(const std::vector<mapping::MeetingEvent>& events, std::size_t frame) {
+    for (const mapping::MeetingEvent& event : events) {
+      const double time_s = recordings_.time_of(frame);
+      if (event.step == mapping::MeetingStep::kMet) met_s_[{event.a, event.b}] = time_s;
+      if (event.step == mapping::MeetingStep::kTakenBack) met_s_.erase({event.a, event.b});
+      auto noted = log_.note(event, names_, fmt::format("after {:.1f} s", time_s), time_s);
+      if (!noted) return noted;
+    }
+    return {};
+  }
+  /// When the fifth keyframe of those that agree was there on both sides, or the last of fewer.
+  [[nodiscard]] double evident_s(const mapping::MergeEvidence& merge) const {
+    constexpr std::size_t kEnough = 5;
+    std::map<std::int32_t, std::set<double>> sides;
+    for (const mapping::VerifiedPair& pair : merge.pairs) {
+      for (const core::KeyframeId id : {pair.query, pair.match}) {
+        if (const auto made = made_s_.find(id); made != made_s_.end()) sides[id.robot].insert(made->second);
+      }
+    }
+    double latest = -1.0;
+    for (const auto& [robot, made] : sides)
+      latest = std::max(
+          latest, *std::next(made.begin(), static_cast<std::ptrdiff_t>(std::min(kEnough, made.size()) - 1)));
+    return latest;
+  }
+
+  const RobotRecordings& recordings_;
+  mapping::MergeServer server_;
+  MeetingLog log_;
+  std::vector<std::string> names_;                               ///< by robot
+  std::map<core::KeyframeId, double> made_s_;                    ///< keyframes
+  std::map<std::pair<std::size_t, std::size_t>, double> met_s_;  ///< robots
+};
 
 class MergeStage : public Stage {
  public:
@@ -57,92 +112,56 @@ class MergeStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    if (context.recordings == nullptr || context.recordings->robots().size() < 2 || !online_) return {};
-    server_.emplace(options_, lag_, *context.executor);
-    for (const RobotInfo& robot : context.recordings->robots()) {
-      server_->join({{robot.number, robot.camera.color}});
-      names_.push_back(robot.name);
-    }
-    meetings_.emplace(context.output_folder, *context.log);
+    if (context.recordings != nullptr && context.recordings->robots().size() > 1 && online_)
+      live_.emplace(options_, lag_, context);
     return {};
   }
 
   core::Result<void> process(StageIo& io) override {
-    const auto track = io.input<TrackedFrame>("track");
-    if (!server_) return {};
-    const auto frame = static_cast<std::int64_t>(io.frame());
-    if (track != nullptr && track->map != nullptr) {
-      times_[track->keyframe] = context_->recordings->time_of(io.frame());
-      server_->add(track->map, track->keyframe, frame);
-    }
-    return note(server_->commit(frame), io.frame());
+    return live_ ? live_->add(io.input<TrackedFrame>("track").get(), io.frame()) : core::Result<void>();
   }
 
   core::Result<void> finish(StageIo& io) override {
     const auto maps = io.input<RobotMaps>("maps");
-    if (server_) {
-      if (auto noted = note(server_->finish(), context_->recordings->size() - 1); !noted) return noted;
-      server_.reset();
-      if (pictures_) {
-        if (auto drawn = meetings_->draw(); !drawn) return drawn;
-      }
+    if (live_) {
+      if (auto finished = live_->finish(pictures_); !finished) return finished;
     }
-    std::shared_ptr<MapResult> result;
     if (maps->maps.size() == 1 && maps->maps.front().robots.size() == 1 && context_->stored_maps == nullptr) {
-      result = std::make_shared<MapResult>();
-      result->map = maps->maps.front().map;
-      result->frame_poses = maps->maps.front().frame_poses;
-      take_poses_from_map(*result);
+      merged_.map = std::make_shared<MapResult>();
+      merged_.map->map = maps->maps.front().map;
+      merged_.map->frame_poses = maps->maps.front().frame_poses;
+      take_poses_from_map(*merged_.map);
     } else {
-      result = merged(maps->maps);
+      merge(maps->maps);
     }
-    result->frame_columns = maps->frame_columns;
-    result->frames = maps->frames;
-    result_ = result;
-    io.output<MapResult>("map", result_);
+    merged_.map->frame_columns = maps->frame_columns;
+    merged_.map->frames = maps->frames;
+    io.output<MapResult>("map", merged_.map);
     return {};
   }
 
   void summarise(RunSummary& summary) const override {
-    summary.keyframes = result_->map->keyframe_count();
-    summary.points = result_->map->point_count();
-    summary.lines = result_->lines.size();
-    summary.merges = merges_;
-    if (meetings_) summary.meetings = meetings_->meetings();
-    summary.unconnected = unconnected_;
-    summary.path.refused += refused_;
+    const MapResult& result = *merged_.map;
+    summary.keyframes = result.map->keyframe_count();
+    summary.points = result.map->point_count();
+    summary.lines = result.lines.size();
+    summary.merges = merged_.merges;
+    if (live_) summary.meetings = live_->meetings();
+    summary.unconnected = merged_.unconnected;
+    summary.path.refused += merged_.refused;
     if (context_->stored_maps == nullptr) return;
-    for (const maps::FramePose& frame : result_->frame_poses)
+    for (const maps::FramePose& frame : result.frame_poses)
       ++(frame.tracked ? summary.frames.tracked : summary.frames.lost);
-    summary.frames.read = summary.frames.available = result_->frame_poses.size();
+    summary.frames.read = summary.frames.available = result.frame_poses.size();
   }
 
  private:
-  /// Events that are reported with a frame of the run.
-  core::Result<void> note(const std::vector<mapping::MeetingEvent>& events, std::size_t frame) {
-    for (const mapping::MeetingEvent& event : events) {
-      const double time_s = context_->recordings->time_of(frame);
-      if (event.step == mapping::MeetingStep::kMet) met_s_[{event.a, event.b}] = time_s;
-      if (event.step == mapping::MeetingStep::kTakenBack) met_s_.erase({event.a, event.b});
-      auto noted = meetings_->note(event, names_, fmt::format("after {:.1f} s", time_s), time_s);
-      if (!noted) return noted;
-    }
-    return {};
-  }
-
-  std::shared_ptr<MapResult> merged(const std::vector<RobotMap>& maps) {
+  void merge(const std::vector<RobotMap>& maps) {
     std::size_t anchor = maps.size();
     if (!context_->anchor.empty()) anchor = *context_->stored_maps->find_part(context_->anchor);
-    MergedRobots all = merge_robots(maps, anchor, options_, *context_->executor, *context_->log);
-    merges_ = std::move(all.merges);
-    for (RunSummary::Merge& merge : merges_) {
-      const auto when = met_s_.find({merge.evidence.a, merge.evidence.b});
-      if (when != met_s_.end()) merge.time_s = when->second;
-      merge.evident_s = evident_s(merge.evidence, times_);
-    }
-    unconnected_ = std::move(all.unconnected);
-    refused_ = all.refused;
-    return all.map;
+    merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log);
+    if (!live_) return;
+    for (RunSummary::Merge& merge : merged_.merges) live_->date(merge);
   }
 
   const RunContext* context_ = nullptr;
@@ -150,15 +169,8 @@ class MergeStage : public Stage {
   bool online_ = true;
   bool pictures_ = true;
   int lag_ = 10;
-  std::optional<mapping::MergeServer> server_;
-  std::vector<std::string> names_;  ///< by robot
-  std::optional<MeetingLog> meetings_;
-  std::map<core::KeyframeId, double> times_;                     ///< when keyframes were made
-  std::map<std::pair<std::size_t, std::size_t>, double> met_s_;  ///< and robots met
-  std::shared_ptr<const MapResult> result_;
-  std::vector<RunSummary::Merge> merges_;
-  std::string unconnected_;
-  std::size_t refused_ = 0;
+  std::optional<LiveMeetings> live_;
+  MergedRobots merged_;
 };
 
 }  // namespace

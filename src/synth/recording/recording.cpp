@@ -169,6 +169,30 @@ Result<std::vector<std::unique_ptr<SynthSource>>> open_all(const std::shared_ptr
   return sources;
 }
 
+/// The recording of each robot; gives what scene.json says of them.
+Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSource>>& sources,
+                                    const Scene& scene, const fs::path& output,
+                                    const core::Executor& executor, const core::StopToken& stop,
+                                    const Progress& progress, WriteSummary& summary) {
+  summary.robots = static_cast<int>(sources.size());
+  std::size_t all_frames = 0;
+  for (const auto& source : sources) all_frames += source->size();
+  const auto start = std::chrono::steady_clock::now();
+  nlohmann::json robots = nlohmann::json::array();
+  for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
+    const std::string folder = folder_name(static_cast<int>(i));
+    const auto written =
+        write_frames({*sources[i], output / folder, summary.frames, all_frames}, executor, stop, progress);
+    if (!written) return tl::unexpected<core::Error>(written.error());
+    summary.frames += *written;
+    summary.path_m += sources[i]->path_length();
+    robots.push_back(
+        describe_robot(*sources[i], folder, scene.robots[i % scene.robots.size()].name, *written));
+  }
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return robots;
+}
+
 }  // namespace
 
 Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& options, const fs::path& output,
@@ -183,24 +207,8 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (auto ok = core::make_folder(output); !ok) return fail(ok.error());
 
   WriteSummary summary;
-  summary.robots = options.robots;
-  std::size_t all_frames = 0;
-  for (const auto& source : *sources) all_frames += source->size();
-  const auto start = std::chrono::steady_clock::now();
-  nlohmann::json robots = nlohmann::json::array();
-  for (int i = 0; i < options.robots && !stop.stop_requested(); ++i) {
-    const SynthSource& source = *(*sources)[static_cast<std::size_t>(i)];
-    const auto written =
-        write_frames({source, output / folder_name(i), summary.frames, all_frames}, executor, stop, progress);
-    if (!written) return fail(written.error());
-    summary.frames += *written;
-    summary.path_m += source.path_length();
-    robots.push_back(describe_robot(source, folder_name(i),
-                                    scene.robots[static_cast<std::size_t>(i) % scene.robots.size()].name,
-                                    *written));
-  }
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-
+  const auto robots = write_robots(*sources, scene, output, executor, stop, progress, summary);
+  if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
   if (!stop.stop_requested()) {
@@ -213,7 +221,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     summary.reference_visible = counts->visible;
   }
   summary.stopped = stop.stop_requested();
-  const std::string json = describe_world(scene, options, summary, robots).dump(2) + "\n";
+  const std::string json = describe_world(scene, options, summary, *robots).dump(2) + "\n";
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
