@@ -39,7 +39,7 @@ void check(const sensor::Pinhole& c) {
       std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
   demand(finite && c.fx > 0.0 && c.fy > 0.0, "a camera's focal length is none");
   demand(c.width > 0 && c.height > 0 && c.width <= kMostSide && c.height <= kMostSide,
-         "a camera's picture has no size");
+         "a camera's image has no size");
 }
 
 void check_id(const core::KeyframeId& id) {

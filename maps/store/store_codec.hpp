@@ -30,7 +30,7 @@ void fields(Io& io, Pinhole& p) {
   constexpr int kMost = 1 << 16;
   io(p.width, p.height);
   io.check(p.width >= 0 && p.height >= 0 && p.width <= kMost && p.height <= kMost,
-           "a picture's size is wrong");
+           "an image's size is wrong");
   io(p.fx, p.fy, p.cx, p.cy);
 }
 
@@ -138,8 +138,8 @@ void fields(Io& io, MapRow& row) {
 }
 
 void encode(const Keyframe& keyframe, ByteWriter& to);
-/// `picture` is what the look-up grid of the points is made for.
-std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& picture);
+/// `camera` is what the look-up grid of the points is made for.
+std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& camera);
 
 /// Rounded: points to 0.2 mm, normals to 0.2 degrees, sigma to 0.005 mm.
 void encode(const StoredSurface& surface, ByteWriter& to);

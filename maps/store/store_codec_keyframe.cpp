@@ -87,13 +87,13 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
 }
 
 template <typename Io>
-void picture(Io& io, cv::Mat& image) {
+void thumbnail(Io& io, cv::Mat& image) {
   if (!image.empty() && image.type() != CV_32FC1)
     throw std::invalid_argument("store: thumbnail is no CV_32FC1");
   std::int32_t rows = image.rows;
   std::int32_t columns = image.cols;
   io(rows, columns);
-  io.check(rows >= 0 && columns >= 0 && rows <= 1 << 14 && columns <= 1 << 14, "a picture's size is wrong");
+  io.check(rows >= 0 && columns >= 0 && rows <= 1 << 14 && columns <= 1 << 14, "an image's size is wrong");
   const auto width = static_cast<std::size_t>(columns);
   std::vector<float> values;
   if constexpr (!Io::kReads) {
@@ -127,8 +127,8 @@ void feature_columns(Io& io, FrameFeatures& f) {
   point_columns(io, f.points);
   io(f.descriptors);
   line_columns(io, f.lines);
-  picture(io, f.thumbnail);
-  picture(io, f.thumbnail_depth);
+  thumbnail(io, f.thumbnail);
+  thumbnail(io, f.thumbnail_depth);
 }
 
 /// `f`: null, or the features, which may be changed when they are read.
@@ -205,14 +205,14 @@ void encode(const Keyframe& keyframe, ByteWriter& to) {
   keyframe_fields(to, const_cast<Keyframe&>(keyframe), features);
 }
 
-std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& picture) {
+std::shared_ptr<const Keyframe> decode_keyframe(const Bytes& bytes, const sensor::Pinhole& camera) {
   ByteReader from(bytes);
   auto keyframe = std::make_shared<Keyframe>();
   std::shared_ptr<FrameFeatures> features;
   keyframe_fields(from, *keyframe, features);
   from.expect_end();
   if (features != nullptr) {
-    features->grid = features::PointGrid(features->points, picture.width, picture.height);
+    features->grid = features::PointGrid(features->points, camera.width, camera.height);
   }
   keyframe->features = std::move(features);
   return keyframe;

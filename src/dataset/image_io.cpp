@@ -53,7 +53,7 @@ core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int lev
   const auto& formats = core::part<ImageFormats>();
   if (!formats) return tl::unexpected<core::Error>(formats.error());
   Bytes bytes = (*formats)->encode_png(image, level);
-  if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the picture cannot be encoded as PNG");
+  if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the image cannot be encoded as PNG");
   return bytes;
 }
 

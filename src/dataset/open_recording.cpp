@@ -49,7 +49,7 @@ core::Result<sensor::Camera> choose_camera(const fs::path& folder, const OpenOpt
       folder.string()));
 }
 
-/// Typical values of the devices that take pictures of this size, in the unit of depth that the layout's own
+/// Typical values of the devices that take images of this size, in the unit of depth that the layout's own
 /// recordings have. Nothing better is known without a file.
 std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
   struct Device {
@@ -216,7 +216,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   const bool none_is_there = !camera && options.camera.empty() && !has_camera_file(folder);
   if (const auto guess = none_is_there ? guessed_camera(*layout) : std::nullopt) {
     log.warning(
-        fmt::format("{}: no camera.yaml; taken for a {} by the size of its pictures, with fx = fy = {:g}: "
+        fmt::format("{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: "
                     "a guess; put a camera.yaml there or name one with --camera",
                     folder.string(), guess->name, guess->color.fx));
     camera = *guess;

@@ -148,17 +148,16 @@ std::vector<Descriptor256> describe(const cv::Mat& level, std::vector<cv::KeyPoi
 }  // namespace
 
 void OrbOptions::declare(core::OptionTable& table) {
-  table.integer("orb.count", count, {50, 20000}, "", "ORB points per picture");
+  table.integer("orb.count", count, {50, 20000}, "", "ORB points per image");
   table.integer("orb.levels", levels, {1, 12}, "", "Pyramid levels");
   table.integer("orb.fast_threshold", fast_threshold, {1, 200}, "", "FAST threshold, grey values");
   table.integer("orb.fast_threshold_min", fast_threshold_min, {1, 200}, "",
-                "FAST threshold where a cell of the picture has no corner otherwise");
+                "FAST threshold where a cell of the image has no corner otherwise");
   table.number(
       "orb.min_corner", min_corner, {0.0, 1.0}, "",
       "Corners whose gradients across the main direction are weaker, squared, than this share of those "
       "along it lie on an edge and are left out; 0: none are");
-  table.boolean("orb.spread", spread,
-                "Points evenly over the picture; off: the strongest, wherever they are");
+  table.boolean("orb.spread", spread, "Points evenly over the image; off: the strongest, wherever they are");
 }
 
 OrbExtractor::OrbExtractor(const OrbOptions& options) : options_(options) {
@@ -186,7 +185,7 @@ cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale
 
 /// Where the middle of a level's pixel lies in the full image: both show the same from edge to edge, and a
 /// level is a whole number of pixels wide, not quite its scale.
-Eigen::Vector2f in_full_picture(const Corner& corner, const cv::Size& level, const cv::Size& full) {
+Eigen::Vector2f in_full_image(const Corner& corner, const cv::Size& level, const cv::Size& full) {
   const auto there = [](int at, int size, int full_size) {
     return (static_cast<float>(at) + 0.5F) * static_cast<float>(full_size) / static_cast<float>(size) - 0.5F;
   };
@@ -222,7 +221,7 @@ OrbFeatures OrbExtractor::extract(const cv::Mat& gray, const cv::Rect& region) c
     std::vector<cv::KeyPoint> on_level;
     for (const Corner& c : corners) {
       const float angle = orb_orientation(image, c.x, c.y);
-      const Eigen::Vector2f pixel = in_full_picture(c, image.size(), gray.size());
+      const Eigen::Vector2f pixel = in_full_image(c, image.size(), gray.size());
       result.points.push_back({pixel, 0.0F, angle, static_cast<float>(c.score), level});
       result.patches.push_back(cut_patch(image, c.x, c.y, pixel));
       on_level.emplace_back(static_cast<float>(c.x), static_cast<float>(c.y), 31.0F, angle);

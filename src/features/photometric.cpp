@@ -95,45 +95,44 @@ void keep_smooth(const std::vector<float>& roughness, std::vector<PhotometricSam
   samples.resize(kept);
 }
 
-/// Value and slope of a picture where the camera sees `p`; none too near to it or to the border.
-std::optional<PhotometricSample> sample_at(const cv::Mat& picture, const sensor::Pinhole& camera,
+/// Value and slope of an image where the camera sees `p`; none too near to it or to the border.
+std::optional<PhotometricSample> sample_at(const cv::Mat& image, const sensor::Pinhole& camera,
                                            const Eigen::Vector3f& p) {
   if (p.z() < kNearestSample_m) return std::nullopt;
   const Eigen::Vector2f pixel = camera.project(p.cast<double>()).cast<float>();
   const float u = pixel.x(), v = pixel.y();
-  if (u < 1.0F || v < 1.0F || u > static_cast<float>(picture.cols - 3) ||
-      v > static_cast<float>(picture.rows - 3)) {
+  if (u < 1.0F || v < 1.0F || u > static_cast<float>(image.cols - 3) ||
+      v > static_cast<float>(image.rows - 3)) {
     return std::nullopt;
   }
-  return PhotometricSample{
-      p,
-      interpolated(picture, u, v),
-      {0.5F * (interpolated(picture, u + 1.0F, v) - interpolated(picture, u - 1.0F, v)),
-       0.5F * (interpolated(picture, u, v + 1.0F) - interpolated(picture, u, v - 1.0F))}};
+  return PhotometricSample{p,
+                           interpolated(image, u, v),
+                           {0.5F * (interpolated(image, u + 1.0F, v) - interpolated(image, u - 1.0F, v)),
+                            0.5F * (interpolated(image, u, v + 1.0F) - interpolated(image, u, v - 1.0F))}};
 }
 
 /// The steepest spot of each cell, where depth is continuous.
-std::vector<PhotometricSample> sample_level(const cv::Mat& picture, std::size_t level, const cv::Mat& depth,
+std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t level, const cv::Mat& depth,
                                             const sensor::Pinhole& camera,
                                             const geometry::Rigid3& camera_from_depth) {
   std::vector<PhotometricSample> samples;
   std::vector<float> roughness;
   const sensor::Pinhole small = photometric_camera(camera, level);
-  const float per_x = static_cast<float>(depth.cols) / static_cast<float>(picture.cols);
-  const float per_y = static_cast<float>(depth.rows) / static_cast<float>(picture.rows);
+  const float per_x = static_cast<float>(depth.cols) / static_cast<float>(image.cols);
+  const float per_y = static_cast<float>(depth.rows) / static_cast<float>(image.rows);
   const Surroundings around{static_cast<int>(2.5F * per_x + 0.5F), static_cast<int>(kHalo * per_x + 0.5F)};
   const int cell = kCell[level];
   const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
   const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
-  for (int cy = kBorder; cy + cell <= picture.rows - kBorder; cy += cell) {
-    for (int cx = kBorder; cx + cell <= picture.cols - kBorder; cx += cell) {
-      const Spot best = steepest(picture, cx, cy, cell);
+  for (int cy = kBorder; cy + cell <= image.rows - kBorder; cy += cell) {
+    for (int cx = kBorder; cx + cell <= image.cols - kBorder; cx += cell) {
+      const Spot best = steepest(image, cx, cy, cell);
       const int full_x = static_cast<int>((static_cast<float>(best.x) + 0.5F) * per_x);
       const int full_y = static_cast<int>((static_cast<float>(best.y) + 0.5F) * per_y);
       const float z = continuous_depth(depth, full_x, full_y, around);
       if (!(z > 0.0F)) continue;
       const Eigen::Vector3f in_depth = camera.unproject(full_x, full_y, static_cast<double>(z)).cast<float>();
-      const auto sample = sample_at(picture, small, rotation * in_depth + translation);
+      const auto sample = sample_at(image, small, rotation * in_depth + translation);
       if (!sample) continue;
       samples.push_back(*sample);
       roughness.push_back(

@@ -16,9 +16,9 @@ using geometry::Rigid3;
 class Lookup {
  public:
   Lookup(const PhotometricFamily& family, const Rigid3& camera_from_world)
-      : picture_(family.picture),
-        last_x_(static_cast<float>(picture_.cols) - 2.0F),
-        last_y_(static_cast<float>(picture_.rows) - 2.0F) {
+      : image_(family.image),
+        last_x_(static_cast<float>(image_.cols) - 2.0F),
+        last_y_(static_cast<float>(image_.rows) - 2.0F) {
     const Rigid3 camera_from_reference = camera_from_world * family.reference_from_world.inverse();
     rotation_ = camera_from_reference.rotation.cast<float>();
     translation_ = camera_from_reference.translation.cast<float>();
@@ -36,15 +36,15 @@ class Lookup {
     if (!(x >= 1.0F && y >= 1.0F && x < last_x_ && y < last_y_)) return false;
     const int ix = static_cast<int>(x), iy = static_cast<int>(y);
     const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
-    const float* top = picture_.ptr<float>(iy) + ix;
-    const float* low = picture_.ptr<float>(iy + 1) + ix;
+    const float* top = image_.ptr<float>(iy) + ix;
+    const float* low = image_.ptr<float>(iy + 1) + ix;
     const float t = top[0] + sx * (top[1] - top[0]), l = low[0] + sx * (low[1] - low[0]);
     value = t + sy * (l - t);
     return true;
   }
 
  private:
-  const cv::Mat& picture_;
+  const cv::Mat& image_;
   float last_x_, last_y_;
   Eigen::Matrix3f rotation_;
   Eigen::Vector3f translation_;
@@ -65,12 +65,12 @@ struct Sums {
 }  // namespace
 
 std::vector<float> photometric_residuals(const PhotometricFamily& family, const Rigid3& camera_from_world) {
-  const Lookup picture(family, camera_from_world);
+  const Lookup image(family, camera_from_world);
   const auto gain = static_cast<float>(family.gain), per_sigma = static_cast<float>(1.0 / family.sigma);
   std::vector<float> result(family.terms.size(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < result.size(); ++i) {
     float value = 0.0F;
-    if (picture.at(family.terms[i].point, value)) {
+    if (image.at(family.terms[i].point, value)) {
       result[i] = (value - gain * family.terms[i].value) * family.terms[i].weight * per_sigma;
     }
   }
@@ -80,7 +80,7 @@ std::vector<float> photometric_residuals(const PhotometricFamily& family, const 
 PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& camera_from_world,
                                 double loss) {
   constexpr std::size_t kBlock = 512;  // summed in single precision
-  const Lookup picture(family, camera_from_world);
+  const Lookup image(family, camera_from_world);
   const auto gain = static_cast<float>(family.gain), per_sigma = static_cast<float>(1.0 / family.sigma);
   const auto threshold = static_cast<float>(loss);
   PhotometricSums sums;
@@ -91,7 +91,7 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
     for (std::size_t i = from; i < to; ++i) {
       const PhotometricTerm& term = family.terms[i];
       float value = 0.0F;
-      if (!picture.at(term.point, value)) {
+      if (!image.at(term.point, value)) {
         cost += 0.5F;
         continue;
       }
@@ -122,12 +122,12 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
 
 double photometric_correlation(const PhotometricFamily& family, const Rigid3& camera_from_world,
                                int min_terms) {
-  const Lookup picture(family, camera_from_world);
+  const Lookup image(family, camera_from_world);
   double vv = 0.0, ss = 0.0, vs = 0.0;
   int count = 0;
   for (const PhotometricTerm& term : family.terms) {
     float seen = 0.0F;
-    if (!picture.at(term.point, seen)) continue;
+    if (!image.at(term.point, seen)) continue;
     const auto s = static_cast<double>(seen), v = static_cast<double>(term.value);
     vv += v * v;
     ss += s * s;

@@ -108,15 +108,15 @@ void Database::reweigh() {
   }
 }
 
-Database::Scores Database::query(const FrameFeatures& picture) const {
+Database::Scores Database::query(const FrameFeatures& image) const {
   Scores result;
   result.database_ = this;
   result.scores_.assign(keyframes_.size(), 0.0F);
   result.votes_ = result.scores_;
   std::vector<Word> words;
-  words.reserve(picture.descriptors.size() + picture.lines.size());
-  for (const auto& d : picture.descriptors) words.push_back(vocabulary_.word(Kind::kPoint, d));
-  for (const auto& l : picture.lines) words.push_back(vocabulary_.word(Kind::kLine, l.descriptor));
+  words.reserve(image.descriptors.size() + image.lines.size());
+  for (const auto& d : image.descriptors) words.push_back(vocabulary_.word(Kind::kPoint, d));
+  for (const auto& l : image.lines) words.push_back(vocabulary_.word(Kind::kLine, l.descriptor));
   std::sort(words.begin(), words.end());
   double mass = 0.0;
   for (const Word w : words) mass += weights_[at(w)];

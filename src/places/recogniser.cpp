@@ -37,10 +37,10 @@ void RecogniserOptions::declare(core::OptionTable& table) {
 }
 
 std::vector<Candidate> Recogniser::recognise(const Database& database, KeyframeId query,
-                                             const features::FrameFeatures& picture, KeyframeId neighbour,
+                                             const features::FrameFeatures& image, KeyframeId neighbour,
                                              const std::function<bool(KeyframeId)>& allowed,
                                              const Neighbours& neighbours) {
-  return recognise(database.query(picture), query, neighbour, allowed, neighbours);
+  return recognise(database.query(image), query, neighbour, allowed, neighbours);
 }
 
 std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, KeyframeId query,

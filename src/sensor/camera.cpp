@@ -173,7 +173,7 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
   double readout_s = 0.0;
   table.number("readout", readout_s, {0.0, 0.1}, "s",
-               "From the first row of a picture to the last; 0: all at once");
+               "From the first row of an image to the last; 0: all at once");
   std::vector<double> slope(2, 0.0);
   table.numbers("depth_slope", slope, 2, {-0.2, 0.2}, "1/m",
                 "Along x and y: what to add to 1 / depth on the ray (x, y, 1)");
@@ -258,7 +258,7 @@ std::string to_yaml(const Camera& camera) {
   text += fmt::format("distortion: [{}, {}, {}, {}, {}]  # k1 k2 p1 p2 k3\n", k[0], k[1], k[2], k[3], k[4]);
   text += fmt::format("depth_scale: {}  # raw units per metre\nfps: {}\n", camera.depth_scale, camera.fps);
   if (camera.readout_s) {
-    text += fmt::format("readout: {}  # s from the first row of a picture to the last; 0: all at once\n",
+    text += fmt::format("readout: {}  # s from the first row of an image to the last; 0: all at once\n",
                         *camera.readout_s);
   }
   if (camera.depth_slope != std::array<double, 2>{}) {

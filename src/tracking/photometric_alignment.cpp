@@ -83,10 +83,10 @@ std::optional<optimize::PhotometricFamily> associate_photometric(const features:
                                                                  const PhotometricView& view,
                                                                  const Rigid3& reference_from_world,
                                                                  const Rigid3& camera_from_world) {
-  const cv::Mat& picture = (*view.image)[level];
-  if (picture.empty() || static_cast<int>(samples[level].size()) < kMinPhotometric) return std::nullopt;
+  const cv::Mat& image = (*view.image)[level];
+  if (image.empty() || static_cast<int>(samples[level].size()) < kMinPhotometric) return std::nullopt;
   optimize::PhotometricFamily family;
-  family.picture = picture;
+  family.image = image;
   family.camera = features::photometric_camera(view.camera, level);
   family.reference_from_world = reference_from_world;
   const Rigid3 camera_from_reference = camera_from_world * reference_from_world.inverse();

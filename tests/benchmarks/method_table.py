@@ -54,7 +54,8 @@ TABLES = {
     },
 }
 LEAN = ['-q', '--force', '--threads', '1', '--set', 'output.views=', '--set', 'output.pcd=off', '--set',
-        'refine.accuracy=off', '--set', 'fuse.free_space=off', '--set', 'fuse.exposure=off']
+        'refine.accuracy=off', '--set', 'fuse.free_space=off', '--set', 'fuse.exposure=off', '--set',
+        'track.camera.refine=off']
 
 
 def word(text):

@@ -50,7 +50,7 @@ struct OpenOptions {
   int every = 1;                 ///< every n-th pair
 };
 
-/// Opens a folder. Without a camera file the camera is a guess by the size of the pictures (Camera::guess;
+/// Opens a folder. Without a camera file the camera is a guess by the size of the images (Camera::guess;
 /// a warning), kUsage when no common device takes such. Checks camera, lists and the depth scale (median
 /// depth of some frames outside 0.35-20 m: error; outside 0.7-7 m, or a tenth of the depths beyond the 10 m
 /// that depth cameras reach: warning; both name the depth_scale that would fit).

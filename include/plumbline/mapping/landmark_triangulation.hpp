@@ -37,14 +37,14 @@ struct NewestImage {
 /// those of `neighbours`, best first: near the epipolar line, alike in descriptor, orientation and scale,
 /// clearly better than the second best; kept when both rays meet within the pixel noise, in front of both
 /// cameras, at a known depth. Corners are found to a pixel, which needs a long way to tell depth: with
-/// `picture` the newest corner is aligned with the older one's patch and then says it after a third of that;
+/// `image` the newest corner is aligned with the older one's patch and then says it after a third of that;
 /// it moves to where it was found, and both see their landmark exactly. Those whose images do not agree
 /// are taken as they are. Returns the new landmarks, which both keyframes observe.
 std::vector<core::PointId> triangulate_points(maps::Map& map, core::KeyframeId keyframe,
                                               const std::vector<core::KeyframeId>& neighbours,
                                               double max_measured_m, const sensor::Pinhole& camera,
                                               const TriangulationOptions& options,
-                                              const NewestImage* picture = nullptr);
+                                              const NewestImage* image = nullptr);
 
 /// The same for lines without depth; a line needs three views that agree.
 std::vector<core::LineId> triangulate_lines(maps::Map& map, core::KeyframeId keyframe,

@@ -67,7 +67,8 @@ class LocalMapper {
   /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
   /// image and the image of the new one; what they say about its pose stays in the map as edges.
   void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
-                         const tracking::TrackResult& track, const tracking::PhotometricKeyframes& pictures,
+                         const tracking::TrackResult& track,
+                         const tracking::PhotometricKeyframes& photometric,
                          const std::vector<core::KeyframeId>& neighbours);
 
   /// What a new keyframe has to say about the map around it, in this order: doubles are fused, landmarks
@@ -78,7 +79,7 @@ class LocalMapper {
   static void count(maps::Map& map, const tracking::TrackResult& track);
   std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
-  void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestImage& picture);
+  void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestImage& image);
   [[nodiscard]] bool distorted(const maps::Map& map, core::KeyframeId keyframe) const;
   [[nodiscard]] std::vector<core::KeyframeId> nearest_undistorted(const maps::Map& map,
                                                                   core::KeyframeId keyframe, int count) const;

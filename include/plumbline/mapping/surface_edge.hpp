@@ -33,6 +33,6 @@ struct EdgeImages {
 std::optional<maps::SurfaceEdge> align_surface_edge(
     const maps::Keyframe& a, core::KeyframeId b, const cv::Mat& depth_of_b, const geometry::Rigid3& b_from_a,
     const geometry::Rigid3& depth_from_camera, const sensor::Pinhole& camera,
-    const SurfaceEdgeOptions& options, const EdgeImages& pictures = {});
+    const SurfaceEdgeOptions& options, const EdgeImages& images = {});
 
 }  // namespace plumbline::mapping

@@ -24,10 +24,10 @@ struct PhotometricTerm {
 
 struct PhotometricFamily {
   std::vector<PhotometricTerm> terms;
-  cv::Mat picture;         ///< CV_32FC1, of the camera whose pose is looked for
-  sensor::Pinhole camera;  ///< that takes `picture`
+  cv::Mat image;           ///< CV_32FC1, of the camera whose pose is looked for
+  sensor::Pinhole camera;  ///< that takes `image`
   geometry::Rigid3 reference_from_world;
-  double gain = 1.0;   ///< grey value expected in `picture` = gain x that of the reference image
+  double gain = 1.0;   ///< grey value expected in `image` = gain x that of the reference image
   double sigma = 1.0;  ///< of a residual, grey values
 };
 

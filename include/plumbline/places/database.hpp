@@ -53,7 +53,7 @@ class Database {
     std::vector<float> votes_;   ///< words in common
   };
   /// Valid until the next add.
-  [[nodiscard]] Scores query(const features::FrameFeatures& picture) const;
+  [[nodiscard]] Scores query(const features::FrameFeatures& image) const;
 
   [[nodiscard]] const Vocabulary& vocabulary() const { return vocabulary_; }
 

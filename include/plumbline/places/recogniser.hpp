@@ -40,12 +40,12 @@ class Recogniser {
  public:
   explicit Recogniser(const RecogniserOptions& options) : options_(options) {}
 
-  /// Candidates for keyframe `query` that looks like `picture`: best group first. `neighbour` is a keyframe
+  /// Candidates for keyframe `query` that looks like `image`: best group first. `neighbour` is a keyframe
   /// that saw nearly the same as the query (usually the one before): its score is what a good score is here;
   /// invalid: scores are not compared. Keyframes that `allowed` refuses (the query's own surroundings) are
   /// left out. Those seen fewer than options.consistent times in a row come too, with their in_a_row.
   std::vector<Candidate> recognise(const Database& database, core::KeyframeId query,
-                                   const features::FrameFeatures& picture, core::KeyframeId neighbour,
+                                   const features::FrameFeatures& image, core::KeyframeId neighbour,
                                    const std::function<bool(core::KeyframeId)>& allowed,
                                    const Neighbours& neighbours);
   /// The same with what `database.query` said of the image.

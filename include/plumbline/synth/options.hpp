@@ -52,7 +52,7 @@ struct Event {
 /// Errors (kUsage) name the piece that could not be read, with a suggestion.
 core::Result<std::vector<Event>> parse_events(const std::string& text);
 
-/// Ranges are the option table's; this checks what a table cannot: events, pictures of no sensible shape.
+/// Ranges are the option table's; this checks what a table cannot: events, images of no sensible shape.
 core::Result<void> check(const SynthOptions& options);
 
 const char* to_string(Texture texture);

@@ -77,7 +77,7 @@ bool is_synth_url(const std::string& input);
 /// it already names its robot.
 core::Result<std::vector<std::string>> split_robots(const std::string& url);
 
-/// The camera of a sensor at a picture size. kinect: TUM fr3's intrinsics; depth_scale 5000; no distortion.
+/// The camera of a sensor at an image size. kinect: TUM fr3's intrinsics; depth_scale 5000; no distortion.
 sensor::Camera make_camera(Sensor sensor, int width, int height, double fps);
 
 }  // namespace plumbline::synth

@@ -16,9 +16,9 @@ void ObservationNoise::declare(core::OptionTable& table, const std::string& pref
       prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
       "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
   table.boolean(prefix + "depth_rows", depth_rows,
-                "The depth of corners and lines, beside where they are in the picture");
+                "The depth of corners and lines, beside where they are in the image");
   table.number(prefix + "turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
-               "What a picture says counts for half when the camera turned this fast");
+               "What an image says counts for half when the camera turned this fast");
 }
 
 double ObservationNoise::motion_factor_of(double rate) const {

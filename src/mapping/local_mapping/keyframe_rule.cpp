@@ -88,7 +88,7 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                 "Cone rule: points a keyframe must match, or half of what should be seen");
   table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "", "The same of lines");
   table.number("keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
-               "Cone rule: points whose viewing angle changed more are asked to spread over the picture");
+               "Cone rule: points whose viewing angle changed more are asked to spread over the image");
   table.choice("keyframe.cone_balance", cone_balance,
                {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
                "Cone rule: how far these must be spread (ECOG against its threshold)");

@@ -151,7 +151,7 @@ struct Meeting {
 /// looked for again by the older one's patch.
 std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, const maps::Observation& newest,
                             const maps::Observation& older, const sensor::Pinhole& camera,
-                            const TriangulationOptions& options, const NewestImage* picture) {
+                            const TriangulationOptions& options, const NewestImage* image) {
   const auto point_of = [&](const maps::Observation& c) -> const features::PointFeature& {
     return map.keyframe(c.keyframe).features->points[static_cast<std::size_t>(c.feature)];
   };
@@ -160,13 +160,13 @@ std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, cons
     if (!point) return std::nullopt;
     return Meeting{*point, std::nullopt};
   };
-  if (picture == nullptr) return alone();
-  const features::CornerPatch& patch = picture->newest.patches[static_cast<std::size_t>(newest.feature)];
+  if (image == nullptr) return alone();
+  const features::CornerPatch& patch = image->newest.patches[static_cast<std::size_t>(newest.feature)];
   if (patch.empty()) return alone();
   const auto rough = search.meet(point_of(newest), point_of(older), options.aligned);
   if (!rough) return std::nullopt;
   const Rigid3& pose = map.camera_from_world(newest.keyframe);
-  const auto at = tracking::align_observation(map, older, pose.inverse() * *rough, picture->levels,
+  const auto at = tracking::align_observation(map, older, pose.inverse() * *rough, image->levels,
                                               patch.middle, camera, pose, options.scale_factor);
   if (!at) return alone();
   const Eigen::Vector2f shift = *at - patch.middle;
@@ -210,12 +210,11 @@ void TriangulationOptions::declare(core::OptionTable& table) {
 std::vector<core::PointId> triangulate_points(maps::Map& map, KeyframeId keyframe,
                                               const std::vector<KeyframeId>& neighbours,
                                               double max_measured_m, const sensor::Pinhole& camera,
-                                              const TriangulationOptions& options,
-                                              const NewestImage* picture) {
+                                              const TriangulationOptions& options, const NewestImage* image) {
   std::vector<core::PointId> made;
-  const bool aligns = picture != nullptr && !picture->levels.empty() &&
-                      picture->newest.patches.size() == picture->newest.points.size();
-  const NewestImage* const shown = aligns ? picture : nullptr;
+  const bool aligns = image != nullptr && !image->levels.empty() &&
+                      image->newest.patches.size() == image->newest.points.size();
+  const NewestImage* const shown = aligns ? image : nullptr;
   bool moved = false;
   for (KeyframeId other : neighbours) {
     const FreeCorners a = free_corners_of(map, keyframe, max_measured_m);

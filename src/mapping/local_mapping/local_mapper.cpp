@@ -33,11 +33,10 @@ void move(std::vector<maps::SurfaceSample>& surface, const geometry::Rigid3& cam
 void LocalMapperOptions::declare(core::OptionTable& table) {
   table.number("landmark.max_depth", max_landmark_depth_m, {0.5, 100.0}, "m",
                "Landmarks are made of depth up to here");
-  table.number(
-      "landmark.max_turn_rate", max_landmark_turn_rate, {0.0, 100.0}, "rad/s",
-      "Pictures taken while turning faster are distorted by the rolling shutter of common sensors: no "
-      "landmark is "
-      "triangulated, looked for or merged with them");
+  table.number("landmark.max_turn_rate", max_landmark_turn_rate, {0.0, 100.0}, "rad/s",
+               "Images taken while turning faster are distorted by the rolling shutter of common sensors: no "
+               "landmark is "
+               "triangulated, looked for or merged with them");
   table.boolean(
       "landmark.depth_normals", depth_normals,
       "Normals of landmarks from the depth image around them, not from the keyframe's surface samples");
@@ -165,7 +164,7 @@ void LocalMapper::count(maps::Map& map, const tracking::TrackResult& track) {
 
 void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const cv::Mat& depth,
                                     const tracking::TrackResult& track,
-                                    const tracking::PhotometricKeyframes& pictures,
+                                    const tracking::PhotometricKeyframes& photometric,
                                     const std::vector<core::KeyframeId>& neighbours) {
   if (!options_.edges) return;
   int made = 0;
@@ -173,7 +172,7 @@ void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const c
     if (made >= options_.edge_keyframes) break;
     if (other == id) continue;
     const geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
-    const auto seen = options_.edge_photometric ? pictures.find(other) : nullptr;
+    const auto seen = options_.edge_photometric ? photometric.find(other) : nullptr;
     const auto edge =
         align_surface_edge(map.keyframe(other), id, depth, id_from_other, track.depth_from_camera, camera_,
                            {options_.edge_min_overlap}, {seen.get(), track.photometric.get()});
@@ -197,12 +196,12 @@ std::vector<core::KeyframeId> LocalMapper::nearest_undistorted(const maps::Map& 
   return neighbours;
 }
 
-void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestImage& picture) {
+void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestImage& image) {
   const std::vector<core::KeyframeId> neighbours =
       nearest_undistorted(map, id, options_.triangulation.keyframes);
   const TriangulationOptions& how = options_.triangulation;
   const double measured = options_.max_landmark_depth_m;
-  for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how, &picture))
+  for (core::PointId p : triangulate_points(map, id, neighbours, measured, camera_, how, &image))
     culler_.watch(p, id);
   for (core::LineId l : triangulate_lines(map, id, neighbours, measured, camera_, how)) culler_.watch(l, id);
 }

@@ -49,11 +49,11 @@ PLUMBLINE_CLONES std::uint32_t take_nearest(const std::uint32_t* distances, std:
 std::size_t index_of(std::uint32_t key) { return key & ((1U << kIndexBits) - 1U); }
 
 /// Whether nothing at another place of the image is nearly as near as `best`.
-bool clearly_nearest(const FrameFeatures& picture, const std::uint32_t* distances, std::size_t step,
+bool clearly_nearest(const FrameFeatures& image, const std::uint32_t* distances, std::size_t step,
                      std::size_t best) {
   const double limit = distances[best * step] / kRatio;
-  for (std::size_t j = 0; j < picture.descriptors.size(); ++j) {
-    if (distances[j * step] < limit && (picture.points[j].pixel - picture.points[best].pixel).norm() > 5.0F) {
+  for (std::size_t j = 0; j < image.descriptors.size(); ++j) {
+    if (distances[j * step] < limit && (image.points[j].pixel - image.points[best].pixel).norm() > 5.0F) {
       return false;
     }
   }

@@ -278,7 +278,7 @@ std::string judge(const PlaceVerification& v, const VerificationOptions& options
   const double evidence = (v.points + 2 * v.lines) * v.found;
   if (v.found < options.min_found || evidence < options.min_evidence)
     return fmt::format("{:.0f} % of the landmarks found", 100.0 * v.found);
-  if (v.cells < options.min_cells) return fmt::format("matches in {} of 16 parts of the picture", v.cells);
+  if (v.cells < options.min_cells) return fmt::format("matches in {} of 16 parts of the image", v.cells);
   if (v.contradiction > options.max_contradiction) {
     return fmt::format("{:.0f} % of the surface seen through", 100.0 * v.contradiction);
   }
@@ -297,7 +297,7 @@ void VerificationOptions::declare(core::OptionTable& table) {
   table.number("verify.min_evidence", min_evidence, {0.0, 1e6}, "",
                "Agreeing points (lines twice) times the share found, at least");
   table.integer("verify.min_cells", min_cells, {1, 16}, "",
-                "Parts of the picture, of 16, that must hold matches");
+                "Parts of the image, of 16, that must hold matches");
   table.number("verify.min_overlap", min_overlap, {0.0, 1.0}, "",
                "Share of a place's surface in view that must be confirmed");
   table.number("verify.max_contradiction", max_contradiction, {0.0, 1.0}, "",

@@ -235,7 +235,7 @@ std::string reason(const PlaceVerification& v, const VerificationOptions& option
   if (v.points + 2 * v.lines < options.min_inliers) return "too few points and lines fit";
   if (v.contradiction > options.max_contradiction) return "surface seen through";
   if (v.overlap < options.min_overlap) return "surface not confirmed";
-  if (v.cells < options.min_cells) return "matches in one corner of the picture";
+  if (v.cells < options.min_cells) return "matches in one corner of the image";
   return "too few of the landmarks found";
 }
 

@@ -70,7 +70,7 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
                                                     const Rigid3& depth_from_camera,
                                                     const sensor::Pinhole& camera,
                                                     const SurfaceEdgeOptions& options,
-                                                    const EdgeImages& pictures) {
+                                                    const EdgeImages& images) {
   if (a.surface.empty()) return std::nullopt;
   const std::vector<tracking::WorldSurface> surface = surface_of(a);
   optimize::PoseProblem problem;
@@ -81,14 +81,14 @@ std::optional<maps::SurfaceEdge> align_surface_edge(const maps::Keyframe& a, cor
   solver.photometric_weight = kPhotometricWeight;
   optimize::PoseSummary summary;
   Rigid3 pose = b_from_a;
-  const tracking::PhotometricView view{pictures.of_b, &depth_of_b, depth_from_camera, camera};
+  const tracking::PhotometricView view{images.of_b, &depth_of_b, depth_from_camera, camera};
   for (const double distance : {0.08, 0.05, 0.03, 0.03, 0.03}) {
     tracking::SurfaceAssociationOptions association;
     association.max_distance_m = distance;
     problem.photometric.reset();
-    if (pictures.of_a != nullptr && pictures.of_b != nullptr) {
+    if (images.of_a != nullptr && images.of_b != nullptr) {
       const std::size_t level = distance > 0.06 ? 1 : 0;
-      problem.photometric = tracking::associate_photometric(*pictures.of_a, level, view, {}, pose);
+      problem.photometric = tracking::associate_photometric(*images.of_a, level, view, {}, pose);
     }
     problem.planes =
         tracking::associate_surface(surface, depth_of_b, camera, pose, depth_from_camera, association);

@@ -47,7 +47,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   return text + to_yaml(graph);
 }
 
-/// Tells recordings apart without reading their pictures.
+/// Tells recordings apart without reading their images.
 std::string input_text(const dataset::FrameSource& source) {
   core::Hash hash;
   for (std::size_t i = 0; i < source.size(); ++i) hash.number(source.info(i).stamp);

@@ -12,7 +12,7 @@ namespace plumbline::pipeline {
 
 enum class Up {
   kFloor,   ///< z along the floor's normal, 0 on the floor
-  kCamera,  ///< z upright in the first camera's picture, 0 at the first camera
+  kCamera,  ///< z upright in the first camera's image, 0 at the first camera
   kNone,    ///< the map's own frame
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Tap of frames: PNG pictures as rectified. Named frame-*.png they are a recording that can be read again.
+// Tap of frames: PNG images as rectified. Named frame-*.png they are a recording that can be read again.
 #include <fmt/format.h>
 
 #include <cmath>
