@@ -158,10 +158,9 @@ Distances measure(const Points& from, const Points& normals, const std::vector<s
   out.mm.resize(from.size());
   std::vector<float> cosines(normals.empty() ? 0 : from.size(), kNone);
   for_chunks(executor, order.size(), kPointsAtOnce, [&](std::size_t first, std::size_t last) {
-    MeasuredSurface::Scratch scratch;
     for (std::size_t k = first; k < last; ++k) {
       const std::uint32_t i = order[k];
-      const Foot foot = surface.foot(from[i].cast<double>(), scratch);
+      const Foot foot = surface.foot(from[i].cast<double>());
       out.error_m[i] = static_cast<float>(foot.distance);
       out.mm[i] = 1000.0 * foot.distance;
       if (cosines.empty() || normals[i].isZero() || foot.normal.isZero()) continue;

@@ -32,10 +32,9 @@ std::vector<Pair> find_pairs(const std::vector<Eigen::Vector3d>& cloud, const Me
                              const Rigid3& pose, double reach, const core::Executor& executor) {
   std::vector<Pair> all(cloud.size());
   for_chunks(executor, cloud.size(), 512, [&](std::size_t first, std::size_t last) {
-    MeasuredSurface::Scratch scratch;
     for (std::size_t i = first; i < last; ++i) {
       const Eigen::Vector3d q = pose * cloud[i];
-      const Foot foot = surface.foot(q, scratch);
+      const Foot foot = surface.foot(q);
       const double residual = foot.normal.dot(q - foot.point);
       all[i] = {q, foot.normal, residual, foot.distance, i};
       // Past a border the nearest point is not below the cloud's point: such a pair pulls the wrong way.

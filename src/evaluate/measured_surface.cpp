@@ -8,16 +8,15 @@
 
 namespace plumbline::evaluate {
 
-Foot MeshSurface::foot(const Eigen::Vector3d& q, Scratch& scratch) const {
-  const MeshPoint nearest = index_.nearest(q, scratch.guess);
-  scratch.guess = nearest.triangle;
+Foot MeshSurface::foot(const Eigen::Vector3d& q) const {
+  const MeshPoint nearest = index_.nearest(q);
   return {std::sqrt(nearest.squared_distance), nearest.point, index_.normal(nearest.triangle)};
 }
 
-bool SampledSurface::surrounded(const Eigen::Vector3d& on_plane, const Eigen::Vector3d& normal,
-                                std::vector<Neighbor>& found) const {
+bool SampledSurface::surrounded(const Eigen::Vector3d& on_plane, const Eigen::Vector3d& normal) const {
   constexpr double kPi = 3.14159265358979323846;
   constexpr std::size_t kNeighbors = 12;
+  std::vector<Neighbor> found;
   index_.nearest(on_plane, kNeighbors, found);
   const Eigen::Vector3d u = normal.unitOrthogonal();
   const Eigen::Vector3d v = normal.cross(u);
@@ -34,9 +33,8 @@ bool SampledSurface::surrounded(const Eigen::Vector3d& on_plane, const Eigen::Ve
   return gap <= kPi + 1e-6;
 }
 
-Foot SampledSurface::foot(const Eigen::Vector3d& q, Scratch& scratch) const {
-  const Neighbor nearest = index_.nearest(q, scratch.guess);
-  scratch.guess = nearest.index;
+Foot SampledSurface::foot(const Eigen::Vector3d& q) const {
+  const Neighbor nearest = index_.nearest(q);
   const Eigen::Vector3d p = index_.points()[nearest.index].cast<double>();
   const Eigen::Vector3d normal = normals_[nearest.index].cast<double>();
   const Foot at_sample{std::sqrt(nearest.squared_distance), p, normal};
@@ -46,7 +44,7 @@ Foot SampledSurface::foot(const Eigen::Vector3d& q, Scratch& scratch) const {
   const Eigen::Vector3d on_plane = q - height * normal;
   const double lateral_sq = (on_plane - p).squaredNorm();
   if (lateral_sq > 4.0 * cell_m_ * cell_m_) return at_sample;
-  if (lateral_sq > 0.25 * cell_m_ * cell_m_ && !surrounded(on_plane, normal, scratch.found)) return at_sample;
+  if (lateral_sq > 0.25 * cell_m_ * cell_m_ && !surrounded(on_plane, normal)) return at_sample;
   return {std::abs(height), on_plane, normal};
 }
 

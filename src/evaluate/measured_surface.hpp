@@ -23,19 +23,14 @@ struct Foot {
 
 class MeasuredSurface {
  public:
-  /// Kept by the caller from one query to the next, one for each thread's chunk.
-  struct Scratch {
-    std::uint32_t guess = 0;
-    std::vector<Neighbor> found;
-  };
   virtual ~MeasuredSurface() = default;
-  [[nodiscard]] virtual Foot foot(const Eigen::Vector3d& q, Scratch& scratch) const = 0;
+  [[nodiscard]] virtual Foot foot(const Eigen::Vector3d& q) const = 0;
 };
 
 class MeshSurface : public MeasuredSurface {
  public:
   explicit MeshSurface(const TriangleMesh& mesh) : index_(mesh) {}
-  [[nodiscard]] Foot foot(const Eigen::Vector3d& q, Scratch& scratch) const override;
+  [[nodiscard]] Foot foot(const Eigen::Vector3d& q) const override;
 
  private:
   TriangleIndex index_;
@@ -51,11 +46,10 @@ class SampledSurface : public MeasuredSurface {
   SampledSurface(const PointIndex& index, std::vector<Eigen::Vector3f> normals, double cell_m,
                  SampleDistance mode)
       : index_(index), normals_(std::move(normals)), cell_m_(cell_m), mode_(mode) {}
-  [[nodiscard]] Foot foot(const Eigen::Vector3d& q, Scratch& scratch) const override;
+  [[nodiscard]] Foot foot(const Eigen::Vector3d& q) const override;
 
  private:
-  [[nodiscard]] bool surrounded(const Eigen::Vector3d& on_plane, const Eigen::Vector3d& normal,
-                                std::vector<Neighbor>& found) const;
+  [[nodiscard]] bool surrounded(const Eigen::Vector3d& on_plane, const Eigen::Vector3d& normal) const;
   const PointIndex& index_;
   std::vector<Eigen::Vector3f> normals_;
   double cell_m_;

@@ -4,56 +4,30 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "plumbline/evaluate/statistics.hpp"
 
 namespace plumbline::evaluate {
 namespace {
 
-constexpr std::size_t kPointsALeaf = 8;
 constexpr std::size_t kChunk = 4096;
-
-double squared_distance(const Eigen::Vector3f& p, const Eigen::Vector3d& q) {
-  return (p.cast<double>() - q).squaredNorm();
-}
 
 }  // namespace
 
 PointIndex::PointIndex(const std::vector<Eigen::Vector3f>& points)
-    : points_(points), tree_(points.size(), kPointsALeaf, [&points](std::size_t i) {
-        return Box{points[i], points[i]};
-      }) {
-  in_order_.reserve(points.size());
-  for (const std::uint32_t i : tree_.order()) in_order_.push_back(points[i]);
-}
+    : points_(points), data_{points}, tree_(3, data_) {}
 
-Neighbor PointIndex::nearest(const Eigen::Vector3d& q, std::uint32_t guess) const {
-  Neighbor best{guess, squared_distance(points_[guess], q)};
-  tree_.search(q, best.squared_distance, [&](std::uint32_t first, std::uint32_t last) {
-    for (std::uint32_t i = first; i < last; ++i) {
-      const Neighbor n{tree_.order()[i], squared_distance(in_order_[i], q)};
-      if (n < best) best = n;
-    }
-  });
+Neighbor PointIndex::nearest(const Eigen::Vector3d& q) const {
+  Neighbor best;
+  tree_.knnSearch(q.data(), 1, &best.index, &best.squared_distance);
   return best;
 }
 
 void PointIndex::nearest(const Eigen::Vector3d& q, std::size_t k, std::vector<Neighbor>& found) const {
-  found.clear();
-  if (k == 0) return;
-  double bound = std::numeric_limits<double>::infinity();
-  tree_.search(q, bound, [&](std::uint32_t first, std::uint32_t last) {
-    for (std::uint32_t i = first; i < last; ++i) {
-      const Neighbor n{tree_.order()[i], squared_distance(in_order_[i], q)};
-      if (found.size() == k) {
-        if (!(n < found.back())) continue;
-        found.pop_back();
-      }
-      found.insert(std::upper_bound(found.begin(), found.end(), n), n);
-      if (found.size() == k) bound = found.back().squared_distance;
-    }
-  });
+  std::vector<std::uint32_t> indices(k);
+  std::vector<double> distances(k);
+  found.resize(tree_.knnSearch(q.data(), k, indices.data(), distances.data()));
+  for (std::size_t i = 0; i < found.size(); ++i) found[i] = {indices[i], distances[i]};
 }
 
 Eigen::Vector3f flat_normal(const std::vector<Eigen::Vector3f>& points, const std::vector<Neighbor>& found) {

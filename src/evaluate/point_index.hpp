@@ -5,9 +5,9 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <nanoflann.hpp>
 #include <vector>
 
-#include "bounding_tree.hpp"
 #include "plumbline/core/executor.hpp"
 
 namespace plumbline::evaluate {
@@ -15,11 +15,6 @@ namespace plumbline::evaluate {
 struct Neighbor {
   std::uint32_t index = 0;
   double squared_distance = 0.0;
-  /// Nearer first; of equals the one with the lower number.
-  friend bool operator<(const Neighbor& a, const Neighbor& b) {
-    return a.squared_distance != b.squared_distance ? a.squared_distance < b.squared_distance
-                                                    : a.index < b.index;
-  }
 };
 
 /// `points` must outlive the index, be finite and not empty.
@@ -27,9 +22,8 @@ class PointIndex {
  public:
   explicit PointIndex(const std::vector<Eigen::Vector3f>& points);
 
-  /// `guess`: any point's number; a good one makes the search faster. Of equally near points any may be
-  /// returned, the same one for the same guess.
-  [[nodiscard]] Neighbor nearest(const Eigen::Vector3d& q, std::uint32_t guess) const;
+  /// Of equally near points always the same one.
+  [[nodiscard]] Neighbor nearest(const Eigen::Vector3d& q) const;
 
   /// The k nearest, nearest first (fewer if there are fewer points). `found` is reused storage.
   void nearest(const Eigen::Vector3d& q, std::size_t k, std::vector<Neighbor>& found) const;
@@ -37,12 +31,26 @@ class PointIndex {
   [[nodiscard]] std::size_t size() const { return points_.size(); }
   [[nodiscard]] const std::vector<Eigen::Vector3f>& points() const { return points_; }
   /// All numbers in an order in space.
-  [[nodiscard]] const std::vector<std::uint32_t>& order() const { return tree_.order(); }
+  [[nodiscard]] const std::vector<std::uint32_t>& order() const { return tree_.vAcc; }
 
  private:
+  /// As nanoflann asks for points.
+  struct Dataset {
+    const std::vector<Eigen::Vector3f>& points;
+    [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
+    [[nodiscard]] double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+      return static_cast<double>(points[i](static_cast<Eigen::Index>(axis)));
+    }
+    template <typename Box>
+    bool kdtree_get_bbox(Box& /*box*/) const {
+      return false;
+    }
+  };
+  using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Dataset>, Dataset, 3,
+                                                   std::uint32_t>;
   const std::vector<Eigen::Vector3f>& points_;
-  BoundingTree tree_;
-  std::vector<Eigen::Vector3f> in_order_;  ///< points by leaf, for the caches' sake
+  Dataset data_;
+  Tree tree_;
 };
 
 /// Calls body(first, last) for fixed chunks of [0, count), the same whatever the number of threads.

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "triangle_index.hpp"
 
+#include <embree3/rtcore.h>
+
 #include <Eigen/Geometry>
+#include <cmath>
+#include <cstring>
+#include <limits>
 
 namespace plumbline::evaluate {
 namespace {
-
-constexpr std::size_t kTrianglesALeaf = 4;
-
-Box box_of(const TriangleMesh& mesh, std::size_t triangle) {
-  const auto& [a, b, c] = mesh.triangles[triangle];
-  const Eigen::Vector3f& p = mesh.vertices[a];
-  const Eigen::Vector3f& q = mesh.vertices[b];
-  const Eigen::Vector3f& r = mesh.vertices[c];
-  return {p.cwiseMin(q).cwiseMin(r), p.cwiseMax(q).cwiseMax(r)};
-}
 
 Eigen::Vector3d nearest_on_segment(const Eigen::Vector3d& q, const Eigen::Vector3d& a,
                                    const Eigen::Vector3d& b) {
@@ -45,8 +40,24 @@ Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& q, const Eigen::Vecto
 }
 
 TriangleIndex::TriangleIndex(const TriangleMesh& mesh)
-    : mesh_(mesh),
-      tree_(mesh.triangles.size(), kTrianglesALeaf, [&mesh](std::size_t i) { return box_of(mesh, i); }) {}
+    : mesh_(mesh), device_(rtcNewDevice("set_affinity=0")), scene_(rtcNewScene(device_)) {
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                           sizeof(mesh.vertices[0]), mesh.vertices.size());
+  void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                            sizeof(mesh.triangles[0]), mesh.triangles.size());
+  std::memcpy(vertices, mesh.vertices.data(), sizeof(mesh.vertices[0]) * mesh.vertices.size());
+  std::memcpy(triangles, mesh.triangles.data(), sizeof(mesh.triangles[0]) * mesh.triangles.size());
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene_, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene_);
+}
+
+TriangleIndex::~TriangleIndex() {
+  rtcReleaseScene(scene_);
+  rtcReleaseDevice(device_);
+}
 
 MeshPoint TriangleIndex::on(std::uint32_t triangle, const Eigen::Vector3d& q) const {
   const auto& [a, b, c] = mesh_.triangles[triangle];
@@ -56,15 +67,29 @@ MeshPoint TriangleIndex::on(std::uint32_t triangle, const Eigen::Vector3d& q) co
   return {triangle, p, (p - q).squaredNorm()};
 }
 
-MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q, std::uint32_t guess) const {
-  MeshPoint best = on(guess, q);
-  tree_.search(q, best.squared_distance, [&](std::uint32_t first, std::uint32_t last) {
-    for (std::uint32_t i = first; i < last; ++i) {
-      const MeshPoint p = on(tree_.order()[i], q);
-      if (p.squared_distance < best.squared_distance) best = p;
-    }
-  });
-  return best;
+/// Embree finds the boxes in reach, in float; distances are taken in double.
+MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
+  struct Search {
+    const TriangleIndex& index;
+    const Eigen::Vector3d& q;
+    double slack;  ///< of the query's place in float
+    MeshPoint best;
+  } search{*this, q, 1e-6 * (1.0 + q.cwiseAbs().maxCoeff()), {}};
+  search.best.squared_distance = std::numeric_limits<double>::infinity();
+  const auto visit = [](RTCPointQueryFunctionArguments* found) {
+    auto& s = *static_cast<Search*>(found->userPtr);
+    const MeshPoint p = s.index.on(found->primID, s.q);
+    if (!(p.squared_distance < s.best.squared_distance)) return false;
+    s.best = p;
+    found->query->radius = static_cast<float>(std::sqrt(p.squared_distance) + s.slack);
+    return true;
+  };
+  RTCPointQuery query{static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()), 0.0F,
+                      std::numeric_limits<float>::infinity()};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(scene_, &query, &context, visit, &search);
+  return search.best;
 }
 
 Eigen::Vector3d TriangleIndex::normal(std::uint32_t triangle) const {

@@ -5,8 +5,10 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "bounding_tree.hpp"
 #include "plumbline/evaluate/surface.hpp"
+
+struct RTCDeviceTy;
+struct RTCSceneTy;
 
 namespace plumbline::evaluate {
 
@@ -25,15 +27,18 @@ Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& q, const Eigen::Vecto
 class TriangleIndex {
  public:
   explicit TriangleIndex(const TriangleMesh& mesh);
-  /// `guess`: any triangle; a good one makes the search faster.
-  [[nodiscard]] MeshPoint nearest(const Eigen::Vector3d& q, std::uint32_t guess) const;
+  ~TriangleIndex();
+  TriangleIndex(const TriangleIndex&) = delete;
+  TriangleIndex& operator=(const TriangleIndex&) = delete;
+  [[nodiscard]] MeshPoint nearest(const Eigen::Vector3d& q) const;
   /// Unit, by the right-hand rule; zero for a degenerate triangle.
   [[nodiscard]] Eigen::Vector3d normal(std::uint32_t triangle) const;
 
  private:
   [[nodiscard]] MeshPoint on(std::uint32_t triangle, const Eigen::Vector3d& q) const;
   const TriangleMesh& mesh_;
-  BoundingTree tree_;
+  RTCDeviceTy* device_;
+  RTCSceneTy* scene_;  ///< Embree's boxes around triangles
 };
 
 }  // namespace plumbline::evaluate
