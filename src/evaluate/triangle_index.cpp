@@ -79,7 +79,9 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
   const auto visit = [](RTCPointQueryFunctionArguments* found) {
     auto& s = *static_cast<Search*>(found->userPtr);
     const MeshPoint p = s.index.on(found->primID, s.q);
-    if (!(p.squared_distance < s.best.squared_distance)) return false;
+    const bool tie = p.squared_distance == s.best.squared_distance;  // on an edge: the first triangle's
+    if (!(p.squared_distance < s.best.squared_distance || (tie && p.triangle < s.best.triangle)))
+      return false;
     s.best = p;
     found->query->radius = static_cast<float>(std::sqrt(p.squared_distance) + s.slack);
     return true;
