@@ -216,8 +216,7 @@ class MapRun {
     if (cameras_.made) return {};
     for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
     if (!request_.resume) return {};
-    cameras_.used = decided_cameras(maps::OutputFolder::partial_of(request_.output), *source_);
-    cameras_.made = !cameras_.used.empty();
+    cameras_.restore(maps::OutputFolder::partial_of(request_.output), *source_);
     return cameras_.made ? open_source() : core::Result<void>();
   }
 

@@ -30,6 +30,26 @@ nlohmann::ordered_json cameras_of(const RunSummary& summary) {
   return list;
 }
 
+std::string camera_json(const RunSummary::Camera& camera) {
+  return camera_of(camera).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try {
+  const auto json = nlohmann::json::parse(text);
+  RunSummary::Camera camera;
+  camera.robot = json.at("robot");
+  camera.gain = json.at("gain");
+  for (const auto& n : json.at("numbers")) {
+    camera.findings.push_back(
+        {n.at("name"), n.at("given"), n.at("found"), n.at("sigma"), n.at("gain"), n.at("used")});
+  }
+  camera.note = json.at("note");
+  camera.doubt = json.at("doubt");
+  return camera;
+} catch (const nlohmann::json::exception&) {
+  return std::nullopt;
+}
+
 nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const RunSummary::DepthField& found : summary.depth_fields) {
