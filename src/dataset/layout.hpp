@@ -22,6 +22,7 @@ struct Layout {
 struct LayoutOptions {
   double max_pair_gap_s = 0.02;
   double fps = 30.0;  ///< for layouts without stamps
+  double depth_delay_s = 0.0;
 };
 
 /// A stamped file of a list, with its place for messages.
@@ -42,10 +43,12 @@ core::Result<Layout> read_seven_scenes(const std::filesystem::path& folder, cons
 core::Result<Layout> read_redwood(const std::filesystem::path& folder, const LayoutOptions& options,
                                   core::Log& log);
 
-/// Pairs by nearest stamp, smallest difference first, each file used once; both lists sorted by stamp. The
-/// result is sorted by colour stamp.
+/// Pairs by when images were taken, depth `depth_delay_s` after its stamps: smallest difference first, each
+/// file used once; both lists sorted by stamp. The result has the lists' stamps and is sorted by that of
+/// colour.
 std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
-                                    const std::vector<StampedFile>& depth, double max_gap_s);
+                                    const std::vector<StampedFile>& depth, double max_gap_s,
+                                    double depth_delay_s = 0.0);
 
 /// What to say when pair_by_stamp finds nothing: the nearest gap, both ranges of time, what to do.
 std::string no_common_time(const std::string& color_name, const std::vector<StampedFile>& color,

@@ -210,7 +210,10 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   // A missing camera must not hide that there is no recording; a layout without stamps needs the camera's
   // fps.
   auto camera = choose_camera(folder, options);
-  const LayoutOptions layout_options{options.max_pair_gap_s, camera ? camera->fps : 30.0};
+  LayoutOptions layout_options;
+  layout_options.max_pair_gap_s = options.max_pair_gap_s;
+  if (camera) layout_options.fps = camera->fps;
+  if (camera) layout_options.depth_delay_s = camera->depth_delay_s;
   auto layout = read_layout(folder, options.format, layout_options, log);
   if (!layout) return tl::unexpected(layout.error());
   const bool none_is_there = !camera && options.camera.empty() && !has_camera_file(folder);
@@ -224,6 +227,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   if (!camera) return tl::unexpected(camera.error());
   if (auto selected = select(options, folder.string(), layout->pairs); !selected)
     return tl::unexpected(selected.error());
+  for (PairInfo& pair : layout->pairs) pair.depth_stamp += camera->depth_delay_s;
 
   fs::path place = fs::weakly_canonical(folder, ignored);  // "." and "room/" have names too
   if (place.filename().empty()) place = folder;

@@ -81,7 +81,7 @@ core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const
   if (!color) return tl::unexpected<core::Error>(color.error());
   auto depth = read_list(folder / "depth.txt", log);
   if (!depth) return tl::unexpected<core::Error>(depth.error());
-  std::vector<PairInfo> pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s);
+  std::vector<PairInfo> pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s, options.depth_delay_s);
   if (pairs.empty()) {
     return core::input_error(no_common_time((folder / "rgb.txt").string(), *color,
                                             (folder / "depth.txt").string(), *depth, options.max_pair_gap_s));

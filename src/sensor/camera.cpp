@@ -177,6 +177,8 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   std::vector<double> slope(2, 0.0);
   table.numbers("depth_slope", slope, 2, {-0.2, 0.2}, "1/m",
                 "Along x and y: what to add to 1 / depth on the ray (x, y, 1)");
+  table.number("depth_delay", camera.depth_delay_s, {-0.1, 0.1}, "s",
+               "How much later than their stamps say depth images were taken");
   if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
 
   check_pinhole(*root, camera.color, "", problems);
@@ -264,6 +266,10 @@ std::string to_yaml(const Camera& camera) {
   if (camera.depth_slope != std::array<double, 2>{}) {
     text += fmt::format("depth_slope: [{}, {}]  # 1/m along x, y: added to 1 / depth on the ray (x, y, 1)\n",
                         camera.depth_slope[0], camera.depth_slope[1]);
+  }
+  if (camera.depth_delay_s != 0.0) {
+    text += fmt::format("depth_delay: {}  # s that depth images were taken later than their stamps say\n",
+                        camera.depth_delay_s);
   }
   if (camera.color_from_depth && camera.depth) {
     const Eigen::Matrix4d m = camera.color_from_depth->isometry().matrix();

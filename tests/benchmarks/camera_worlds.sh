@@ -37,18 +37,20 @@ echo "|---|---|---|---|---|---|---|"
 for seed in "${seeds[@]}"; do
   sign=$((seed % 2 * 2 - 1))
   scene=$([ $((seed % 3)) -eq 0 ] && echo office || echo room)
-  for kind in ${KINDS:-focal k1 slope readout}; do
-    readout=0
+  for kind in ${KINDS:-focal k1 slope readout delay}; do
+    readout=0 delay=0
     [ "$kind" = readout ] && readout=$(python3 -c "print(0.005 * (($seed - 1) % 5 + 1))")
-    world=$work/$scene.$seed.$readout
+    [ "$kind" = delay ] && delay=$(python3 -c "print(0.01 * $sign * (($seed - 1) // 2 % 2 + 1))")
+    world=$work/$scene.$seed.$readout.$delay
     [ -d "$world" ] || "$program" synth "$scene" -o "$world" --frames "${FRAMES:-300}" --seed "$seed" --readout "$readout" \
-      --reference-spacing 0.5 -q
+      --depth-delay "$delay" --reference-spacing 0.5 -q
     true=$world/robot0/camera.yaml wrong=$work/wrong.yaml
     case $kind in
       focal) what="fx, fy $((2 * sign)) %" ; awk -v s="$sign" '/^f[xy]:/ {$2 *= 1 + s * 0.02} {print}' "$true" >"$wrong" ;;
       k1) what="k1 $sign * 0.05" ; sed "s/^distortion:.*/distortion: [$(python3 -c "print(0.05 * $sign)"), 0, 0, 0, 0]/" "$true" >"$wrong" ;;
       slope) what="depth_slope x $sign * 0.02" ; { cat "$true" ; echo "depth_slope: [$(python3 -c "print(0.02 * $sign)"), 0]" ; } >"$wrong" ;;
       readout) what="readout, $readout s" ; sed '/^readout/d' "$true" >"$wrong" ;;
+      delay) what="depth_delay, $delay s" ; sed '/^depth_delay/d' "$true" >"$wrong" ;;
     esac
     right=$(ate "$world/robot0" "$true" off)
     kept=$(ate "$world/robot0" "$true" auto)

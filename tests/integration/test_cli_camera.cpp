@@ -97,6 +97,8 @@ TEST_F(CameraRefinement, ResumingKeepsWhatWasDecided) {
   EXPECT_FALSE(o.told("beginning again")) << o;
   EXPECT_EQ(slurp(path("out/trajectory.txt")), slurp(path("whole/trajectory.txt")));
   EXPECT_EQ(slurp(path("out/camera.yaml")), slurp(path("whole/camera.yaml")));
+  ASSERT_EQ(cameras("out").size(), 1U);
+  EXPECT_EQ(cameras("out"), cameras("whole"));
 }
 
 TEST_F(CameraRefinement, WithoutAFileTheCameraIsAGuessThatTheRecordingConfirms) {

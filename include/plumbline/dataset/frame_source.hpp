@@ -19,7 +19,7 @@ namespace plumbline::dataset {
 
 struct PairInfo {
   double stamp = 0.0;        ///< of colour, seconds
-  double depth_stamp = 0.0;  ///< seconds
+  double depth_stamp = 0.0;  ///< seconds; the camera's depth_delay_s is in it
   std::string color_file;    ///< for messages; empty when there is no file
   std::string depth_file;
 };

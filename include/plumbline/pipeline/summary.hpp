@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -78,7 +79,7 @@ struct RunSummary {
   struct Camera {
     std::string robot;
     std::vector<mapping::CameraFinding> findings;
-    double gain = 0.0;  ///< share of what was left unexplained, where it was not looked for
+    double gain = 0.0;  ///< by which share parts of the map fit better that it was not found from
     std::string note;   ///< why nothing was found; empty: it was looked for
     std::string doubt;  ///< why the camera must not be trusted; empty: nothing speaks against it
   };
@@ -170,6 +171,11 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
 /// the memory the process held when the frame was done, MB.
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
                                 const std::vector<StageTiming>& parts, const dataset::FrameSource& source);
+
+/// What summary.json says of a camera, on one line.
+std::string camera_json(const RunSummary::Camera& camera);
+/// None: `text` is not that.
+std::optional<RunSummary::Camera> camera_from_json(const std::string& text);
 
 /// What summary.json says of a merge.
 std::string evidence_json(const RunSummary::Merge& merge);

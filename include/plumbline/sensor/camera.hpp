@@ -52,7 +52,8 @@ struct Camera {
   /// What depth gets wrong across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
   /// ray (x, y, 1) of the undistorted colour camera. A depth camera whose axis is not where its maker thinks.
   std::array<double, 2> depth_slope{};
-  bool guess = false;  ///< typical values, of no file
+  double depth_delay_s = 0.0;  ///< so much later than their stamps say were depth images taken
+  bool guess = false;          ///< typical values, of no file
 
   [[nodiscard]] bool distorted() const {
     for (double k : distortion) {
@@ -63,8 +64,8 @@ struct Camera {
 };
 
 /// Reads a camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
-/// depth_slope [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told together with
-/// file:line:column (kUsage).
+/// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told
+/// together with file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
 
 /// Reads the intrinsics file of an Open3D recording (JSON: width, height, intrinsic_matrix of 9 numbers

@@ -25,8 +25,9 @@ struct SynthOptions {
   int width = 640;
   int height = 480;
   double fps = 30.0;
-  double speed = 1.0;      ///< times the scene's own speed
-  double readout_s = 0.0;  ///< rolling shutter of the colour camera: first to last row; 0: all at once
+  double speed = 1.0;          ///< times the scene's own speed
+  double readout_s = 0.0;      ///< rolling shutter of the colour camera: first to last row; 0: all at once
+  double depth_delay_s = 0.0;  ///< depth images are taken so much later than their stamps say
   double reference_spacing = 0.0;  ///< m between samples of reference.ply; 0 = 5 mm, more for large scenes
   double visible_range = 4.0;      ///< m; as far as the shipped pipelines use depth, and the sensor's range
   /// Hard moments, "kind@start+duration[*value]" in seconds from the first frame, separated by commas; added

@@ -48,7 +48,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
 }
 
 /// Tells recordings apart without reading their images.
-std::string input_text(const dataset::FrameSource& source) {
+std::string input_text(const RobotRecordings& source) {
   core::Hash hash;
   for (std::size_t i = 0; i < source.size(); ++i) hash.number(source.info(i).stamp);
   std::string text = fmt::format("frames: {}\n", source.size());
@@ -56,7 +56,12 @@ std::string input_text(const dataset::FrameSource& source) {
     text += fmt::format("first: {:.6f} s\nlast: {:.6f} s\n", source.info(0).stamp,
                         source.info(source.size() - 1).stamp);
   }
-  return text + fmt::format("stamps: {:016x}\n", hash.value());
+  text += fmt::format("stamps: {:016x}\n", hash.value());
+  for (const RobotInfo& robot : source.robots()) {
+    if (robot.camera.depth_delay_s != 0.0)
+      text += fmt::format("depth_delay: {} s\n", robot.camera.depth_delay_s);
+  }
+  return text;
 }
 
 /// The same request for any order of its recordings: by name, and by folder where names are alike.
@@ -210,8 +215,7 @@ class MapRun {
     if (cameras_.made) return {};
     for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
     if (!request_.resume) return {};
-    cameras_.used = decided_cameras(maps::OutputFolder::partial_of(request_.output), *source_);
-    cameras_.made = !cameras_.used.empty();
+    cameras_.restore(maps::OutputFolder::partial_of(request_.output), *source_);
     return cameras_.made ? open_source() : core::Result<void>();
   }
 

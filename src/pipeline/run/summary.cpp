@@ -9,28 +9,15 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
+#include "run/summary_json.hpp"
 
 namespace plumbline::pipeline {
 namespace {
 
 constexpr double kMostLostPercent = 10.0;
-
-/// Numbers are for people: 4 decimals are more than any of them is good for.
-double rounded(double value) { return std::round(value * 1e4) / 1e4; }
-
-/// The 4 x 4 matrix, row by row.
-nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
-  nlohmann::ordered_json matrix = nlohmann::ordered_json::array();
-  const Eigen::Matrix4d values = transform.isometry().matrix();
-  for (int row = 0; row < 4; ++row) {
-    matrix.push_back({values(row, 0), values(row, 1), values(row, 2), values(row, 3)});
-  }
-  return matrix;
-}
 
 /// Every candidate that was verified: what was found, and why it is no loop.
 nlohmann::ordered_json trials_of(const RunSummary& summary) {
@@ -107,13 +94,6 @@ std::string left_out_of_map_text(const RunSummary& summary) {
   return text.empty() ? text : text + ", of the merged cloud";
 }
 
-nlohmann::ordered_json laid(const mapping::OverlayFit& fit) {
-  return {{"expected", fit.expected},
-          {"matched", fit.matched},
-          {"chance", rounded(fit.chance)},
-          {"seen_through", fit.contradicted}};
-}
-
 nlohmann::ordered_json fits_of(const optimize::BundleFits& fits) {
   nlohmann::ordered_json all = nlohmann::ordered_json::object();
   for (const auto& [name, fit] :
@@ -121,114 +101,6 @@ nlohmann::ordered_json fits_of(const optimize::BundleFits& fits) {
     if (fit.all > 0) all[name] = {{"all", fit.all}, {"fitting", fit.fitting}, {"rms", rounded(fit.rms)}};
   }
   return all;
-}
-
-nlohmann::ordered_json cameras_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const RunSummary::Camera& camera : summary.cameras) {
-    nlohmann::ordered_json numbers = nlohmann::ordered_json::array();
-    for (const mapping::CameraFinding& f : camera.findings) {
-      numbers.push_back({{"name", f.name},
-                         {"given", f.given},
-                         {"found", f.found},
-                         {"sigma", f.sigma},
-                         {"gain", rounded(f.gain)},
-                         {"used", f.used}});
-    }
-    list.push_back({{"robot", camera.robot},
-                    {"gain", rounded(camera.gain)},
-                    {"numbers", numbers},
-                    {"note", camera.note},
-                    {"doubt", camera.doubt}});
-  }
-  return list;
-}
-
-nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const RunSummary::DepthField& found : summary.depth_fields) {
-    nlohmann::ordered_json entry = {{"robot", found.robot},
-                                    {"used", found.report.used},
-                                    {"samples", found.report.samples},
-                                    {"before", rounded(found.report.before)},
-                                    {"after", rounded(found.report.after)}};
-    if (found.report.used) {
-      const auto& c = found.field.coefficients();
-      entry["most_at_2m"] = rounded(found.report.most_at_2m);
-      entry["coefficients"] = std::vector<double>(c.data(), c.data() + c.size());
-    }
-    list.push_back(entry);
-  }
-  return list;
-}
-
-/// Standard deviations, the whole matrix, and where the maps lie.
-void add_alignment(const mapping::Alignment& alignment, nlohmann::ordered_json& entry) {
-  nlohmann::ordered_json sigma = nlohmann::ordered_json::array();
-  nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
-  for (int row = 0; row < 6; ++row) {
-    sigma.push_back(rounded(std::sqrt(alignment.covariance(row, row))));
-    nlohmann::ordered_json line = nlohmann::ordered_json::array();
-    for (int column = 0; column < 6; ++column) line.push_back(alignment.covariance(row, column));
-    covariance.push_back(line);
-  }
-  entry["sigma"] = sigma;
-  entry["covariance"] = covariance;
-  entry["a_from_b"] = rows(alignment.a_from_b);
-}
-
-nlohmann::ordered_json merges_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const RunSummary::Merge& merge : summary.merges) {
-    const mapping::MergeEvidence& e = merge.evidence;
-    const mapping::PairTotals totals = e.totals();
-    nlohmann::ordered_json refused = nlohmann::ordered_json::object();
-    for (const auto& [why, count] : e.refused_pairs) refused[why] = count;
-    nlohmann::ordered_json entry = {{"a", merge.a},
-                                    {"b", merge.b},
-                                    {"accepted", e.accepted},
-                                    {"reason", e.refused},
-                                    {"candidates", e.candidates},
-                                    {"tried", e.tried},
-                                    {"verified", e.consistency.verified},
-                                    {"refused", refused},
-                                    {"agreeing", e.consistency.agreeing},
-                                    {"alternative", e.ambiguity.alternative},
-                                    {"overlay", laid(e.ambiguity.overlap)},
-                                    {"expected", e.validation.expected},
-                                    {"confirmed", e.validation.confirmed},
-                                    {"pairs", e.pairs.size()},
-                                    {"rejected", e.rejected},
-                                    {"matches", totals.matches},
-                                    {"inliers", totals.inliers},
-                                    {"rms", rounded(totals.rms_px)},
-                                    {"overlap", rounded(totals.overlap)},
-                                    {"span_m", rounded(e.consistency.span_m)},
-                                    {"span_rad", rounded(e.consistency.span_rad)},
-                                    {"spread_m", rounded(e.alignment.spread_m)}};
-    if (e.ambiguity.alternative_m > 0.0) {
-      entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
-      entry["alternative_overlay"] = laid(e.ambiguity.alternative_overlap);
-    }
-    if (e.accepted) add_alignment(e.alignment, entry);
-    if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
-    if (merge.evident_s >= 0.0) entry["evident_s"] = rounded(merge.evident_s);
-    list.push_back(entry);
-  }
-  return list;
-}
-
-nlohmann::ordered_json meetings_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const RunSummary::Meeting& meeting : summary.meetings) {
-    list.push_back({{"number", meeting.number},
-                    {"a", meeting.a},
-                    {"b", meeting.b},
-                    {"time_s", rounded(meeting.time_s)},
-                    {"frame", meeting.frame},
-                    {"taken_back", meeting.taken_back}});
-  }
-  return list;
 }
 
 nlohmann::ordered_json path_of(const RunSummary& summary) {
@@ -393,12 +265,6 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
   // Names of files need not be UTF-8: replace what JSON cannot hold.
   return core::write_file(file,
                           json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
-}
-
-std::string evidence_json(const RunSummary::Merge& merge) {
-  RunSummary one;
-  one.merges.push_back(merge);
-  return merges_of(one).front().dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,

@@ -102,27 +102,33 @@ core::Result<void> write_cameras(const std::filesystem::path& folder, const Robo
     const std::filesystem::path file = camera_file(folder, recordings, robot.number);
     std::error_code ignored;
     std::filesystem::create_directories(file.parent_path(), ignored);
-    const sensor::Camera& given = decision.given[static_cast<std::size_t>(robot.number)];
-    if (auto ok = core::write_file(file, made_of(given) + "\n" + sensor::to_yaml(robot.camera)); !ok)
-      return ok;
+    const auto number = static_cast<std::size_t>(robot.number);
+    std::string text = made_of(decision.given[number]) + "\n";
+    if (!decision.said.empty()) text += "# " + camera_json(decision.said[number]) + "\n";
+    if (auto ok = core::write_file(file, text + sensor::to_yaml(robot.camera)); !ok) return ok;
   }
   return {};
 }
 
-std::vector<sensor::Camera> decided_cameras(const std::filesystem::path& folder,
-                                            const RobotRecordings& recordings) {
-  std::vector<sensor::Camera> cameras;
+void CameraDecision::restore(const std::filesystem::path& folder, const RobotRecordings& recordings) {
+  CameraDecision found;
   for (const RobotInfo& robot : recordings.robots()) {
     const std::filesystem::path file = camera_file(folder, recordings, robot.number);
     std::ifstream in(file);
     std::string first;
+    std::string told;
     std::getline(in, first);
+    std::getline(in, told);
     const auto camera = sensor::read_camera(file);
-    if (first != made_of(robot.camera) || !camera) return {};
-    cameras.push_back(*camera);
-    cameras.back().guess = robot.camera.guess && sensor::to_yaml(*camera) == sensor::to_yaml(robot.camera);
+    if (first != made_of(robot.camera) || !camera) return;
+    found.used.push_back(*camera);
+    found.used.back().guess = robot.camera.guess && sensor::to_yaml(*camera) == sensor::to_yaml(robot.camera);
+    if (auto camera_said = camera_from_json(told.substr(0, 2) == "# " ? told.substr(2) : ""))
+      found.said.push_back(std::move(*camera_said));
   }
-  return cameras;
+  used = std::move(found.used);
+  said = std::move(found.said);
+  made = true;
 }
 
 }  // namespace plumbline::pipeline

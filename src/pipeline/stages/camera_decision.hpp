@@ -28,15 +28,13 @@ struct CameraDecision {
   /// After all were asked, or nobody is to be: writes what is used. An error ends the run: it is to begin
   /// again.
   core::Result<void> settle(const RunContext& context);
+  /// What an interrupted run decided for these recordings; nothing changes when it had not, or was given
+  /// other cameras.
+  void restore(const std::filesystem::path& folder, const RobotRecordings& recordings);
 };
 
 /// OUT/camera.yaml, of several robots OUT/robots/NAME/camera.yaml.
 core::Result<void> write_cameras(const std::filesystem::path& folder, const RobotRecordings& recordings,
                                  const CameraDecision& decision);
-
-/// What an interrupted run used in place of these recordings' cameras; empty: it had not decided, or it was
-/// given others.
-std::vector<sensor::Camera> decided_cameras(const std::filesystem::path& folder,
-                                            const RobotRecordings& recordings);
 
 }  // namespace plumbline::pipeline

@@ -173,7 +173,8 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
   const maps::StoreHeader& header = reader->header();
   if (auto same = check_same(run.store, "recording", header.input, input); !same) return fail(same.error());
   for (const RobotInfo& robot : header.robots) {
-    const sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
+    sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
+    camera.depth_delay_s = 0.0;  // belongs to the recording's stamps
     if (auto same = check_same(run.store, "camera", sensor::to_yaml(robot.camera), sensor::to_yaml(camera));
         !same) {
       return fail(same.error());

@@ -32,11 +32,18 @@ std::string depth_name(const dataset::PairInfo& info) {
   return fmt::format("depth/{:.6f}.png", info.depth_stamp);
 }
 
+/// With the stamps that the files have.
+dataset::PairInfo labelled(const SynthSource& source, std::size_t index) {
+  dataset::PairInfo info = source.info(index);
+  info.depth_stamp -= source.camera().depth_delay_s;
+  return info;
+}
+
 /// Writes one pair; "" or what went wrong.
 std::string write_pair(const SynthSource& source, std::size_t index, const fs::path& folder) {
   const auto frame = source.read(index);
   if (!frame) return frame.error().message;
-  const dataset::PairInfo info = source.info(index);
+  const dataset::PairInfo info = labelled(source, index);
   cv::Mat raw;
   frame->depth.convertTo(raw, CV_16U, source.camera().depth_scale);
   const std::string problem = write_png(folder / color_name(info), frame->color);
@@ -48,14 +55,14 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
   for (std::size_t i = 0; i < frames; ++i) {
-    const dataset::PairInfo info = source.info(i);
+    const dataset::PairInfo info = labelled(source, i);
     color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
     depth += fmt::format("{:.6f} {}\n", info.depth_stamp, depth_name(info));
     pairs += fmt::format("{:.6f} {} {:.6f} {}\n", info.stamp, color_name(info), info.depth_stamp,
                          depth_name(info));
     truth.push_back({info.stamp, source.world_from_camera(info.stamp)});
-    if (info.depth_stamp != info.stamp)
-      truth.push_back({info.depth_stamp, source.world_from_camera(info.depth_stamp)});
+    const double depth_taken = source.info(i).depth_stamp;
+    if (depth_taken != info.stamp) truth.push_back({depth_taken, source.world_from_camera(depth_taken)});
   }
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
@@ -127,6 +134,7 @@ nlohmann::json describe_options(const SynthOptions& o) {
           {"fps", o.fps},
           {"speed", o.speed},
           {"readout", o.readout_s},
+          {"depth_delay", o.depth_delay_s},
           {"visible_range", o.visible_range},
           {"events", o.events}};
 }

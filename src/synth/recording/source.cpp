@@ -63,7 +63,9 @@ std::vector<Stamps> make_stamps(const SynthOptions& o, const std::vector<Event>&
     bool dropped = false;
     for (const Event& e : events) dropped = dropped || (e.kind == EventKind::kDrop && e.active(t));
     const double stamp = whole_us(kFirstStamp + t + jitter);
-    if (!dropped) out.push_back({static_cast<std::int64_t>(i), stamp, whole_us(stamp + offset + other)});
+    if (!dropped)
+      out.push_back(
+          {static_cast<std::int64_t>(i), stamp, whole_us(stamp + offset + other + o.depth_delay_s)});
   }
   return out;
 }
@@ -241,6 +243,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->name = o.robots > 1 ? fmt::format("{}-robot{}", world->scene.name, robot) : world->scene.name;
   impl->camera = make_camera(o.sensor, o.width, o.height, o.fps);
   impl->camera.readout_s = o.readout_s;
+  impl->camera.depth_delay_s = o.depth_delay_s;
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
   CameraPath::Options motion;
   motion.speed = o.speed;

@@ -33,6 +33,8 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.number(
       "readout", readout_s, {0.0, 0.1}, "s",
       "Rolling shutter of the colour camera: from the first row to the last; a stamp is the middle row's");
+  table.number("depth_delay", depth_delay_s, {-0.1, 0.1}, "s",
+               "How much later than its stamp says a depth image is taken");
   table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
                "Distance between samples of reference.ply; 0 = 5 mm, more for large scenes");
   table.number("visible_range", visible_range, {0.5, 20.0}, "m",

@@ -70,6 +70,23 @@ TEST_F(Tum, PairsByNearestStampOnceEach) {
   EXPECT_EQ((*open(wide))->size(), 3U);
 }
 
+TEST_F(Tum, PairsByWhenDepthWasTaken) {
+  write_tum(3);
+  write_text("rgb.txt", "100.000 rgb/0.png\n100.033 rgb/1.png\n100.066 rgb/2.png\n");
+  write_text("depth.txt", "100.001 depth/0.png\n100.034 depth/1.png\n100.067 depth/2.png\n");
+  write_camera("depth_scale: 5000\ndepth_delay: 0.03\n");
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  ASSERT_EQ((*source)->size(), 2U);
+  EXPECT_THAT((*source)->info(0).color_file, HasSubstr("rgb/1.png"));
+  EXPECT_THAT((*source)->info(0).depth_file, HasSubstr("depth/0.png"));
+  EXPECT_NEAR((*source)->info(0).depth_stamp, 100.031, 1e-9);
+  EXPECT_NEAR((*source)->read(0)->depth_stamp, 100.031, 1e-9);
+  // Listed pairs stay what they are.
+  write_text("associations.txt", "100.000 rgb/0.png 100.001 depth/0.png\n");
+  EXPECT_NEAR((*open())->info(0).depth_stamp, 100.031, 1e-9);
+}
+
 TEST_F(Tum, AssociationsInEitherOrder) {
   write_tum(3);
   write_text("associations.txt",

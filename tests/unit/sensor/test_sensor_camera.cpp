@@ -76,6 +76,7 @@ TEST_F(CameraFile, TextReadsBackTheSame) {
   camera->readout_s = 0.021;
   EXPECT_EQ(camera->depth_slope, (std::array<double, 2>{}));
   camera->depth_slope = {0.0125, -1.0 / 300.0};
+  camera->depth_delay_s = -0.1 / 7.0;
   camera->color_from_depth->rotation = geometry::exp_so3({0.01, -0.02, 0.03});
   const auto again = read_camera(write(to_yaml(*camera), "again.yaml"));
   ASSERT_TRUE(again) << again.error().message;
@@ -83,6 +84,7 @@ TEST_F(CameraFile, TextReadsBackTheSame) {
   EXPECT_EQ(again->color.fx, camera->color.fx);
   EXPECT_EQ(again->readout_s, camera->readout_s);
   EXPECT_EQ(again->depth_slope, camera->depth_slope);
+  EXPECT_EQ(again->depth_delay_s, camera->depth_delay_s);
   EXPECT_EQ(again->distortion, camera->distortion);
   EXPECT_EQ(again->depth->fx, camera->depth->fx);
   EXPECT_LT((again->color_from_depth->rotation - camera->color_from_depth->rotation).norm(), 1e-14);
@@ -126,6 +128,11 @@ TEST_F(CameraFile, ImpossibleValues) {
 TEST_F(CameraFile, DepthSlopeIsTwoSmallNumbers) {
   EXPECT_THAT(error_of(std::string(kGood) + "depth_slope: [0.01]\n"), HasSubstr("depth_slope"));
   EXPECT_THAT(error_of(std::string(kGood) + "depth_slope: [0.01, 0.5]\n"), HasSubstr("depth_slope"));
+}
+
+TEST_F(CameraFile, DepthDelayIsAFewFramesAtMost) {
+  EXPECT_THAT(error_of(std::string(kGood) + "depth_delay: 0.2\n"), HasSubstr("depth_delay"));
+  EXPECT_THAT(error_of(std::string(kGood) + "depth_delay: late\n"), HasSubstr("depth_delay"));
 }
 
 TEST_F(CameraFile, DepthCameraMustBeRigidAndComplete) {

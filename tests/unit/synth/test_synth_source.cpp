@@ -62,6 +62,21 @@ bool same(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0.0;
 }
 
+TEST(SynthSource, DepthComesLaterThanItsStampWhereThatIsAsked) {
+  SynthOptions late = small(Sensor::kKinect, 3);
+  late.depth_delay_s = 0.02;
+  const auto source = source_of(kCell, late);
+  const auto prompt = source_of(kCell, small(Sensor::kKinect, 3));
+  EXPECT_EQ(source->camera().depth_delay_s, 0.02);
+  for (std::size_t i = 0; i < source->size(); ++i) {
+    EXPECT_EQ(source->info(i).stamp, prompt->info(i).stamp);
+    EXPECT_NEAR(source->info(i).depth_stamp, prompt->info(i).depth_stamp + 0.02, 1.5e-6);
+    EXPECT_EQ(source->read(i)->depth_stamp, source->info(i).depth_stamp);
+    const Eigen::Vector3d there = source->world_from_camera(source->info(i).depth_stamp).translation;
+    EXPECT_EQ(source->exact(i).world_from_depth.translation, there);
+  }
+}
+
 TEST(SynthSource, IdealDepthIsTheTrueSurface) {
   const auto source = source_of(kCell, small(Sensor::kIdeal, 5));
   for (std::size_t i = 0; i < source->size(); ++i) {

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What summary.json says of cameras: what the maps told of them, and the errors of their depth.
+#include "run/summary_json.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+nlohmann::ordered_json camera_of(const RunSummary::Camera& camera) {
+  nlohmann::ordered_json numbers = nlohmann::ordered_json::array();
+  for (const mapping::CameraFinding& f : camera.findings) {
+    numbers.push_back({{"name", f.name},
+                       {"given", f.given},
+                       {"found", f.found},
+                       {"sigma", f.sigma},
+                       {"gain", rounded(f.gain)},
+                       {"used", f.used}});
+  }
+  return {{"robot", camera.robot},
+          {"gain", rounded(camera.gain)},
+          {"numbers", numbers},
+          {"note", camera.note},
+          {"doubt", camera.doubt}};
+}
+
+}  // namespace
+
+nlohmann::ordered_json cameras_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::Camera& camera : summary.cameras) list.push_back(camera_of(camera));
+  return list;
+}
+
+std::string camera_json(const RunSummary::Camera& camera) {
+  return camera_of(camera).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try {
+  const auto json = nlohmann::json::parse(text);
+  RunSummary::Camera camera;
+  camera.robot = json.at("robot");
+  camera.gain = json.at("gain");
+  for (const auto& n : json.at("numbers")) {
+    camera.findings.push_back(
+        {n.at("name"), n.at("given"), n.at("found"), n.at("sigma"), n.at("gain"), n.at("used")});
+  }
+  camera.note = json.at("note");
+  camera.doubt = json.at("doubt");
+  return camera;
+} catch (const nlohmann::json::exception&) {
+  return std::nullopt;
+}
+
+nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RunSummary::DepthField& found : summary.depth_fields) {
+    nlohmann::ordered_json entry = {{"robot", found.robot},
+                                    {"used", found.report.used},
+                                    {"samples", found.report.samples},
+                                    {"before", rounded(found.report.before)},
+                                    {"after", rounded(found.report.after)}};
+    if (found.report.used) {
+      const auto& c = found.field.coefficients();
+      entry["most_at_2m"] = rounded(found.report.most_at_2m);
+      entry["coefficients"] = std::vector<double>(c.data(), c.data() + c.size());
+    }
+    list.push_back(entry);
+  }
+  return list;
+}
+
+}  // namespace plumbline::pipeline
