@@ -9,13 +9,13 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <system_error>
-#include <thread>
 #include <utility>
 
 #include "hub_desk.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
+#include "side_thread.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -39,22 +39,6 @@ class LogFile : public core::Log {
   std::mutex mutex_;
   std::ofstream file_;
   core::Log& next_;
-};
-
-/// As long as it lives.
-class Goodbye {
- public:
-  explicit Goodbye(HubDesk& desk) : thread_([this, &desk] { desk.say_goodbye(stop_); }) {}
-  Goodbye(const Goodbye&) = delete;
-  Goodbye& operator=(const Goodbye&) = delete;
-  ~Goodbye() {
-    stop_.request_stop();
-    thread_.join();
-  }
-
- private:
-  core::StopToken stop_;
-  std::thread thread_;
 };
 
 core::Result<void> move_up(const fs::path& from, const fs::path& to) {
@@ -156,35 +140,14 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
   });
 }
 
-}  // namespace
-
-core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
-                                           core::Log& console, const core::StopToken& stop,
-                                           const Status& status, const pipeline::Progress& progress) {
+/// The maps that came, fused into `folder`; what keeps the result from being trusted is its `reason`.
+core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const fs::path& folder,
+                                                  const std::vector<RobotTraffic>& traffic,
+                                                  const HubMeetings& meetings, const core::Executor& executor,
+                                                  core::Log& log, const pipeline::Progress& progress) {
   const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
-  const auto options = checked(request.network, true);
-  if (!options) return fail(options.error());
-  const pipeline::FuseRequest& fuse = request.fuse;
-  auto output = request.resume ? maps::OutputFolder::resume(fuse.output, fuse.replace)
-                               : maps::OutputFolder::prepare(fuse.output, fuse.replace);
-  if (!output) return fail(output.error());
-  output->keep();
-  const fs::path folder = output->path();
-  LogFile log(folder / "hub.log", console);
-  if (auto secure = warn_of_security(*options, log); !secure) return fail(secure.error());
-  auto bus = open_logged_bus(*options, log);
-  if (!bus) return fail(bus.error());
-  auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);
-  if (!desk) return fail(desk.error());
-  if (auto alone = (*desk)->look_for_others(stop); !alone) return fail(alone.error());
-  log.info(
-      fmt::format("waiting for {} on {}, domain {}",
-                  request.robots > 0 ? fmt::format("{} robots", request.robots) : "robots; Ctrl-C ends that",
-                  options->interface, options->domain));
-  const std::vector<RobotTraffic> traffic = (*desk)->serve(stop, status);
-  const Goodbye goodbye(**desk);
   std::string reason;
-  pipeline::FuseRequest last = fuse;
+  pipeline::FuseRequest last = request.fuse;
   last.maps = usable_maps(folder, traffic, request.robots, executor, log, reason);
   if (last.maps.empty()) {
     return core::failure(
@@ -199,10 +162,43 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;
   if (auto moved = move_up(last.output, folder); !moved) return fail(moved.error());
-  if (auto added = add_network(folder / "summary.json", traffic, (*desk)->meetings().meetings(), reason);
-      !added) {
+  if (auto added = add_network(folder / "summary.json", traffic, meetings.meetings(), reason); !added) {
     return fail(added.error());
   }
+  return summary;
+}
+
+}  // namespace
+
+core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
+                                           core::Log& console, const core::StopToken& stop,
+                                           const Status& status, const pipeline::Progress& progress) {
+  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
+  const auto options = checked(request.network, true);
+  if (!options) return fail(options.error());
+  auto output = request.resume ? maps::OutputFolder::resume(request.fuse.output, request.fuse.replace)
+                               : maps::OutputFolder::prepare(request.fuse.output, request.fuse.replace);
+  if (!output) return fail(output.error());
+  output->keep();
+  const fs::path folder = output->path();
+  LogFile log(folder / "hub.log", console);
+  if (auto secure = warn_of_security(*options, log); !secure) return fail(secure.error());
+  auto bus = open_logged_bus(*options, log);
+  if (!bus) return fail(bus.error());
+  auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);
+  if (!desk) return fail(desk.error());
+  if (auto alone = (*desk)->look_for_others(stop); !alone) return fail(alone.error());
+  log.info(
+      fmt::format("waiting for {} on {}, domain {}",
+                  request.robots > 0 ? fmt::format("{} robots", request.robots) : "robots; Ctrl-C ends that",
+                  options->interface, options->domain));
+  (*desk)->serve(stop, status);
+  const HubDesk::Collected collected = (*desk)->close();
+  const SideThread goodbye(
+      [&](const core::StopToken& enough) { (*desk)->speaker().say_goodbye(collected.last_words, enough); });
+  auto summary =
+      fuse_collected(request, folder, collected.traffic, (*desk)->meetings(), executor, log, progress);
+  if (!summary) return summary;
   if (auto committed = output->commit(); !committed) return fail(committed.error());
   return summary;
 }

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <thread>
 #include <utility>
 
 #include "plumbline/core/version.hpp"
@@ -17,7 +16,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kWait = 50ms;
-constexpr auto kSayAgain = 500ms;
 constexpr auto kLookForOthers = 2500ms;
 constexpr auto kTroubleLasts = 3s;
 constexpr int kPiecesAtATime = 4;           // of one robot, before the next one's
@@ -40,14 +38,11 @@ core::Result<std::unique_ptr<HubDesk>> HubDesk::open(const std::filesystem::path
 }
 
 core::Result<void> HubDesk::read_ledger() {
-  const auto known = ledger_.all();
+  const auto known = ledger().all();
   if (!known) return tl::unexpected<core::Error>(known.error());
   std::map<std::string, std::string> texts(known->begin(), known->end());
-  id_ = texts["hub"];
-  if (id_.empty()) {
-    id_ = request_.fresh_id;
-    if (auto put = ledger_.put({{"hub", id_}}); !put) return put;
-  }
+  speaker_.set_id(texts["hub"].empty() ? request_.fresh_id : texts["hub"]);
+  if (auto put = ledger().put({{"hub", speaker_.id()}}); !put) return put;
   for (const auto& [key, run] : *known) {
     constexpr std::size_t kPrefix = 6;
     const std::string ending = "/run";
@@ -57,10 +52,9 @@ core::Result<void> HubDesk::read_ledger() {
     hello.name = key.substr(kPrefix, key.size() - kPrefix - ending.size());
     if (!is_robot_name(hello.name)) continue;
     hello.run = run;
+    hello.incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     const auto robot = add(hello);
     if (!robot) return tl::unexpected<core::Error>(robot.error());
-    (*robot)->run = run;
-    (*robot)->incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     (*robot)->done = texts[key_of(hello.name, "state")] == kDone;
     log_.info(fmt::format("{}: {} keyframes are here from before", hello.name, (*robot)->copy().keyframes()));
     if ((*robot)->copy().keyframes() > 0) meetings_.committed(hello.name);
@@ -68,39 +62,37 @@ core::Result<void> HubDesk::read_ledger() {
   return {};
 }
 
-core::Result<HubRobot*> HubDesk::add(const Hello& hello) {
-  auto robot = HubRobot::open(hello.name, folder_ / "robots" / hello.name / "map.db", request_.quota_bytes);
+core::Result<HubRobot*> HubDesk::add(const Hello& known) {
+  auto robot = HubRobot::open(known, folder_ / "robots" / known.name / "map.db", request_.quota_bytes);
   if (!robot) return tl::unexpected<core::Error>(robot.error());
-  if (auto listened = bus_->listen_to(hello.name); !listened)
+  if (auto listened = bus_->listen_to(known.name); !listened)
     return tl::unexpected<core::Error>(listened.error());
-  return &robots_.insert_or_assign(hello.name, std::move(*robot)).first->second;
+  return &robots_.insert_or_assign(known.name, std::move(*robot)).first->second;
 }
 
 core::Result<void> HubDesk::remember(const HubRobot& robot) const {
-  return ledger_.put({{key_of(robot.name, "run"), robot.run},
-                      {key_of(robot.name, "incarnation"), std::to_string(robot.incarnation)},
-                      {key_of(robot.name, "state"), robot.done ? kDone : "going on"}});
+  const Hello& hello = robot.hello;
+  return ledger().put({{key_of(hello.name, "run"), hello.run},
+                       {key_of(hello.name, "incarnation"), std::to_string(hello.incarnation)},
+                       {key_of(hello.name, "state"), robot.done ? kDone : "going on"}});
 }
 
 core::Result<void> HubDesk::look_for_others(const core::StopToken& stop) {
   const auto until = Clock::now() + kLookForOthers;
   while (Clock::now() < until && !stop.stop_requested()) {
-    if (Clock::now() - said_at_ >= kSayAgain) {
-      say({});
-      said_at_ = Clock::now();
-    }
+    speaker_.say_presence();
     bus_->wait(kWait);
     for (const Word& word : bus_->hear_hubs()) {
-      const bool first = word.up_s >= 0.0 || word.hub < id_;  // of two that begin together one stays
-      if (word.hub == id_ || !first) continue;
+      const bool first =
+          word.up_s >= 0.0 || word.hub < speaker_.id();  // of two that begin together one stays
+      if (word.hub == speaker_.id() || !first) continue;
       return core::usage_error(fmt::format(
           "another hub is there in domain {}; end that one, or choose another --domain for this one "
           "and its robots",
           request_.network.domain));
     }
   }
-  serving_ = true;
-  began_ = Clock::now();
+  speaker_.serve();
   return {};
 }
 
@@ -123,7 +115,7 @@ std::string HubDesk::refusal(const HeardHello& heard) const {
     return fmt::format("{}: the hub takes {} robots, and has {}; begin the hub with a larger --robots",
                        hello.name, most, names);
   }
-  if (known->second.run != hello.run) {
+  if (known->second.hello.run != hello.run) {
     return fmt::format(
         "{}: the hub has another run of that name; give this one another --name, or begin the hub without "
         "--resume "
@@ -150,7 +142,7 @@ void HubDesk::hear(const HeardHello& heard) {
   word.incarnation = hello.incarnation;
   word.answer = Answer::kRefused;
   word.problem = why;
-  say(word);
+  speaker_.say(word);
 }
 
 void HubDesk::let_in(const Hello& hello) {
@@ -158,97 +150,89 @@ void HubDesk::let_in(const Hello& hello) {
   const bool is_new = known == robots_.end();
   const auto fail = [&](const core::Error& error) { report_once(hello.name + ": " + error.message); };
   if (is_new) {
-    const auto added = add(hello);
+    Hello known_by_name;
+    known_by_name.name = hello.name;
+    const auto added = add(known_by_name);
     if (!added) return fail(added.error());
     known = robots_.find(hello.name);
   }
   HubRobot& robot = known->second;
-  if (hello.incarnation < robot.incarnation) return;  // of a process that is gone
-  const bool takes_over = hello.incarnation > robot.incarnation;
-  if (takes_over) {
-    robot.answer = Answer::kAccepted;
-    robot.problem.clear();
-  }
+  if (hello.incarnation < robot.hello.incarnation) return;  // of a process that is gone
+  const bool takes_over = hello.incarnation > robot.hello.incarnation;
+  if (takes_over) robot.verdict = {};
   const auto rewound = robot.hear(hello);
   if (!rewound) return fail(rewound.error());
   if (*rewound) {
-    log_.warning(robot.name + ": has lost what was here; everything is asked for again");
+    log_.warning(hello.name + ": has lost what was here; everything is asked for again");
     meetings_.restart();
   }
   if (is_new || takes_over || *rewound) {
     if (auto put = remember(robot); !put) return fail(put.error());
-    log_.info(fmt::format("{}: {} of its keyframes are here", robot.name, robot.copy().keyframes()));
+    log_.info(fmt::format("{}: {} of its keyframes are here", hello.name, robot.copy().keyframes()));
     robot.changed = true;
   }
   if (robot.done != (robot.done && robot.has_all())) robot.done = false;
-  close(robot);
+  finish(robot);
 }
 
 /// Remembered before it is said: a robot that was told may leave for ever.
-void HubDesk::close(HubRobot& robot) {
-  if (!robot.has_all() || robot.answer == Answer::kRefused) return;
+void HubDesk::finish(HubRobot& robot) {
+  if (!robot.has_all() || robot.verdict.answer == Answer::kRefused) return;
   if (!robot.done) {
     robot.done = true;
     if (auto put = remember(robot); !put) {
       robot.done = false;
-      return report_once(robot.name + ": " + put.error().message);
+      return report_once(robot.hello.name + ": " + put.error().message);
     }
-    log_.info(fmt::format("{}: everything is here, {} keyframes{}", robot.name, robot.copy().keyframes(),
+    log_.info(fmt::format("{}: everything is here, {} keyframes{}", robot.hello.name,
+                          robot.copy().keyframes(),
                           robot.copy().complete() ? "" : "; its run did not come to its end"));
   }
-  robot.answer = Answer::kDone;
+  robot.verdict.answer = Answer::kDone;
   robot.changed = true;
 }
 
 void HubDesk::take_pieces(HubRobot& robot) {
-  for (const Piece& piece : bus_->take(robot.name, kPiecesAtATime)) {
-    const bool other = piece.protocol != kProtocol || piece.name != robot.name || piece.run != robot.run ||
-                       piece.incarnation != robot.incarnation;
-    if (other || robot.answer == Answer::kRefused || Clock::now() < trouble_[robot.name]) continue;
+  const Hello& hello = robot.hello;
+  HubRobot::Verdict& verdict = robot.verdict;
+  for (const Piece& piece : bus_->take(hello.name, kPiecesAtATime)) {
+    const bool other = piece.protocol != kProtocol || piece.name != hello.name || piece.run != hello.run ||
+                       piece.incarnation != hello.incarnation;
+    if (other || verdict.answer == Answer::kRefused || Clock::now() < verdict.until) continue;
     const std::int64_t before = robot.copy().heads().map;
     const auto taken = robot.take(piece);
     if (taken) {
-      if (robot.copy().heads().map > before) meetings_.committed(robot.name);
-      if (robot.answer == Answer::kTrouble) robot.answer = Answer::kAccepted;
-      if (robot.answer == Answer::kAccepted) robot.problem.clear();
-      close(robot);
+      if (robot.copy().heads().map > before) meetings_.committed(hello.name);
+      if (verdict.answer == Answer::kTrouble) verdict.answer = Answer::kAccepted;
+      if (verdict.answer == Answer::kAccepted) verdict.problem.clear();
+      finish(robot);
       continue;
     }
     const bool here = taken.error().kind == core::ErrorKind::kOutput;
-    robot.answer = here ? Answer::kTrouble : Answer::kRefused;
-    robot.problem =
-        here ? fmt::format("{} cannot be stored at the hub: {}", robot.name, taken.error().message)
+    verdict.answer = here ? Answer::kTrouble : Answer::kRefused;
+    verdict.problem =
+        here ? fmt::format("{} cannot be stored at the hub: {}", hello.name, taken.error().message)
              : fmt::format(
                    "{} sent what no map of Plumbline {} holds ({}): check both ends for the same version, "
                    "then begin it again with --resume",
-                   robot.name, core::version(), taken.error().message);
-    log_.error(robot.problem);
+                   hello.name, core::version(), taken.error().message);
+    log_.error(verdict.problem);
     robot.changed = true;
-    if (here) trouble_[robot.name] = Clock::now() + kTroubleLasts;
+    if (here) verdict.until = Clock::now() + kTroubleLasts;
   }
 }
 
-void HubDesk::say(Word word) {
-  word.store_format = maps::kStoreFormat;
-  word.program = core::version();
-  word.hub = id_;
-  word.up_s = serving_ ? std::chrono::duration<double>(Clock::now() - began_).count() : -1.0;
-  bus_->say(word);
+Word HubDesk::word_for(const HubRobot& robot) const {
+  Word word = robot.word();
+  word.place = meetings_.place(word.robot);
+  return word;
 }
 
 void HubDesk::say_all() {
-  const bool again = Clock::now() - said_at_ >= kSayAgain;
-  if (again) {
-    say({});
-    said_at_ = Clock::now();
-  }
+  const bool again = speaker_.say_presence();
   for (auto& [name, robot] : robots_) {
-    if (robot.run.empty() || !(again || robot.changed)) continue;
-    // A robot whose pieces could not be stored is asked for them again.
-    Word word = robot.word();
-    word.place = meetings_.place(name);
-    if (word.answer == Answer::kTrouble && Clock::now() >= trouble_[name]) word.answer = Answer::kAccepted;
-    say(word);
+    if (robot.hello.run.empty() || !(again || robot.changed)) continue;
+    speaker_.say(word_for(robot));
     robot.changed = false;
   }
 }
@@ -265,7 +249,7 @@ std::string HubDesk::line(double kbytes_per_s) const {
   std::int64_t behind = 0;
   for (const auto& [name, robot] : robots_) {
     keyframes += robot.copy().keyframes();
-    silent += robot.silent() && !robot.done ? 1U : 0U;
+    silent += robot.presence.silent() && !robot.done ? 1U : 0U;
     const std::int64_t lacks =
         std::max(robot.hello.map_head, robot.hello.clouds_head) - robot.copy().heads().last();
     behind += std::max<std::int64_t>(0, lacks);
@@ -276,22 +260,26 @@ std::string HubDesk::line(double kbytes_per_s) const {
                      behind);
 }
 
-std::vector<RobotTraffic> HubDesk::serve(const core::StopToken& stop, const Status& status) {
+void HubDesk::listen() {
+  for (const HeardHello& heard : bus_->hear()) hear(heard);
+  for (const Word& word : bus_->hear_hubs()) {
+    if (word.hub != speaker_.id() && word.up_s >= 0.0)
+      report_once("another hub is there; robots stay with whom they found first");
+  }
+  for (auto& [name, robot] : robots_) {
+    take_pieces(robot);
+    const bool silent = robot.presence.silent() && !robot.done;
+    if (robot.presence.tell(silent))
+      log_.info(fmt::format("{}: {}", name, silent ? "is not heard any more" : "is heard"));
+  }
+}
+
+void HubDesk::serve(const core::StopToken& stop, const Status& status) {
   auto line_at = Clock::now();
   std::uint64_t before = received();
   while (!stop.stop_requested()) {
     bus_->wait(kWait);
-    for (const HeardHello& heard : bus_->hear()) hear(heard);
-    for (const Word& word : bus_->hear_hubs()) {
-      if (word.hub != id_ && word.up_s >= 0.0)
-        report_once("another hub is there; robots stay with whom they found first");
-    }
-    for (auto& [name, robot] : robots_) {
-      take_pieces(robot);
-      const bool silent = robot.silent() && !robot.done;
-      if (std::exchange(robot.silence_reported, silent) != silent)
-        log_.info(fmt::format("{}: {}", name, silent ? "is not heard any more" : "is heard"));
-    }
+    listen();
     if (meetings_.step()) {
       for (auto& [name, robot] : robots_) robot.changed = true;
     }
@@ -306,23 +294,16 @@ std::vector<RobotTraffic> HubDesk::serve(const core::StopToken& stop, const Stat
     if (request_.robots > 0 && done() >= request_.robots) break;
   }
   meetings_.finish();
-  std::vector<RobotTraffic> traffic;
-  for (const auto& [name, robot] : robots_) {
-    traffic.push_back(robot.traffic());
-    if (!robot.done) continue;
-    last_words_.push_back(robot.word());
-    last_words_.back().place = meetings_.place(name);
-  }
-  robots_.clear();
-  return traffic;
 }
 
-void HubDesk::say_goodbye(const core::StopToken& stop) {
-  for (int i = 0; i < 10 || !stop.stop_requested(); ++i) {
-    for (const Word& word : last_words_) say(word);
-    bus_->hear();
-    std::this_thread::sleep_for(stop.stop_requested() ? kWait : kSayAgain / 2);
+HubDesk::Collected HubDesk::close() {
+  Collected collected;
+  for (const auto& [name, robot] : robots_) {
+    collected.traffic.push_back(robot.traffic());
+    if (robot.done) collected.last_words.push_back(word_for(robot));
   }
+  robots_.clear();
+  return collected;
 }
 
 std::size_t HubDesk::done() const {

@@ -13,6 +13,7 @@
 #include "bus.hpp"
 #include "hub_meetings.hpp"
 #include "hub_robot.hpp"
+#include "hub_speaker.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/core/stop.hpp"
 #include "plumbline/net/hub.hpp"
@@ -29,33 +30,39 @@ class HubDesk {
 
   /// Errors (kUsage): another hub is there.
   core::Result<void> look_for_others(const core::StopToken& stop);
-  /// Until all robots that are waited for are done, or `stop` is asked for. Closes the copies; what came, by
-  /// name.
-  std::vector<RobotTraffic> serve(const core::StopToken& stop, const Status& status);
+  /// Until all robots that are waited for are done, or `stop` is asked for.
+  void serve(const core::StopToken& stop, const Status& status);
+  struct Collected {
+    std::vector<RobotTraffic> traffic;  ///< by name
+    std::vector<Word> last_words;       ///< for robots that everything came of
+  };
+  /// After that: closes the copies.
+  Collected close();
   [[nodiscard]] const HubMeetings& meetings() const { return meetings_; }
-  /// After that, until `stop`: robots that everything came of are told so, as often as they may need it.
-  void say_goodbye(const core::StopToken& stop);
+  [[nodiscard]] const HubSpeaker& speaker() const { return speaker_; }
 
  private:
   HubDesk(std::filesystem::path folder, const HubRequest& request, std::unique_ptr<HubBus> bus,
           const core::Executor& executor, core::Log& log)
       : folder_(std::move(folder)),
         request_(request),
-        ledger_(folder_ / "network.db"),
         bus_(std::move(bus)),
         log_(log),
+        speaker_(*bus_),
         meetings_(folder_, executor, log) {}
+  [[nodiscard]] maps::Ledger ledger() const { return maps::Ledger(folder_ / "network.db"); }
   core::Result<void> read_ledger();
+  void listen();
   void hear(const HeardHello& heard);
   /// Why a robot may not come in; empty: it may.
   std::string refusal(const HeardHello& heard) const;
   void let_in(const Hello& hello);
-  core::Result<HubRobot*> add(const Hello& hello);
+  core::Result<HubRobot*> add(const Hello& known);
   core::Result<void> remember(const HubRobot& robot) const;
   void take_pieces(HubRobot& robot);
-  void close(HubRobot& robot);
+  void finish(HubRobot& robot);
+  [[nodiscard]] Word word_for(const HubRobot& robot) const;
   void say_all();
-  void say(Word word);
   void report_once(const std::string& message);
   [[nodiscard]] std::string line(double kbytes_per_s) const;
   [[nodiscard]] std::uint64_t received() const;
@@ -63,16 +70,10 @@ class HubDesk {
 
   std::filesystem::path folder_;
   const HubRequest& request_;
-  maps::Ledger ledger_;
   std::unique_ptr<HubBus> bus_;
   core::Log& log_;
-  std::string id_;
-  Clock::time_point began_ = Clock::now();
-  bool serving_ = false;
-  Clock::time_point said_at_;
+  HubSpeaker speaker_;
   std::map<std::string, HubRobot> robots_;
-  std::vector<Word> last_words_;
-  std::map<std::string, Clock::time_point> trouble_;  ///< until when a robot's pieces are not looked at
   std::set<std::string> reported_;
   HubMeetings meetings_;
 };

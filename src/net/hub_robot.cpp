@@ -25,28 +25,37 @@ tl::unexpected<core::Error> refuse(const char* why) { return core::input_error(w
 
 }  // namespace
 
-core::Result<HubRobot> HubRobot::open(std::string name, const std::filesystem::path& file,
+void Presence::note() {
+  if (heard_at_) longest_break_s_ = std::max(longest_break_s_, silent_s());
+  heard_at_ = Clock::now();
+}
+
+double Presence::silent_s() const {
+  return heard_at_ ? std::chrono::duration<double>(Clock::now() - *heard_at_).count() : 0.0;
+}
+
+bool Presence::silent() const { return !heard_at_ || Clock::now() - *heard_at_ > kSilent; }
+
+core::Result<HubRobot> HubRobot::open(Hello known, const std::filesystem::path& file,
                                       std::uint64_t quota_bytes) {
   if (auto made = core::make_folder(file.parent_path()); !made)
     return tl::unexpected<core::Error>(made.error());
   auto copy = maps::StoreReplica::open(file);
   if (!copy) return tl::unexpected<core::Error>(copy.error());
   HubRobot robot;
-  robot.name = std::move(name);
+  robot.hello = std::move(known);
   robot.file_ = file;
   robot.quota_bytes_ = quota_bytes;
   robot.copy_.emplace(std::move(*copy));
   return robot;
 }
 
-bool HubRobot::silent() const { return !heard_at_ || Clock::now() - *heard_at_ > kSilent; }
-
 /// Transactions above the result may be of a process that was ended with the power cut: the robot has others
 /// by these numbers now.
 std::int64_t HubRobot::lost_below(const Hello& next) const {
   std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
-  if (next.incarnation > incarnation) {
-    const std::uint64_t since = next.incarnation - incarnation;
+  if (next.incarnation > hello.incarnation) {
+    const std::uint64_t since = next.incarnation - hello.incarnation;
     if (since > next.began.size()) return 0;
     for (auto began = next.began.end() - static_cast<std::ptrdiff_t>(since); began != next.began.end();
          ++began) {
@@ -57,19 +66,13 @@ std::int64_t HubRobot::lost_below(const Hello& next) const {
 }
 
 core::Result<bool> HubRobot::hear(const Hello& next) {
-  const auto now = Clock::now();
-  if (heard_at_) {
-    longest_break_s_ = std::max(longest_break_s_, std::chrono::duration<double>(now - *heard_at_).count());
-  }
-  heard_at_ = now;
+  presence.note();
   const maps::StoreHeads& heads = copy_->heads();
   // A store that is just being opened tells no heads yet.
   const bool tells = next.map_head > 0 || next.clouds_head > 0;
   const bool lost = heads.last() > lost_below(next) ||
                     (tells && (heads.map > next.map_head || heads.clouds > next.clouds_head));
-  if (next.incarnation > incarnation) forget();
-  incarnation = next.incarnation;
-  run = next.run;
+  if (next.incarnation > hello.incarnation) forget();
   hello = next;
   if (!lost) return false;
   forget();
@@ -85,9 +88,7 @@ bool HubRobot::has_all() const {
 
 void HubRobot::forget() {
   copy_->forget();
-  number_ = 0;
-  edition_ = 0;
-  pieces_ = 0;
+  coming_ = {};
   changed = true;
 }
 
@@ -98,28 +99,27 @@ core::Result<void> HubRobot::begin(const Piece& piece) {
     return core::output_error(
         fmt::format("{}: its map takes {} MB at the hub, more than the {} MB it may have; begin the hub with "
                     "a larger --quota",
-                    name, size / 1000000, quota_bytes_ / 1000000));
+                    hello.name, size / 1000000, quota_bytes_ / 1000000));
   }
   forget();
   if (auto begun = copy_->begin(static_cast<maps::StoreShare>(piece.share), piece.number); !begun)
     return begun;
-  number_ = piece.number;
-  edition_ = piece.edition;
-  all_ = {};
+  coming_.number = piece.number;
+  coming_.edition = piece.edition;
   return {};
 }
 
 core::Result<void> HubRobot::take(const Piece& piece) {
-  received_ += piece.bytes.size();
+  counted_.received_bytes += piece.bytes.size();
   if (piece.share > 1) return refuse("a share that is not known");
   const auto share = static_cast<maps::StoreShare>(piece.share);
   if (piece.count == 0 || piece.count > kMostPieces || piece.index >= piece.count || piece.number <= 0) {
     return refuse("numbers that cannot be");
   }
   const bool old = piece.number <= copy_->heads()[share];
-  const bool same = piece.number == number_ && piece.edition == edition_;
-  if (old || (same && piece.index < pieces_)) {
-    again_ += piece.bytes.size();
+  const bool same = piece.number == coming_.number && piece.edition == coming_.edition;
+  if (old || (same && piece.index < coming_.pieces)) {
+    counted_.again_bytes += piece.bytes.size();
     changed = true;
     return {};
   }
@@ -128,12 +128,12 @@ core::Result<void> HubRobot::take(const Piece& piece) {
     if (piece.index != 0) return {};
     if (auto begun = begin(piece); !begun) return begun;
   }
-  if (piece.index != pieces_) return {};
+  if (piece.index != coming_.pieces) return {};
   core::Hash hash;
   hash.bytes(piece.bytes.data(), piece.bytes.size());
-  all_.bytes(piece.bytes.data(), piece.bytes.size());
+  coming_.all.bytes(piece.bytes.data(), piece.bytes.size());
   const bool last = piece.index + 1 == piece.count;
-  if (hash.value() != piece.hash || (last && all_.value() != edition_)) {
+  if (hash.value() != piece.hash || (last && coming_.all.value() != coming_.edition)) {
     forget();
     return refuse("bytes were changed on the way");
   }
@@ -143,7 +143,7 @@ core::Result<void> HubRobot::take(const Piece& piece) {
     forget();
     return taken;
   }
-  ++pieces_;
+  ++coming_.pieces;
   if (last) forget();
   changed = true;
   return {};
@@ -151,32 +151,32 @@ core::Result<void> HubRobot::take(const Piece& piece) {
 
 Word HubRobot::word() const {
   Word word;
-  word.robot = name;
-  word.run = run;
-  word.incarnation = incarnation;
-  word.answer = answer;
-  word.problem = problem;
+  word.robot = hello.name;
+  word.run = hello.run;
+  word.incarnation = hello.incarnation;
+  word.answer = verdict.answer;
+  // A robot whose pieces could not be stored is asked for them again.
+  if (word.answer == Answer::kTrouble && Clock::now() >= verdict.until) word.answer = Answer::kAccepted;
+  word.problem = verdict.problem;
   word.map = copy_->heads().map;
   word.clouds = copy_->heads().clouds;
-  word.number = number_;
-  word.edition = edition_;
-  word.pieces = pieces_;
+  word.number = coming_.number;
+  word.edition = coming_.edition;
+  word.pieces = coming_.pieces;
   return word;
 }
 
 RobotTraffic HubRobot::traffic() const {
-  RobotTraffic t;
-  t.name = name;
+  RobotTraffic t = counted_;
+  t.name = hello.name;
   t.keyframes = copy_->keyframes();
   t.complete = copy_->complete();
   t.done = done;
-  t.received_bytes = received_;
   t.place_bytes = copy_->bytes().place;
   t.map_bytes = copy_->bytes().map;
   t.cloud_bytes = copy_->bytes().cloud;
-  t.again_bytes = again_;
-  const double silent_s = heard_at_ ? std::chrono::duration<double>(Clock::now() - *heard_at_).count() : 0.0;
-  t.longest_break_s = done ? longest_break_s_ : std::max(longest_break_s_, silent_s);
+  t.longest_break_s =
+      done ? presence.longest_break_s() : std::max(presence.longest_break_s(), presence.silent_s());
   t.lag_median_s = hello.lag_median_s;
   t.lag_p95_s = hello.lag_p95_s;
   return t;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "bus.hpp"
 #include "plumbline/core/hash.hpp"
@@ -16,22 +17,41 @@ namespace plumbline::net {
 
 using Clock = std::chrono::steady_clock;
 
+/// Signs of life.
+class Presence {
+ public:
+  void note();
+  [[nodiscard]] bool silent() const;  ///< for some seconds
+  [[nodiscard]] double silent_s() const;
+  [[nodiscard]] double longest_break_s() const { return longest_break_s_; }
+  /// Whether that is another answer than was told last; at first it was silent.
+  bool tell(bool silent) { return std::exchange(told_silent_, silent) != silent; }
+
+ private:
+  std::optional<Clock::time_point> heard_at_;
+  double longest_break_s_ = 0.0;
+  bool told_silent_ = true;
+};
+
 class HubRobot {
  public:
-  /// `file`: of the copy. Errors (kOutput): it cannot be made.
-  static core::Result<HubRobot> open(std::string name, const std::filesystem::path& file,
+  /// `known`: its name, and what is known of it from before. `file`: of the copy. Errors (kOutput): it cannot
+  /// be made.
+  static core::Result<HubRobot> open(Hello known, const std::filesystem::path& file,
                                      std::uint64_t quota_bytes);
 
-  std::string name;
-  std::string run;
-  std::uint64_t incarnation = 0;
+  Hello hello;        ///< the last one: name, run and incarnation are this robot's
   bool done = false;  ///< everything is here, and nothing will come
-  Hello hello;        ///< the last one
-  Answer answer = Answer::kAccepted;
-  std::string problem;
+  struct Verdict {
+    Answer answer = Answer::kAccepted;
+    std::string problem;
+    Clock::time_point until;  ///< of kTrouble: then its pieces are looked at again
+  } verdict;
   bool changed = true;  ///< there is something to say
+  Presence presence;
 
   [[nodiscard]] const maps::StoreReplica& copy() const { return *copy_; }
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }  ///< of the copy
   /// A hello of this run and incarnation, or of a later one of it, which takes over. True: what the robot
   /// lost in between was here, so everything is asked for again.
   core::Result<bool> hear(const Hello& next);
@@ -41,10 +61,15 @@ class HubRobot {
   [[nodiscard]] bool has_all() const;
   [[nodiscard]] Word word() const;
   [[nodiscard]] RobotTraffic traffic() const;
-  [[nodiscard]] bool silent() const;  ///< for some seconds
-  bool silence_reported = true;       ///< as long as it was not heard
 
  private:
+  /// The transaction that is under way to here.
+  struct Coming {
+    std::int64_t number = 0;
+    std::uint64_t edition = 0;
+    std::uint32_t pieces = 0;
+    core::Hash all;
+  };
   HubRobot() = default;
   core::Result<void> begin(const Piece& piece);
   void forget();
@@ -53,15 +78,8 @@ class HubRobot {
   std::filesystem::path file_;
   std::uint64_t quota_bytes_ = 0;
   std::optional<maps::StoreReplica> copy_;
-  // The transaction that is coming:
-  std::int64_t number_ = 0;
-  std::uint64_t edition_ = 0;
-  std::uint32_t pieces_ = 0;
-  core::Hash all_;
-  std::uint64_t again_ = 0;  ///< bytes that had come before
-  std::uint64_t received_ = 0;
-  std::optional<Clock::time_point> heard_at_;
-  double longest_break_s_ = 0.0;
+  Coming coming_;
+  RobotTraffic counted_;  ///< bytes that came, and came again
 };
 
 }  // namespace plumbline::net

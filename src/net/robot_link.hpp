@@ -3,24 +3,18 @@
 
 // What a robot's hub lacks is read from its store and sent, beside the run: nothing here is waited for by
 // anybody, and nothing of it enters the map.
-#include <atomic>
-#include <chrono>
-#include <deque>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include "bus.hpp"
+#include "outbox.hpp"
 #include "plumbline/core/log.hpp"
-#include "plumbline/maps/store_replica.hpp"
+#include "side_thread.hpp"
 
 namespace plumbline::net {
-
-using Clock = std::chrono::steady_clock;
 
 struct LinkStatus {
   bool heard = false;       ///< a hub, ever
@@ -31,81 +25,70 @@ struct LinkStatus {
   std::string place;        ///< in the frame of which robot it is, for people; empty: it met nobody
   std::int64_t behind = 0;  ///< transactions that are not acknowledged
   std::uint64_t sent_bytes = 0;
-  std::uint64_t again_bytes = 0;  ///< of these, sent before
-  Clock::time_point progress;     ///< when something was acknowledged last, or the link began
+  std::uint64_t again_bytes = 0;              ///< of these, sent before
+  Clock::time_point progress = Clock::now();  ///< when something was acknowledged last, or the link began
+};
+
+/// What a robot hears of its hub.
+class HeardHub {
+ public:
+  explicit HeardHub(core::Log& log) : log_(log) {}
+
+  /// True: it is another hub than before, which knows nothing of what was sent.
+  bool take(const Word& word, const Hello& hello);
+  /// At the latest now somebody should know that nobody answers. `others`: participants that are there.
+  void report_silence(RobotBus& bus);
+  /// The robot is another incarnation now.
+  void forget() { word_ = {}; }
+  [[nodiscard]] const Word& word() const { return word_; }  ///< the last answer to this incarnation
+  [[nodiscard]] Clock::time_point heard_at() const { return heard_at_; }
+  /// It listens and goes on.
+  [[nodiscard]] bool accepts() const;
+  /// Without what was sent.
+  [[nodiscard]] LinkStatus status() const;
+
+ private:
+  void take_answer(const Word& word, bool over);
+  void note_place(const Place& place, const std::string& name);
+
+  core::Log& log_;
+  Clock::time_point began_ = Clock::now();
+  std::string hub_;
+  Clock::time_point heard_at_;  ///< that hub
+  Word word_;
+  LinkStatus status_;
+  bool silence_reported_ = false;
+  bool foreign_reported_ = false;
 };
 
 class RobotLink {
  public:
   /// `fresh`: an id for the run should it have none yet.
   RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh, core::Log& log);
-  RobotLink(const RobotLink&) = delete;
-  RobotLink& operator=(const RobotLink&) = delete;
-  ~RobotLink();
 
   /// From now on sends what is or comes to be in `store`; who is who lies in network.db beside it. Errors
   /// (kOutput): that cannot be written.
   core::Result<void> follow(const std::filesystem::path& store);
   /// The store's folder has another name now, and nothing will be added.
   void over(const std::filesystem::path& store);
-  [[nodiscard]] LinkStatus status() const;
+  [[nodiscard]] LinkStatus status() const { return *std::atomic_load(&status_); }
 
  private:
-  /// A transaction under way.
-  struct Sending {
-    maps::StoreShare share = maps::StoreShare::kMap;
-    std::int64_t after = 0;
-    maps::StoreTransaction transaction;
-    std::uint64_t edition = 0;
-    std::uint32_t count = 0;
-    std::uint32_t index = 0;                   ///< the next piece
-    std::uint32_t most = 0;                    ///< pieces that were sent at least once
-    std::optional<Clock::time_point> settled;  ///< since when DDS owes nobody a piece
-  };
-
-  void run();
-  void take(const Word& word);
-  void take_answer(const Word& word);
-  void look_at_store();
-  void choose();
-  void send();
-  void send_again();
-  [[nodiscard]] Piece piece(std::uint32_t index) const;
+  void run(const core::StopToken& stop);
+  void look();
   void say();
-  void report_silence();
-  void note_lags();
-  void note_place(const Place& place);
+  void publish();
+  [[nodiscard]] bool following() const { return hello_.incarnation > 0; }
 
   std::unique_ptr<RobotBus> bus_;
-  const std::string name_;
-  const std::string fresh_;
-  core::Log& log_;
-  mutable std::mutex published_mutex_;  ///< held for a moment only
-  LinkStatus published_;
-  std::mutex mutex_;  ///< of what follow() and over() share with the thread
-  std::filesystem::path store_;
+  std::shared_ptr<const LinkStatus> status_ = std::make_shared<LinkStatus>();  ///< exchanged as a whole
+  std::mutex mutex_;  ///< of the rest, which follow() and over() share with the thread
   Hello hello_;
-  bool following_ = false;
-  LinkStatus status_;
-  // The thread's own:
-  std::string hub_;
-  Clock::time_point began_ = Clock::now();
-  Clock::time_point heard_at_;  ///< that hub
+  StoreWatch store_;
+  Outbox outbox_;
+  HeardHub hub_;
   Clock::time_point said_at_;
-  bool hello_changed_ = true;
-  Word word_;  ///< the last answer to this incarnation
-  bool listened_ = false;
-  std::optional<Sending> sending_;
-  std::filesystem::file_time_type store_time_;
-  std::uintmax_t store_size_ = 0;
-  std::deque<std::pair<maps::StoreHeads, Clock::time_point>> noticed_;  ///< not acknowledged yet
-  std::vector<double> lags_s_;
-  bool silence_reported_ = false;
-  bool foreign_reported_ = false;
-  std::string problem_reported_;
-  std::string frame_of_;  ///< that was told last
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
+  SideThread thread_;
 };
 
 }  // namespace plumbline::net

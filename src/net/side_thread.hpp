@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <thread>
+#include <utility>
+
+#include "plumbline/core/stop.hpp"
+
+namespace plumbline::net {
+
+/// Work beside the rest that goes on until this ends. The last member: what it works with must be there.
+class SideThread {
+ public:
+  explicit SideThread(const std::function<void(const core::StopToken&)>& work)
+      : thread_([this, work] { work(stop_); }) {}
+  SideThread(const SideThread&) = delete;
+  SideThread& operator=(const SideThread&) = delete;
+  ~SideThread() {
+    stop_.request_stop();
+    thread_.join();
+  }
+
+ private:
+  core::StopToken stop_;
+  std::thread thread_;
+};
+
+}  // namespace plumbline::net
