@@ -31,7 +31,7 @@ TABLES = {
         'points + lines': '-p points_lines',
         '+ depth': OFF['grey values'],
         '+ grey values (all)': '',
-        **{f'all but {family}': options for family, options in OFF.items()},
+        **{f'all but {family}': OFF[family] for family in ('points', 'lines', 'depth')},
     },
     'deviations': {
         'ours': '',
