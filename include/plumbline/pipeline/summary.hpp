@@ -71,6 +71,13 @@ struct RunSummary {
     std::size_t rejected = 0;  ///< of the verified, taken for wrong by the pose graph
     std::vector<mapping::LoopTrial> trials;
   } loops;
+  /// What maps of other robots were used for.
+  struct Feedback {
+    bool on = false;
+    std::size_t keyframes = 0;    ///< of others that came
+    std::size_t relocalised = 0;  ///< frames
+    std::size_t loops = 0;        ///< that moved the map
+  } feedback;
   struct Refine {
     std::size_t local_maps = 0;
     std::size_t tried = 0;      ///< alignments of two local maps
