@@ -169,9 +169,8 @@ struct MapFollower::Impl {
     if (row.removed) return rows.remove(table.name, key);
     const bool header = std::string(table.name) == "header";
     if (table.named && !(header && row.name.key == "robots")) return;
-    const Bytes plain = unpack(row.data.data(), row.data.size());
-    if (header) robots = decode<std::vector<RobotInfo>>(plain);
-    rows.put(table.name, key, plain, robots);
+    check_row(row.name, row.data, robots);  // learns of robots, too
+    rows.put(table.name, key, unpack(row.data.data(), row.data.size()), robots);
   }
 };
 

@@ -87,6 +87,10 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   if (bundle_.due(++frame_count_)) put_back_bundle(bundle);  // section 3.3, of an earlier keyframe
   last_track_ = tracker_.track(map_, frame, features);       // section 3.2
   const tracking::TrackResult& track = last_track_;
+  if (tracker_.astray()) {
+    const auto place = closer_.locate(frame, features, options_.mapper.surface);
+    if (place) last_track_ = tracker_.begin_at(*place, frame, features);
+  }
   FrameReport report = FrameReport::of(frame, track);
   report.bundle = bundle;
   if (track.state == tracking::TrackState::kInitialising) {
@@ -96,7 +100,9 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   maps::FramePose pose = frames_.measured(map_, frame.stamp, track);
   if (pose.tracked) {
     mapper_.count_observations(map_, track);  // section 3.3: the share of keyframes that find a landmark
-    report.decision = keyframe_rule_.decide(map_, track, bundle_.idle());  // section 4.1
+    report.decision.wanted = !track.reference.valid();  // where nothing of this map is seen
+    if (!report.decision.wanted)
+      report.decision = keyframe_rule_.decide(map_, track, bundle_.idle());  // section 4.1
     if (report.decision.reuse.valid()) switch_reference(report);
     if (report.decision.wanted) insert_keyframe(frame, features, report);
   }

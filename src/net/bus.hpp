@@ -95,7 +95,9 @@ class RobotBus {
   virtual void say(const Hello& hello) = 0;
   /// False: no room now; try again.
   virtual bool send(const Piece& piece) = 0;
-  virtual std::vector<Word> hear() = 0;
+  virtual std::vector<Word> hear() = 0;  ///< also those to other robots
+  /// Rows of other robots' maps; the hub sends them from the first call on.
+  virtual std::vector<Piece> hear_of_others() = 0;
   [[nodiscard]] virtual bool listened_to() = 0;   ///< somebody takes this robot's pieces
   [[nodiscard]] virtual bool all_received() = 0;  ///< of those who take them, all have all that was sent
   [[nodiscard]] virtual int others() = 0;         ///< participants that are there, of any kind
@@ -119,6 +121,11 @@ class HubBus {
   virtual core::Result<void> listen_to(const std::string& robot) = 0;
   virtual void ignore(const std::string& robot) = 0;
   virtual std::vector<Piece> take(const std::string& robot, int most) = 0;
+  /// How many times this robot has begun to hear of others; 0: it does not now. What was sent before the last
+  /// time may be lost.
+  [[nodiscard]] virtual int begun_to_hear(const std::string& robot) = 0;
+  /// A piece of another one's map for this robot. False: no room now; try again. Never waits.
+  virtual bool tell(const std::string& robot, const Piece& piece) = 0;
   virtual void wait(std::chrono::milliseconds most) = 0;
 };
 

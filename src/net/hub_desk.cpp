@@ -284,6 +284,7 @@ void HubDesk::serve(const core::StopToken& stop, const Status& status) {
       for (auto& [name, robot] : robots_) robot.changed = true;
     }
     say_all();
+    feedback_.step(robots_, meetings_, *bus_);
     const double since_s = std::chrono::duration<double>(Clock::now() - line_at).count();
     if (status && since_s >= 1.0) {
       const std::uint64_t now = received();

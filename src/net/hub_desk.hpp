@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bus.hpp"
+#include "hub_feedback.hpp"
 #include "hub_meetings.hpp"
 #include "hub_robot.hpp"
 #include "hub_speaker.hpp"
@@ -76,6 +77,7 @@ class HubDesk {
   std::map<std::string, HubRobot> robots_;
   std::set<std::string> reported_;
   HubMeetings meetings_;
+  HubFeedback feedback_;
 };
 
 }  // namespace plumbline::net

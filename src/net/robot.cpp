@@ -19,7 +19,10 @@ using namespace std::chrono_literals;
 
 constexpr const char* kStore = "map.db";
 
-core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request, core::Log& log) {
+/// `feedback`: as RobotLink's.
+core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request,
+                                                   std::shared_ptr<mapping::OtherMapsInbox> feedback,
+                                                   core::Log& log) {
   if (!is_robot_name(request.name)) {
     return core::usage_error(
         "--name: letters, digits, '.', '_' and '-', the first a letter or digit, 64 at most");
@@ -40,7 +43,8 @@ core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request, 
   auto bus =
       open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug("DDS: " + line); });
   if (!bus) return tl::unexpected<core::Error>(bus.error());
-  return std::make_unique<RobotLink>(std::move(*bus), request.name, request.fresh_id, log);
+  return std::make_unique<RobotLink>(std::move(*bus), request.name, request.fresh_id, std::move(feedback),
+                                     log);
 }
 
 std::string line_of(const LinkStatus& s, double kbytes_per_s) {
@@ -122,7 +126,7 @@ core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& 
                                    const core::StopToken& stop, const Status& status) {
   if (auto heads = maps::store_heads(folder / kStore); !heads)
     return tl::unexpected<core::Error>(heads.error());
-  auto link = open_link(request, log);
+  auto link = open_link(request, nullptr, log);
   if (!link) return tl::unexpected<core::Error>(link.error());
   if (auto followed = (*link)->follow(folder / kStore); !followed) {
     return tl::unexpected<core::Error>(followed.error());
@@ -134,9 +138,11 @@ core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& 
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
                                      core::Log& log, const core::StopToken& stop, const Status& status,
                                      const pipeline::Progress& progress) {
-  auto link = open_link(request, log);
+  const auto others = request.feedback ? std::make_shared<mapping::OtherMapsInbox>() : nullptr;
+  auto link = open_link(request, others, log);
   if (!link) return tl::unexpected<core::Error>(link.error());
   pipeline::MapRequest map = request.map;
+  map.feedback = others;
   map.prepared = [&](const fs::path& folder) {
     if (auto followed = (*link)->follow(folder / kStore); !followed) log.error(followed.error().message);
     if (request.map.prepared) request.map.prepared(folder);

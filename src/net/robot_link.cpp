@@ -134,11 +134,14 @@ void HeardHub::note_place(const Place& place, const std::string& name) {
   if (changed) log_.info("hub: others are met; now " + status_.place);
 }
 
-RobotLink::RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh, core::Log& log)
+RobotLink::RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh,
+                     std::shared_ptr<mapping::OtherMapsInbox> feedback, core::Log& log)
     : bus_(std::move(bus)),
       hello_(hello_of(std::move(name), std::move(fresh))),
       outbox_(*bus_),
       hub_(log),
+      others_(feedback == nullptr ? std::nullopt
+                                  : std::optional<OtherRobots>(std::in_place, hello_.name, feedback)),
       thread_([this](const core::StopToken& stop) { run(stop); }) {}
 
 core::Result<void> RobotLink::follow(const fs::path& store) {
@@ -182,25 +185,33 @@ void RobotLink::over(const fs::path& store) {
 }
 
 void RobotLink::run(const core::StopToken& stop) {
-  auto looked_at = Clock::time_point();
   while (!stop.stop_requested()) {
     std::this_thread::sleep_for(kPause);
     bus_->wait(kLookEvery);
-    const std::lock_guard<std::mutex> lock(mutex_);
-    for (const Word& word : bus_->hear()) {
-      if (hub_.take(word, hello_)) outbox_.forget();
-    }
-    if (following()) {
-      if (Clock::now() - looked_at >= kLookEvery) {
-        look();
-        looked_at = Clock::now();
-      }
-      if (hub_.accepts()) outbox_.send(hello_, store_, hub_.word(), hub_.heard_at());
-      if (Clock::now() - said_at_ >= kSayEvery) say();
-    }
-    hub_.report_silence(*bus_);
-    publish();
+    const std::vector<Word> words = bus_->hear();
+    talk(words);
+    if (others_) hear_of_others(words);
   }
+}
+
+void RobotLink::talk(const std::vector<Word>& words) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const Word& word : words) {
+    if (hub_.take(word, hello_)) outbox_.forget();
+  }
+  if (following()) {
+    look();
+    if (hub_.accepts()) outbox_.send(hello_, store_, hub_.word(), hub_.heard_at());
+    if (Clock::now() - said_at_ >= kSayEvery) say();
+  }
+  hub_.report_silence(*bus_);
+  publish();
+}
+
+void RobotLink::hear_of_others(const std::vector<Word>& words) {
+  for (const Word& word : words) others_->take(word);
+  for (const Piece& piece : bus_->hear_of_others()) others_->take(piece);
+  others_->publish();
 }
 
 void RobotLink::look() {

@@ -7,9 +7,11 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "bus.hpp"
+#include "other_robots.hpp"
 #include "outbox.hpp"
 #include "plumbline/core/log.hpp"
 #include "side_thread.hpp"
@@ -63,8 +65,10 @@ class HeardHub {
 
 class RobotLink {
  public:
-  /// `fresh`: an id for the run should it have none yet.
-  RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh, core::Log& log);
+  /// `fresh`: an id for the run should it have none yet. `feedback`: where maps of other robots go; null:
+  /// they are not asked for.
+  RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::string fresh,
+            std::shared_ptr<mapping::OtherMapsInbox> feedback, core::Log& log);
 
   /// From now on sends what is or comes to be in `store`; who is who lies in network.db beside it. Errors
   /// (kOutput): that cannot be written.
@@ -75,6 +79,8 @@ class RobotLink {
 
  private:
   void run(const core::StopToken& stop);
+  void talk(const std::vector<Word>& words);
+  void hear_of_others(const std::vector<Word>& words);
   void look();
   void say();
   void publish();
@@ -88,6 +94,7 @@ class RobotLink {
   Outbox outbox_;
   HeardHub hub_;
   Clock::time_point said_at_;
+  std::optional<OtherRobots> others_;  ///< the thread's own
   SideThread thread_;
 };
 

@@ -96,6 +96,19 @@ void Tracker::record(const sensor::RgbdFrame& frame, TrackResult& result) {
   thumbnail_depth_ = result.features->thumbnail_depth;
 }
 
+TrackResult Tracker::begin_at(const geometry::Rigid3& camera_from_world, const sensor::RgbdFrame& frame,
+                              const Features& features) {
+  TrackResult result;
+  result.state = TrackState::kTracked;
+  result.camera_from_world = camera_from_world;
+  result.relocalised = true;
+  result.features = features;
+  motion_.reset();
+  record(frame, result);
+  result.reference = {};
+  return result;
+}
+
 void Tracker::add_keyframe(core::KeyframeId id, const sensor::RgbdFrame& frame, const TrackResult& result) {
   if (!options_.photometric || result.photometric == nullptr) return;
   photometric_.add(id, std::make_shared<const features::PhotometricSamples>(features::sample_photometric(

@@ -40,6 +40,10 @@ struct PoseEdge {
 /// All trusted; the information grows with what they share. The body of a pose graph.
 std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared = 30, int max_neighbours = 6);
 
+/// What the map's own way from keyframe `a` to `b` of one robot may be off, were the errors from one keyframe
+/// to the next independent: covariance of log(b_from_a_estimate * b_from_a^-1).
+geometry::Matrix6d path_covariance(const maps::Map& map, core::KeyframeId a, core::KeyframeId b);
+
 /// The loops of the map that were closed: edges that may be taken for wrong.
 std::vector<PoseEdge> loop_edges(const maps::Map& map);
 /// Makes these the map's loops. Throws as maps::Map::set_loops.

@@ -6,6 +6,7 @@
 // not take for wrong moves the map, doubles are merged, and everything is adjusted together.
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,13 @@
 #include "plumbline/mapping/consistent_pairs.hpp"
 #include "plumbline/mapping/global_adjustment.hpp"
 #include "plumbline/mapping/landmark_fusion.hpp"
+#include "plumbline/mapping/other_maps.hpp"
 #include "plumbline/mapping/place_verification.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/places/recogniser.hpp"
 #include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/frame.hpp"
+#include "plumbline/tracking/surface_sampler.hpp"
 
 namespace plumbline::mapping {
 
@@ -46,6 +50,8 @@ struct LoopCounts {
   int accepted = 0;    ///< loops that moved the map
   int rejected = 0;    ///< edges that the pose graph took for wrong
   int refused = 0;     ///< closings that would have torn the map
+  int located = 0;     ///< frames of a lost tracker that another robot's map knew
+  int by_others = 0;   ///< loops by way of another robot's map that moved this one
 };
 
 /// A verified pair of keyframes.
@@ -61,10 +67,26 @@ struct LoopTrial {
   double score = 0.0;         ///< of the images
   double correction_m = 0.0;  ///< how far closing it would move the query; 0 when there is no pose
   double correction_rad = 0.0;
-  double path_m = 0.0;  ///< from the match to the query, along the keyframes
-  bool closed = false;  ///< the pose graph believed it, and the map was moved
-  std::string refused;  ///< why it is no loop; empty: it passed
+  double path_m = 0.0;     ///< from the match to the query, along the keyframes
+  bool by_others = false;  ///< query and match were both seen in another robot's map, not in each other
+  bool closed = false;     ///< the pose graph believed it, and the map was moved
+  std::string refused;     ///< why it is no loop; empty: it passed
 };
+
+/// Verified loops that wait for others to agree with them.
+class PendingLoops {
+ public:
+  /// Adds those of `keyframe`, which is new in the queries' map. The largest consistent set of the loops
+  /// found lately, with `keyframe` in it, when it holds enough keyframes and no other set comes near; then
+  /// none is left waiting.
+  std::vector<Loop> confirm(const maps::Map& matches, const maps::Map& queries, core::KeyframeId keyframe,
+                            const std::vector<Loop>& verified, const LoopOptions& options);
+
+ private:
+  std::vector<Loop> waiting_;
+};
+
+class InterRobotLoops;
 
 class LoopCloser {
  public:
@@ -81,6 +103,14 @@ class LoopCloser {
   /// Knows the places of a map that another one left, whose newest keyframe is `newest`; its loops are in the
   /// map.
   void restore(const maps::Map& map, core::KeyframeId newest);
+
+  /// From now on detect() finds loops by way of other robots' maps, too.
+  void use(std::shared_ptr<const OtherMapsInbox> others);
+  /// Where an image was taken that the tracker cannot place: camera_from_world, as other robots' maps know
+  /// it.
+  std::optional<geometry::Rigid3> locate(const sensor::RgbdFrame& frame,
+                                         const std::shared_ptr<const features::FrameFeatures>& features,
+                                         const tracking::SurfaceSamplerOptions& surface);
 
   /// Pose graph with these edges and the loops of the map; what it believes become the map's loops. When it
   /// believes one of the new edges: moves the map, merges doubles around these, adjusts all. Returns whether
@@ -107,15 +137,15 @@ class LoopCloser {
   void note_verdict(const PoseEdge& edge, const std::string& refused);
   void measure_correction(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
-  [[nodiscard]] std::vector<Loop> confirmed(const maps::Map& map, core::KeyframeId keyframe) const;
   void merge_duplicates(maps::Map& map, const PoseEdge& edge) const;
 
   LoopOptions options_;
   sensor::Pinhole camera_;
   places::Database database_;
   places::Recogniser recogniser_;
-  core::KeyframeId last_;      ///< the keyframe before
-  std::vector<Loop> waiting_;  ///< verified lately, not yet confirmed by others
+  core::KeyframeId last_;  ///< the keyframe before
+  PendingLoops pending_;
+  std::shared_ptr<InterRobotLoops> others_;  ///< null: none are used
   LoopCounts counts_;
   std::vector<LoopTrial> trials_;
 };

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
@@ -70,6 +71,12 @@ class Slam {
   /// As Tracker::set_shutter(). Turns distort no image of a global shutter: keyframes count however fast
   /// the camera turned.
   void set_shutter(std::optional<double> readout_s) { tracker_.set_shutter(readout_s); }
+
+  /// From now on maps of other robots serve for relocalisation and loops (without loops: for nothing). What
+  /// comes in there, and when, decides what becomes of this map.
+  void use(std::shared_ptr<const OtherMapsInbox> others) {
+    if (options_.loops.enabled) closer_.use(std::move(others));
+  }
 
   using Features = std::shared_ptr<const features::FrameFeatures>;
   /// Frames in order of time. The features are kept when the frame becomes a keyframe.

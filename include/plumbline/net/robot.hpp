@@ -22,6 +22,7 @@ struct RobotRequest {
   pipeline::MapRequest map;  ///< `output` is the result folder; a `prepared` of the caller's is called, too
   std::string name;
   NetworkOptions network;
+  bool feedback = false;       ///< maps of other robots serve for relocalisation and loops
   double wait_s = 30.0;        ///< for a hub that was never heard, after the last frame
   double wait_lost_s = 600.0;  ///< for one that was, since it acknowledged something
   std::string fresh_id;        ///< made up at random, 16 letters or digits
@@ -37,10 +38,10 @@ struct RobotOutcome {
 /// The folder with the map of an earlier run that `input` names, finished or interrupted; empty: it is none.
 std::filesystem::path earlier_run(const std::string& input);
 
-/// The map is a function of recording, camera and configuration, whatever the network does: nothing of it is
-/// waited for before the last frame. Errors as pipeline::map_recording; (kUsage) options, a hub that refuses
-/// this robot; (kUntrustworthy) a hub was there and has not got everything: the message has the command.
-/// `status` and `progress` may be empty.
+/// The map is a function of recording, camera and configuration, whatever the network does, but with
+/// feedback: nothing of it is waited for before the last frame. Errors as pipeline::map_recording; (kUsage)
+/// options, a hub that refuses this robot; (kUntrustworthy) a hub was there and has not got everything: the
+/// message has the command. `status` and `progress` may be empty.
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
                                      core::Log& log, const core::StopToken& stop, const Status& status,
                                      const pipeline::Progress& progress);

@@ -4,6 +4,7 @@
 // `plumbline map` as a call: a recording in, a result folder out.
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "plumbline/core/log.hpp"
 #include "plumbline/core/stop.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/mapping/other_maps.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
 
@@ -28,6 +30,9 @@ struct MapRequest : RunRequest {
   /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
   /// when the run begins anew with another camera: nothing of before is there then. May be empty.
   std::function<void(const std::filesystem::path&)> prepared;
+  /// Maps of other robots that the trackers use for relocalisation and loops: the result depends on what
+  /// comes in there, and when; null: none do.
+  std::shared_ptr<const mapping::OtherMapsInbox> feedback;
   std::function<void(maps::Map&)>
       alter_map;  ///< for tests: changes the map when tracking has ended; may be empty
 };

@@ -31,6 +31,10 @@ namespace plumbline::dataset {
 class FrameSource;
 }
 
+namespace plumbline::mapping {
+class OtherMapsInbox;
+}
+
 namespace plumbline::maps {
 class Map;
 struct RobotInfo;
@@ -133,6 +137,7 @@ struct RunContext {
       alter_map;                        ///< for tests: changes the map when tracking has ended; may be empty
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
   CameraDecision* cameras = nullptr;    ///< what a track stage asks its maps; null: nothing is asked
+  std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
 };
 
 /// What a stage may look at while the graph is checked.

@@ -72,6 +72,13 @@ struct RunSummary {
     std::size_t rejected = 0;  ///< of the verified, taken for wrong by the pose graph
     std::vector<mapping::LoopTrial> trials;
   } loops;
+  /// What maps of other robots were used for.
+  struct Feedback {
+    bool on = false;
+    std::size_t keyframes = 0;    ///< of others that came
+    std::size_t relocalised = 0;  ///< frames
+    std::size_t loops = 0;        ///< that moved the map
+  } feedback;
   mapping::RefinementSummary refine;
   Sigma sigma_position_m;  ///< of keyframes beside the first one
   Sigma sigma_rotation_rad;

@@ -109,6 +109,11 @@ class Tracker {
   void add_keyframe(core::KeyframeId id, const sensor::RgbdFrame& frame, const TrackResult& result);
   [[nodiscard]] const PhotometricKeyframes& photometric() const { return photometric_; }
 
+  /// The frame that was just lost was taken at `camera_from_world`, as others know: the motion model begins
+  /// there. The result names no reference; the caller makes a keyframe of the frame, and that the reference.
+  TrackResult begin_at(const geometry::Rigid3& camera_from_world, const sensor::RgbdFrame& frame,
+                       const Features& features);
+
   /// Goes on where another tracker left `map`: it had just tracked the keyframe `reference`, with this motion
   /// of camera_from_world per second.
   void restore(const maps::Map& map, core::KeyframeId reference, const geometry::Vector6d& velocity);
@@ -128,6 +133,8 @@ class Tracker {
 
   /// Of the last tracked frame, in the map as it is now.
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return motion_.camera_from_world(); }
+  /// The last frame was lost, and several before it.
+  [[nodiscard]] bool astray() const { return motion_.outdated(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
   [[nodiscard]] const LocalMap& local_map() const { return local_map_; }
 

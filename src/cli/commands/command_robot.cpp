@@ -76,6 +76,12 @@ void add_robot(CLI::App& app, Session& session) {
       ->type_name("OUT");
   add_network_options(*command, request->network);
   command
+      ->add_option_function<std::string>(
+          "--feedback", [request](const std::string& choice) { request->feedback = choice == "on"; },
+          "on: maps of other robots serve for this one's relocalisation and loops; its map then depends on "
+          "the network (default: off)")
+      ->check(CLI::IsMember({"off", "on"}));
+  command
       ->add_option("--wait", request->wait_s,
                    "For a hub that was never heard, after the last frame (default: 30)")
       ->type_name("S")

@@ -196,6 +196,15 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
   return edges.take();
 }
 
+Matrix6d path_covariance(const maps::Map& map, KeyframeId a, KeyframeId b) {
+  if (b < a) {
+    const Matrix6d carry = geometry::adjoint(map.camera_from_world(b) * map.camera_from_world(a).inverse());
+    return carry * path_covariance(map, b, a) * carry.transpose();
+  }
+  int steps = 0;
+  return covariance_of_path(map, map.keyframe_ids(), a, b, steps);
+}
+
 std::vector<PoseEdge> loop_edges(const maps::Map& map) {
   std::vector<PoseEdge> edges;
   for (const maps::LoopEdge& loop : map.loops()) {

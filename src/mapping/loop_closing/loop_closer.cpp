@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "loop_closing/inter_robot_loops.hpp"
+#include "loop_closing/relocalisation_check.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -103,22 +106,31 @@ std::string LoopCloser::judge(const maps::Map& map, LoopTrial& trial) const {
   return {};
 }
 
-/// The largest consistent set of the loops found lately, with the new keyframe in it: when it holds enough
-/// keyframes and no other set comes near.
-std::vector<Loop> LoopCloser::confirmed(const maps::Map& map, KeyframeId keyframe) const {
+std::vector<Loop> PendingLoops::confirm(const maps::Map& matches, const maps::Map& queries,
+                                        KeyframeId keyframe, const std::vector<Loop>& verified,
+                                        const LoopOptions& options) {
+  const auto gone = [&](const Loop& l) {
+    return keyframe.index - l.query.index > kPatience || !queries.has_keyframe(l.query) ||
+           !matches.has_keyframe(l.match);
+  };
+  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());
+  if (verified.empty()) return {};
+  waiting_.insert(waiting_.end(), verified.begin(), verified.end());
   std::vector<PlacePair> pairs;
   for (const Loop& loop : waiting_) pairs.push_back({loop.match, loop.query, loop.evidence.query_from_match});
-  const std::vector<ConsistentSet> sets = consistent_sets(map, map, pairs, options_.consistency);
-  if (sets.empty() || static_cast<int>(sets[0].keyframes_b) < options_.agreeing) return {};
+  const std::vector<ConsistentSet> sets = consistent_sets(matches, queries, pairs, options.consistency);
+  if (sets.empty() || static_cast<int>(sets[0].keyframes_b) < options.agreeing) return {};
   if (sets.size() > 1 && static_cast<double>(sets[1].keyframes_b) >
-                             options_.max_alternative * static_cast<double>(sets[0].keyframes_b)) {
+                             options.max_alternative * static_cast<double>(sets[0].keyframes_b)) {
     return {};
   }
   std::vector<Loop> result;
   for (const std::size_t i : sets[0].members) result.push_back(waiting_[i]);
   const bool fresh =
       std::any_of(result.begin(), result.end(), [&](const Loop& l) { return l.query == keyframe; });
-  return fresh ? result : std::vector<Loop>{};
+  if (!fresh) return {};
+  waiting_.clear();
+  return result;
 }
 
 std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) {
@@ -135,17 +147,31 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
   const std::vector<Loop> verified = verify(map, keyframe, candidates);
   database_.add(keyframe, features);
   last_ = keyframe;
-
-  const auto gone = [&](const Loop& l) {
-    return keyframe.index - l.query.index > kPatience || !map.has_keyframe(l.query) ||
-           !map.has_keyframe(l.match);
-  };
-  waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());
-  if (verified.empty()) return {};
-  waiting_.insert(waiting_.end(), verified.begin(), verified.end());
-  std::vector<Loop> sure = confirmed(map, keyframe);
-  if (!sure.empty()) waiting_.clear();
+  std::vector<Loop> sure = pending_.confirm(map, map, keyframe, verified, options_);
+  if (others_ == nullptr) return sure;
+  for (const Loop& loop : others_->detect(database_, map, keyframe)) {
+    LoopTrial trial;
+    trial.loop = loop;
+    trial.by_others = true;
+    trial.refused = judge(map, trial);
+    trials_.push_back(trial);
+    if (trial.refused.empty()) sure.push_back(loop);
+  }
   return sure;
+}
+
+void LoopCloser::use(std::shared_ptr<const OtherMapsInbox> others) {
+  others_ = std::make_shared<InterRobotLoops>(options_, camera_, std::move(others));
+}
+
+std::optional<Rigid3> LoopCloser::locate(const sensor::RgbdFrame& frame,
+                                         const std::shared_ptr<const features::FrameFeatures>& features,
+                                         const tracking::SurfaceSamplerOptions& surface) {
+  if (others_ == nullptr) return std::nullopt;
+  const std::optional<Rigid3> found =
+      others_->locate(database_, image_map(frame, features, camera_, surface));
+  if (found) ++counts_.located;
+  return found;
 }
 
 void LoopCloser::restore(const maps::Map& map, KeyframeId newest) {
@@ -177,6 +203,7 @@ void LoopCloser::note_verdict(const PoseEdge& edge, const std::string& refused) 
     if (trial->loop.match != edge.a || trial->loop.query != edge.b) continue;
     trial->closed = refused.empty();
     trial->refused = refused;
+    if (trial->closed && trial->by_others) ++counts_.by_others;
     return;
   }
 }

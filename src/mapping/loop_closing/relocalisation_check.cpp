@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_closing/relocalisation_check.hpp"
 
+#include <utility>
+
 namespace plumbline::mapping {
 namespace {
 
@@ -13,20 +15,27 @@ bool within(const Rigid3& a, const Rigid3& b, double most_m, double most_rad) {
 
 }  // namespace
 
+maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
+                      const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface) {
+  auto seen = std::make_shared<maps::Keyframe>();
+  seen->id = {0, 0};
+  seen->stamp = frame.stamp;
+  seen->features = std::move(features);
+  seen->surface = tracking::sample_surface(frame.depth, camera, surface);
+  maps::Map map;
+  map.add_keyframe(seen, {});
+  return map;
+}
+
 bool RelocalisationCheck::passes(const maps::Map& map, const Rigid3& lost_at, const sensor::RgbdFrame& frame,
                                  const features::FrameFeatures& features, core::KeyframeId keyframe,
                                  const Rigid3& found_at) const {
   if (within(found_at, lost_at, 0.6, 0.6)) return true;
   if (features.points.empty() && features.lines.empty()) return true;  // depth alone: nothing to match
-  auto seen = std::make_shared<maps::Keyframe>();
-  seen->id = {keyframe.robot, 0};
-  seen->stamp = frame.stamp;
-  seen->features = std::make_shared<features::FrameFeatures>(features);
-  seen->surface = tracking::sample_surface(frame.depth, camera, surface);
-  maps::Map probe;
-  probe.add_keyframe(seen, found_at);
-  const PlaceVerification place =
-      verify_place({&probe, seen->id, camera}, {&map, keyframe, camera}, verify, seed);
+  const maps::Map picture =
+      image_map(frame, std::make_shared<features::FrameFeatures>(features), camera, surface);
+  const PlaceVerification place = verify_place({&picture, picture.keyframe_ids().front(), camera},
+                                               {&map, keyframe, camera}, verify, seed);
   return place.accepted &&
          within(found_at, place.query_from_match * map.camera_from_world(keyframe), 0.1, 0.05);
 }

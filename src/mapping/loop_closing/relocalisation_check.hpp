@@ -2,11 +2,17 @@
 #pragma once
 
 // Whether a camera that was lost is where it was found by appearance.
+#include <memory>
+
 #include "plumbline/mapping/place_verification.hpp"
 #include "plumbline/sensor/frame.hpp"
 #include "plumbline/tracking/surface_sampler.hpp"
 
 namespace plumbline::mapping {
+
+/// A map of nothing but one frame, as keyframe 0 of `robot` in the origin: what places are verified with.
+maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
+                      const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface);
 
 /// A camera that turns up far from where it was lost must pass as a loop would: corridors look alike from
 /// both ends. Near by there is nothing to confuse.

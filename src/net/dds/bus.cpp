@@ -157,6 +157,16 @@ void take_some(dds_entity_t reader, int most, const Use& use) {
 }
 
 constexpr int kMostWords = 256;
+constexpr int kFeedbackAtATime = 4;
+constexpr const char* kFeedback = "plumbline_feedback";
+
+std::vector<Piece> take_pieces(dds_entity_t reader, int most) {
+  std::vector<Piece> pieces;
+  take_some<plumbline_wire_Piece>(reader, most, [&](const plumbline_wire_Piece& piece, const auto&) {
+    pieces.push_back(from_wire(piece));
+  });
+  return pieces;
+}
 
 template <typename Wire, typename Message>
 dds_return_t write_message(dds_entity_t writer, const Message& message) {
@@ -201,6 +211,14 @@ class CycloneRobot : public RobotBus {
     });
     return words;
   }
+  std::vector<Piece> hear_of_others() override {
+    if (others_pieces_ == 0) {
+      others_pieces_ =
+          dds_create_reader(subscriber_.handle, participant_.topic(plumbline_wire_Piece_desc, kFeedback),
+                            piece_qos().get(), nullptr);
+    }
+    return take_pieces(others_pieces_, kFeedbackAtATime);
+  }
   bool listened_to() override {
     dds_publication_matched_status_t status;
     return dds_get_publication_matched_status(pieces_, &status) == DDS_RETCODE_OK && status.current_count > 0;
@@ -216,6 +234,7 @@ class CycloneRobot : public RobotBus {
   dds_entity_t hellos_ = 0;
   dds_entity_t pieces_ = 0;
   dds_entity_t words_ = 0;
+  dds_entity_t others_pieces_ = 0;  ///< 0: not asked for
 };
 
 class CycloneHub : public HubBus {
@@ -261,6 +280,10 @@ class CycloneHub : public HubBus {
     Robot listener;
     listener.subscriber = participant_.subscriber({robot});
     listener.pieces = dds_create_reader(listener.subscriber.handle, piece_topic_, piece_qos().get(), nullptr);
+    listener.publisher = participant_.publisher({robot});
+    listener.feedback =
+        dds_create_writer(listener.publisher.handle, participant_.topic(plumbline_wire_Piece_desc, kFeedback),
+                          piece_qos(0).get(), nullptr);
     if (listener.pieces < 0) {
       return core::usage_error(
           fmt::format("{}: cannot be listened to ({})", robot, dds_strretcode(listener.pieces)));
@@ -271,13 +294,22 @@ class CycloneHub : public HubBus {
   }
   void ignore(const std::string& robot) override { robots_.erase(robot); }
   std::vector<Piece> take(const std::string& robot, int most) override {
-    std::vector<Piece> pieces;
     const auto found = robots_.find(robot);
-    if (found == robots_.end()) return pieces;
-    take_some<plumbline_wire_Piece>(
-        found->second.pieces, most,
-        [&](const plumbline_wire_Piece& piece, const auto&) { pieces.push_back(from_wire(piece)); });
-    return pieces;
+    return found == robots_.end() ? std::vector<Piece>() : take_pieces(found->second.pieces, most);
+  }
+  int begun_to_hear(const std::string& robot) override {
+    const auto found = robots_.find(robot);
+    dds_publication_matched_status_t status;
+    const bool heard =
+        found != robots_.end() &&
+        dds_get_publication_matched_status(found->second.feedback, &status) == DDS_RETCODE_OK &&
+        status.current_count > 0;
+    return heard ? static_cast<int>(status.total_count) : 0;
+  }
+  bool tell(const std::string& robot, const Piece& piece) override {
+    const auto found = robots_.find(robot);
+    return found != robots_.end() &&
+           write_message<plumbline_wire_Piece>(found->second.feedback, piece) == DDS_RETCODE_OK;
   }
   void wait(std::chrono::milliseconds most) override { participant_.wait(most); }
 
@@ -285,6 +317,8 @@ class CycloneHub : public HubBus {
   struct Robot {
     Entity subscriber;
     dds_entity_t pieces = 0;
+    Entity publisher;
+    dds_entity_t feedback = 0;  ///< what it is told of others; negative: keys do not permit it
   };
   /// Empty: not known, or several.
   std::string partition_of(dds_instance_handle_t writer) const {

@@ -181,11 +181,11 @@ std::string permissions(const std::string& name) {
       "validity>\n";
   xml += std::string("<allow_rule>\n") + kDomains;
   if (hub) {
-    xml += allow("publish", {"plumbline_word"}, where);
+    xml += allow("publish", {"plumbline_word", "plumbline_feedback"}, where);
     xml += allow("subscribe", {"plumbline_hello", "plumbline_piece", "plumbline_word"}, where);
   } else {
     xml += allow("publish", {"plumbline_hello", "plumbline_piece"}, where);
-    xml += allow("subscribe", {"plumbline_word"}, where);
+    xml += allow("subscribe", {"plumbline_word", "plumbline_feedback"}, where);
   }
   return xml + "</allow_rule><default>DENY</default></grant></permissions></dds>\n";
 }

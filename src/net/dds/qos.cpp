@@ -39,11 +39,11 @@ Qos word_qos() {
   return qos;
 }
 
-Qos piece_qos() {
+Qos piece_qos(int most_ms) {
   Qos qos = new_qos();
   // What is lost on the way is sent again by DDS, fragment by fragment; what is lost with a link or a process
-  // by the robot, which knows what was acknowledged. Who sends waits 0.1 s for room, then looks around.
-  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
+  // by the robot, which knows what was acknowledged. Who sends waits a moment for room, then looks around.
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(most_ms));
   // History would die with its process and come twice: the store is the history.
   dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
   // Nothing is overwritten: a piece that is missing costs the whole transaction.

@@ -19,7 +19,8 @@ Qos partition_qos(const std::vector<std::string>& partitions);
 /// Of hellos and the hub's words.
 Qos word_qos();
 /// Of transactions' pieces.
-Qos piece_qos();
+/// `most_ms`: that who writes waits for room.
+Qos piece_qos(int most_ms = 100);
 /// Of the participant: keys, when there are any.
 core::Result<Qos> participant_qos(const NetworkOptions& options);
 /// The configuration of a domain, XML. The environment is not read.

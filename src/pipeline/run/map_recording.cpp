@@ -43,6 +43,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   constexpr double kNoEnd_s = 1e299;
   if (request.open.to_s < kNoEnd_s) text += fmt::format("  to: {} s\n", request.open.to_s);
   text += fmt::format("  every: {}\n", request.open.every);
+  if (request.feedback != nullptr) text += "  feedback: on\n";
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
   return text + to_yaml(graph);
 }
@@ -258,6 +259,7 @@ class MapRun {
     context.keeps_map = keeps_map(graph_);
     context.keeps_clouds = keeps_clouds(graph_);
     context.alter_map = request_.alter_map;
+    context.feedback = request_.feedback;
     if (resumed_) context.resumed = &*resumed_;
     if (tracks(graph_) && source_->format() != "synth") context.cameras = &cameras_;  // no lens, no error
     return context;

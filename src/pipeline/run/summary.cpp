@@ -27,6 +27,7 @@ nlohmann::ordered_json trials_of(const RunSummary& summary) {
     list.push_back({{"query", trial.loop.query.index},
                     {"match", trial.loop.match.index},
                     {"closed", trial.closed},
+                    {"by_others", trial.by_others},
                     {"reason", trial.refused},
                     {"score", rounded(trial.score)},
                     {"matches", e.matched_points + e.matched_lines},
@@ -134,6 +135,14 @@ nlohmann::ordered_json loops_of(const RunSummary& summary) {
           {"list", trials_of(summary)}};
 }
 
+nlohmann::ordered_json feedback_of(const RunSummary::Feedback& feedback) {
+  return {{"on", true},
+          {"keyframes_received", feedback.keyframes},
+          {"relocalised", feedback.relocalised},
+          {"loops", feedback.loops},
+          {"note", "this map depends on what the network brought and when: another run gives other bytes"}};
+}
+
 nlohmann::ordered_json refine_of(const RunSummary& s) {
   const mapping::RefinementSummary& refine = s.refine;
   return {{"local_maps", refine.local_maps},
@@ -238,7 +247,7 @@ void judge(RunSummary& summary) {
 }
 
 core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& s) {
-  const nlohmann::ordered_json json = {
+  nlohmann::ordered_json json = {
       {"input", s.input},
       {"pipeline", s.pipeline},
       {"trustworthy", s.reason.empty()},
@@ -262,6 +271,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"memory", {{"peak_rss_mb", rounded(s.peak_rss_mb)}}},
       {"version", core::version()},
       {"seed", s.seed}};
+  if (s.feedback.on) json["feedback"] = feedback_of(s.feedback);
   // Names of files need not be UTF-8: replace what JSON cannot hold.
   return core::write_file(file,
                           json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");

@@ -39,6 +39,7 @@ class TrackStage : public Stage {
       slams_.push_back(std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                        *context.executor, *context.log));
       slams_.back()->set_shutter(robot.camera.readout_s);
+      if (context.feedback != nullptr) slams_.back()->use(context.feedback);
     }
     revisions_.resize(slams_.size());
     if (refine_ == "off" && context.cameras != nullptr) {
@@ -133,9 +134,14 @@ class TrackStage : public Stage {
       summary.loops.rejected += static_cast<std::size_t>(loops.rejected);
       const auto& trials = slam.loop_trials();
       summary.loops.trials.insert(summary.loops.trials.end(), trials.begin(), trials.end());
+      summary.feedback.relocalised += static_cast<std::size_t>(loops.located);
+      summary.feedback.loops += static_cast<std::size_t>(loops.by_others);
       summary.path.refused += static_cast<std::size_t>(slam.refused());
       if (several()) summary.robots.push_back({robot.name, slam.map().keyframe_count()});
     }
+    summary.feedback.on = context_->feedback != nullptr;
+    if (const auto others = summary.feedback.on ? context_->feedback->get() : nullptr)
+      summary.feedback.keyframes = others->map.keyframe_count();
     summary.causes = {count(mapping::KeyframeCause::kCone), count(mapping::KeyframeCause::kUrgent),
                       count(mapping::KeyframeCause::kPlain)};
     summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
