@@ -123,7 +123,7 @@ class LoopCloser {
 
   /// Keyframes of the map that an image looks like, best first; for a tracker that is lost.
   [[nodiscard]] std::vector<core::KeyframeId> look_alikes(const maps::Map& map,
-                                                          const features::FrameFeatures& picture,
+                                                          const features::FrameFeatures& image,
                                                           std::size_t count) const;
 
   [[nodiscard]] const LoopCounts& counts() const { return counts_; }

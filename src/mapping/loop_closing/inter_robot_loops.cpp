@@ -54,10 +54,10 @@ std::optional<Loop> InterRobotLoops::recognise(const places::Database& database,
   return std::nullopt;
 }
 
-std::optional<Rigid3> InterRobotLoops::locate(places::Database& database, const maps::Map& picture) {
+std::optional<Rigid3> InterRobotLoops::locate(places::Database& database, const maps::Map& image) {
   update(database);
   if (others_ == nullptr) return std::nullopt;
-  const auto seen = recognise(database, picture, picture.keyframe_ids().front());
+  const auto seen = recognise(database, image, image.keyframe_ids().front());
   if (!seen) return std::nullopt;
   return seen->evidence.query_from_match * others_->map.camera_from_world(seen->match);
 }

@@ -18,9 +18,9 @@ class InterRobotLoops {
                   std::shared_ptr<const OtherMapsInbox> inbox)
       : options_(options), camera_(camera), inbox_(std::move(inbox)) {}
 
-  /// camera_from_world of the only keyframe of `picture`, in the world of the robot that asks. The database
+  /// camera_from_world of the only keyframe of `image`, in the world of the robot that asks. The database
   /// holds own keyframes, and gets others' as they come.
-  std::optional<geometry::Rigid3> locate(places::Database& database, const maps::Map& picture);
+  std::optional<geometry::Rigid3> locate(places::Database& database, const maps::Map& image);
   /// Loops between keyframes of the robot's own map that ended at `keyframe`: those that contradict their
   /// present poses by more than their own errors explain.
   std::vector<Loop> detect(places::Database& database, const maps::Map& map, core::KeyframeId keyframe);

@@ -252,11 +252,11 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   return true;
 }
 
-std::vector<KeyframeId> LoopCloser::look_alikes(const maps::Map& map, const features::FrameFeatures& picture,
+std::vector<KeyframeId> LoopCloser::look_alikes(const maps::Map& map, const features::FrameFeatures& image,
                                                 std::size_t count) const {
   std::vector<KeyframeId> result;
   for (const places::Hit& hit :
-       database_.query(picture).best(count, [&](KeyframeId id) { return map.has_keyframe(id); })) {
+       database_.query(image).best(count, [&](KeyframeId id) { return map.has_keyframe(id); })) {
     result.push_back(hit.keyframe);
   }
   return result;

@@ -16,7 +16,7 @@ bool within(const Rigid3& a, const Rigid3& b, double most_m, double most_rad) {
 }  // namespace
 
 maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
-                      const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface) {
+                    const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface) {
   auto seen = std::make_shared<maps::Keyframe>();
   seen->id = {0, 0};
   seen->stamp = frame.stamp;
@@ -32,10 +32,10 @@ bool RelocalisationCheck::passes(const maps::Map& map, const Rigid3& lost_at, co
                                  const Rigid3& found_at) const {
   if (within(found_at, lost_at, 0.6, 0.6)) return true;
   if (features.points.empty() && features.lines.empty()) return true;  // depth alone: nothing to match
-  const maps::Map picture =
+  const maps::Map image =
       image_map(frame, std::make_shared<features::FrameFeatures>(features), camera, surface);
-  const PlaceVerification place = verify_place({&picture, picture.keyframe_ids().front(), camera},
-                                               {&map, keyframe, camera}, verify, seed);
+  const PlaceVerification place =
+      verify_place({&image, image.keyframe_ids().front(), camera}, {&map, keyframe, camera}, verify, seed);
   return place.accepted &&
          within(found_at, place.query_from_match * map.camera_from_world(keyframe), 0.1, 0.05);
 }
