@@ -282,10 +282,10 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   for (int round = 0; round < kRounds; ++round) {
     const auto evidence = evidence_of(parts, change, executor);
     if (!evidence || result.keyframes < kLeastKeyframes || result.observations < kLeastObservations) {
-      return core::input_error(
-          fmt::format("{} keyframes with {} observations of points that several of them share are too little "
-                      "to tell the camera by; film a place with texture for 10 s or more, turning and moving",
-                      result.keyframes, result.observations));
+      return core::input_error(fmt::format(
+          "{} keyframes with {} observations of shared points are too few to estimate the camera from; "
+          "film a place with texture for 10 s or more while turning and moving the camera",
+          result.keyframes, result.observations));
     }
     const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
     if (change == before) break;
