@@ -62,6 +62,17 @@ CalibrationObservation observation_of(const features::PointFeature& feature, boo
   return seen;
 }
 
+/// How fast the depth on the ray to a point changes, m/s: the surface that it lies on is carried along by the
+/// camera's motion. 0 where that surface is not known, or the ray grazes it.
+double depth_rate(const maps::MapPoint& point, const optimize::CalibrationPose& pose) {
+  constexpr double kLeastCosine = 0.3;  // between ray and normal
+  const Eigen::Vector3d p = pose.camera_from_world * point.position;
+  const Eigen::Vector3d normal = pose.camera_from_world.rotation * point.normal;
+  const double along = normal.dot(p);
+  if (!(std::abs(along) > kLeastCosine * p.norm())) return 0.0;
+  return p.z() * normal.dot(pose.velocity.head<3>() + pose.velocity.tail<3>().cross(p)) / along;
+}
+
 /// Each part has the keyframes of its stretch, and what two of them see.
 void add_run(const CalibrationRun& run, int wanted, const sensor::Camera& camera, Parts& parts) {
   const geometry::Trajectory path = maps::trajectory(*run.frames, *run.map);
@@ -89,6 +100,7 @@ void add_run(const CalibrationRun& run, int wanted, const sensor::Camera& camera
           observation_of(features.points[static_cast<std::size_t>(o.feature)], o.aligned, camera));
       seen[part].back().pose = pose;
       seen[part].back().point = static_cast<int>(parts[part].points.size());
+      seen[part].back().depth_rate = depth_rate(point, parts[part].poses[static_cast<std::size_t>(pose)]);
     }
     for (std::size_t p = 0; p < kParts; ++p) {
       if (static_cast<int>(seen[p].size()) < kLeastViews) continue;
@@ -124,12 +136,10 @@ struct Trial {
 using Group = std::vector<CameraUnknown>;
 /// What matters most first; each has to explain what those before it leave.
 const std::vector<Group>& groups() {
-  static const std::vector<Group> all = {{optimize::kReadout},
-                                         {optimize::kSlopeX},
-                                         {optimize::kSlopeY},
-                                         {optimize::kFocal},
-                                         {optimize::kCentreX, optimize::kCentreY},
-                                         {optimize::kK1, optimize::kK2}};
+  static const std::vector<Group> all = {
+      {optimize::kReadout},          {optimize::kDelay}, {optimize::kSlopeX},
+      {optimize::kSlopeY},           {optimize::kFocal}, {optimize::kCentreX, optimize::kCentreY},
+      {optimize::kK1, optimize::kK2}};
   return all;
 }
 
@@ -141,6 +151,7 @@ struct CameraNumber {
 };
 std::vector<CameraNumber> numbers_of(const sensor::Camera& camera) {
   return {{"readout", optimize::kReadout, camera.readout_s.value_or(0.0)},
+          {"depth_delay", optimize::kDelay, camera.depth_delay_s},
           {"depth_slope x", optimize::kSlopeX, camera.depth_slope[0]},
           {"depth_slope y", optimize::kSlopeY, camera.depth_slope[1]},
           {"fx", optimize::kFocal, camera.color.fx},
@@ -158,7 +169,7 @@ class Calibrator {
     prior_.mean = none_;
     prior_.sigma = CameraChange{{options.focal_prior, options.readout_prior_s, options.slope_prior,
                                  options.slope_prior, options.centre_prior_px, options.centre_prior_px,
-                                 options.distortion_prior, options.distortion_prior}};
+                                 options.distortion_prior, options.distortion_prior, options.delay_prior_s}};
   }
 
   /// What is believed, by the evidence of each part. What one unknown hides of another (a wrong distortion
@@ -271,10 +282,10 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   for (int round = 0; round < kRounds; ++round) {
     const auto evidence = evidence_of(parts, change, executor);
     if (!evidence || result.keyframes < kLeastKeyframes || result.observations < kLeastObservations) {
-      return core::input_error(
-          fmt::format("{} keyframes with {} observations of points that several of them share are too little "
-                      "to tell the camera by; film a place with texture for 10 s or more, turning and moving",
-                      result.keyframes, result.observations));
+      return core::input_error(fmt::format(
+          "{} keyframes with {} observations of shared points are too few to estimate the camera from; "
+          "film a place with texture for 10 s or more while turning and moving the camera",
+          result.keyframes, result.observations));
     }
     const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
     if (change == before) break;

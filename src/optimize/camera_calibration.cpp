@@ -74,7 +74,8 @@ class PixelCost {
   const sensor::Camera* camera_;
 };
 
-/// e = (z - p_z / (1 - p_z slope.(x, y))) / sigma: what the depth camera says of a point that lies at p.
+/// e = (z - p_z / (1 - p_z slope.(x, y)) - delay rate) / sigma: what the depth camera says of a point that
+/// lies at p.
 class DepthCost {
  public:
   DepthCost(const CalibrationObservation& seen, const RowPoint& in_camera)
@@ -86,7 +87,7 @@ class DepthCost {
     in_camera_(change, step, point, p);
     const T grow = 1.0 - p[2] * (change[kSlopeX] * seen_.ray.x() + change[kSlopeY] * seen_.ray.y());
     if (grow < 0.1) return false;
-    residual[0] = (seen_.depth - p[2] / grow) / seen_.depth_sigma;
+    residual[0] = (seen_.depth - p[2] / grow - change[kDelay] * seen_.depth_rate) / seen_.depth_sigma;
     return true;
   }
 
@@ -219,6 +220,7 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
   camera.distortion[1] += change[kK2];
   camera.depth_slope[0] += change[kSlopeX];
   camera.depth_slope[1] += change[kSlopeY];
+  camera.depth_delay_s += change[kDelay];
   if (given.readout_s || change[kReadout] != 0.0) camera.readout_s = change[kReadout];
   return camera;
 }

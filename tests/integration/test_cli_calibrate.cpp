@@ -15,7 +15,7 @@ TEST_F(Calibrate, LeavesACameraThatFitsAlone) {
   const Outcome o = run("calibrate \"synth:room?frames=40&texture=full&fps=15\" -o found.yaml");
   ASSERT_EQ(o.code, 0) << o;
   EXPECT_NE(o.out.find("fx"), std::string::npos) << o;
-  EXPECT_NE(o.out.find("nothing better can be told"), std::string::npos) << o;
+  EXPECT_NE(o.out.find("nothing better was found"), std::string::npos) << o;
   const std::string found = slurp(path("found.yaml"));
   EXPECT_NE(found.find("fx: 535.4\n"), std::string::npos) << found;
   EXPECT_NE(found.find("readout: 0 "), std::string::npos) << found;

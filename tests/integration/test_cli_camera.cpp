@@ -73,13 +73,31 @@ TEST_F(CameraRefinement, AWrongFocalLengthIsFoundAndTheRunBeginsAgain) {
   EXPECT_TRUE(cameras("same").empty());
 }
 
+TEST_F(CameraRefinement, DepthThatCameLaterThanItsStampsSayIsFound) {
+  fs::copy(recording(), path("late"), fs::copy_options::recursive);
+  std::ifstream pairs(recording() + "/associations.txt");
+  std::string early;
+  for (std::string a, color, b, depth; pairs >> a >> color >> b >> depth;)
+    early += a + " " + color + " " + std::to_string(std::stod(b) - 0.02) + " " + depth + "\n";
+  write("late/associations.txt", early);
+  const Outcome o = map("late -o out");
+  ASSERT_EQ(o.code, 0) << o;
+  std::smatch found;
+  const std::string camera = slurp(path("out/camera.yaml"));
+  ASSERT_TRUE(std::regex_search(camera, found, std::regex("\ndepth_delay: ([0-9.]+)"))) << camera;
+  EXPECT_NEAR(std::stod(found[1]), 0.02, 0.008);
+}
+
 TEST_F(CameraRefinement, ARightCameraIsLeftAlone) {
   const Outcome o = map(recording() + " -o out");
   ASSERT_EQ(o.code, 0) << o;
   EXPECT_FALSE(o.told("beginning again")) << o;
   ASSERT_EQ(map(recording() + " -o off --set track.camera.refine=off").code, 0);
-  for (const char* file : {"map.ply", "trajectory.txt", "frames.csv", "camera.yaml"})
+  for (const char* file : {"map.ply", "trajectory.txt", "frames.csv"})
     EXPECT_EQ(slurp(path("out") / file), slurp(path("off") / file)) << file;
+  const std::string used = slurp(path("off/camera.yaml"));
+  const std::string camera = used.substr(used.find("\nname: "));  // what the map said of it stands before
+  EXPECT_NE(slurp(path("out/camera.yaml")).find(camera), std::string::npos);
   EXPECT_EQ(cameras("out").size(), 1U);
   EXPECT_TRUE(cameras("off").empty());
 }

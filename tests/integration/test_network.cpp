@@ -195,5 +195,28 @@ TEST_F(Network, AFullDiskAtTheHubIsToldOnBothSides) {
   EXPECT_EQ(dump(path("out/robots/a/map.db")), dump(path("a/map.db")));
 }
 
+TEST_F(Network, ARobotThatBeginsAgainWithABetterCameraIsFollowed) {
+  const Outcome made = run("synth room -o filmed --frames 90 --fps 15 --reference-spacing 10cm -q");
+  ASSERT_EQ(made.code, 0) << made;
+  const fs::path recording = path("filmed/robot0");
+  std::string camera = slurp(recording / "camera.yaml");
+  for (const std::string key : {"\nfx: ", "\nfy: "}) {
+    const std::size_t at = camera.find(key) + key.size();
+    const std::size_t end = camera.find('\n', at);
+    camera.replace(at, end - at, std::to_string(1.02 * std::stod(camera.substr(at, end - at))));
+  }
+  write("long.yaml", camera);
+  Process h = hub(" --robots 1");
+  Process a = start("a", "robot " + recording.string() + " --camera long.yaml --pace 15 -o a --name a" +
+                             network() + " --set cloud.filters=[]");
+  ASSERT_EQ(a.wait(kLong_s), 0) << a.told() << h.told();
+  ASSERT_EQ(h.wait(kLong_s), 0) << h.told();
+  EXPECT_NE(a.told().find("beginning again"), std::string::npos) << a.told();
+  EXPECT_EQ(dump(path("out/robots/a/map.db")), dump(path("a/map.db"))) << "nothing of the first run is left";
+  EXPECT_TRUE(read_json(path("out/summary.json"))["network"]["a"]["delivered"]);
+  const std::string log = slurp(path("out/hub.log"));
+  EXPECT_NE(log.find("a: has lost what was here"), std::string::npos) << "nothing had come of it: " << log;
+}
+
 }  // namespace
 }  // namespace plumbline::integration

@@ -214,10 +214,10 @@ std::string merges_html(const ReportData& data) {
   return overview.html() + details;
 }
 
-/// What the maps told about their cameras; empty: nobody asked, or nothing was found out.
+/// What the maps say of their cameras; empty: none was asked, or none could tell.
 static std::string cameras_html(const Json& s) {
   HtmlTable table(
-      {{"camera of"}, {"number"}, {"given", true}, {"found", true}, {"±", true}, {"gain", true}, {""}});
+      {{"camera of"}, {"parameter"}, {"given", true}, {"found", true}, {"±", true}, {"gain", true}, {""}});
   for (const Json& camera : list_at(s, "/camera")) {
     for (const Json& n : list_at(camera, "/numbers")) {
       const auto number = [&](const char* place) { return fmt::format("{:.5g}", number_at(n, place)); };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The camera from its own recordings: what focal length, readout, depth slope, centre and distortion explain
-// best what the keyframes of finished maps saw. Something is believed only when it also explains parts of
-// the runs that it was not found from.
+// The camera from its own recordings: what focal length, readout, depth slope, depth delay, centre and
+// distortion explain best what the keyframes of finished maps saw. Something is believed only when it also
+// explains parts of the runs that it was not found from.
 #include <string>
 #include <vector>
 
@@ -33,6 +33,7 @@ struct CalibrationOptions {
   double readout_prior_s = 0.02;
   double slope_prior = 0.02;      ///< 1/m
   double distortion_prior = 0.1;  ///< of k1 and of k2
+  double delay_prior_s = 0.02;
 };
 
 /// One number of the camera.

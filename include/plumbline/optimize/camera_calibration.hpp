@@ -25,6 +25,7 @@ enum CameraUnknown : std::size_t {
   kCentreY,
   kK1,  ///< added to the distortion
   kK2,
+  kDelay,  ///< added to sensor::Camera::depth_delay_s, seconds
   kCameraUnknowns
 };
 using CameraChange = Eigen::Matrix<double, kCameraUnknowns, 1>;
@@ -46,6 +47,7 @@ struct CalibrationObservation {
   double pixel_sigma = 1.0;
   double depth = 0.0;  ///< metres as the given camera's reader gives it; 0: none
   double depth_sigma = 1.0;
+  double depth_rate = 0.0;  ///< m/s: how fast the depth on its ray changes as the camera moves
   Eigen::Vector2d ray = Eigen::Vector2d::Zero();  ///< (x, y) of the undistorted pixel, where depth was read
 };
 

@@ -112,7 +112,7 @@ void print(const mapping::CameraCalibration& calibration) {
     fmt::print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,
                100.0 * f.gain, f.used ? "used" : "not used");
   }
-  fmt::print("the camera explains {:.1f} % of what was left unexplained in parts it was not found from\n",
+  fmt::print("held-out parts of the recordings fit {:.1f} % better with this camera\n",
              100.0 * calibration.gain);
 }
 
@@ -127,7 +127,7 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
   if (!session.quiet) print(*calibration);
   const auto& findings = calibration->findings;
   const bool any = std::any_of(findings.begin(), findings.end(), [](const auto& f) { return f.used; });
-  if (!any && !session.quiet) fmt::print("the camera that was given fits; nothing better can be told\n");
+  if (!any && !session.quiet) fmt::print("the given camera fits; nothing better was found\n");
   if (request.output.empty()) return {};
   core::OutputFile file(request.output);
   file.write("# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera));
@@ -142,7 +142,7 @@ void add_calibrate(CLI::App& app, Session& session) {
   const auto request = std::make_shared<CalibrateRequest>();
   CLI::App* command =
       add_command(app, session, "calibrate",
-                  "Find focal length, rolling shutter and depth slope of the camera from its recordings",
+                  "Find focal length, lens, shutter and depth errors of a camera from its recordings",
                   [&session, request] {
                     const auto done = calibrate(*request, session);
                     return done ? 0 : session.fail(done.error());

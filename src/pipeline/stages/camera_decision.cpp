@@ -38,14 +38,14 @@ std::string found_text(const std::vector<mapping::CameraFinding>& findings) {
 
 /// Why typical values in the place of a camera file are no camera; empty: the recording agrees.
 std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
-  const std::string file = "no camera file was given, and the camera is a guess";
-  if (!found) return fmt::format("{} that the recording cannot confirm: {}", file, found.error().message);
+  const std::string doubt = "no camera file was given, and the recording cannot confirm the guessed camera: ";
+  if (!found) return doubt + found.error().message;
   const auto& findings = found->findings;
   const auto fx =
       std::find_if(findings.begin(), findings.end(), [](const auto& f) { return f.name == "fx"; });
   if (fx->sigma < kGuessedFocalSigma * fx->given) return "";
-  return fmt::format("{}: the recording tells fx to {:.0f} px only ({:.1f} % would do)", file, fx->sigma,
-                     100.0 * kGuessedFocalSigma);
+  return fmt::format("{}fx is known to {:.1f} px only, {:.1f} px are needed", doubt, fx->sigma,
+                     kGuessedFocalSigma * fx->given);
 }
 
 }  // namespace
@@ -74,10 +74,10 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
     if (!text.empty()) {
       used.back() = found->camera;
       used.back().guess = false;
-      log.info(
-          fmt::format("{}: the camera is better with {}: {:.1f} % less is left unexplained where it was "
-                      "not looked for; beginning again with it",
-                      robot.name, text, 100.0 * found->gain));
+      log.info(fmt::format(
+          "{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better; "
+          "beginning again with it",
+          robot.name, text, 100.0 * found->gain));
     }
   }
   said.push_back(std::move(camera));

@@ -27,9 +27,10 @@ class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice("camera.refine", refine_, {"auto", "off"},
-                 "Whether the recording begins anew with a better camera when its map knows one, after 40 "
-                 "keyframes, 10 s or at its end");
+    table.choice(
+        "camera.refine", refine_, {"auto", "off"},
+        "Whether a run looks for a better camera in its own map, after 40 keyframes, 10 s or at its end, "
+        "and begins again with it");
   }
 
   core::Result<void> start(const RunContext& context) override {

@@ -60,6 +60,10 @@ World swing(const sensor::Camera& truth, int keyframes, int corners) {
       const double tilt = (truth.depth_slope[0] * p.x() + truth.depth_slope[1] * p.y()) / p.z();
       f.depth =
           static_cast<float>(p.z() / (1.0 - p.z() * tilt) + sensor::depth_sigma(p.z()) * normal(random));
+      // The surface is level in the world: what the same ray meets when the depth image is taken.
+      const Rigid3 later = pose_at(stamp + truth.readout_s.value_or(0.0) * (row - 0.5) + truth.depth_delay_s);
+      const Eigen::Vector3d facing = later.rotation.col(2);
+      f.depth += static_cast<float>(facing.dot(later * points[i]) / facing.dot(p / p.z()) - p.z());
       seen_as[i].emplace_back(k, static_cast<int>(features->points.size()));
       features->points.push_back(f);
       features->descriptors.emplace_back();
@@ -78,6 +82,7 @@ World swing(const sensor::Camera& truth, int keyframes, int corners) {
     if (seen_as[i].empty()) continue;
     maps::MapPoint point;
     point.position = points[i];
+    point.normal = -Eigen::Vector3d::UnitZ();
     const core::PointId id = world.map.add_point(0, point);
     for (const auto& [k, feature] : seen_as[i])
       world.map.observe(id, ids[static_cast<std::size_t>(k)], feature);
@@ -114,6 +119,19 @@ TEST(CalibrateCamera, FindsReadoutSlopeAndFocalLength) {
   EXPECT_NEAR(found->camera.color.fy, truth.color.fy, 2.5);
   EXPECT_GT(found->gain, 0.2);
   EXPECT_EQ(found->camera.color.cx, 319.5);
+}
+
+TEST(CalibrateCamera, FindsThatDepthCameLate) {
+  sensor::Camera truth = given_camera();
+  truth.depth_delay_s = 0.02;
+  const auto found = calibrate(swing(truth, 40, 150));
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_TRUE(finding(*found, "depth_delay").used);
+  EXPECT_NEAR(found->camera.depth_delay_s, 0.02, 0.006);
+  for (const CameraFinding& f : found->findings) {
+    EXPECT_EQ(f.used, f.name == "depth_delay")
+        << f.name << " " << f.found << " +- " << f.sigma << " " << f.gain;
+  }
 }
 
 TEST(CalibrateCamera, LeavesACameraThatFitsAlone) {

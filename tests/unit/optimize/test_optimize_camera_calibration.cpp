@@ -34,6 +34,9 @@ bool see(const sensor::Camera& camera, const CalibrationPose& pose, const Eigen:
   seen.ray = p.head<2>() / p.z();
   seen.depth =
       p.z() / (1.0 - p.z() * (camera.depth_slope[0] * seen.ray.x() + camera.depth_slope[1] * seen.ray.y()));
+  const Eigen::Vector3d moved = pose.velocity.head<3>() + pose.velocity.tail<3>().cross(p);
+  seen.depth_rate = moved.z();  // of a surface that faces the camera
+  seen.depth += camera.depth_delay_s * seen.depth_rate;
   seen.depth_sigma = 0.01;
   return camera.color.contains(seen.pixel);
 }
@@ -73,7 +76,7 @@ CalibrationProblem room(const sensor::Camera& truth, const sensor::Camera& given
 
 CameraPrior weak_prior() {
   CameraPrior prior;
-  prior.sigma = CameraChange{{0.05, 0.02, 0.05, 0.05, 20.0, 20.0, 0.2, 0.2}};
+  prior.sigma = CameraChange{{0.05, 0.02, 0.05, 0.05, 20.0, 20.0, 0.2, 0.2, 0.02}};
   return prior;
 }
 
@@ -103,6 +106,7 @@ TEST(CameraCalibration, FindsWhatIsWrong) {
   truth.distortion[0] += 0.05;
   truth.readout_s = 0.018;
   truth.depth_slope = {0.02, -0.01};
+  truth.depth_delay_s = -0.015;
   CalibrationProblem problem = room(truth, given, 0.3);
   const CameraChange change = solve(problem, all_free());
   const auto there = camera_evidence(problem, change);
@@ -115,6 +119,7 @@ TEST(CameraCalibration, FindsWhatIsWrong) {
   EXPECT_NEAR(*found.readout_s, 0.018, 0.001);
   EXPECT_NEAR(found.depth_slope[0], 0.02, 0.002);
   EXPECT_NEAR(found.depth_slope[1], -0.01, 0.002);
+  EXPECT_NEAR(found.depth_delay_s, -0.015, 0.001);
 }
 
 TEST(CameraCalibration, WhatIsNotFreeStays) {
@@ -126,7 +131,7 @@ TEST(CameraCalibration, WhatIsNotFreeStays) {
   free[kReadout] = true;
   const CameraChange change = solve(problem, free);
   EXPECT_NEAR(change[kReadout], 0.02, 0.002);
-  for (const CameraUnknown u : {kFocal, kSlopeX, kSlopeY, kCentreX, kCentreY, kK1, kK2}) {
+  for (const CameraUnknown u : {kFocal, kSlopeX, kSlopeY, kCentreX, kCentreY, kK1, kK2, kDelay}) {
     EXPECT_EQ(change[u], 0.0);
   }
 }
@@ -139,10 +144,11 @@ TEST(CameraCalibration, EvidenceForetellsTheCost) {
   CalibrationProblem problem = room(truth, kinect(), 0.3);
   const auto here = camera_evidence(problem, CameraChange::Zero());
   ASSERT_TRUE(here);
-  for (const CameraChange& step :
-       {CameraChange{{0.002, 0, 0, 0, 0, 0, 0, 0}}, CameraChange{{0, 0.003, 0, 0, 0, 0, 0, 0}},
-        CameraChange{{0, 0, 0.004, -0.002, 0, 0, 0, 0}}, CameraChange{{0, 0, 0, 0, 1, -1, 0, 0}},
-        CameraChange{{0, 0, 0, 0, 0, 0, 0.01, -0.01}}}) {
+  for (const auto& [u, by] : {std::pair{kFocal, 0.002}, std::pair{kReadout, 0.003}, std::pair{kSlopeX, 0.004},
+                              std::pair{kSlopeY, -0.004}, std::pair{kCentreX, 1.0}, std::pair{kK1, 0.01},
+                              std::pair{kDelay, 0.005}}) {
+    CameraChange step = CameraChange::Zero();
+    step[u] = by;
     const auto there = camera_evidence(problem, step);
     ASSERT_TRUE(there);
     const double expected = here->cost_of(step) - here->cost;
