@@ -3,16 +3,14 @@
 // goes on as it is.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "plumbline/mapping/evident.hpp"
 #include "plumbline/mapping/merge_server.hpp"
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
@@ -58,7 +56,7 @@ class LiveMeetings {
   void date(RunSummary::Merge& merge) const {
     const auto when = met_s_.find({merge.evidence.a, merge.evidence.b});
     if (when != met_s_.end()) merge.time_s = when->second;
-    merge.evident_s = evident_s(merge.evidence);
+    merge.evident_s = mapping::evident_s(merge.evidence, made_s_);
   }
 
  private:
@@ -72,21 +70,6 @@ class LiveMeetings {
       if (!noted) return noted;
     }
     return {};
-  }
-  /// When the fifth keyframe of those that agree was there on both sides, or the last of fewer.
-  [[nodiscard]] double evident_s(const mapping::MergeEvidence& merge) const {
-    constexpr std::size_t kEnough = 5;
-    std::map<std::int32_t, std::set<double>> sides;
-    for (const mapping::VerifiedPair& pair : merge.pairs) {
-      for (const core::KeyframeId id : {pair.query, pair.match}) {
-        if (const auto made = made_s_.find(id); made != made_s_.end()) sides[id.robot].insert(made->second);
-      }
-    }
-    double latest = -1.0;
-    for (const auto& [robot, made] : sides)
-      latest = std::max(
-          latest, *std::next(made.begin(), static_cast<std::ptrdiff_t>(std::min(kEnough, made.size()) - 1)));
-    return latest;
   }
 
   const RobotRecordings& recordings_;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which robots that the end merges have met while they mapped, how late, and how good the previews were.
 //   meetings [--lag N] RECORDING RECORDING...
-// "Evident" is the moment at which the fifth keyframe of those that agree at the end was there on both sides
-// (the last one where fewer agree). ATE: of the keyframes of a preview and of the same keyframes at the end,
-// in one frame, after alignment, where the recordings' truths have one world. The log of keyframes is
-// replayed with one thread and with two.
+// "Evident" is the moment at which the pairs that agree at the end had five keyframes on both sides (or all
+// of fewer). ATE: of the keyframes of a preview and of the same keyframes at the end, in one frame, after
+// alignment, where the recordings' truths have one world. The log of keyframes is replayed with one thread
+// and with two.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -13,13 +13,13 @@
 #include <cmath>
 #include <map>
 #include <opencv2/core/utility.hpp>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "../slam_overrides.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/alignment.hpp"
+#include "plumbline/mapping/evident.hpp"
 #include "plumbline/mapping/merge_server.hpp"
 #include "plumbline/mapping/slam.hpp"
 
@@ -132,20 +132,6 @@ std::vector<Reported> replay(const Log& log, const std::vector<Robot>& robots, i
   return told;
 }
 
-double evident(const mapping::MergeEvidence& merge, const Log& log) {
-  constexpr std::size_t kEnough = 5;
-  std::map<std::int32_t, std::set<double>> sides;
-  for (const mapping::VerifiedPair& pair : merge.pairs) {
-    for (const KeyframeId id : {pair.query, pair.match}) sides[id.robot].insert(log.made.at(id));
-  }
-  double latest = 0.0;
-  for (const auto& [robot, made] : sides) {
-    latest = std::max(
-        latest, *std::next(made.begin(), static_cast<std::ptrdiff_t>(std::min(kEnough, made.size()) - 1)));
-  }
-  return latest;
-}
-
 /// Of these keyframes where a map has them, after alignment, metres.
 double ate(const maps::Map& map, const std::vector<KeyframeId>& ids, const std::vector<Robot>& robots) {
   std::vector<Eigen::Vector3d> estimate;
@@ -180,7 +166,7 @@ void report(const std::vector<Robot>& robots, const Log& log, const std::vector<
       if (t.event.step == MeetingStep::kMet) met = t.time;
       if (t.event.step == MeetingStep::kTakenBack) met = std::nan("");
     }
-    const double since = merge.pairs.empty() ? std::nan("") : evident(merge, log);
+    const double since = merge.pairs.empty() ? std::nan("") : mapping::evident_s(merge, log.made);
     merged += merge.accepted ? 1 : 0;
     in_time += merge.accepted && met <= since + 3.0 ? 1 : 0;
     fmt::print("{} {} {} agree {} evident {:.1f} met {:.1f} late {:.1f}{}\n", robots[merge.a].source->name(),

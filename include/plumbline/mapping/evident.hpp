@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// From when on two robots could have been found to have met.
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "plumbline/mapping/map_fusion.hpp"
+
+namespace plumbline::mapping {
+
+/// When the pairs that agree had five keyframes on both sides, or all where there are fewer; negative: not
+/// known. `made`: when keyframes were; a pair is there when both of its are.
+inline double evident_s(const MergeEvidence& merge, const std::map<core::KeyframeId, double>& made) {
+  constexpr std::size_t kEnough = 5;
+  std::map<core::KeyframeId, double> paired;  // of each keyframe, first
+  for (const VerifiedPair& pair : merge.pairs) {
+    const auto query = made.find(pair.query);
+    const auto match = made.find(pair.match);
+    if (query == made.end() || match == made.end()) continue;
+    const double both = std::max(query->second, match->second);
+    for (const core::KeyframeId id : {pair.query, pair.match}) {
+      const auto known = paired.emplace(id, both).first;
+      known->second = std::min(known->second, both);
+    }
+  }
+  std::map<std::int32_t, std::vector<double>> sides;
+  for (const auto& [id, time] : paired) sides[id.robot].push_back(time);
+  double latest = -1.0;
+  for (auto& [robot, times] : sides) {
+    std::sort(times.begin(), times.end());
+    latest = std::max(latest, times[std::min(kEnough, times.size()) - 1]);
+  }
+  return latest;
+}
+
+}  // namespace plumbline::mapping
