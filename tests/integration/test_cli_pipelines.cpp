@@ -117,6 +117,7 @@ TEST_F(Pipelines, FamiliesAreWhatTheirNamesSay) {
 
 TEST_F(Pipelines, TapsWriteEveryPortAndFramesAreARecordingAgain) {
   write_wall(path("wall"));
+  write("wall/camera.yaml", slurp(path("wall/camera.yaml")) + "depth_slope: [0.001, 0]\n");
   write("mine.yaml",
         "include: known_poses.yaml\n"
         "stages:\n  features: {type: features, inputs: {frame: read}, orb.count: 200}\n"
@@ -148,6 +149,8 @@ TEST_F(Pipelines, TapsWriteEveryPortAndFramesAreARecordingAgain) {
   }
   EXPECT_EQ(clouds, keyframes->size());
   // What was tapped is read again, and gives the same cloud at the same poses.
+  EXPECT_EQ(slurp(path("out/frames/camera.yaml")).find("depth_slope"), std::string::npos)
+      << "is in the depth";
   fs::copy_file(path("out/trajectory.txt"), path("poses.txt"));
   const Outcome info = run("info out/frames");
   EXPECT_EQ(info.code, 0) << info;

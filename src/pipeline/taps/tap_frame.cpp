@@ -35,6 +35,7 @@ class FrameTap : public Tap {
     if (auto made = file_.start(context); !made) return made;
     sensor::Camera camera = context.source->camera();
     camera.distortion = {};  // frames are rectified and registered
+    camera.depth_slope = {};
     camera.color_from_depth.reset();
     camera.depth.reset();
     depth_scale_ = camera.depth_scale;
