@@ -6,9 +6,9 @@
 //
 //   read ──frame──▶ features ──features──▶ track ──track──▶ cloud ──keyframe_cloud──▶ fuse ──cloud──▶ output
 //
-// Adding a stage: derive from Stage in src/pipeline/stage_<name>.cpp, describe it in a StageType, add one
-// line to register_stages() (src/pipeline/registry.cpp). A new port type wants a tap as well
-// (tap_<name>.cpp).
+// Adding a stage: derive from Stage in src/pipeline/stages/stage_<name>.cpp, describe it in a StageType, add
+// one line to register_stages() (src/pipeline/stages/registry.cpp). A new port type wants a tap as well
+// (src/pipeline/taps/tap_<name>.cpp).
 #include <cstddef>
 #include <filesystem>
 #include <functional>
