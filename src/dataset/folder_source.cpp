@@ -50,8 +50,11 @@ core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole&
 
 class FolderSource final : public FrameSource {
  public:
-  FolderSource(std::string name, Layout layout, sensor::Camera camera)
-      : name_(std::move(name)), layout_(std::move(layout)), camera_(std::move(camera)), rectifier_(camera_) {}
+  FolderSource(std::string name, Layout layout, sensor::Camera camera, const sensor::Pinhole& rectified)
+      : name_(std::move(name)),
+        layout_(std::move(layout)),
+        camera_(std::move(camera)),
+        rectifier_(camera_, rectified) {}
 
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& format() const override { return layout_.format; }
@@ -59,6 +62,12 @@ class FolderSource final : public FrameSource {
   [[nodiscard]] std::size_t size() const override { return layout_.pairs.size(); }
   [[nodiscard]] PairInfo info(std::size_t index) const override { return layout_.pairs.at(index); }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return layout_.truth; }
+
+  [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
+    Layout layout = layout_;
+    for (PairInfo& pair : layout.pairs) pair.depth_stamp += better.depth_delay_s - camera_.depth_delay_s;
+    return std::make_unique<FolderSource>(name_, std::move(layout), better, camera_.color);
+  }
 
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
     const PairInfo& pair = layout_.pairs.at(index);
@@ -86,7 +95,8 @@ class FolderSource final : public FrameSource {
 }  // namespace
 
 std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera) {
-  return std::make_unique<FolderSource>(std::move(name), std::move(layout), std::move(camera));
+  const sensor::Pinhole rectified = camera.color;
+  return std::make_unique<FolderSource>(std::move(name), std::move(layout), std::move(camera), rectified);
 }
 
 }  // namespace plumbline::dataset

@@ -36,20 +36,27 @@ void correct_slope(const Pinhole& camera, const std::array<double, 2>& slope, cv
 
 struct Rectifier::Maps {
   Camera camera;
+  Pinhole target;
   cv::Mat fixed_xy;                   ///< CV_16SC2, whole part of the source pixel
   cv::Mat fixed_fraction;             ///< CV_16UC1, index into OpenCV's table of bilinear weights
   std::vector<std::int32_t> nearest;  ///< source pixel of every target pixel, -1 outside
 
-  explicit Maps(const Camera& c) : camera(c) {
-    if (!camera.distorted()) return;
-    const Pinhole& p = camera.color;
-    const cv::Matx33d k(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1);
+  Maps(const Camera& c, const Pinhole& t) : camera(c), target(t) {
+    if (!moves_pixels()) return;
+    const auto matrix = [](const Pinhole& p) { return cv::Matx33d(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1); };
     const cv::Mat distortion(1, static_cast<int>(camera.distortion.size()), CV_64F, camera.distortion.data());
     cv::Mat x;
     cv::Mat y;
-    cv::initUndistortRectifyMap(k, distortion, cv::noArray(), k, {p.width, p.height}, CV_32FC1, x, y);
+    cv::initUndistortRectifyMap(matrix(camera.color), distortion, cv::noArray(), matrix(target),
+                                {target.width, target.height}, CV_32FC1, x, y);
     cv::convertMaps(x, y, fixed_xy, fixed_fraction, CV_16SC2);
     if (!(camera.color_from_depth && camera.depth)) fill_nearest(x, y);
+  }
+
+  [[nodiscard]] bool moves_pixels() const {
+    const Pinhole& p = camera.color;
+    return camera.distorted() || p.fx != target.fx || p.fy != target.fy || p.cx != target.cx ||
+           p.cy != target.cy;
   }
 
   void fill_nearest(const cv::Mat& x, const cv::Mat& y) {
@@ -98,7 +105,7 @@ cv::Mat Rectifier::Maps::undistorted(const cv::Mat& raw) const {
 cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
   constexpr double slack_px = 0.25;  // closes the seams that parallax opens between neighbours on a slope
   const Pinhole& d = *camera.depth;
-  const Pinhole& c = camera.color;
+  const Pinhole& c = target;
   const geometry::Rigid3& color_from_depth = *camera.color_from_depth;
   const auto scale = static_cast<float>(camera.depth_scale);
   cv::Mat out = cv::Mat::zeros(c.height, c.width, CV_32FC1);
@@ -129,7 +136,8 @@ cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
   return out;
 }
 
-Rectifier::Rectifier(const Camera& camera) : maps_(std::make_unique<const Maps>(camera)) {}
+Rectifier::Rectifier(const Camera& camera, const Pinhole& target)
+    : maps_(std::make_unique<const Maps>(camera, target)) {}
 Rectifier::~Rectifier() = default;
 
 cv::Mat Rectifier::color(const cv::Mat& raw) const {
@@ -137,7 +145,7 @@ cv::Mat Rectifier::color(const cv::Mat& raw) const {
   if (raw.cols != p.width || raw.rows != p.height || raw.depth() != CV_8U) {
     throw std::invalid_argument("Rectifier::color: an 8-bit image of the camera's size is needed");
   }
-  if (!maps_->camera.distorted()) return raw;
+  if (!maps_->moves_pixels()) return raw;
   cv::Mat out;
   // The rim is repeated outwards: a black rim would be one long, strong line for every line detector.
   cv::remap(raw, out, maps_->fixed_xy, maps_->fixed_fraction, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
@@ -151,10 +159,10 @@ cv::Mat Rectifier::depth(const cv::Mat& raw16) const {
   if (raw16.type() != CV_16UC1 || raw16.cols != p.width || raw16.rows != p.height) {
     throw std::invalid_argument("Rectifier::depth: a 16-bit image of the depth camera's size is needed");
   }
-  cv::Mat metres = own_camera           ? maps_->registered(raw16)
-                   : camera.distorted() ? maps_->undistorted(raw16)
-                                        : maps_->converted(raw16);
-  correct_slope(camera.color, camera.depth_slope, metres);
+  cv::Mat metres = own_camera              ? maps_->registered(raw16)
+                   : maps_->moves_pixels() ? maps_->undistorted(raw16)
+                                           : maps_->converted(raw16);
+  correct_slope(maps_->target, camera.depth_slope, metres);
   return metres;
 }
 

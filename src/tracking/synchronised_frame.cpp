@@ -9,7 +9,7 @@ namespace plumbline::tracking {
 using geometry::Rigid3;
 
 void Tracker::set_shutter(std::optional<double> readout_s) {
-  if (options_.readout_s > 0.0 || !readout_s) return;
+  if (!readout_s) return;
   options_.readout_s = *readout_s;
   global_shutter_ = *readout_s == 0.0;
 }

@@ -119,6 +119,35 @@ TEST_F(CameraRefinement, ResumingKeepsWhatWasDecided) {
   EXPECT_EQ(cameras("out"), cameras("whole"));
 }
 
+TEST_F(CameraRefinement, LiveARunGoesOnWithWhatItFound) {
+  ASSERT_EQ(run("synth room -o world --frames 230 --fps 5 --seed 3 --reference-spacing 10cm -q").code, 0);
+  std::string text = slurp(path("world/robot0/camera.yaml"));
+  for (const char* key : {"fx", "fy"})
+    text = std::regex_replace(text, std::regex("\n" + std::string(key)), "\n#");
+  const double fx = 1.02 * fx_of(path("world/robot0/camera.yaml"));
+  write("long.yaml", text + "fx: " + std::to_string(fx) + "\nfy: " + std::to_string(fx) + "\n");
+  const std::string command = "world/robot0 --camera long.yaml --set track.camera.refine=";
+  const Outcome o = map(command + "live -o out --threads 1");
+  ASSERT_EQ(o.code, 0) << o;
+  EXPECT_TRUE(o.told("going on with it from frame 211")) << o;
+  EXPECT_FALSE(o.told("beginning again")) << o;
+  EXPECT_EQ(cameras("out")[0]["from_frame"], 211);
+  EXPECT_NEAR(fx_of(path("out/camera.yaml")), fx / 1.02, 0.005 * fx);
+  // Up to there it is the run of the camera that was given, and from there on it is not.
+  ASSERT_EQ(map(command + "off -o off").code, 0);
+  const std::string with = slurp(path("out/frames.csv"));
+  const std::string without = slurp(path("off/frames.csv"));
+  const auto differ = std::mismatch(with.begin(), with.end(), without.begin(), without.end()).first;
+  EXPECT_EQ(std::count(with.begin(), differ, '\n'), 212);
+  // An interrupted run goes on with it, too, whatever the number of threads.
+  fs::create_directories(path("resumed.partial"));
+  fs::copy(path("out/camera.yaml"), path("resumed.partial/camera.yaml"));
+  write("resumed.partial/.plumbline-unfinished", "");
+  ASSERT_EQ(map(command + "live --resume -o resumed --threads 3").code, 0);
+  EXPECT_EQ(slurp(path("resumed/map.ply")), slurp(path("out/map.ply")));
+  EXPECT_EQ(cameras("resumed"), cameras("out"));
+}
+
 TEST_F(CameraRefinement, WithoutAFileTheCameraIsAGuessThatTheRecordingConfirms) {
   fs::copy(recording(), path("bare"), fs::copy_options::recursive);
   fs::remove(path("bare/camera.yaml"));

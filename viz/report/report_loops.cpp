@@ -219,12 +219,13 @@ static std::string cameras_html(const Json& s) {
   HtmlTable table(
       {{"camera of"}, {"parameter"}, {"given", true}, {"found", true}, {"±", true}, {"gain", true}, {""}});
   for (const Json& camera : list_at(s, "/camera")) {
+    const double from = number_at(camera, "/from_frame");
+    const std::string used = from > 0.0 ? fmt::format("used from frame {:.0f} on", from) : "used";
     for (const Json& n : list_at(camera, "/numbers")) {
       const auto number = [&](const char* place) { return fmt::format("{:.5g}", number_at(n, place)); };
       table.row({text_at(camera, "/robot"), text_at(n, "/name"), number("/given"), number("/found"),
                  fmt::format("{:.2g}", number_at(n, "/sigma")),
-                 number_text(100.0 * number_at(n, "/gain"), 1, "%"),
-                 is_true(n, "used") ? "used" : "not used"});
+                 number_text(100.0 * number_at(n, "/gain"), 1, "%"), is_true(n, "used") ? used : "not used"});
     }
   }
   return table.rows() > 0 ? "<h3>Cameras</h3>\n" + table.html() : "";

@@ -35,6 +35,11 @@ class FrameSource {
   [[nodiscard]] virtual PairInfo info(std::size_t index) const = 0;
   /// Decoded, rectified, depth in metres, gray filled in. An error is about this frame only: skip it.
   [[nodiscard]] virtual core::Result<sensor::RgbdFrame> read(std::size_t index) const = 0;
+  /// The same frames as taken by `better` in the place of camera(), rectified into images of camera().color
+  /// all the same; null when the source cannot.
+  [[nodiscard]] virtual std::unique_ptr<FrameSource> taken_by(const sensor::Camera& /*better*/) const {
+    return nullptr;
+  }
   /// Truth that comes with the recording, if any.
   [[nodiscard]] virtual std::optional<geometry::Trajectory> truth() const = 0;
 };

@@ -4,6 +4,7 @@
 // One recording or several side by side, each of a robot of its own, as one source of frames.
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,10 @@ class RobotRecordings : public dataset::FrameSource {
   /// Seconds since the run began, of a frame.
   [[nodiscard]] double time_of(std::size_t index) const { return order_.at(index).time; }
 
+  /// Frames from `from` on are read as taken by these cameras, one a robot, and rectified into images of
+  /// robot(...).camera all the same. Of sources that cannot, nothing changes. Beside read().
+  void correct(std::size_t from, const std::vector<sensor::Camera>& cameras);
+
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& format() const override { return recordings_.front()->format(); }
   [[nodiscard]] const sensor::Camera& camera() const override { return recordings_.front()->camera(); }
@@ -56,10 +61,14 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] const dataset::FrameSource& of(const Place& place) const {
     return *recordings_[static_cast<std::size_t>(place.robot)];
   }
+  [[nodiscard]] std::shared_ptr<const dataset::FrameSource> corrected(std::size_t index) const;
   std::string name_;
   std::vector<std::unique_ptr<dataset::FrameSource>> recordings_;
   std::vector<RobotInfo> robots_;
   std::vector<Place> order_;
+  mutable std::mutex mutex_;  ///< of what follows
+  std::size_t corrected_from_ = 0;
+  std::vector<std::shared_ptr<const dataset::FrameSource>> corrected_;  ///< by robot; empty: none
 };
 
 }  // namespace plumbline::pipeline

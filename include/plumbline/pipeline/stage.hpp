@@ -116,11 +116,14 @@ class StageIo {
   std::vector<Value> out_;
 };
 
+/// Frames under way side by side, at most, whatever the number of threads.
+constexpr std::size_t kMostUnderWay = 64;
+
 /// What a run lends to its stages; outlives them.
 struct RunContext {
   const dataset::FrameSource* source = nullptr;
   const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
-  const RobotRecordings* recordings = nullptr;           ///< `source`, when recordings are mapped; else null
+  RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
   std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any
   const core::Executor* executor = nullptr;

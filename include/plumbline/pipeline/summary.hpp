@@ -86,9 +86,10 @@ struct RunSummary {
   struct Camera {
     std::string robot;
     std::vector<mapping::CameraFinding> findings;
-    double gain = 0.0;  ///< by which share parts of the map fit better that it was not found from
-    std::string note;   ///< why nothing was found; empty: it was looked for
-    std::string doubt;  ///< why the camera must not be trusted; empty: nothing speaks against it
+    double gain = 0.0;           ///< by which share parts of the map fit better that it was not found from
+    std::string note;            ///< why nothing was found; empty: it was looked for
+    std::string doubt;           ///< why the camera must not be trusted; empty: nothing speaks against it
+    std::size_t from_frame = 0;  ///< what was found is used from this frame on; 0: from the first
   };
   std::vector<Camera> cameras;
   /// What was found of a depth camera's systematic error.

@@ -97,8 +97,8 @@ class Tracker {
   /// Localises a frame in `map`. An empty map gives kInitialising.
   TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
 
-  /// What the camera's file says of its shutter (sensor::Camera::readout_s); before the first frame. The
-  /// option goes before. A readout of 0 is a global shutter's.
+  /// What the camera's file says of its shutter (sensor::Camera::readout_s), in the place of the option;
+  /// none: as it was. A readout of 0 is a global shutter's.
   void set_shutter(std::optional<double> readout_s);
 
   /// The map has changed, or another keyframe becomes the reference: where the last pose lies now.

@@ -217,7 +217,10 @@ class MapRun {
     for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
     if (!request_.resume) return {};
     cameras_.restore(maps::OutputFolder::partial_of(request_.output), *source_);
-    return cameras_.made ? open_source() : core::Result<void>();
+    if (!cameras_.made) return {};
+    if (cameras_.from == 0) return open_source();
+    source_->correct(cameras_.from, cameras_.used);
+    return {};
   }
 
   /// The folders that are written into, and what lies there already.
@@ -274,7 +277,7 @@ class MapRun {
     for (const RobotInfo& robot : source_->robots()) {
       if (robot.camera.guess && cameras_.said.empty())
         summary.cameras.push_back(
-            {robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess"});
+            {robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess", 0});
     }
     return summary;
   }

@@ -52,9 +52,24 @@ dataset::PairInfo RobotRecordings::info(std::size_t index) const {
   return of(place).info(place.index);
 }
 
+void RobotRecordings::correct(std::size_t from, const std::vector<sensor::Camera>& cameras) {
+  const std::lock_guard lock(mutex_);
+  corrected_from_ = from;
+  corrected_.clear();
+  for (std::size_t r = 0; r < recordings_.size(); ++r)
+    corrected_.push_back(recordings_[r]->taken_by(cameras.at(r)));
+}
+
+std::shared_ptr<const dataset::FrameSource> RobotRecordings::corrected(std::size_t index) const {
+  const std::lock_guard lock(mutex_);
+  if (corrected_.empty() || index < corrected_from_) return nullptr;
+  return corrected_[static_cast<std::size_t>(order_.at(index).robot)];
+}
+
 core::Result<sensor::RgbdFrame> RobotRecordings::read(std::size_t index) const {
   const Place& place = order_.at(index);
-  return of(place).read(place.index);
+  const auto better = corrected(index);
+  return (better ? *better : of(place)).read(place.index);
 }
 
 }  // namespace plumbline::pipeline

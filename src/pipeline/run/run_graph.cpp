@@ -130,8 +130,8 @@ class Runner {
     }
     auto sink = tbb::make_filter<TickPtr, void>(tbb::filter_mode::serial_in_order,
                                                 [this](const TickPtr& tick) { done(*tick); });
-    const auto under_way = static_cast<std::size_t>(2 * context_.executor->threads() + 2);
-    tbb::parallel_pipeline(under_way, source & *stages & sink);
+    const auto wanted = static_cast<std::size_t>(2 * context_.executor->threads() + 2);
+    tbb::parallel_pipeline(std::min(wanted, kMostUnderWay), source & *stages & sink);
   }
 
   [[nodiscard]] bool ended() const {

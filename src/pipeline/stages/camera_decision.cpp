@@ -51,7 +51,7 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
 }  // namespace
 
 void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& run,
-                         const core::Executor& executor, core::Log& log) {
+                         const core::Executor& executor, core::Log& log, bool live) {
   mapping::CalibrationOptions options;
   options.least_gain = kLeastGain;
   if (robot.camera.guess) {
@@ -70,14 +70,23 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
     camera.findings = found->findings;
     camera.gain = found->gain;
     const std::string text = found_text(found->findings);
-    again = again || !text.empty();
     if (!text.empty()) {
-      used.back() = found->camera;
-      used.back().guess = false;
+      const bool late = live && from == 0;
       log.info(fmt::format(
-          "{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better; "
-          "beginning again with it",
-          robot.name, text, 100.0 * found->gain));
+          "{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better; {}",
+          robot.name, text, 100.0 * found->gain,
+          late   ? "too late to go on with it"
+          : live ? fmt::format("going on with it from frame {}", from)
+                 : "beginning again with it"));
+      again = again || !live;
+      if (late) {
+        camera.note = "found when the recording was over";
+        for (mapping::CameraFinding& f : camera.findings) f.used = false;
+      } else {
+        camera.from_frame = from;
+        used.back() = found->camera;
+        used.back().guess = false;
+      }
     }
   }
   said.push_back(std::move(camera));
@@ -86,6 +95,10 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
 core::Result<void> CameraDecision::settle(const RunContext& context) {
   if (std::exchange(made, true)) return {};
   if (again) return core::failure(core::ErrorKind::kInternal, "the run begins again with a better camera");
+  const bool goes_on =
+      std::any_of(said.begin(), said.end(), [](const RunSummary::Camera& c) { return c.from_frame > 0; });
+  if (!goes_on) from = 0;
+  if (goes_on) context.recordings->correct(from, used);
   return write_cameras(context.output_folder, *context.recordings, *this);
 }
 
@@ -105,7 +118,8 @@ core::Result<void> write_cameras(const std::filesystem::path& folder, const Robo
     const auto number = static_cast<std::size_t>(robot.number);
     std::string text = made_of(decision.given[number]) + "\n";
     if (!decision.said.empty()) text += "# " + camera_json(decision.said[number]) + "\n";
-    if (auto ok = core::write_file(file, text + sensor::to_yaml(robot.camera)); !ok) return ok;
+    const sensor::Camera& camera = decision.from > 0 ? decision.used[number] : robot.camera;
+    if (auto ok = core::write_file(file, text + sensor::to_yaml(camera)); !ok) return ok;
   }
   return {};
 }
@@ -123,11 +137,14 @@ void CameraDecision::restore(const std::filesystem::path& folder, const RobotRec
     if (first != made_of(robot.camera) || !camera) return;
     found.used.push_back(*camera);
     found.used.back().guess = robot.camera.guess && sensor::to_yaml(*camera) == sensor::to_yaml(robot.camera);
-    if (auto camera_said = camera_from_json(told.substr(0, 2) == "# " ? told.substr(2) : ""))
+    if (auto camera_said = camera_from_json(told.substr(0, 2) == "# " ? told.substr(2) : "")) {
+      found.from = std::max(found.from, camera_said->from_frame);
       found.said.push_back(std::move(*camera_said));
+    }
   }
   used = std::move(found.used);
   said = std::move(found.said);
+  from = found.from;
   made = true;
 }
 

@@ -18,15 +18,17 @@ namespace plumbline::pipeline {
 struct CameraDecision {
   bool made = false;
   bool again = false;                    ///< the run is to begin anew, with `used`
+  std::size_t from = 0;                  ///< it goes on, with `used` from this frame on; 0: it does not
   std::vector<sensor::Camera> given;     ///< by robot
   std::vector<sensor::Camera> used;      ///< by robot
   std::vector<RunSummary::Camera> said;  ///< by robot; empty: nobody asked
 
-  /// Asks one robot's map; of all robots in order.
+  /// Asks one robot's map; of all robots in order. With `live`, what is found is used from frame `from` on,
+  /// not at all where that is 0.
   void ask(const RobotInfo& robot, const mapping::CalibrationRun& run, const core::Executor& executor,
-           core::Log& log);
-  /// After all were asked, or nobody is to be: writes what is used. An error ends the run: it is to begin
-  /// again.
+           core::Log& log, bool live);
+  /// After all were asked, or nobody is to be: writes what is used, and has the recordings go on with it
+  /// where it was found live. An error ends the run: it is to begin again.
   core::Result<void> settle(const RunContext& context);
   /// What an interrupted run decided for these recordings; nothing changes when it had not, or was given
   /// other cameras.

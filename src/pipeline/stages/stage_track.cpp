@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -22,15 +23,19 @@ namespace {
 // What a map has seen when it is asked for its camera: keyframes or seconds.
 constexpr std::size_t kCameraKeyframes = 40;
 constexpr double kCamera_s = 10.0;
+// Live the answer is waited for so many frames later, and used so many after that: by then no frame that it
+// is for has been read, whatever the number of threads.
+constexpr std::size_t kAnswerFrames = 96;
+constexpr std::size_t kUseFrames = kMostUnderWay;
 
 class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice(
-        "camera.refine", refine_, {"auto", "off"},
-        "Whether a run looks for a better camera in its own map, after 40 keyframes, 10 s or at its end, "
-        "and begins again with it");
+    table.choice("camera.refine", refine_, {"auto", "live", "off"},
+                 "Whether a run looks for a better camera in its own map, after 40 keyframes, 10 s or at its "
+                 "end: auto "
+                 "begins again with it, live goes on with it 160 frames later");
   }
 
   core::Result<void> start(const RunContext& context) override {
@@ -39,10 +44,10 @@ class TrackStage : public Stage {
     for (const RobotInfo& robot : recordings_->robots()) {
       slams_.push_back(std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                        *context.executor, *context.log));
-      slams_.back()->set_shutter(robot.camera.readout_s);
       if (context.feedback != nullptr) slams_.back()->use(context.feedback);
     }
     revisions_.resize(slams_.size());
+    set_shutters(0);
     if (refine_ == "off" && context.cameras != nullptr) {
       if (auto settled = context.cameras->settle(context); !settled) return settled;
     }
@@ -61,6 +66,7 @@ class TrackStage : public Stage {
     const auto features = io.input<features::FrameFeatures>("features");
     const RobotInfo& robot = recordings_->robot(recordings_->robot_of(io.frame()));
     const auto number = static_cast<std::size_t>(robot.number);
+    if (refine_ == "live") set_shutters(io.frame());
     mapping::Slam& slam = *slams_[number];
     const std::size_t poses = slam.frame_poses().size();
     const mapping::FrameReport report = slam.process(*frame, features);
@@ -86,9 +92,8 @@ class TrackStage : public Stage {
       }
     }
     io.output<TrackedFrame>("track", tracked);
-    if (knows_enough(io.frame())) {
-      if (auto decided = decide_cameras(); !decided) return decided;
-    }
+    if (auto decided = refine_ == "live" ? decide_live(io.frame()) : decide(io.frame()); !decided)
+      return decided;
     if (context_->debug_folder.empty()) return {};
     return write_debug_picture(context_->debug_folder, io.frame(), *frame, *features, slam, report,
                                robot.camera.color);
@@ -108,7 +113,7 @@ class TrackStage : public Stage {
     }
     for (const auto& slam : slams_) slam->finish();
     if (!context_->stop.stop_requested()) {
-      if (auto decided = decide_cameras(); !decided) return decided;
+      if (auto decided = decide_now(); !decided) return decided;
     }
     for (const RobotInfo& robot : recordings_->robots()) {
       mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
@@ -161,16 +166,54 @@ class TrackStage : public Stage {
            std::all_of(slams_.begin(), slams_.end(),
                        [](const auto& slam) { return slam->map().keyframe_count() >= kCameraKeyframes; });
   }
-  core::Result<void> decide_cameras() {
-    if (context_->cameras == nullptr || context_->cameras->made) return {};
-    for (const RobotInfo& robot : recordings_->robots()) {
-      const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
-      const double told = options_.tracker.readout_s;
-      const double undone_s = told > 0.0 ? told : robot.camera.readout_s.value_or(0.0);
-      context_->cameras->ask(robot, {&slam.map(), &slam.frame_poses(), undone_s}, *context_->executor,
-                             *context_->log);
+  /// Each robot's map, as it is now, asked for its camera.
+  [[nodiscard]] std::function<void(const core::Executor&)> question() const {
+    struct Robot {
+      maps::Map map;
+      std::vector<maps::FramePose> poses;
+    };
+    auto robots = std::make_shared<std::vector<Robot>>();
+    for (const auto& slam : slams_) robots->push_back({slam->map(), slam->frame_poses()});
+    const double told_s = options_.tracker.readout_s;
+    return [robots, told_s, live = refine_ == "live", context = context_](const core::Executor& executor) {
+      for (const RobotInfo& robot : context->recordings->robots()) {
+        const Robot& of = (*robots)[static_cast<std::size_t>(robot.number)];
+        const double undone_s = told_s > 0.0 ? told_s : robot.camera.readout_s.value_or(0.0);
+        context->cameras->ask(robot, {&of.map, &of.poses, undone_s}, executor, *context->log, live);
+      }
+    };
+  }
+  [[nodiscard]] bool undecided() const { return context_->cameras != nullptr && !context_->cameras->made; }
+  core::Result<void> decide(std::size_t frame) {
+    return undecided() && knows_enough(frame) ? decide_now() : core::Result<void>();
+  }
+  /// Beside the tracker: frames go on as they are until the answer is due.
+  core::Result<void> decide_live(std::size_t frame) {
+    if (!undecided()) return {};
+    if (answer_.valid()) return frame < answer_due_ ? core::Result<void>() : decide_now();
+    const std::size_t due = frame + kAnswerFrames;
+    if (!knows_enough(frame) || due + kUseFrames >= recordings_->size()) return {};
+    answer_due_ = due;
+    context_->cameras->from = due + kUseFrames;
+    answer_ = context_->executor->submit([ask = question()] { ask(core::Executor(1)); });
+    return {};
+  }
+  core::Result<void> decide_now() {
+    if (!undecided()) return {};
+    if (answer_.valid()) {
+      answer_.wait();
+    } else {
+      question()(*context_->executor);
     }
     return context_->cameras->settle(*context_);
+  }
+  /// As the cameras' files say, and from some frame on what was found; an option goes before.
+  void set_shutters(std::size_t frame) {
+    if (options_.tracker.readout_s > 0.0) return;
+    const CameraDecision* found = context_->cameras;
+    const bool better = found != nullptr && found->made && found->from > 0 && frame >= found->from;
+    for (std::size_t r = 0; r < slams_.size(); ++r)
+      slams_[r]->set_shutter((better ? found->used[r] : recordings_->robots()[r].camera).readout_s);
   }
   void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
     if (!bundle.keyframe.valid()) return;
@@ -186,6 +229,8 @@ class TrackStage : public Stage {
   std::string refine_ = "auto";
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
   std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were reported
+  core::Executor::Job answer_;                ///< what the cameras are, while it is being looked for
+  std::size_t answer_due_ = 0;                ///< the frame at which it is waited for
   std::vector<FrameRow> rows_;
   std::map<mapping::KeyframeCause, std::size_t> causes_;  ///< of the keyframes
   std::vector<float> bundle_wait_ms_;                     ///< by frame; NaN: no bundle was put back
