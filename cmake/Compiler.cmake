@@ -15,6 +15,9 @@ target_compile_options(plumbline_warnings INTERFACE
 if(PLUMBLINE_SANITIZE)
   add_compile_options(-fsanitize=${PLUMBLINE_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${PLUMBLINE_SANITIZE})
+  # Under AddressSanitizer Eigen would put a header before what it allocates; what the packaged PCL and Ceres free and
+  # allocate has none.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 find_program(CCACHE ccache)
