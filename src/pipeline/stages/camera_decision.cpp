@@ -51,7 +51,7 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
 }  // namespace
 
 void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& run,
-                         const core::Executor& executor, core::Log& log, bool live) {
+                         const core::Executor& executor, core::Log& log) {
   mapping::CalibrationOptions options;
   options.least_gain = kLeastGain;
   if (robot.camera.guess) {
@@ -69,36 +69,34 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
   } else {
     camera.findings = found->findings;
     camera.gain = found->gain;
-    const std::string text = found_text(found->findings);
-    if (!text.empty()) {
-      const bool late = live && from == 0;
-      log.info(fmt::format(
-          "{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better; {}",
-          robot.name, text, 100.0 * found->gain,
-          late   ? "too late to go on with it"
-          : live ? fmt::format("going on with it from frame {}", from)
-                 : "beginning again with it"));
-      again = again || !live;
-      if (late) {
-        camera.note = "found when the recording was over";
-        for (mapping::CameraFinding& f : camera.findings) f.used = false;
-      } else {
-        camera.from_frame = from;
-        used.back() = found->camera;
-        used.back().guess = false;
-      }
+    if (!found_text(camera.findings).empty()) {
+      used.back() = found->camera;
+      used.back().guess = false;
     }
   }
   said.push_back(std::move(camera));
 }
 
-core::Result<void> CameraDecision::settle(const RunContext& context) {
+core::Result<void> CameraDecision::settle(const RunContext& context, std::optional<std::size_t> live) {
   if (std::exchange(made, true)) return {};
+  const bool late = live == std::size_t{0};
+  for (RunSummary::Camera& camera : said) {
+    const std::string text = found_text(camera.findings);
+    if (text.empty()) continue;
+    context.log->info(fmt::format(
+        "{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better; {}",
+        camera.robot, text, 100.0 * camera.gain,
+        late   ? "too late to go on with it"
+        : live ? fmt::format("going on with it from frame {}", *live)
+               : "beginning again with it"));
+    again = again || !live;
+    if (live) camera.from_frame = from = *live;
+    if (!late) continue;
+    camera.note = "found when the recording was over";
+    for (mapping::CameraFinding& f : camera.findings) f.used = false;
+  }
   if (again) return core::failure(core::ErrorKind::kInternal, "the run begins again with a better camera");
-  const bool goes_on =
-      std::any_of(said.begin(), said.end(), [](const RunSummary::Camera& c) { return c.from_frame > 0; });
-  if (!goes_on) from = 0;
-  if (goes_on) context.recordings->correct(from, used);
+  if (from > 0) context.recordings->correct(from, used);
   return write_cameras(context.output_folder, *context.recordings, *this);
 }
 

@@ -3,6 +3,7 @@
 
 // Whether a run's cameras are what their files say: asked once, of the run's own maps.
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "plumbline/core/error.hpp"
@@ -23,13 +24,12 @@ struct CameraDecision {
   std::vector<sensor::Camera> used;      ///< by robot
   std::vector<RunSummary::Camera> said;  ///< by robot; empty: nobody asked
 
-  /// Asks one robot's map; of all robots in order. With `live`, what is found is used from frame `from` on,
-  /// not at all where that is 0.
+  /// Asks one robot's map; of all robots in order.
   void ask(const RobotInfo& robot, const mapping::CalibrationRun& run, const core::Executor& executor,
-           core::Log& log, bool live);
-  /// After all were asked, or nobody is to be: writes what is used, and has the recordings go on with it
-  /// where it was found live. An error ends the run: it is to begin again.
-  core::Result<void> settle(const RunContext& context);
+           core::Log& log);
+  /// After all were asked, or nobody is to be: says what was found and writes what is used. An error ends the
+  /// run: it is to begin again. `live`: it goes on, with what was found from this frame on; 0: without.
+  core::Result<void> settle(const RunContext& context, std::optional<std::size_t> live = std::nullopt);
   /// What an interrupted run decided for these recordings; nothing changes when it had not, or was given
   /// other cameras.
   void restore(const std::filesystem::path& folder, const RobotRecordings& recordings);

@@ -28,6 +28,13 @@ constexpr double kCamera_s = 10.0;
 constexpr std::size_t kAnswerFrames = 96;
 constexpr std::size_t kUseFrames = kMostUnderWay;
 
+/// What the cameras are, while it is being looked for.
+struct LiveAnswer {
+  CameraDecision decision;
+  std::size_t due = 0;      ///< the frame at which it is waited for
+  core::Executor::Job job;  ///< last: its destructor waits for it
+};
+
 class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
@@ -92,8 +99,7 @@ class TrackStage : public Stage {
       }
     }
     io.output<TrackedFrame>("track", tracked);
-    if (auto decided = refine_ == "live" ? decide_live(io.frame()) : decide(io.frame()); !decided)
-      return decided;
+    if (auto decided = decide(io.frame()); !decided) return decided;
     if (context_->debug_folder.empty()) return {};
     return write_debug_picture(context_->debug_folder, io.frame(), *frame, *features, slam, report,
                                robot.camera.color);
@@ -112,7 +118,7 @@ class TrackStage : public Stage {
       return {};
     }
     for (const auto& slam : slams_) slam->finish();
-    if (!context_->stop.stop_requested()) {
+    if (undecided() && !context_->stop.stop_requested()) {
       if (auto decided = decide_now(); !decided) return decided;
     }
     for (const RobotInfo& robot : recordings_->robots()) {
@@ -166,46 +172,50 @@ class TrackStage : public Stage {
            std::all_of(slams_.begin(), slams_.end(),
                        [](const auto& slam) { return slam->map().keyframe_count() >= kCameraKeyframes; });
   }
-  /// Each robot's map, as it is now, asked for its camera.
-  [[nodiscard]] std::function<void(const core::Executor&)> question() const {
+  /// The question to each robot's map as it is now; what is answered goes to `decision`.
+  [[nodiscard]] std::function<void(const core::Executor&)> question(CameraDecision& decision) const {
     struct Robot {
+      RobotInfo info;
       maps::Map map;
       std::vector<maps::FramePose> poses;
     };
     auto robots = std::make_shared<std::vector<Robot>>();
-    for (const auto& slam : slams_) robots->push_back({slam->map(), slam->frame_poses()});
+    for (const RobotInfo& robot : recordings_->robots()) {
+      const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
+      robots->push_back({robot, slam.map(), slam.frame_poses()});
+    }
     const double told_s = options_.tracker.readout_s;
-    return [robots, told_s, live = refine_ == "live", context = context_](const core::Executor& executor) {
-      for (const RobotInfo& robot : context->recordings->robots()) {
-        const Robot& of = (*robots)[static_cast<std::size_t>(robot.number)];
-        const double undone_s = told_s > 0.0 ? told_s : robot.camera.readout_s.value_or(0.0);
-        context->cameras->ask(robot, {&of.map, &of.poses, undone_s}, executor, *context->log, live);
+    return [robots, told_s, &decision, log = context_->log](const core::Executor& executor) {
+      for (const Robot& robot : *robots) {
+        const double undone_s = told_s > 0.0 ? told_s : robot.info.camera.readout_s.value_or(0.0);
+        decision.ask(robot.info, {&robot.map, &robot.poses, undone_s}, executor, *log);
       }
     };
   }
   [[nodiscard]] bool undecided() const { return context_->cameras != nullptr && !context_->cameras->made; }
   core::Result<void> decide(std::size_t frame) {
-    return undecided() && knows_enough(frame) ? decide_now() : core::Result<void>();
+    if (!undecided() || !knows_enough(frame)) return {};
+    return refine_ == "live" ? decide_live(frame) : decide_now();
   }
-  /// Beside the tracker: frames go on as they are until the answer is due.
+  /// Asked beside the tracker; frames go on as they are until the answer is due, and some more.
   core::Result<void> decide_live(std::size_t frame) {
-    if (!undecided()) return {};
-    if (answer_.valid()) return frame < answer_due_ ? core::Result<void>() : decide_now();
-    const std::size_t due = frame + kAnswerFrames;
-    if (!knows_enough(frame) || due + kUseFrames >= recordings_->size()) return {};
-    answer_due_ = due;
-    context_->cameras->from = due + kUseFrames;
-    answer_ = context_->executor->submit([ask = question()] { ask(core::Executor(1)); });
-    return {};
+    if (live_ == nullptr) {
+      if (frame + kAnswerFrames + kUseFrames >= recordings_->size()) return {};
+      live_ = std::make_unique<LiveAnswer>();
+      live_->due = frame + kAnswerFrames;
+      live_->job = context_->executor->submit([ask = question(live_->decision)] { ask(core::Executor(1)); });
+    }
+    if (frame < live_->due) return {};
+    live_->job.wait();
+    CameraDecision& cameras = *context_->cameras;
+    cameras.used = live_->decision.used;
+    cameras.said = live_->decision.said;
+    return cameras.settle(*context_, frame + kUseFrames);
   }
   core::Result<void> decide_now() {
-    if (!undecided()) return {};
-    if (answer_.valid()) {
-      answer_.wait();
-    } else {
-      question()(*context_->executor);
-    }
-    return context_->cameras->settle(*context_);
+    question (*context_->cameras)(*context_->executor);
+    return context_->cameras->settle(*context_,
+                                     refine_ == "live" ? std::optional<std::size_t>(0) : std::nullopt);
   }
   /// As the cameras' files say, and from some frame on what was found; an option goes before.
   void set_shutters(std::size_t frame) {
@@ -229,8 +239,7 @@ class TrackStage : public Stage {
   std::string refine_ = "auto";
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
   std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were reported
-  core::Executor::Job answer_;                ///< what the cameras are, while it is being looked for
-  std::size_t answer_due_ = 0;                ///< the frame at which it is waited for
+  std::unique_ptr<LiveAnswer> live_;          ///< null: nobody has asked
   std::vector<FrameRow> rows_;
   std::map<mapping::KeyframeCause, std::size_t> causes_;  ///< of the keyframes
   std::vector<float> bundle_wait_ms_;                     ///< by frame; NaN: no bundle was put back
