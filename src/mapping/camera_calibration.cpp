@@ -177,7 +177,7 @@ class Calibrator {
   CameraChange choose(const std::vector<CameraEvidence>& evidence, CameraCalibration& result) const {
     FreeUnknowns believed{};
     const Trial before = try_out(evidence, believed);
-    Trial best = before;
+    Trial best = believed_again(evidence, before, believed);
     result.findings.clear();
     for (const CameraNumber& n : numbers_of(given_)) result.findings.push_back({n.name, n.value, n.value});
     std::size_t in_vain = 0;  // tried since something was believed
@@ -206,6 +206,23 @@ class Calibrator {
   }
 
  private:
+  /// What was believed earlier, all of it at once; `believed` stays none when it says nothing new.
+  [[nodiscard]] Trial believed_again(const std::vector<CameraEvidence>& evidence, const Trial& before,
+                                     FreeUnknowns& believed) const {
+    FreeUnknowns free{};
+    Group all;
+    for (const CameraNumber& n : numbers_of(given_)) {
+      const auto was_used = [&](const CameraFinding& f) { return f.used && f.name == n.name; };
+      if (std::none_of(options_.earlier.begin(), options_.earlier.end(), was_used)) continue;
+      free[n.unknown] = true;
+      all.push_back(n.unknown);
+    }
+    if (all.empty()) return before;
+    Trial trial = try_out(evidence, free);
+    if (!is_believed(before, trial, all)) return before;
+    believed = free;
+    return trial;
+  }
   [[nodiscard]] Trial try_out(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free) const {
     Trial trial;
     for (std::size_t i = 0; i < kParts; ++i) {

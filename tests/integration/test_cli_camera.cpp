@@ -61,6 +61,7 @@ TEST_F(CameraRefinement, AWrongFocalLengthIsFoundAndTheRunBeginsAgain) {
   const nlohmann::json told = cameras("out");
   for (const auto& n : told[0]["numbers"]) used = used || (n["name"] == "fx" && n["used"]);
   EXPECT_TRUE(used) << told;
+  EXPECT_EQ(told[0]["asked"], 2) << told;
   // Whoever begins with what was found gets the same, whatever the number of threads.
   for (const char* threads : {"1", "3"}) {
     const std::string again = std::string("again") + threads;
@@ -117,6 +118,15 @@ TEST_F(CameraRefinement, ResumingKeepsWhatWasDecided) {
   EXPECT_EQ(slurp(path("out/camera.yaml")), slurp(path("whole/camera.yaml")));
   ASSERT_EQ(cameras("out").size(), 1U);
   EXPECT_EQ(cameras("out"), cameras("whole"));
+  // What one leaves that is ended before the second question, which then finds nothing more.
+  fs::create_directories(path("second.partial"));
+  std::string once = slurp(path("whole/camera.yaml"));
+  once.replace(once.find("\"asked\":2"), 9, "\"asked\":1");
+  write("second.partial/camera.yaml", once);
+  write("second.partial/.plumbline-unfinished", "");
+  ASSERT_EQ(run("map " + wrong + " --resume -o second" + kCheap).code, 0);
+  EXPECT_EQ(slurp(path("second/trajectory.txt")), slurp(path("whole/trajectory.txt")));
+  EXPECT_EQ(cameras("second"), cameras("whole"));
 }
 
 TEST_F(CameraRefinement, LiveARunGoesOnWithWhatItFound) {

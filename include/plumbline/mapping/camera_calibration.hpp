@@ -24,6 +24,16 @@ struct CalibrationRun {
       0.0;  ///< the readout that was undone in its features; 0: they are as the camera showed them
 };
 
+/// One number of the camera.
+struct CameraFinding {
+  std::string name;  ///< as in camera.yaml
+  double given = 0.0;
+  double found = 0.0;
+  double sigma = 0.0;  ///< by leaving parts of the runs out, one at a time (jackknife)
+  double gain = 0.0;   ///< share of the cost of parts held out that it takes away
+  bool used = false;   ///< it is in `camera`
+};
+
 struct CalibrationOptions {
   int keyframes = 120;        ///< of all runs, at most: stretches spread over the runs
   double least_gain = 0.002;  ///< share of the cost of parts held out that must go
@@ -34,16 +44,7 @@ struct CalibrationOptions {
   double slope_prior = 0.02;      ///< 1/m
   double distortion_prior = 0.1;  ///< of k1 and of k2
   double delay_prior_s = 0.02;
-};
-
-/// One number of the camera.
-struct CameraFinding {
-  std::string name;  ///< as in camera.yaml
-  double given = 0.0;
-  double found = 0.0;
-  double sigma = 0.0;  ///< by leaving parts of the runs out, one at a time (jackknife)
-  double gain = 0.0;   ///< share of the cost of parts held out that it takes away
-  bool used = false;   ///< it is in `camera`
+  std::vector<CameraFinding> earlier;  ///< of a map made with another camera: looked for together at first
 };
 
 struct CameraCalibration {

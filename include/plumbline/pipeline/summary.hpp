@@ -89,6 +89,7 @@ struct RunSummary {
     double gain = 0.0;           ///< by which share parts of the map fit better that it was not found from
     std::string note;            ///< why nothing was found; empty: it was looked for
     std::string doubt;           ///< why the camera must not be trusted; empty: nothing speaks against it
+    int asked = 0;               ///< times; the second time of a map made with what was found the first time
     std::size_t from_frame = 0;  ///< what was found is used from this frame on; 0: from the first
   };
   std::vector<Camera> cameras;

@@ -176,7 +176,7 @@ class MapRun {
     auto graph = load_pipeline(request_);
     if (!graph) return tl::unexpected<core::Error>(graph.error());
     graph_ = std::move(*graph);
-    if (!cameras_.made) {
+    if (cameras_.given.empty()) {
       for (const std::string& warning : graph_.warnings) log_.warning(warning);
     }
     if (auto can = fits(graph_, request_); !can) return can;
@@ -189,7 +189,7 @@ class MapRun {
     const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
     if (auto prepared = prepare(); !prepared) return fail(prepared.error());
     RunContext context = context_of(stop);
-    if (cameras_.made || context.cameras == nullptr) {
+    if (!cameras_.used.empty() || context.cameras == nullptr) {
       if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok) return fail(ok.error());
     }
     if (request_.prepared) request_.prepared(output_->path());
@@ -213,11 +213,11 @@ class MapRun {
     auto source = open_inputs(request_, cameras_.used, executor_, log_);
     if (!source) return tl::unexpected<core::Error>(source.error());
     source_ = std::move(*source);
-    if (cameras_.made) return {};
+    if (!cameras_.given.empty()) return {};
     for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
     if (!request_.resume) return {};
     cameras_.restore(maps::OutputFolder::partial_of(request_.output), *source_);
-    if (!cameras_.made) return {};
+    if (cameras_.used.empty()) return {};
     if (cameras_.from == 0) return open_source();
     source_->correct(cameras_.from, cameras_.used);
     return {};

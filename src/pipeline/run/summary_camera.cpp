@@ -15,8 +15,9 @@ nlohmann::ordered_json camera_of(const RunSummary::Camera& camera) {
                        {"gain", rounded(f.gain)},
                        {"used", f.used}});
   }
-  return {{"robot", camera.robot},           {"gain", rounded(camera.gain)}, {"numbers", numbers},
-          {"from_frame", camera.from_frame}, {"note", camera.note},          {"doubt", camera.doubt}};
+  return {{"robot", camera.robot}, {"gain", rounded(camera.gain)},    {"numbers", numbers},
+          {"asked", camera.asked}, {"from_frame", camera.from_frame}, {"note", camera.note},
+          {"doubt", camera.doubt}};
 }
 
 }  // namespace
@@ -40,6 +41,7 @@ std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try 
     camera.findings.push_back(
         {n.at("name"), n.at("given"), n.at("found"), n.at("sigma"), n.at("gain"), n.at("used")});
   }
+  camera.asked = json.at("asked");
   camera.from_frame = json.at("from_frame");
   camera.note = json.at("note");
   camera.doubt = json.at("doubt");

@@ -16,6 +16,7 @@ namespace plumbline::pipeline {
 namespace {
 
 constexpr double kLeastGain = 0.01;  // beginning again is worth more than the last few parts in a thousand
+constexpr int kMostAsked = 2;        // what a wrong camera has bent shows in a map made with a better one
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
 /// The first line of a camera.yaml: what it was made of.
@@ -50,38 +51,61 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
 
 }  // namespace
 
+/// What two questions found, one after the other, against what was given at first.
+static RunSummary::Camera both(const RunSummary::Camera& first, RunSummary::Camera second) {
+  for (std::size_t i = 0; i < first.findings.size(); ++i) {
+    mapping::CameraFinding& f = second.findings[i];
+    if (!f.used && first.findings[i].used) f.found = f.given;
+    f.used = f.used || first.findings[i].used;
+    f.given = first.findings[i].given;
+  }
+  second.gain = 1.0 - (1.0 - first.gain) * (1.0 - second.gain);
+  return second;
+}
+
 void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& run,
                          const core::Executor& executor, core::Log& log) {
+  const auto number = static_cast<std::size_t>(robot.number);
+  const bool guess = asked > 0 ? given[number].guess : robot.camera.guess;
+  used.resize(std::max(used.size(), number + 1), robot.camera);
+  said.resize(used.size());
+  news.resize(used.size());
   mapping::CalibrationOptions options;
   options.least_gain = kLeastGain;
-  if (robot.camera.guess) {
+  options.earlier = said[number].findings;
+  if (guess) {
     options.focal_prior = 0.1;
     options.centre_prior_px = 20.0;
   }
   const auto found = mapping::calibrate_camera({run}, robot.camera, options, executor);
-  RunSummary::Camera camera;
+  RunSummary::Camera& camera = said[number];
   camera.robot = robot.name;
-  if (robot.camera.guess) camera.doubt = doubt_of(found);
-  used.push_back(robot.camera);
+  camera.asked = asked + 1;
+  if (guess) camera.doubt = doubt_of(found);
   if (!found) {
-    camera.note = found.error().message;
-    log.debug(fmt::format("{}: the camera is as given: {}", robot.name, camera.note));
-  } else {
-    camera.findings = found->findings;
-    camera.gain = found->gain;
-    if (!found_text(camera.findings).empty()) {
-      used.back() = found->camera;
-      used.back().guess = false;
-    }
+    if (asked == 0) camera.note = found.error().message;
+    log.debug(fmt::format("{}: the camera is as given: {}", robot.name, found.error().message));
+    return;
   }
-  said.push_back(std::move(camera));
+  const bool better = !found_text(found->findings).empty();
+  if (asked > 0 && !better) return;
+  RunSummary::Camera now = camera;
+  now.findings = found->findings;
+  now.gain = found->gain;
+  camera = both(camera, std::move(now));
+  if (!better) return;
+  news[number] = found_text(camera.findings);
+  used[number] = found->camera;
+  used[number].guess = false;
 }
 
 core::Result<void> CameraDecision::settle(const RunContext& context, std::optional<std::size_t> live) {
   if (std::exchange(made, true)) return {};
   const bool late = live == std::size_t{0};
-  for (RunSummary::Camera& camera : said) {
-    const std::string text = found_text(camera.findings);
+  asked += said.empty() ? 0 : 1;
+  for (std::size_t r = 0; r < news.size(); ++r) {
+    RunSummary::Camera& camera = said[r];
+    const std::string text = std::exchange(news[r], "");
     if (text.empty()) continue;
     context.log->info(fmt::format(
         "{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better; {}",
@@ -95,6 +119,7 @@ core::Result<void> CameraDecision::settle(const RunContext& context, std::option
     camera.note = "found when the recording was over";
     for (mapping::CameraFinding& f : camera.findings) f.used = false;
   }
+  made = !again || asked >= kMostAsked;
   if (again) return core::failure(core::ErrorKind::kInternal, "the run begins again with a better camera");
   if (from > 0) context.recordings->correct(from, used);
   return write_cameras(context.output_folder, *context.recordings, *this);
@@ -137,13 +162,16 @@ void CameraDecision::restore(const std::filesystem::path& folder, const RobotRec
     found.used.back().guess = robot.camera.guess && sensor::to_yaml(*camera) == sensor::to_yaml(robot.camera);
     if (auto camera_said = camera_from_json(told.substr(0, 2) == "# " ? told.substr(2) : "")) {
       found.from = std::max(found.from, camera_said->from_frame);
+      found.asked = camera_said->asked;
       found.said.push_back(std::move(*camera_said));
     }
   }
   used = std::move(found.used);
   said = std::move(found.said);
   from = found.from;
-  made = true;
+  asked = found.asked;
+  const auto better = [](const RunSummary::Camera& c) { return !found_text(c.findings).empty(); };
+  made = asked != 1 || from > 0 || std::none_of(said.begin(), said.end(), better);
 }
 
 }  // namespace plumbline::pipeline

@@ -210,6 +210,7 @@ class TrackStage : public Stage {
     CameraDecision& cameras = *context_->cameras;
     cameras.used = live_->decision.used;
     cameras.said = live_->decision.said;
+    cameras.news = live_->decision.news;
     return cameras.settle(*context_, frame + kUseFrames);
   }
   core::Result<void> decide_now() {

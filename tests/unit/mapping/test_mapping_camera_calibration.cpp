@@ -90,9 +90,10 @@ World swing(const sensor::Camera& truth, int keyframes, int corners) {
   return world;
 }
 
-core::Result<CameraCalibration> calibrate(const World& world, int threads = 1) {
+core::Result<CameraCalibration> calibrate(const World& world, int threads = 1,
+                                          const CalibrationOptions& options = {}) {
   const core::Executor executor(threads);
-  return calibrate_camera({{&world.map, &world.frames}}, given_camera(), {}, executor);
+  return calibrate_camera({{&world.map, &world.frames}}, given_camera(), options, executor);
 }
 
 const CameraFinding& finding(const CameraCalibration& calibration, const std::string& name) {
@@ -139,6 +140,30 @@ TEST(CalibrateCamera, LeavesACameraThatFitsAlone) {
   ASSERT_TRUE(found) << found.error().message;
   for (const CameraFinding& f : found->findings) EXPECT_FALSE(f.used) << f.name << " " << f.found;
   EXPECT_EQ(sensor::to_yaml(found->camera), sensor::to_yaml(given_camera()));
+}
+
+TEST(CalibrateCamera, WhatWasFoundEarlierIsLookedForTogether) {
+  sensor::Camera truth = given_camera();
+  truth.readout_s = 0.02;
+  truth.color.fx *= 1.01;
+  truth.color.fy *= 1.01;
+  const World world = swing(truth, 20, 90);
+  CalibrationOptions options;
+  options.least_gain = 0.03;
+  const auto alone = calibrate(world, 1, options);
+  ASSERT_TRUE(alone) << alone.error().message;
+  EXPECT_TRUE(finding(*alone, "readout").used);
+  EXPECT_FALSE(finding(*alone, "fx").used);
+  options.earlier = alone->findings;
+  for (CameraFinding& f : options.earlier) f.used = f.used || f.name == "fx" || f.name == "fy";
+  const auto together = calibrate(world, 1, options);
+  ASSERT_TRUE(together) << together.error().message;
+  EXPECT_NEAR(*together->camera.readout_s, 0.02, 0.002);
+  EXPECT_NEAR(together->camera.color.fx, truth.color.fx, 1.0);
+  // A camera that fits stays as it is, whatever was found earlier.
+  const auto right = calibrate(swing(given_camera(), 20, 90), 1, options);
+  ASSERT_TRUE(right) << right.error().message;
+  EXPECT_EQ(sensor::to_yaml(right->camera), sensor::to_yaml(given_camera()));
 }
 
 TEST(CalibrateCamera, SameForAnyNumberOfThreads) {
