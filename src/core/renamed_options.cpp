@@ -27,7 +27,6 @@ const std::vector<RenamedOption> kRenamedOptions{
     {"track", "places.groups", "places.islands"},
     {"track", "landmark.grace", "landmark.min_age"},
     {"track", "keyframe.cone_patience", "keyframe.cone_max_wait"},
-    {"track", "fuse.earlier", "fuse.backward"},
     {"merge", "max_apart", "max_translation"},
     {"merge", "max_turned", "max_rotation"},
     {"merge", "rival", "max_alternative"},

@@ -24,7 +24,7 @@ OFF = {
     'depth': 'track.depth=off track.edges=off track.verify.align=off refine.icp=off refine.adjust.surface_weight=0',
     'grey values': 'features.photometric=off track.edges.photometric=off',
 }
-CONES = 'track.keyframe.rule=cone track.landmark.depth_normals=on track.keyframe.urgent=nearly_lost'
+CONES = 'track.keyframe.rule=cone track.keyframe.urgent=nearly_lost'
 TABLES = {
     'families': {
         'points': '-p points_only',

@@ -24,11 +24,9 @@ struct LocalMapperOptions {
   double max_landmark_turn_rate =
       0.6;  ///< rad/s; images taken while turning faster make and merge no landmarks
   LandmarkCullingOptions culling;
-  bool depth_normals = false;  ///< landmarks' normals from the depth image, not from surface samples
   bool triangulate = true;
   TriangulationOptions triangulation;
   bool fuse = true;
-  bool earlier_observations = true;
   FusionOptions fusion;
   bool bundle = true;
   int bundle_keyframes = 12;
@@ -77,7 +75,7 @@ class LocalMapper {
 
  private:
   static void count(maps::Map& map, const tracking::TrackResult& track);
-  std::vector<core::PointId> add_points(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth);
+  void add_points(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth);
   void add_lines(maps::Map& map, core::KeyframeId keyframe);
   void triangulate(maps::Map& map, core::KeyframeId keyframe, const NewestImage& image);
   [[nodiscard]] bool distorted(const maps::Map& map, core::KeyframeId keyframe) const;

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "plumbline/features/depth_delay.hpp"
-#include "plumbline/mapping/earlier_observations.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
 #include "plumbline/mapping/surface_edge.hpp"
 
@@ -37,16 +36,10 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
                "Images taken while turning faster are distorted by the rolling shutter of common sensors: no "
                "landmark is "
                "triangulated, looked for or merged with them");
-  table.boolean(
-      "landmark.depth_normals", depth_normals,
-      "Normals of landmarks from the depth image around them, not from the keyframe's surface samples");
   culling.declare(table);
   table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
   triangulation.declare(table);
   table.boolean("fuse", fuse, "Look for landmarks in neighbouring keyframes and merge doubles");
-  table.boolean(
-      "fuse.backward", earlier_observations,
-      "Look for new landmarks among corners of older keyframes that see none, as where depth was missing");
   fusion.declare(table);
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
@@ -87,23 +80,17 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
     if (map.observe(m.point, id, m.feature, m.aligned)) map.refresh_point(m.point);
   }
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
-  const std::vector<core::PointId> made = add_points(map, id, frame.depth);
+  add_points(map, id, frame.depth);
   add_lines(map, id);
   map.attach(id);
-  if (options_.fuse && options_.earlier_observations && !distorted(map, id))
-    add_earlier_observations(map, made, id, nearest_undistorted(map, id, options_.fusion.keyframes), levels,
-                             camera_, options_.fusion.association, *own);
   if (options_.triangulate && !distorted(map, id)) triangulate(map, id, {levels, *own});
   own->slants = {};  // corners stay where they are from here on
   return id;
 }
 
-std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::KeyframeId id,
-                                                   const cv::Mat& depth) {
-  std::vector<core::PointId> made;
+void LocalMapper::add_points(maps::Map& map, core::KeyframeId id, const cv::Mat& depth) {
   const features::FrameFeatures& features = *map.keyframe(id).features;
   const geometry::Rigid3 world_from_camera = map.camera_from_world(id).inverse();
-  const SurfaceNormals normals(map.keyframe(id).surface, camera_);
   for (std::size_t i = 0; i < features.points.size(); ++i) {
     const features::PointFeature& f = features.points[i];
     if (!(f.depth > 0.0F) || static_cast<double>(f.depth) > options_.max_landmark_depth_m) continue;
@@ -117,9 +104,7 @@ std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::Keyfram
     point.angle_keyframe = id;
     point.view_direction = (point.position - world_from_camera.translation).normalized();
     point.normal = world_from_camera.rotation *
-                   (options_.depth_normals
-                        ? depth_normal(depth, f.pixel.cast<double>(), static_cast<double>(f.depth), camera_)
-                        : normals.at(in_camera));
+                   depth_normal(depth, f.pixel.cast<double>(), static_cast<double>(f.depth), camera_);
     point.reference_distance = in_camera.norm();
     point.reference_octave = f.octave;
     point.visible = 1;
@@ -127,9 +112,7 @@ std::vector<core::PointId> LocalMapper::add_points(maps::Map& map, core::Keyfram
     const core::PointId point_id = map.add_point(id.robot, point);
     map.observe(point_id, id, static_cast<int>(i), true);
     culler_.watch(point_id, id);
-    made.push_back(point_id);
   }
-  return made;
 }
 
 void LocalMapper::add_lines(maps::Map& map, core::KeyframeId id) {

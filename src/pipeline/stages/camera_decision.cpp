@@ -15,7 +15,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-constexpr double kLeastGain = 0.01;  // beginning again is worth more than the last few parts in a thousand
+constexpr double kLeastGain = 0.01;  // of a camera that may well be right; afterwards as calibrate asks
 constexpr int kMostAsked = 2;        // what a wrong camera has bent shows in a map made with a better one
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
@@ -71,7 +71,7 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
   said.resize(used.size());
   news.resize(used.size());
   mapping::CalibrationOptions options;
-  options.least_gain = kLeastGain;
+  if (asked == 0) options.least_gain = kLeastGain;
   options.earlier = said[number].findings;
   if (guess) {
     options.focal_prior = 0.1;

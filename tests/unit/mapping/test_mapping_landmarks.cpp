@@ -16,37 +16,6 @@ using core::KeyframeId;
 using tests::LandmarkWorld;
 using tests::looking_from;
 
-TEST(LandmarkNormal, IsThatOfTheSurfaceUnderIt) {
-  LandmarkWorld world(1, 0, 0);
-  world.add_wall(2.0);
-  const KeyframeId id = world.add_keyframe({});
-  const SurfaceNormals normals(world.map.keyframe(id).surface, world.camera);
-  EXPECT_LT((normals.at({0.3, 0.2, 2.004}) + Eigen::Vector3d::UnitZ()).norm(), 1e-6);
-  EXPECT_TRUE(normals.at({0.3, 0.2, 1.7}).isZero()) << "it floats in front of the wall";
-  EXPECT_TRUE(normals.at({0.3, 0.2, -2.0}).isZero()) << "behind the camera";
-  EXPECT_TRUE(normals.at({30.0, 0.2, 2.0}).isZero()) << "out of the picture";
-  const std::vector<maps::SurfaceSample> none;
-  EXPECT_TRUE(SurfaceNormals(none, world.camera).at({0.0, 0.0, 2.0}).isZero());
-}
-
-TEST(LandmarkNormal, AnEdgeHasNone) {
-  LandmarkWorld world(1, 0, 0);
-  for (double a = 0.02; a < 0.3; a += 0.02) {  // two walls that meet at a right angle in x = 0
-    for (double y = -0.3; y < 0.3; y += 0.02) {
-      const auto wall = [&](double side) {
-        world.surface.push_back({Eigen::Vector3d(side * a, y, 2.0 + a).cast<float>(),
-                                 Eigen::Vector3d(side, 0.0, -1.0).normalized().cast<float>(), 0.005F});
-      };
-      wall(1.0);
-      wall(-1.0);
-    }
-  }
-  const KeyframeId id = world.add_keyframe({});
-  const SurfaceNormals normals(world.map.keyframe(id).surface, world.camera);
-  EXPECT_TRUE(normals.at({0.0, 0.0, 2.0}).isZero());
-  EXPECT_LT((normals.at({0.2, 0.0, 2.2}) - Eigen::Vector3d(1.0, 0.0, -1.0).normalized()).norm(), 1e-6);
-}
-
 /// Depth of the planes normal . p = distance, the nearest first: what the camera sees.
 cv::Mat depth_of(const sensor::Pinhole& camera,
                  const std::vector<std::pair<Eigen::Vector3d, double>>& planes) {
