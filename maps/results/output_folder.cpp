@@ -82,9 +82,7 @@ core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   }
   if (takes_over) return {};
   const int lock = lock_marker(partial, O_RDONLY);
-  if (lock < 0 && !fs::is_empty(partial, ec)) {
-    return another_run(partial);
-  }
+  if (lock < 0 && !fs::is_empty(partial, ec)) return another_run(partial);
   fs::remove_all(partial, ec);
   if (lock >= 0) close(lock);
   if (ec)
@@ -134,10 +132,9 @@ core::Result<OutputFolder> OutputFolder::begin(const fs::path& out, bool replace
   if (out.empty()) return core::usage_error("the output folder has no name");
   const fs::path target = normal(out);
   if (auto checked = check_target(target, replace, is_earlier); !checked)
-    return tl::unexpected<core::Error>(checked.error());
+    return tl::unexpected(checked.error());
   const fs::path partial = with_ending(target, ".partial");
-  if (auto cleared = clear_leftover(partial, takes_over); !cleared)
-    return tl::unexpected<core::Error>(cleared.error());
+  if (auto cleared = clear_leftover(partial, takes_over); !cleared) return tl::unexpected(cleared.error());
   std::error_code ec;
   fs::create_directories(partial, ec);
   if (ec) {

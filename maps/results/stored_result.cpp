@@ -51,7 +51,7 @@ core::Result<MapPlace> find_map(const fs::path& input) {
   if (fs::is_regular_file(input / kStoreFile, ec)) place.store = input / kStoreFile;
   auto result = open_result(input);
   if (result) place.result = std::move(*result);
-  if (!result && place.store.empty()) return tl::unexpected<core::Error>(result.error());
+  if (!result && place.store.empty()) return tl::unexpected(result.error());
   return place;
 }
 
@@ -62,9 +62,9 @@ StoredResult::StoredResult(fs::path file, StoreReader reader, StoredMap map)
 
 core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::string& robot) {
   auto reader = StoreReader::open(store);
-  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  if (!reader) return tl::unexpected(reader.error());
   auto map = reader->load(robot);
-  if (!map) return tl::unexpected<core::Error>(map.error());
+  if (!map) return tl::unexpected(map.error());
   return StoredResult(store, std::move(*reader), std::move(*map));
 }
 
@@ -132,13 +132,13 @@ core::Result<StoredViews> StoredResult::views() const {
 core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
                                                     const core::Executor& executor) const {
   const auto stored = views();
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   if (stored->size() == 0) {
     return core::input_error(fmt::format("{}: holds no clouds; map the recording again", file_.string()));
   }
   FusionState state;
   const auto kept = reader_->attachment(kFusionAttachment);
-  if (!kept) return tl::unexpected<core::Error>(kept.error());
+  if (!kept) return tl::unexpected(kept.error());
   if (*kept) {
     auto read = fusion_state_of(**kept);
     if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
@@ -163,7 +163,7 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
 
 core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& folder) const {
   const auto stored = views();
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   return maps::write_keyframe_clouds(folder, *stored, map_.result.output_from_map,
                                      [&](std::size_t i) { return stored->read(i); });
 }
@@ -174,9 +174,9 @@ core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core:
       place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));
   if (written || place.store.empty()) return read_result_cloud(*place.result);
   const auto stored = StoredResult::open(place);
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   auto fused = stored->fused(stored->fusion_options(), executor);
-  if (!fused) return tl::unexpected<core::Error>(fused.error());
+  if (!fused) return tl::unexpected(fused.error());
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);

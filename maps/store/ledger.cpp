@@ -39,7 +39,7 @@ core::Result<std::vector<std::pair<std::string, std::string>>> Ledger::all() con
 
 core::Result<std::optional<std::string>> Ledger::get(const std::string& name) const {
   const auto texts = all();
-  if (!texts) return tl::unexpected<core::Error>(texts.error());
+  if (!texts) return tl::unexpected(texts.error());
   for (const auto& [key, value] : *texts) {
     if (key == name) return value;
   }

@@ -53,12 +53,12 @@ std::string to_text(const geometry::Trajectory& trajectory) {
 
 core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& file) {
   auto lines = read_lines(file);
-  if (!lines) return tl::unexpected<core::Error>(lines.error());
+  if (!lines) return tl::unexpected(lines.error());
   geometry::Trajectory trajectory;
   trajectory.reserve(lines->size());
   for (const TextLine& line : *lines) {
     auto pose = read_pose(file.string(), line);
-    if (!pose) return tl::unexpected<core::Error>(pose.error());
+    if (!pose) return tl::unexpected(pose.error());
     trajectory.push_back(*pose);
   }
   std::stable_sort(

@@ -33,13 +33,13 @@ core::Result<std::unique_ptr<HubDesk>> HubDesk::open(const std::filesystem::path
                                                      const HubRequest& request, std::unique_ptr<HubBus> bus,
                                                      const core::Executor& executor, core::Log& log) {
   std::unique_ptr<HubDesk> desk(new HubDesk(folder, request, std::move(bus), executor, log));
-  if (auto read = desk->read_ledger(); !read) return tl::unexpected<core::Error>(read.error());
+  if (auto read = desk->read_ledger(); !read) return tl::unexpected(read.error());
   return desk;
 }
 
 core::Result<void> HubDesk::read_ledger() {
   const auto known = ledger().all();
-  if (!known) return tl::unexpected<core::Error>(known.error());
+  if (!known) return tl::unexpected(known.error());
   std::map<std::string, std::string> texts(known->begin(), known->end());
   speaker_.set_id(texts["hub"].empty() ? request_.fresh_id : texts["hub"]);
   if (auto put = ledger().put({{"hub", speaker_.id()}}); !put) return put;
@@ -54,7 +54,7 @@ core::Result<void> HubDesk::read_ledger() {
     hello.run = run;
     hello.incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     const auto robot = add(hello);
-    if (!robot) return tl::unexpected<core::Error>(robot.error());
+    if (!robot) return tl::unexpected(robot.error());
     (*robot)->done = texts[key_of(hello.name, "state")] == kDone;
     log_.info(fmt::format("{}: {} keyframes are here from before", hello.name, (*robot)->copy().keyframes()));
     if ((*robot)->copy().keyframes() > 0) meetings_.committed(hello.name);
@@ -64,9 +64,8 @@ core::Result<void> HubDesk::read_ledger() {
 
 core::Result<HubRobot*> HubDesk::add(const Hello& known) {
   auto robot = HubRobot::open(known, folder_ / "robots" / known.name / "map.db", request_.quota_bytes);
-  if (!robot) return tl::unexpected<core::Error>(robot.error());
-  if (auto listened = bus_->listen_to(known.name); !listened)
-    return tl::unexpected<core::Error>(listened.error());
+  if (!robot) return tl::unexpected(robot.error());
+  if (auto listened = bus_->listen_to(known.name); !listened) return tl::unexpected(listened.error());
   return &robots_.insert_or_assign(known.name, std::move(*robot)).first->second;
 }
 

@@ -38,10 +38,9 @@ bool Presence::silent() const { return !heard_at_ || Clock::now() - *heard_at_ >
 
 core::Result<HubRobot> HubRobot::open(Hello known, const std::filesystem::path& file,
                                       std::uint64_t quota_bytes) {
-  if (auto made = core::make_folder(file.parent_path()); !made)
-    return tl::unexpected<core::Error>(made.error());
+  if (auto made = core::make_folder(file.parent_path()); !made) return tl::unexpected(made.error());
   auto copy = maps::StoreReplica::open(file);
-  if (!copy) return tl::unexpected<core::Error>(copy.error());
+  if (!copy) return tl::unexpected(copy.error());
   HubRobot robot;
   robot.hello = std::move(known);
   robot.file_ = file;
@@ -76,7 +75,7 @@ core::Result<bool> HubRobot::hear(const Hello& next) {
   hello = next;
   if (!lost) return false;
   forget();
-  if (auto cleared = copy_->clear(); !cleared) return tl::unexpected<core::Error>(cleared.error());
+  if (auto cleared = copy_->clear(); !cleared) return tl::unexpected(cleared.error());
   done = false;
   return true;
 }

@@ -31,7 +31,7 @@ core::Result<void> check_names(const std::vector<std::string>& robots) {
 
 core::Result<const BusPart*> part() {
   const auto& found = core::part<BusPart>();
-  if (!found) return tl::unexpected<core::Error>(found.error());
+  if (!found) return tl::unexpected(found.error());
   return *found;
 }
 
@@ -40,7 +40,7 @@ core::Result<const BusPart*> part() {
 core::Result<void> create_keys(const fs::path& folder, const std::vector<std::string>& robots) {
   if (auto names = check_names(robots); !names) return names;
   const auto keys = part();
-  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  if (!keys) return tl::unexpected(keys.error());
   std::error_code ec;
   if (fs::exists(folder, ec)) {
     return core::usage_error(
@@ -59,7 +59,7 @@ core::Result<void> create_keys(const fs::path& folder, const std::vector<std::st
 core::Result<void> add_keys(const fs::path& folder, const std::vector<std::string>& robots) {
   if (auto names = check_names(robots); !names) return names;
   const auto keys = part();
-  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  if (!keys) return tl::unexpected(keys.error());
   std::error_code ec;
   for (const std::string& name : robots) {
     if (fs::exists(folder / name, ec))
@@ -74,7 +74,7 @@ core::Result<void> add_keys(const fs::path& folder, const std::vector<std::strin
 core::Result<void> revoke_keys(const fs::path& folder, const std::vector<std::string>& robots) {
   if (auto names = check_names(robots); !names) return names;
   const auto keys = part();
-  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  if (!keys) return tl::unexpected(keys.error());
   return (*keys)->revoke(folder, robots);
 }
 

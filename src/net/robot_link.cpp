@@ -147,7 +147,7 @@ RobotLink::RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::strin
 core::Result<void> RobotLink::follow(const fs::path& store) {
   const maps::Ledger ledger(store.parent_path() / "network.db");
   const auto known = ledger.all();
-  if (!known) return tl::unexpected<core::Error>(known.error());
+  if (!known) return tl::unexpected(known.error());
   const auto text = [&](const char* name) {
     const auto found =
         std::find_if(known->begin(), known->end(), [&](const auto& entry) { return entry.first == name; });

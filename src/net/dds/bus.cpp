@@ -84,7 +84,7 @@ class Participant {
     const auto id = static_cast<dds_domainid_t>(options.domain);
     domain_ = Entity(dds_create_domain(id, domain_configuration(options, hub).c_str()));
     const auto qos = participant_qos(options);
-    if (!qos) return tl::unexpected<core::Error>(qos.error());
+    if (!qos) return tl::unexpected(qos.error());
     if (domain_.handle > 0) participant_ = Entity(dds_create_participant(id, qos->get(), nullptr));
     if (participant_.handle > 0) {
       waitset_ = dds_create_waitset(participant_.handle);
@@ -350,13 +350,13 @@ class CycloneHub : public HubBus {
 core::Result<std::unique_ptr<RobotBus>> open_robot(const NetworkOptions& options, const std::string& name,
                                                    const BusLog& log) {
   auto bus = std::make_unique<CycloneRobot>(log);
-  if (auto opened = bus->open(options, name); !opened) return tl::unexpected<core::Error>(opened.error());
+  if (auto opened = bus->open(options, name); !opened) return tl::unexpected(opened.error());
   return bus;
 }
 
 core::Result<std::unique_ptr<HubBus>> open_hub(const NetworkOptions& options, const BusLog& log) {
   auto bus = std::make_unique<CycloneHub>(log);
-  if (auto opened = bus->open(options); !opened) return tl::unexpected<core::Error>(opened.error());
+  if (auto opened = bus->open(options); !opened) return tl::unexpected(opened.error());
   return bus;
 }
 

@@ -59,7 +59,7 @@ void assemble(const std::vector<std::size_t>& order, StageSpecs& specs, Graph& g
 core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesystem::path& file,
                                 const StageRegistry& registry, const std::filesystem::path& pipelines_folder,
                                 const std::vector<std::string>& overrides, ConfigProblems problems) {
-  const auto refuse = [&] { return tl::unexpected<core::Error>(core::to_error(problems)); };
+  const auto refuse = [&] { return tl::unexpected(core::to_error(problems)); };
   if (!own) return refuse();
   Graph graph;
   graph.file = file;

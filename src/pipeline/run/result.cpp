@@ -5,7 +5,7 @@ namespace plumbline::pipeline {
 
 core::Result<Graph> load_pipeline(const RunRequest& request) {
   const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
-  if (!file) return tl::unexpected<core::Error>(file.error());
+  if (!file) return tl::unexpected(file.error());
   StageRegistry registry;
   register_stages(registry);
   registry.filters() = request.filters;

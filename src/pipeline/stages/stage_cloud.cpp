@@ -99,7 +99,7 @@ class CloudStage : public Stage {
     core::Result<cloud::CloudPtr> made =
         gives_cloud ? filtered(*frame, camera, track->keyframe)
                     : cloud::depth_view(*frame, camera, options_.min_depth_m, options_.max_depth_m);
-    if (!made) return tl::unexpected<core::Error>(made.error());
+    if (!made) return tl::unexpected(made.error());
     cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;

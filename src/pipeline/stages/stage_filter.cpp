@@ -39,7 +39,7 @@ class FilterStage : public Stage {
     context.columns = &input->columns;
     context.made_columns = &dense->columns;
     auto filtered = filters_.chain().apply(input->cloud, context, &reports_);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!filtered) return tl::unexpected(filtered.error());
     if (!reports_.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
     dense->cloud = std::move(*filtered);
     dense->voxel_m = input->voxel_m;

@@ -62,7 +62,7 @@ class FuseStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
     auto clouds = WaitingClouds::create(context);
-    if (!clouds) return tl::unexpected<core::Error>(clouds.error());
+    if (!clouds) return tl::unexpected(clouds.error());
     clouds_.emplace(std::move(*clouds));
     return {};
   }
@@ -75,11 +75,11 @@ class FuseStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
     const auto stored = clouds_->open();
-    if (!stored) return tl::unexpected<core::Error>(stored.error());
+    if (!stored) return tl::unexpected(stored.error());
     const auto views = views_of(**stored, *map, clouds_->arrivals());
-    if (!views) return tl::unexpected<core::Error>(views.error());
+    if (!views) return tl::unexpected(views.error());
     auto fused = fuse(*map, *views);
-    if (!fused) return tl::unexpected<core::Error>(fused.error());
+    if (!fused) return tl::unexpected(fused.error());
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
     report_.frame = find_up(up_, yaw_, fused->cloud, map->trajectory);
@@ -91,12 +91,12 @@ class FuseStage : public Stage {
       const auto written = maps::write_keyframe_clouds(
           context_->output_folder / "keyframes", *views, report_.frame.output_from_map,
           [&](std::size_t i) { return read_corrected(*views, i); });
-      if (!written) return tl::unexpected<core::Error>(written.error());
+      if (!written) return tl::unexpected(written.error());
     }
     clouds_->clear();
     auto filtered =
         filters_.chain().apply(std::move(*fused), dense->voxel_m, *context_->executor, &report_.filters);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!filtered) return tl::unexpected(filtered.error());
     if (!report_.filters.empty())
       context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(report_.filters));
     dense->cloud = std::move(filtered->cloud);
@@ -122,7 +122,7 @@ class FuseStage : public Stage {
 
  private:
   core::Result<cloud::FusedCloud> fuse(const MapResult& map, const maps::StoredViews& stored) {
-    if (auto found = find_fields(map, stored); !found) return tl::unexpected<core::Error>(found.error());
+    if (auto found = find_fields(map, stored); !found) return tl::unexpected(found.error());
     cloud::FusionViews views;
     views.world_from_camera = stored.world_from_camera;
     views.cameras = cameras_of(stored);
@@ -167,7 +167,7 @@ class FuseStage : public Stage {
       cloud::DepthFieldReport report;
       const auto field = cloud::find_depth_field(own, stored.world_from_camera, read, camera, depth_field_,
                                                  *context_->executor, &report);
-      if (!field) return tl::unexpected<core::Error>(field.error());
+      if (!field) return tl::unexpected(field.error());
       state_->depth_fields[robot] = *field;
       std::string name;
       for (const RobotInfo& info : map.robots) {
@@ -187,8 +187,7 @@ class FuseStage : public Stage {
   [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
     if (cloud || context_->stored_maps == nullptr) return cloud;
-    return tl::unexpected<core::Error>(
-        context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
+    return tl::unexpected(context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
   }
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(const maps::StoredViews& views,
                                                              std::size_t i) const {

@@ -30,7 +30,7 @@ class MapsStage : public Stage {
     result->stored = [maps = maps_, index = io.frame()] { return maps->cloud_bytes(index); };
     if (stored.id.valid()) {
       if (auto read = read_surface(io.frame(), *result); !read) {
-        return tl::unexpected<core::Error>(maps_->damaged(stored.id, {}, read.error()));
+        return tl::unexpected(maps_->damaged(stored.id, {}, read.error()));
       }
     }
     io.output<KeyframeCloud>("cloud", result);
@@ -50,10 +50,10 @@ class MapsStage : public Stage {
   /// As it was kept with the map, if it was.
   core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
     const auto kept = maps_->surface_bytes(index);
-    if (!kept) return tl::unexpected<core::Error>(kept.error());
+    if (!kept) return tl::unexpected(kept.error());
     if (kept->empty()) return {};
     auto surface = maps::unpack_surface(*kept);
-    if (!surface) return tl::unexpected<core::Error>(surface.error());
+    if (!surface) return tl::unexpected(surface.error());
     result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
     return {};
   }

@@ -39,7 +39,7 @@ class PosesStage : public Stage {
     }
     for (const RobotInfo& robot : recordings_->robots()) {
       auto poses = poses_of(robot);
-      if (!poses) return tl::unexpected<core::Error>(poses.error());
+      if (!poses) return tl::unexpected(poses.error());
       ways_[static_cast<std::size_t>(robot.number)].poses = std::move(*poses);
     }
     return {};

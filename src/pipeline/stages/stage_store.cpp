@@ -50,7 +50,7 @@ class StoreStage : public Stage {
     std::vector<maps::StoreCloud> clouds;
     if (cloud != nullptr && (cloud->id.valid() || cloud->frame.valid())) {
       auto waiting = store_cloud_of(*cloud);
-      if (!waiting) return tl::unexpected<core::Error>(waiting.error());
+      if (!waiting) return tl::unexpected(waiting.error());
       clouds.push_back(std::move(*waiting));
     }
     if (track != nullptr) {
@@ -82,7 +82,7 @@ class StoreStage : public Stage {
 
  private:
   core::Result<void> take(core::Result<maps::StoreWriter> writer) {
-    if (!writer) return tl::unexpected<core::Error>(writer.error());
+    if (!writer) return tl::unexpected(writer.error());
     writer_.emplace(std::move(*writer));
     return {};
   }

@@ -41,7 +41,7 @@ class KeyframeCloudTap : public Tap {
     const auto keyframe = io.input<KeyframeCloud>("in");
     if (!keyframe->id.valid()) return {};
     const auto cloud = cloud_of(*keyframe);
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    if (!cloud) return tl::unexpected(cloud.error());
     return cloud::write_cloud(file_.path(static_cast<std::size_t>(keyframe->id.index)), **cloud);
   }
 };
