@@ -45,8 +45,7 @@ core::Result<void> check_target(const fs::path& target, bool replace, OutputFold
   if (!is_earlier(target)) {
     return core::usage_error(
         fmt::format("{}: exists, is not empty and is no earlier result; name a folder that does not exist "
-                    "yet (only earlier "
-                    "results are ever replaced)",
+                    "yet (only earlier results are ever replaced)",
                     target.string()));
   }
   if (!replace) {
@@ -75,10 +74,9 @@ core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
-    return core::usage_error(
-        fmt::format("{}: is in the way; results are written there first. Remove it or name "
-                    "another output folder",
-                    partial.string()));
+    return core::usage_error(fmt::format(
+        "{}: is in the way; results are written there first. Remove it or name another output folder",
+        partial.string()));
   }
   if (takes_over) return {};
   const int lock = lock_marker(partial, O_RDONLY);

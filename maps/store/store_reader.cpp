@@ -212,8 +212,7 @@ core::Result<StoreContents> StoreReader::contents() const {
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
     contents.cloud_bytes = count(
-        "SELECT (SELECT total(length(data)) FROM cloud)"
-        " + (SELECT total(length(data)) FROM frame_cloud)");
+        "SELECT (SELECT total(length(data)) FROM cloud) + (SELECT total(length(data)) FROM frame_cloud)");
     Statement names(database, "SELECT key FROM attachment ORDER BY key");
     while (names.step()) contents.attachments.push_back(names.text(0));
     return contents;

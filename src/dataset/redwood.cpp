@@ -142,10 +142,9 @@ bool looks_like_redwood(const fs::path& folder) {
 core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   const std::optional<fs::path> colors = color_folder(folder);
   if (!colors || !is_folder(folder / "depth")) {
-    return core::input_error(
-        fmt::format("{}: no {} folder (a Redwood or Open3D recording needs color/, image/ or "
-                    "rgb/, and depth/)",
-                    folder.string(), colors ? "depth/" : "colour"));
+    return core::input_error(fmt::format(
+        "{}: no {} folder (a Redwood or Open3D recording needs color/, image/ or rgb/, and depth/)",
+        folder.string(), colors ? "depth/" : "colour"));
   }
   const auto color = list_images(*colors);
   const auto depth = list_images(folder / "depth");

@@ -71,8 +71,7 @@ core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const
   for (const char* name : {"rgb.txt", "depth.txt"}) {
     if (is_file(folder / name)) continue;
     return core::input_error(
-        fmt::format("{}: {} is missing (a TUM recording needs rgb.txt and depth.txt, or "
-                    "associations.txt)",
+        fmt::format("{}: {} is missing (a TUM recording needs rgb.txt and depth.txt, or associations.txt)",
                     folder.string(), name));
   }
   auto color = read_list(folder / "rgb.txt", log);

@@ -85,10 +85,10 @@ core::Result<void> HubDesk::look_for_others(const core::StopToken& stop) {
       const bool first =
           word.up_s >= 0.0 || word.hub < speaker_.id();  // of two that begin together one stays
       if (word.hub == speaker_.id() || !first) continue;
-      return core::usage_error(fmt::format(
-          "another hub is there in domain {}; end that one, or choose another --domain for this one "
-          "and its robots",
-          request_.network.domain));
+      return core::usage_error(
+          fmt::format("another hub is there in domain {}; end that one, or choose another --domain for this "
+                      "one and its robots",
+                      request_.network.domain));
     }
   }
   speaker_.serve();
@@ -117,8 +117,7 @@ std::string HubDesk::refusal(const HeardHello& heard) const {
   if (known->second.hello.run != hello.run) {
     return fmt::format(
         "{}: the hub has another run of that name; give this one another --name, or begin the hub without "
-        "--resume "
-        "in another folder",
+        "--resume in another folder",
         hello.name);
   }
   return {};

@@ -45,8 +45,7 @@ core::Result<void> create_keys(const fs::path& folder, const std::vector<std::st
   if (fs::exists(folder, ec)) {
     return core::usage_error(
         folder.string() +
-        ": is there already; more robots are added by plumbline keys add, new keys need a new "
-        "folder");
+        ": is there already; more robots are added by plumbline keys add, new keys need a new folder");
   }
   if (auto made = (*keys)->make_authority(folder); !made) return made;
   if (auto made = (*keys)->make_keys(folder, "hub"); !made) return made;

@@ -99,8 +99,7 @@ class Participant {
     const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
     return core::usage_error(
         fmt::format("the network cannot be used on interface {}, domain {} ({}); another program may have "
-                    "the port: choose "
-                    "other values with --interface, --port or --domain",
+                    "the port: choose other values with --interface, --port or --domain",
                     options.interface, options.domain, dds_strretcode(code)));
   }
   [[nodiscard]] dds_entity_t handle() const { return participant_.handle; }

@@ -12,11 +12,9 @@ constexpr const char* kIntroduction =
     "<!-- Made by `plumbline pipelines describe`; a test compares. -->\n"
     "# Stages\n\n"
     "What may stand under `stages:` of a [pipeline file](../guide/pipelines.md). Lengths, angles and times "
-    "may carry "
-    "a "
-    "unit\n"
-    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. "
-    "`plumbline pipelines describe STAGE --all`\n"
+    "may carry a unit\n"
+    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. `plumbline pipelines "
+    "describe STAGE --all`\n"
     "shows more options, for those who know what they do.\n";
 
 constexpr const char* kTaps =

@@ -35,10 +35,9 @@ core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
   if (!graph) return graph;
   for (const std::string& warning : graph->warnings) log.warning(warning);
   if (graph->source().type->name == "maps") return graph;
-  return core::usage_error(
-      fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "
-                  "begins with a maps stage",
-                  graph->file.string(), graph->source().type->name));
+  return core::usage_error(fmt::format(
+      "{}: begins with a {} stage; finished maps are fused by a pipeline that begins with a maps stage",
+      graph->file.string(), graph->source().type->name));
 }
 
 core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& request,

@@ -134,10 +134,9 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
 core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
   if (!request.resume) return {};
   if (!keeps_map(graph) || !tracks(graph)) {
-    return core::usage_error(
-        fmt::format("{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave "
-                    "out --resume",
-                    graph.file.string()));
+    return core::usage_error(fmt::format(
+        "{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave out --resume",
+        graph.file.string()));
   }
   if (!request.debug_video.empty()) {
     return core::usage_error(

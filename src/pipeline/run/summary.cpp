@@ -190,8 +190,7 @@ std::string torn_text(const maps::PathCheck& check) {
                                         [](const auto& a, const auto& b) { return a.off_m < b.off_m; });
   return fmt::format(
       "the map is torn: at {:.3f} s, between keyframes {} and {}, the path jumps by {:.1f} cm and {:.1f} "
-      "degrees "
-      "that the tracker did not see{}",
+      "degrees that the tracker did not see{}",
       worst.stamp, worst.from.index, worst.to.index, 100.0 * worst.off_m, worst.off_rad * 180.0 / M_PI,
       check.tears.size() > 1 ? fmt::format("; {} such places in all", check.tears.size()) : "");
 }
@@ -227,8 +226,7 @@ void judge(RunSummary& summary) {
   if (all > 0 && lost_percent > kMostLostPercent) {
     summary.reason = fmt::format(
         "{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would be trusted): {} lost, {} unreadable; "
-        "the "
-        "longest loss is {} frames",
+        "the longest loss is {} frames",
         all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
         frames.longest_loss);
   } else if (!summary.path.check.tears.empty()) {

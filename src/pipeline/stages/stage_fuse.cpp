@@ -33,17 +33,16 @@ class FuseStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice<Up>("up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
-                     "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own "
-                     "up on average), z up "
-                     "as the first camera was held, or the frame of the poses as they are");
-    table.choice<Yaw>(
-        "yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
-        "Where x points unless up is none: along the walls, as near as can be to where the first "
-        "camera looks, or just there");
-    table.boolean("depth_field", find_depth_field_,
-                  "Find out from overlapping views what the depth camera gets wrong everywhere alike, and "
-                  "correct it");
+    table.choice<Up>(
+        "up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
+        "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own up on "
+        "average), z up as the first camera was held, or the frame of the poses as they are");
+    table.choice<Yaw>("yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
+                      "Where x points unless up is none: along the walls, as near as can be to where the "
+                      "first camera looks, or just there");
+    table.boolean(
+        "depth_field", find_depth_field_,
+        "Find out from overlapping views what the depth camera gets wrong everywhere alike, and correct it");
     depth_field_.declare(table);
     table.boolean("keyframe_clouds", keyframe_clouds_,
                   "Write the cloud of every keyframe to keyframes/, in the frame of the results");
@@ -175,8 +174,8 @@ class FuseStage : public Stage {
       }
       report_.depth_fields.push_back({name, report, *field});
       context_->log->debug(fmt::format(
-          "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
-          "explains: {}",
+          "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field explains: "
+          "{}",
           name.empty() ? "" : " of ", name, report.samples, report.before, report.after,
           report.used ? fmt::format("up to {:.0f} mm at 2 m", 1e3 * report.most_at_2m) : "not used"));
     }

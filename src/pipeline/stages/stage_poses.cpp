@@ -32,10 +32,9 @@ class PosesStage : public Stage {
     recordings_ = context.recordings;
     ways_.resize(recordings_->robots().size());
     if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
-      return core::usage_error(
-          fmt::format("{}: are poses of one recording; write {} where the file's name "
-                      "has the robot's: poses/{}.txt",
-                      file_, kRobot, kRobot));
+      return core::usage_error(fmt::format(
+          "{}: are poses of one recording; write {} where the file's name has the robot's: poses/{}.txt",
+          file_, kRobot, kRobot));
     }
     for (const RobotInfo& robot : recordings_->robots()) {
       auto poses = poses_of(robot);

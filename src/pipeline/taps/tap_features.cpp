@@ -19,8 +19,8 @@ class FeaturesTap : public Tap {
     const auto features = io.input<features::FrameFeatures>("in");
     core::OutputFile out(file_.path(io.frame()));
     out.write(
-        "kind,x_px,y_px,end_x_px,end_y_px,depth_m,octave,angle_deg,response,"
-        "start_x_m,start_y_m,start_z_m,end_x_m,end_y_m,end_z_m\n");
+        "kind,x_px,y_px,end_x_px,end_y_px,depth_m,octave,angle_deg,response,start_x_m,start_y_m,start_z_m,"
+        "end_x_m,end_y_m,end_z_m\n");
     for (const features::PointFeature& p : features->points) {
       const std::string depth = p.depth > 0.0F ? fmt::format("{:.4f}", p.depth) : "";
       out.write(fmt::format("point,{:.2f},{:.2f},,,{},{},{:.2f},{:.6g},,,,,,\n", p.pixel.x(), p.pixel.y(),
@@ -46,15 +46,14 @@ class FeaturesTap : public Tap {
 }  // namespace
 
 StageType features_tap() {
-  return {
-      "features",
-      "Points and lines of a frame, one a line: pixels, depth, and the 3D ends (camera frame) of lines that "
-      "have them",
-      Mode::kStateless,
-      {{"in", features_port()}},
-      {},
-      [] { return std::make_unique<FeaturesTap>(); },
-      true};
+  return {"features",
+          "Points and lines of a frame, one a line: pixels, depth, and the 3D ends (camera frame) of lines "
+          "that have them",
+          Mode::kStateless,
+          {{"in", features_port()}},
+          {},
+          [] { return std::make_unique<FeaturesTap>(); },
+          true};
 }
 
 }  // namespace plumbline::pipeline

@@ -72,15 +72,14 @@ class FrameTap : public Tap {
 }  // namespace
 
 StageType frame_tap() {
-  return {
-      "frame",
-      "Colour and depth (16 bit, at the camera's depth_scale) with a camera.yaml beside; as frame-*.png a "
-      "recording of its own",
-      Mode::kStateless,
-      {{"in", frame_port()}},
-      {},
-      [] { return std::make_unique<FrameTap>(); },
-      true};
+  return {"frame",
+          "Colour and depth (16 bit, at the camera's depth_scale) with a camera.yaml beside; as frame-*.png "
+          "a recording of its own",
+          Mode::kStateless,
+          {{"in", frame_port()}},
+          {},
+          [] { return std::make_unique<FrameTap>(); },
+          true};
 }
 
 }  // namespace plumbline::pipeline
