@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "depth_statistics.hpp"
-#include "folder_source.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/image_io.hpp"

@@ -83,8 +83,7 @@ std::vector<StampedFile> by_stamp(const std::map<long long, NumberedFile>& image
   std::vector<StampedFile> files;
   files.reserve(images.size());
   for (const auto& [number, image] : images) files.push_back({*image.stamp, image.file, 0});
-  std::sort(files.begin(), files.end(),
-            [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; });
+  std::sort(files.begin(), files.end(), kByStamp);
   return files;
 }
 
@@ -115,9 +114,7 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
     truth.push_back({pairs[static_cast<std::size_t>(*index)].stamp,
                      geometry::Rigid3(Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>())});
   }
-  std::stable_sort(
-      truth.begin(), truth.end(),
-      [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
+  std::stable_sort(truth.begin(), truth.end(), kByStamp);
   return truth;
 }
 

@@ -61,17 +61,13 @@ core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& 
     if (!pose) return tl::unexpected(pose.error());
     trajectory.push_back(*pose);
   }
-  std::stable_sort(
-      trajectory.begin(), trajectory.end(),
-      [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
+  std::stable_sort(trajectory.begin(), trajectory.end(), kByStamp);
   return trajectory;
 }
 
 core::Result<void> write_trajectory(const std::filesystem::path& file,
                                     const geometry::Trajectory& trajectory) {
-  core::OutputFile out(file);
-  out.write(to_text(trajectory));
-  return out.commit();
+  return core::write_file(file, to_text(trajectory));
 }
 
 }  // namespace plumbline::dataset

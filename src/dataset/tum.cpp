@@ -30,10 +30,9 @@ core::Result<double> read_stamp(const std::string& list, const TextLine& line, s
 
 /// Sorts by stamp and drops files whose stamp came before; says so.
 void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, core::Log& log) {
-  const auto by_stamp = [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; };
-  if (!std::is_sorted(files.begin(), files.end(), by_stamp)) {
+  if (!std::is_sorted(files.begin(), files.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list));
-    std::stable_sort(files.begin(), files.end(), by_stamp);
+    std::stable_sort(files.begin(), files.end(), kByStamp);
   }
   const auto same = [](const StampedFile& a, const StampedFile& b) { return a.stamp == b.stamp; };
   const auto end = std::unique(files.begin(), files.end(), same);
@@ -135,10 +134,9 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
   for (std::size_t i = 0; i < color.size(); ++i) {
     pairs.push_back({color[i].stamp, depth[i].stamp, color[i].file, depth[i].file});
   }
-  const auto by_stamp = [](const PairInfo& a, const PairInfo& b) { return a.stamp < b.stamp; };
-  if (!std::is_sorted(pairs.begin(), pairs.end(), by_stamp)) {
+  if (!std::is_sorted(pairs.begin(), pairs.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list.string()));
-    std::stable_sort(pairs.begin(), pairs.end(), by_stamp);
+    std::stable_sort(pairs.begin(), pairs.end(), kByStamp);
   }
   return pairs;
 }
