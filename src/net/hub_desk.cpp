@@ -40,17 +40,14 @@ core::Result<std::unique_ptr<HubDesk>> HubDesk::open(const std::filesystem::path
 core::Result<void> HubDesk::read_ledger() {
   const auto known = ledger().all();
   if (!known) return tl::unexpected(known.error());
-  std::map<std::string, std::string> texts(known->begin(), known->end());
+  std::map<std::string, std::string> texts = *known;
   speaker_.set_id(texts["hub"].empty() ? request_.fresh_id : texts["hub"]);
   if (auto put = ledger().put({{"hub", speaker_.id()}}); !put) return put;
   for (const auto& [key, run] : *known) {
-    constexpr std::size_t kPrefix = 6;
-    const std::string ending = "/run";
-    if (key.rfind("robot/", 0) != 0 || key.size() <= kPrefix + ending.size()) continue;
-    if (key.compare(key.size() - ending.size(), ending.size(), ending) != 0) continue;
+    constexpr std::size_t kAround = 10;  // of "robot/" and "/run"
     Hello hello;
-    hello.name = key.substr(kPrefix, key.size() - kPrefix - ending.size());
-    if (!is_robot_name(hello.name)) continue;
+    hello.name = key.size() > kAround ? key.substr(6, key.size() - kAround) : "";
+    if (!is_robot_name(hello.name) || key != key_of(hello.name, "run")) continue;
     hello.run = run;
     hello.incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     const auto robot = add(hello);
