@@ -113,20 +113,10 @@ OutputFolder::~OutputFolder() {
   if (lock_ >= 0) close(lock_);
 }
 
-core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, IsEarlier is_earlier) {
-  return begin(out, replace, is_earlier, false);
-}
-
-core::Result<OutputFolder> OutputFolder::resume(const fs::path& out, bool replace, IsEarlier is_earlier) {
-  auto folder = begin(out, replace, is_earlier, true);
-  if (folder) folder->keep();
-  return folder;
-}
-
 fs::path OutputFolder::partial_of(const fs::path& out) { return with_ending(normal(out), ".partial"); }
 
-core::Result<OutputFolder> OutputFolder::begin(const fs::path& out, bool replace, IsEarlier is_earlier,
-                                               bool takes_over) {
+core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, bool takes_over,
+                                                 IsEarlier is_earlier) {
   if (out.empty()) return core::usage_error("the output folder has no name");
   const fs::path target = normal(out);
   if (auto checked = check_target(target, replace, is_earlier); !checked)
@@ -153,6 +143,7 @@ core::Result<OutputFolder> OutputFolder::begin(const fs::path& out, bool replace
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
                                           target.string(), space.available / kMegabyte, kLeastFreeMb));
   }
+  folder.kept_ = takes_over;
   return folder;
 }
 

@@ -174,8 +174,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
                                            const Status& status, const pipeline::Progress& progress) {
   const auto options = checked(request.network, true);
   if (!options) return tl::unexpected(options.error());
-  auto output = request.resume ? maps::OutputFolder::resume(request.fuse.output, request.fuse.replace)
-                               : maps::OutputFolder::prepare(request.fuse.output, request.fuse.replace);
+  auto output = maps::OutputFolder::prepare(request.fuse.output, request.fuse.replace, request.resume);
   if (!output) return tl::unexpected(output.error());
   output->keep();
   const fs::path folder = output->path();

@@ -224,8 +224,7 @@ class MapRun {
 
   /// The folders that are written into, and what lies there already.
   core::Result<void> prepare() {
-    auto output = request_.resume ? maps::OutputFolder::resume(request_.output, request_.replace)
-                                  : maps::OutputFolder::prepare(request_.output, request_.replace);
+    auto output = maps::OutputFolder::prepare(request_.output, request_.replace, request_.resume);
     if (!output) return tl::unexpected(output.error());
     output_.emplace(std::move(*output));
     if (request_.resume) {

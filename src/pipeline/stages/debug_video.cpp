@@ -8,7 +8,6 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/image_io.hpp"
@@ -62,7 +61,7 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
   }
   const fs::path relative = inside(out, folder);
   if (relative.empty()) {
-    auto own = maps::OutputFolder::prepare(folder, replace, is_debug_folder);
+    auto own = maps::OutputFolder::prepare(folder, replace, false, is_debug_folder);
     if (!own) return tl::unexpected(own.error());
     result.path_ = own->path();
     result.own_.emplace(std::move(*own));
@@ -86,9 +85,7 @@ core::Result<void> write_debug_picture(const fs::path& folder, std::size_t numbe
   constexpr int kQuick = 1;
   const auto png = dataset::encode_png(picture, kQuick);
   if (!png) return tl::unexpected(png.error());
-  core::OutputFile file(folder / picture_name(number));
-  file.write(png->data(), png->size());
-  return file.commit();
+  return core::write_file(folder / picture_name(number), *png);
 }
 
 }  // namespace plumbline::pipeline
