@@ -5,7 +5,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -68,27 +67,9 @@ core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::
   return StoredResult(store, std::move(*reader), std::move(*map));
 }
 
-geometry::Trajectory StoredResult::trajectory() const {
-  geometry::Trajectory poses = maps::trajectory(map_.frames, map_.map);
-  for (geometry::StampedPose& pose : poses) {
-    pose.world_from_camera = map_.result.output_from_map * pose.world_from_camera;
-  }
-  return poses;
-}
-
-std::vector<KeyframePose> StoredResult::keyframes() const {
-  std::vector<KeyframePose> poses = keyframe_poses(map_.map);
-  for (KeyframePose& pose : poses) {
-    pose.world_from_camera = map_.result.output_from_map * pose.world_from_camera;
-  }
-  return poses;
-}
-
-geometry::Trajectory StoredResult::keyframe_trajectory() const {
-  geometry::Trajectory poses;
-  for (const KeyframePose& keyframe : keyframes()) {
-    poses.push_back({keyframe.stamp, keyframe.world_from_camera});
-  }
+MapPoses StoredResult::poses() const {
+  MapPoses poses = poses_of(map_.map, map_.frames);
+  move(poses, map_.result.output_from_map);
   return poses;
 }
 
