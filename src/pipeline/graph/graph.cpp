@@ -28,7 +28,7 @@ void check_stage(StageSpec& spec, const CheckContext& context, ConfigProblems& p
       const std::string key = problem.path.substr(prefix.size());
       const ConfigNode* value = spec.body->find(key);
       if (std::find(spec.set.begin(), spec.set.end(), key) != spec.set.end()) {
-        problem.mark = {"--set", 0, 0};
+        problem.mark = {kCommandLineFile, 0, 0};
         problem.path = spec.node.name + "." + key;
       } else if (value != nullptr) {
         problem.mark = value->mark;

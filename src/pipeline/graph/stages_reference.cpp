@@ -40,16 +40,9 @@ std::string ports(const StageType& type) {
   return text;
 }
 
-std::vector<core::OptionSpec> options(const StageType& type) {
-  const std::unique_ptr<Stage> stage = type.make();
-  core::OptionTable table;
-  stage->declare(table);
-  return table.specs();
-}
-
 std::string tap_row(const StageType& tap) {
   std::string file;
-  for (const core::OptionSpec& spec : options(tap)) {
+  for (const core::OptionSpec& spec : tap.options()) {
     if (spec.key == "file") file = spec.help;
   }
   return fmt::format("| {} | {} | {} |\n", tap.name, file, tap.help);
@@ -59,7 +52,7 @@ std::string tap_row(const StageType& tap) {
 
 std::vector<core::OptionSpec> shown_options(const StageType& type, bool all) {
   std::vector<core::OptionSpec> shown;
-  for (core::OptionSpec& spec : options(type)) {
+  for (core::OptionSpec& spec : type.options()) {
     const OptionLevel level = option_level(type.name, spec.key);
     if (level == OptionLevel::kBasic || (all && level == OptionLevel::kAdvanced))
       shown.push_back(std::move(spec));

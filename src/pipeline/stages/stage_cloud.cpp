@@ -140,12 +140,9 @@ class CloudStage : public Stage {
 }  // namespace
 
 StageType cloud_stage() {
-  return {"cloud",
-          "Turns a keyframe's depth into a filtered cloud with colour and normals",
-          Mode::kStateless,
-          {{"frame", frame_port()}, {"track", track_port()}},
-          {{"cloud", keyframe_cloud_port()}},
-          [] { return std::make_unique<CloudStage>(); }};
+  return stage_type<CloudStage>(
+      "cloud", "Turns a keyframe's depth into a filtered cloud with colour and normals", Mode::kStateless,
+      {{"frame", frame_port()}, {"track", track_port()}}, {{"cloud", keyframe_cloud_port()}});
 }
 
 }  // namespace plumbline::pipeline

@@ -28,7 +28,6 @@ class FilterStage : public Stage {
     context_ = &context;
     return {};
   }
-  core::Result<void> process(StageIo& /*io*/) override { return {}; }  // its input comes at the end
 
   core::Result<void> finish(StageIo& io) override {
     const auto input = io.input<DenseCloud>("cloud");
@@ -64,12 +63,8 @@ class FilterStage : public Stage {
 }  // namespace
 
 StageType filter_stage() {
-  return {"filter",
-          "Runs a filter chain on the merged cloud",
-          Mode::kSerial,
-          {{"cloud", cloud_port()}},
-          {{"cloud", cloud_port()}},
-          [] { return std::make_unique<FilterStage>(); }};
+  return stage_type<FilterStage>("filter", "Runs a filter chain on the merged cloud", Mode::kSerial,
+                                 {{"cloud", cloud_port()}}, {{"cloud", cloud_port()}});
 }
 
 }  // namespace plumbline::pipeline

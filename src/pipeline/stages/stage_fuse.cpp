@@ -5,12 +5,10 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -219,12 +217,9 @@ class FuseStage : public Stage {
 }  // namespace
 
 StageType fuse_stage() {
-  return {"fuse",
-          "Merges the keyframes' clouds at their final poses into one cloud with thin walls",
-          Mode::kSerial,
-          {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
-          {{"cloud", cloud_port()}},
-          [] { return std::make_unique<FuseStage>(); }};
+  return stage_type<FuseStage>(
+      "fuse", "Merges the keyframes' clouds at their final poses into one cloud with thin walls",
+      Mode::kSerial, {{"cloud", keyframe_cloud_port()}, {"map", map_port()}}, {{"cloud", cloud_port()}});
 }
 
 }  // namespace plumbline::pipeline

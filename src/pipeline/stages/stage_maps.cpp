@@ -18,7 +18,7 @@ class MapsStage : public Stage {
     }
     return {};
   }
-  [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
+  [[nodiscard]] std::size_t frames() const override { return maps_->clouds().size(); }
 
   /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
   core::Result<void> process(StageIo& io) override {
@@ -64,12 +64,9 @@ class MapsStage : public Stage {
 }  // namespace
 
 StageType maps_stage() {
-  return {"maps",
-          "Reads finished maps of robots, with the clouds that are stored with them",
-          Mode::kStateless,
-          {},
-          {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}},
-          [] { return std::make_unique<MapsStage>(); }};
+  return stage_type<MapsStage>(
+      "maps", "Reads finished maps of robots, with the clouds that are stored with them", Mode::kStateless,
+      {}, {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}});
 }
 
 }  // namespace plumbline::pipeline

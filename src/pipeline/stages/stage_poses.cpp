@@ -139,12 +139,9 @@ class PosesStage : public Stage {
 }  // namespace
 
 StageType poses_stage() {
-  return {"poses",
-          "Takes poses from files or the recordings' truth instead of tracking",
-          Mode::kSerial,
-          {{"frame", frame_port()}},
-          {{"track", track_port()}, {"map", map_port()}},
-          [] { return std::make_unique<PosesStage>(); }};
+  return stage_type<PosesStage>(
+      "poses", "Takes poses from files or the recordings' truth instead of tracking", Mode::kSerial,
+      {{"frame", frame_port()}}, {{"track", track_port()}, {"map", map_port()}});
 }
 
 }  // namespace plumbline::pipeline

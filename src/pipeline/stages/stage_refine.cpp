@@ -103,12 +103,9 @@ class RefineStage : public Stage {
 }  // namespace
 
 StageType refine_stage() {
-  return {"refine",
-          "Aligns local maps with each other and adjusts the whole map once more",
-          Mode::kStateless,
-          {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
-          {{"map", map_port()}},
-          [] { return std::make_unique<RefineStage>(); }};
+  return stage_type<RefineStage>(
+      "refine", "Aligns local maps with each other and adjusts the whole map once more", Mode::kStateless,
+      {{"cloud", keyframe_cloud_port()}, {"map", map_port()}}, {{"map", map_port()}});
 }
 
 }  // namespace plumbline::pipeline

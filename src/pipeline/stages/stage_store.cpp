@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // store: the maps as map.db while the run goes, so that a run that ends early has lost nothing.
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -105,16 +104,13 @@ class StoreStage : public Stage {
 }  // namespace
 
 StageType store_stage() {
-  return {"store",
-          "Keeps the maps in map.db as the run goes, one transaction a keyframe",
-          Mode::kSerial,
-          {{"track", track_port(), false},
-           {"cloud", keyframe_cloud_port(), false},
-           {"map", map_port()},
-           {"result", cloud_port(), false}},
-          {},
-          [] { return std::make_unique<StoreStage>(); },
-          true};
+  return stage_type<StoreStage>(
+      "store", "Keeps the maps in map.db as the run goes, one transaction a keyframe", Mode::kSerial,
+      {{"track", track_port(), false},
+       {"cloud", keyframe_cloud_port(), false},
+       {"map", map_port()},
+       {"result", cloud_port(), false}},
+      {}, true);
 }
 
 }  // namespace plumbline::pipeline

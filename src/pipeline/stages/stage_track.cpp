@@ -248,13 +248,11 @@ class TrackStage : public Stage {
 }  // namespace
 
 StageType track_stage() {
-  return {
+  return stage_type<TrackStage>(
       "track",
       "Tracks each robot's camera with points, lines and depth, and keeps its map of keyframes and landmarks",
-      Mode::kSerial,
-      {{"frame", frame_port()}, {"features", features_port()}},
-      {{"track", track_port()}, {"maps", maps_port()}},
-      [] { return std::make_unique<TrackStage>(); }};
+      Mode::kSerial, {{"frame", frame_port()}, {"features", features_port()}},
+      {{"track", track_port()}, {"maps", maps_port()}});
 }
 
 }  // namespace plumbline::pipeline
