@@ -176,7 +176,7 @@ core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t in
 core::Error StoredMaps::damaged(KeyframeId id, FrameId frame, const core::Error& how) const {
   const auto cloud = std::find_if(clouds_.begin(), clouds_.end(),
                                   [&](const StoredCloud& c) { return c.id == id && c.frame == frame; });
-  const std::string file = cloud == clouds_.end() ? name_ : parts_[cloud->part].file.string();
+  const std::string file = cloud == clouds_.end() ? "fused maps" : parts_[cloud->part].file.string();
   return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, how.message)).value();
 }
 
@@ -190,16 +190,6 @@ core::Result<std::size_t> StoredMaps::find_part(const std::string& name) const {
     }
   }
   return core::usage_error(fmt::format("--anchor: there is no robot '{}'; there are {}", name, names));
-}
-
-dataset::PairInfo StoredMaps::info(std::size_t index) const {
-  dataset::PairInfo info;
-  info.stamp = info.depth_stamp = clouds_.at(index).stamp;
-  return info;
-}
-
-core::Result<sensor::RgbdFrame> StoredMaps::read(std::size_t /*index*/) const {
-  return core::usage_error("finished maps have no frames; use a pipeline that begins with a maps stage");
 }
 
 }  // namespace plumbline::maps

@@ -52,7 +52,6 @@ core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& req
 RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph,
                       const std::filesystem::path& folder) {
   RunContext context;
-  context.source = &maps;
   context.stored_maps = &maps;
   context.robots = &maps.robots();
   context.keeps_clouds = keeps_clouds(graph);
