@@ -114,22 +114,6 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
   return maps;
 }
 
-/// What others could do who are on the network, in words for the log. Errors: the keys cannot be used.
-core::Result<void> warn_of_security(const NetworkOptions& options, core::Log& log) {
-  if (options.security.empty()) {
-    if (options.interface == "lo") return {};
-    log.warning(fmt::format("on {} without --security: whoever is there can read maps and send some",
-                            options.interface));
-    return {};
-  }
-  constexpr int kSoon = 30;
-  const auto days = days_of_keys(options);
-  if (!days) return tl::unexpected(days.error());
-  if (*days < kSoon)
-    log.warning(fmt::format("the keys in {} expire in {} days", options.security.string(), *days));
-  return {};
-}
-
 /// Why somebody with foreign keys gets nothing only the hub learns.
 core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& options, core::Log& log) {
   const bool secured = !options.security.empty();
@@ -179,7 +163,8 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   output->keep();
   const fs::path folder = output->path();
   LogFile log(folder / "hub.log", console);
-  if (auto secure = warn_of_security(*options, log); !secure) return tl::unexpected(secure.error());
+  if (auto secure = warn_of_security(*options, "whoever is there can read maps and send some", log); !secure)
+    return tl::unexpected(secure.error());
   auto bus = open_logged_bus(*options, log);
   if (!bus) return tl::unexpected(bus.error());
   auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);

@@ -14,7 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-core::Result<void> check_names(const std::vector<std::string>& robots) {
+/// The part that makes keys, when these names may have some.
+core::Result<const BusPart*> part_for(const std::vector<std::string>& robots) {
   std::set<std::string> names = {"ca", "hub"};
   for (const std::string& name : robots) {
     if (!is_robot_name(name)) {
@@ -26,20 +27,13 @@ core::Result<void> check_names(const std::vector<std::string>& robots) {
           fmt::format("--robots: {} is there twice, or is none that a robot may have", name));
     }
   }
-  return {};
-}
-
-core::Result<const BusPart*> part() {
-  const auto& found = core::part<BusPart>();
-  if (!found) return tl::unexpected(found.error());
-  return *found;
+  return core::part<BusPart>();
 }
 
 }  // namespace
 
 core::Result<void> create_keys(const fs::path& folder, const std::vector<std::string>& robots) {
-  if (auto names = check_names(robots); !names) return names;
-  const auto keys = part();
+  const auto keys = part_for(robots);
   if (!keys) return tl::unexpected(keys.error());
   std::error_code ec;
   if (fs::exists(folder, ec)) {
@@ -56,8 +50,7 @@ core::Result<void> create_keys(const fs::path& folder, const std::vector<std::st
 }
 
 core::Result<void> add_keys(const fs::path& folder, const std::vector<std::string>& robots) {
-  if (auto names = check_names(robots); !names) return names;
-  const auto keys = part();
+  const auto keys = part_for(robots);
   if (!keys) return tl::unexpected(keys.error());
   std::error_code ec;
   for (const std::string& name : robots) {
@@ -71,10 +64,7 @@ core::Result<void> add_keys(const fs::path& folder, const std::vector<std::strin
 }
 
 core::Result<void> revoke_keys(const fs::path& folder, const std::vector<std::string>& robots) {
-  if (auto names = check_names(robots); !names) return names;
-  const auto keys = part();
-  if (!keys) return tl::unexpected(keys.error());
-  return (*keys)->revoke(folder, robots);
+  return part_for(robots).and_then([&](const BusPart* keys) { return keys->revoke(folder, robots); });
 }
 
 }  // namespace plumbline::net

@@ -29,17 +29,8 @@ core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request,
   }
   const auto options = checked(request.network, false);
   if (!options) return tl::unexpected(options.error());
-  if (options->interface != "lo" && options->security.empty()) {
-    log.warning(fmt::format("on {} without --security: whoever is there can read the map and speak as {}",
-                            options->interface, request.name));
-  }
-  if (!options->security.empty()) {
-    constexpr int kSoon = 30;
-    const auto days = days_of_keys(*options);
-    if (!days) return tl::unexpected(days.error());
-    if (*days < kSoon)
-      log.warning(fmt::format("the keys in {} expire in {} days", options->security.string(), *days));
-  }
+  const std::string danger = "whoever is there can read the map and speak as " + request.name;
+  if (auto secure = warn_of_security(*options, danger, log); !secure) return tl::unexpected(secure.error());
   auto bus =
       open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug("DDS: " + line); });
   if (!bus) return tl::unexpected(bus.error());
