@@ -50,13 +50,16 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
   return check;
 }
 
-geometry::Trajectory keyframe_trajectory(const Map& map) {
+geometry::Trajectory trajectory(const std::vector<KeyframePose>& keyframes,
+                                std::optional<std::int32_t> robot) {
   geometry::Trajectory result;
-  for (const KeyframePose& keyframe : keyframe_poses(map)) {
-    result.push_back({keyframe.stamp, keyframe.world_from_camera});
+  for (const KeyframePose& keyframe : keyframes) {
+    if (!robot || keyframe.id.robot == *robot) result.push_back({keyframe.stamp, keyframe.world_from_camera});
   }
   return result;
 }
+
+geometry::Trajectory keyframe_trajectory(const Map& map) { return trajectory(keyframe_poses(map)); }
 
 std::vector<KeyframePose> keyframe_poses(const Map& map) {
   std::vector<KeyframePose> poses;
@@ -74,6 +77,15 @@ MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames) {
     if (frame.tracked) poses.trajectory_ids.push_back({frame.reference.robot, number});
   }
   return poses;
+}
+
+void move(MapPoses& poses, const geometry::Rigid3& frame_from_map) {
+  for (geometry::StampedPose& pose : poses.trajectory) {
+    pose.world_from_camera = frame_from_map * pose.world_from_camera;
+  }
+  for (KeyframePose& keyframe : poses.keyframes) {
+    keyframe.world_from_camera = frame_from_map * keyframe.world_from_camera;
+  }
 }
 
 }  // namespace plumbline::maps

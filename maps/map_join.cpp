@@ -2,7 +2,6 @@
 #include "plumbline/maps/map_join.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <stdexcept>
 
 #include "plumbline/core/hash.hpp"
@@ -26,8 +25,7 @@ std::vector<Observation> renamed(std::vector<Observation> seen, const RobotNumbe
   return seen;
 }
 
-template <typename Edge>
-Edge renamed_ends(Edge edge, const RobotNumbers& to) {
+KeyframeEdge renamed(KeyframeEdge edge, const RobotNumbers& to) {
   edge.a = renamed(edge.a, to);
   edge.b = renamed(edge.b, to);
   return edge;
@@ -68,9 +66,9 @@ class PartsCollector {
     }
     const std::uint64_t first_edge = parts_.next.edge;
     for (const auto& [order, edge] : map.edges()) {
-      parts_.edges.emplace_back(first_edge + order, renamed_ends(edge, to));
+      parts_.edges.emplace_back(first_edge + order, renamed(edge, to));
     }
-    for (const LoopEdge& loop : map.loops()) parts_.loops.push_back(renamed_ends(loop, to));
+    for (const LoopEdge& loop : map.loops()) parts_.loops.push_back(renamed(loop, to));
     const NextIds next = map.next_ids();
     for (const KeyframeId id : next.keyframes) parts_.next.keyframes.push_back(renamed(id, to));
     for (const core::PointId id : next.points) parts_.next.points.push_back(renamed(id, to));

@@ -5,6 +5,17 @@
 
 #include "plumbline/core/archive.hpp"
 
+namespace plumbline::cloud {
+
+template <typename Io>
+void fields(Io& io, DepthField& field) {
+  DepthField::Terms coefficients = field.coefficients();
+  io(coefficients);
+  if constexpr (Io::kReads) field = DepthField(coefficients);
+}
+
+}  // namespace plumbline::cloud
+
 namespace plumbline::maps {
 
 std::vector<geometry::Matrix6d> FusionState::covariances_of(const std::vector<std::int32_t>& robots,
@@ -24,60 +35,19 @@ void FusionState::correct(std::int32_t robot, cloud::Cloud& camera_cloud) const 
   if (field != depth_fields.end()) field->second.correct(camera_cloud);
 }
 
-namespace {
-
-/// As it is kept: what its maps hold, one behind the other.
-struct KeptState {
-  struct Field {
-    std::int32_t robot = 0;
-    cloud::DepthField::Terms coefficients = cloud::DepthField::Terms::Zero();
-  };
-  struct View {
-    std::int32_t robot = 0;
-    double stamp = 0.0;
-    geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
-  };
-  std::vector<Field> fields;
-  std::vector<View> views;
-};
 template <typename Io>
-void fields(Io& io, KeptState::Field& field) {
-  io(field.robot, field.coefficients);
-}
-template <typename Io>
-void fields(Io& io, KeptState::View& view) {
-  io(view.robot, view.stamp, view.covariance);
-}
-template <typename Io>
-void fields(Io& io, KeptState& state) {
-  io(state.fields, state.views);
+void fields(Io& io, FusionState& state) {
+  io(state.depth_fields, state.covariances);
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> to_bytes(const FusionState& state) {
-  KeptState kept;
-  for (const auto& [robot, field] : state.depth_fields) kept.fields.push_back({robot, field.coefficients()});
-  for (const auto& [view, covariance] : state.covariances) {
-    kept.views.push_back({view.first, view.second, covariance});
-  }
-  core::ByteWriter bytes;
-  core::encode(kept, bytes);
-  return bytes.bytes();
-}
+std::vector<std::uint8_t> to_bytes(const FusionState& state) { return core::encoded(state); }
 
 core::Result<FusionState> fusion_state_of(const std::vector<std::uint8_t>& bytes) {
-  FusionState state;
   try {
-    const auto kept = core::decode<KeptState>(bytes);
-    for (const auto& [robot, coefficients] : kept.fields) {
-      state.depth_fields[robot] = cloud::DepthField(coefficients);
-    }
-    for (const auto& [robot, stamp, covariance] : kept.views) state.covariances[{robot, stamp}] = covariance;
+    return core::decode<FusionState>(bytes);
   } catch (const core::BadBytes&) {
     return core::input_error("what its clouds were laid down with is damaged; map the recording again");
   }
-  return state;
 }
 
 }  // namespace plumbline::maps

@@ -45,8 +45,7 @@ core::Result<void> check_target(const fs::path& target, bool replace, OutputFold
   if (!is_earlier(target)) {
     return core::usage_error(
         fmt::format("{}: exists, is not empty and is no earlier result; name a folder that does not exist "
-                    "yet (only earlier "
-                    "results are ever replaced)",
+                    "yet (only earlier results are ever replaced)",
                     target.string()));
   }
   if (!replace) {
@@ -75,16 +74,13 @@ core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   std::error_code ec;
   if (!fs::exists(partial, ec)) return {};
   if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
-    return core::usage_error(
-        fmt::format("{}: is in the way; results are written there first. Remove it or name "
-                    "another output folder",
-                    partial.string()));
+    return core::usage_error(fmt::format(
+        "{}: is in the way; results are written there first. Remove it or name another output folder",
+        partial.string()));
   }
   if (takes_over) return {};
   const int lock = lock_marker(partial, O_RDONLY);
-  if (lock < 0 && !fs::is_empty(partial, ec)) {
-    return another_run(partial);
-  }
+  if (lock < 0 && !fs::is_empty(partial, ec)) return another_run(partial);
   fs::remove_all(partial, ec);
   if (lock >= 0) close(lock);
   if (ec)
@@ -117,27 +113,16 @@ OutputFolder::~OutputFolder() {
   if (lock_ >= 0) close(lock_);
 }
 
-core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, IsEarlier is_earlier) {
-  return begin(out, replace, is_earlier, false);
-}
-
-core::Result<OutputFolder> OutputFolder::resume(const fs::path& out, bool replace, IsEarlier is_earlier) {
-  auto folder = begin(out, replace, is_earlier, true);
-  if (folder) folder->keep();
-  return folder;
-}
-
 fs::path OutputFolder::partial_of(const fs::path& out) { return with_ending(normal(out), ".partial"); }
 
-core::Result<OutputFolder> OutputFolder::begin(const fs::path& out, bool replace, IsEarlier is_earlier,
-                                               bool takes_over) {
+core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool replace, bool takes_over,
+                                                 IsEarlier is_earlier) {
   if (out.empty()) return core::usage_error("the output folder has no name");
   const fs::path target = normal(out);
   if (auto checked = check_target(target, replace, is_earlier); !checked)
-    return tl::unexpected<core::Error>(checked.error());
+    return tl::unexpected(checked.error());
   const fs::path partial = with_ending(target, ".partial");
-  if (auto cleared = clear_leftover(partial, takes_over); !cleared)
-    return tl::unexpected<core::Error>(cleared.error());
+  if (auto cleared = clear_leftover(partial, takes_over); !cleared) return tl::unexpected(cleared.error());
   std::error_code ec;
   fs::create_directories(partial, ec);
   if (ec) {
@@ -158,6 +143,7 @@ core::Result<OutputFolder> OutputFolder::begin(const fs::path& out, bool replace
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
                                           target.string(), space.available / kMegabyte, kLeastFreeMb));
   }
+  folder.kept_ = takes_over;
   return folder;
 }
 

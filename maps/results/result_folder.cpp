@@ -51,7 +51,7 @@ core::Result<cloud::CloudFile> read_result_cloud(const ResultFolder& result) {
 
 core::Result<std::vector<LineSegment3>> read_lines_ply(const std::filesystem::path& file) {
   const auto data = cloud::read_ply(file);
-  if (!data) return tl::unexpected<core::Error>(data.error());
+  if (!data) return tl::unexpected(data.error());
   const std::vector<float>* x = data->floats("x");
   const std::vector<float>* y = data->floats("y");
   const std::vector<float>* z = data->floats("z");

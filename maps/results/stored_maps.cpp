@@ -51,14 +51,12 @@ core::Result<std::unique_ptr<StoredMaps>> StoredMaps::open(const std::vector<fs:
   std::vector<core::Result<StoredPart>> parts(maps.size());
   executor.parallel_for(maps.size(), [&](std::size_t i) { parts[i] = read_part(maps[i]); });
   for (core::Result<StoredPart>& part : parts) {
-    if (!part) return tl::unexpected<core::Error>(part.error());
+    if (!part) return tl::unexpected(part.error());
     result->parts_.push_back(std::move(*part));
   }
-  if (auto arranged = result->arrange(executor); !arranged) {
-    return tl::unexpected<core::Error>(arranged.error());
-  }
+  if (auto arranged = result->arrange(executor); !arranged) return tl::unexpected(arranged.error());
   for (std::size_t p = 0; p < result->parts_.size(); ++p) {
-    if (auto listed = result->list_clouds(p); !listed) return tl::unexpected<core::Error>(listed.error());
+    if (auto listed = result->list_clouds(p); !listed) return tl::unexpected(listed.error());
   }
   return result;
 }
@@ -71,10 +69,10 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
         fmt::format("{}: no such map; give result folders of plumbline map", file.string()));
   }
   auto reader = StoreReader::open(file);
-  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  if (!reader) return tl::unexpected(reader.error());
   reader->read_ahead();
   auto stored = reader->load();
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   if (stored->map.keyframe_count() == 0) {
     return core::input_error(fmt::format("{}: the map has no keyframes; leave it out", file.string()));
   }
@@ -139,7 +137,7 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
 core::Result<void> StoredMaps::list_clouds(std::size_t p) {
   const StoredPart& part = parts_[p];
   const auto ids = part.reader->cloud_ids();
-  if (!ids) return tl::unexpected<core::Error>(ids.error());
+  if (!ids) return tl::unexpected(ids.error());
   for (const KeyframeId stored : *ids) {
     const auto found = part.numbers.find(stored.robot);
     if (found == part.numbers.end()) continue;
@@ -147,7 +145,7 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
     if (part.map.has_keyframe(id)) clouds_.push_back({p, stored.robot, id, {}, part.map.keyframe(id).stamp});
   }
   const auto frames = part.reader->frame_cloud_ids();
-  if (!frames) return tl::unexpected<core::Error>(frames.error());
+  if (!frames) return tl::unexpected(frames.error());
   std::map<std::int32_t, std::vector<double>> stamps;  // of frames, by robot
   for (const FramePose& frame : part.frames) stamps[frame.reference.robot].push_back(frame.stamp);
   for (const FrameId stored : *frames) {
@@ -178,7 +176,7 @@ core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t in
 core::Error StoredMaps::damaged(KeyframeId id, FrameId frame, const core::Error& how) const {
   const auto cloud = std::find_if(clouds_.begin(), clouds_.end(),
                                   [&](const StoredCloud& c) { return c.id == id && c.frame == frame; });
-  const std::string file = cloud == clouds_.end() ? name_ : parts_[cloud->part].file.string();
+  const std::string file = cloud == clouds_.end() ? "fused maps" : parts_[cloud->part].file.string();
   return core::input_error(fmt::format("{}: a cloud is damaged ({})", file, how.message)).value();
 }
 
@@ -192,16 +190,6 @@ core::Result<std::size_t> StoredMaps::find_part(const std::string& name) const {
     }
   }
   return core::usage_error(fmt::format("--anchor: there is no robot '{}'; there are {}", name, names));
-}
-
-dataset::PairInfo StoredMaps::info(std::size_t index) const {
-  dataset::PairInfo info;
-  info.stamp = info.depth_stamp = clouds_.at(index).stamp;
-  return info;
-}
-
-core::Result<sensor::RgbdFrame> StoredMaps::read(std::size_t /*index*/) const {
-  return core::usage_error("finished maps have no frames; use a pipeline that begins with a maps stage");
 }
 
 }  // namespace plumbline::maps

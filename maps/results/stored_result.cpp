@@ -5,7 +5,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -51,7 +50,7 @@ core::Result<MapPlace> find_map(const fs::path& input) {
   if (fs::is_regular_file(input / kStoreFile, ec)) place.store = input / kStoreFile;
   auto result = open_result(input);
   if (result) place.result = std::move(*result);
-  if (!result && place.store.empty()) return tl::unexpected<core::Error>(result.error());
+  if (!result && place.store.empty()) return tl::unexpected(result.error());
   return place;
 }
 
@@ -62,33 +61,15 @@ StoredResult::StoredResult(fs::path file, StoreReader reader, StoredMap map)
 
 core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::string& robot) {
   auto reader = StoreReader::open(store);
-  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  if (!reader) return tl::unexpected(reader.error());
   auto map = reader->load(robot);
-  if (!map) return tl::unexpected<core::Error>(map.error());
+  if (!map) return tl::unexpected(map.error());
   return StoredResult(store, std::move(*reader), std::move(*map));
 }
 
-geometry::Trajectory StoredResult::trajectory() const {
-  geometry::Trajectory poses = maps::trajectory(map_.frames, map_.map);
-  for (geometry::StampedPose& pose : poses) {
-    pose.world_from_camera = map_.result.output_from_map * pose.world_from_camera;
-  }
-  return poses;
-}
-
-std::vector<KeyframePose> StoredResult::keyframes() const {
-  std::vector<KeyframePose> poses = keyframe_poses(map_.map);
-  for (KeyframePose& pose : poses) {
-    pose.world_from_camera = map_.result.output_from_map * pose.world_from_camera;
-  }
-  return poses;
-}
-
-geometry::Trajectory StoredResult::keyframe_trajectory() const {
-  geometry::Trajectory poses;
-  for (const KeyframePose& keyframe : keyframes()) {
-    poses.push_back({keyframe.stamp, keyframe.world_from_camera});
-  }
+MapPoses StoredResult::poses() const {
+  MapPoses poses = poses_of(map_.map, map_.frames);
+  move(poses, map_.result.output_from_map);
   return poses;
 }
 
@@ -132,13 +113,13 @@ core::Result<StoredViews> StoredResult::views() const {
 core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
                                                     const core::Executor& executor) const {
   const auto stored = views();
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   if (stored->size() == 0) {
     return core::input_error(fmt::format("{}: holds no clouds; map the recording again", file_.string()));
   }
   FusionState state;
   const auto kept = reader_->attachment(kFusionAttachment);
-  if (!kept) return tl::unexpected<core::Error>(kept.error());
+  if (!kept) return tl::unexpected(kept.error());
   if (*kept) {
     auto read = fusion_state_of(**kept);
     if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
@@ -163,7 +144,7 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
 
 core::Result<std::size_t> StoredResult::write_keyframe_clouds(const fs::path& folder) const {
   const auto stored = views();
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   return maps::write_keyframe_clouds(folder, *stored, map_.result.output_from_map,
                                      [&](std::size_t i) { return stored->read(i); });
 }
@@ -174,9 +155,9 @@ core::Result<cloud::CloudFile> read_map_cloud(const MapPlace& place, const core:
       place.result && (fs::exists(place.result->ply(), ec) || fs::exists(place.result->pcd(), ec));
   if (written || place.store.empty()) return read_result_cloud(*place.result);
   const auto stored = StoredResult::open(place);
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   auto fused = stored->fused(stored->fusion_options(), executor);
-  if (!fused) return tl::unexpected<core::Error>(fused.error());
+  if (!fused) return tl::unexpected(fused.error());
   cloud::CloudFile file;
   file.cloud = std::move(fused->cloud);
   file.columns = std::move(fused->columns);

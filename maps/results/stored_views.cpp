@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <set>
-#include <system_error>
 #include <utility>
 
 #include "plumbline/cloud/cloud_io.hpp"
@@ -21,9 +20,9 @@ core::Result<cloud::CloudPtr> StoredViews::read(std::size_t view) const {
 
 core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map, const Arrivals& arrivals) {
   const auto keyframes = reader.cloud_ids();
-  if (!keyframes) return tl::unexpected<core::Error>(keyframes.error());
+  if (!keyframes) return tl::unexpected(keyframes.error());
   auto frames = reader.frame_cloud_ids();
-  if (!frames) return tl::unexpected<core::Error>(frames.error());
+  if (!frames) return tl::unexpected(frames.error());
   const auto arrival = [&](FrameId frame) {
     const auto found = arrivals.find(frame);
     return found == arrivals.end() ? 0 : found->second;
@@ -61,19 +60,17 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
 core::Result<std::size_t> write_keyframe_clouds(
     const std::filesystem::path& folder, const StoredViews& views, const geometry::Rigid3& output_from_map,
     const std::function<core::Result<cloud::CloudPtr>(std::size_t)>& read) {
-  if (auto made = core::make_folder(folder); !made) return tl::unexpected<core::Error>(made.error());
+  if (auto made = core::make_folder(folder); !made) return tl::unexpected(made.error());
   std::size_t written = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const core::KeyframeId id = views.keyframes[i];
     if (!id.valid()) continue;
     const auto cloud = read(i);
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    if (!cloud) return tl::unexpected(cloud.error());
     cloud::transform(**cloud, output_from_map * views.world_from_camera[i] * cloud::sensor_pose(**cloud));
     const std::string name =
         id.robot == 0 ? fmt::format("{:06}.ply", id.index) : fmt::format("{}_{:06}.ply", id.robot, id.index);
-    if (auto done = cloud::write_ply(folder / name, **cloud); !done) {
-      return tl::unexpected<core::Error>(done.error());
-    }
+    if (auto done = cloud::write_ply(folder / name, **cloud); !done) return tl::unexpected(done.error());
     ++written;
   }
   return written;

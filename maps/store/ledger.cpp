@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <system_error>
-#include <utility>
 
 #include "plumbline/maps/store_replica.hpp"
 #include "store/store_sqlite.hpp"
@@ -18,35 +17,22 @@ void check_ledger(Database& database) {
   }
 }
 
-std::vector<std::pair<std::string, std::string>> read_all(Database& database) {
-  std::vector<std::pair<std::string, std::string>> texts;
-  Statement rows(database, "SELECT name, value FROM text ORDER BY name");
-  while (rows.step()) texts.emplace_back(rows.text(0), rows.text(1));
-  return texts;
-}
-
 }  // namespace
 
-core::Result<std::vector<std::pair<std::string, std::string>>> Ledger::all() const {
+core::Result<std::map<std::string, std::string>> Ledger::all() const {
+  std::map<std::string, std::string> texts;
   std::error_code ignored;
-  if (!std::filesystem::exists(file_, ignored)) return std::vector<std::pair<std::string, std::string>>();
+  if (!std::filesystem::exists(file_, ignored)) return texts;
   return guarded(file_, ErrorKind::kInput, [&] {
     Database database(file_, Database::Access::kRead);
     check_ledger(database);
-    return read_all(database);
+    Statement rows(database, "SELECT name, value FROM text");
+    while (rows.step()) texts.emplace(rows.text(0), rows.text(1));
+    return texts;
   });
 }
 
-core::Result<std::optional<std::string>> Ledger::get(const std::string& name) const {
-  const auto texts = all();
-  if (!texts) return tl::unexpected<core::Error>(texts.error());
-  for (const auto& [key, value] : *texts) {
-    if (key == name) return value;
-  }
-  return std::nullopt;
-}
-
-core::Result<void> Ledger::put(const std::vector<std::pair<std::string, std::string>>& texts) const {
+core::Result<void> Ledger::put(const std::map<std::string, std::string>& texts) const {
   return guarded(file_, ErrorKind::kOutput, [&] {
     Database database(file_, Database::Access::kCreate);
     database.run("PRAGMA synchronous = FULL");

@@ -14,16 +14,9 @@ void expect_own(bool own) {
   if (!own) throw BadBytes("it holds what belongs to another row");
 }
 
-template <typename Row>
-std::vector<Row> page_of(const Bytes& plain) {
-  std::vector<Row> rows;
-  decode_page(plain, rows);
-  return rows;
-}
-
 template <typename Landmark>
 std::vector<Landmark> landmarks_of(const Bytes& plain, const MapRows::Key& key) {
-  std::vector<Landmark> landmarks = page_of<Landmark>(plain);
+  std::vector<Landmark> landmarks = decode_page<Landmark>(plain);
   for (const Landmark& landmark : landmarks) {
     expect_own(landmark.id.robot == key.first && landmark.id.index / kLandmarksPerPage == key.second);
   }
@@ -71,8 +64,8 @@ void MapRows::put(const std::string& table, const Key& key, const Bytes& plain,
     expect_own(row.number == static_cast<std::uint64_t>(key.second));
     edges_[key] = row.edge;
   }
-  if (table == "frame") frames_[key] = page_of<FramePose>(plain);
-  if (table == "log") log_[key] = page_of<std::string>(plain);
+  if (table == "frame") frames_[key] = decode_page<FramePose>(plain);
+  if (table == "log") log_[key] = decode_page<std::string>(plain);
 }
 
 void MapRows::remove(const std::string& table, const Key& key) {

@@ -13,6 +13,7 @@ using core::ByteWriter;
 using core::decode;
 using core::decode_page;
 using core::encode;
+using core::encoded;
 using core::pack;
 using core::unpack;
 

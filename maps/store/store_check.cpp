@@ -23,13 +23,8 @@ void demand(bool holds, const char* otherwise) {
   if (!holds) throw BadBytes(otherwise);
 }
 
-template <typename Matrix>
-bool all_finite(const Matrix& m) {
-  return m.allFinite();
-}
-
 void check(const geometry::Rigid3& pose) {
-  demand(all_finite(pose.rotation) && all_finite(pose.translation), "a pose is not finite");
+  demand(pose.rotation.allFinite() && pose.translation.allFinite(), "a pose is not finite");
   const Eigen::Matrix3d unit = pose.rotation * pose.rotation.transpose();
   demand(unit.isIdentity(1e-3) && pose.rotation.determinant() > 0.0, "a pose is no rotation");
 }
@@ -66,36 +61,32 @@ void check_keyframe(const Bytes& bytes, const RowName& name, const std::vector<R
   check(keyframe->camera_from_reference);
   if (keyframe->features == nullptr) return;
   for (const features::PointFeature& p : keyframe->features->points) {
-    demand(all_finite(p.pixel) && p.pixel.cwiseAbs().maxCoeff() <= static_cast<float>(kMostSide),
+    demand(p.pixel.allFinite() && p.pixel.cwiseAbs().maxCoeff() <= static_cast<float>(kMostSide),
            "a point's pixel is out of range");
   }
 }
 
 template <typename Landmark>
 void check_landmarks(const Bytes& bytes, const RowName& name) {
-  std::vector<Landmark> landmarks;
-  decode_page(bytes, landmarks);
   std::int32_t last = -1;
-  for (const Landmark& landmark : landmarks) {
+  for (const Landmark& landmark : decode_page<Landmark>(bytes)) {
     demand(landmark.id.robot == name.robot && landmark.id.index / kLandmarksPerPage == name.number,
            "it holds what belongs to another row");
     demand(landmark.id.index > last, "a landmark is there twice");
     last = landmark.id.index;
     if constexpr (std::is_same_v<Landmark, MapPoint>) {
       demand(
-          all_finite(landmark.position) && all_finite(landmark.normal) && all_finite(landmark.view_direction),
+          landmark.position.allFinite() && landmark.normal.allFinite() && landmark.view_direction.allFinite(),
           "a landmark is not finite");
     } else {
-      demand(all_finite(landmark.start) && all_finite(landmark.end), "a landmark is not finite");
+      demand(landmark.start.allFinite() && landmark.end.allFinite(), "a landmark is not finite");
     }
     for (const Observation& o : landmark.observations) check_id(o.keyframe);
   }
 }
 
 void check_frame_page(const Bytes& bytes) {
-  std::vector<FramePose> frames;
-  decode_page(bytes, frames);
-  for (const FramePose& frame : frames) {
+  for (const FramePose& frame : decode_page<FramePose>(bytes)) {
     demand(std::isfinite(frame.stamp), "a frame's stamp is not finite");
     check_id(frame.reference);
     if (!frame.tracked) continue;
@@ -104,12 +95,11 @@ void check_frame_page(const Bytes& bytes) {
   }
 }
 
-template <typename Edge>
-void check_edge(const Edge& edge) {
+void check_edge(const KeyframeEdge& edge) {
   check_id(edge.a);
   check_id(edge.b);
   check(edge.b_from_a);
-  demand(all_finite(edge.information), "an edge is not finite");
+  demand(edge.information.allFinite(), "an edge is not finite");
 }
 
 void check(const sensor::Camera& camera) {
@@ -143,11 +133,6 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
     const bool known = key == "input" || key == "program" || key == "configuration" || key == "complete";
     demand(known, "nothing has this name");
   }
-}
-
-void check_log(const Bytes& plain) {
-  std::vector<std::string> lines;
-  decode_page(plain, lines);
 }
 
 void check_cloud(const Bytes& bytes) {
@@ -191,15 +176,9 @@ void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& 
     return check_edge(row.edge);
   }
   if (table == "frame") return check_frame_page(plain(kMostPage));
-  if (table == "log") return check_log(plain(kMostPage));
-  if (table == "attachment") {
-    plain(kMostPlain);
-    return;
-  }
-  if (table == "surface") {
-    decode_surface(plain(kMostPlain));
-    return;
-  }
+  if (table == "log") return void(decode_page<std::string>(plain(kMostPage)));
+  if (table == "attachment") return void(plain(kMostPlain));
+  if (table == "surface") return void(decode_surface(plain(kMostPlain)));
   check_cloud(bytes);
 }
 

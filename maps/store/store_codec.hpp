@@ -3,7 +3,6 @@
 
 // What a map consists of as bytes (docs/reference/store.md), before packing: `fields` of each type is the
 // format.
-#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -92,8 +91,8 @@ void fields(Io& io, MapLine& l) {
 }
 
 template <typename Io>
-void fields(Io& io, LoopEdge& loop) {
-  io(loop.a, loop.b, loop.b_from_a, loop.information);
+void fields(Io& io, KeyframeEdge& edge) {
+  io(edge.a, edge.b, edge.b_from_a, edge.information);
 }
 
 /// A surface edge with its number, which tells a row that holds another's bytes.
@@ -103,7 +102,7 @@ struct EdgeRow {
 };
 template <typename Io>
 void fields(Io& io, EdgeRow& row) {
-  io(row.number, row.edge.a, row.edge.b, row.edge.b_from_a, row.edge.information);
+  io(row.number, row.edge);
 }
 
 template <typename Io>

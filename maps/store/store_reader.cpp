@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 #include "plumbline/cloud/compact_cloud.hpp"
@@ -110,7 +109,7 @@ core::Result<std::vector<StoredMap>> StoreReader::load_each() const {
 
 core::Result<StoredMap> StoreReader::load(const std::string& robot) const {
   auto maps = load_each();
-  if (!maps) return tl::unexpected<core::Error>(maps.error());
+  if (!maps) return tl::unexpected(maps.error());
   if (maps->size() == 1) return std::move(maps->front());
   std::string names;
   for (StoredMap& map : *maps) {
@@ -157,7 +156,7 @@ core::Result<std::vector<std::uint8_t>> StoreReader::Impl::blob(const char* sql,
 
 core::Result<cloud::CloudPtr> StoreReader::Impl::decode(const core::Result<std::vector<std::uint8_t>>& bytes,
                                                         const std::string& what) const {
-  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  if (!bytes) return tl::unexpected(bytes.error());
   core::Result<cloud::CloudPtr> cloud = cloud::decode_cloud(bytes->data(), bytes->size());
   if (cloud) return cloud;
   return core::input_error(file.string() + ": " + what + ": " + cloud.error().message);
@@ -212,8 +211,7 @@ core::Result<StoreContents> StoreReader::contents() const {
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
     contents.cloud_bytes = count(
-        "SELECT (SELECT total(length(data)) FROM cloud)"
-        " + (SELECT total(length(data)) FROM frame_cloud)");
+        "SELECT (SELECT total(length(data)) FROM cloud) + (SELECT total(length(data)) FROM frame_cloud)");
     Statement names(database, "SELECT key FROM attachment ORDER BY key");
     while (names.step()) contents.attachments.push_back(names.text(0));
     return contents;
@@ -246,7 +244,7 @@ core::Result<bool> is_blank_store(const std::filesystem::path& file) {
 
 core::Result<StoredMap> load_map(const std::filesystem::path& file) {
   const core::Result<StoreReader> reader = StoreReader::open(file);
-  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  if (!reader) return tl::unexpected(reader.error());
   return reader->load();
 }
 

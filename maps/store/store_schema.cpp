@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
 
 #include "store/store_codec.hpp"
 
@@ -63,9 +62,7 @@ void put_header(Database& database, const StoreHeader& header) {
 }
 
 void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots) {
-  ByteWriter bytes;
-  encode(robots, bytes);
-  put_header(database, transaction, "robots", pack(bytes.bytes()));
+  put_header(database, transaction, "robots", pack(encoded(robots)));
 }
 
 void put_complete(Database& database, std::int64_t transaction, bool complete) {
@@ -128,9 +125,7 @@ StoreHeader read_header(Database& database) {
 }
 
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame) {
-  ByteWriter bytes;
-  encode(frame, bytes);
-  put_header(database, transaction, "result", pack(bytes.bytes()));
+  put_header(database, transaction, "result", pack(encoded(frame)));
 }
 
 ResultFrame read_result_frame(Database& database) {

@@ -1,31 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "store/store_sqlite.hpp"
 
-#include <sqlite3.h>
-
 namespace plumbline::maps {
 namespace {
 
 constexpr int kPatienceMs = 3000;
-
-int flags_of(Database::Access access) {
-  switch (access) {
-    case Database::Access::kRead:
-      return SQLite::OPEN_READONLY;
-    case Database::Access::kWrite:
-      return SQLite::OPEN_READWRITE;
-    case Database::Access::kCreate:
-      break;
-  }
-  return SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
-}
 
 /// With a mutex: clouds are read by several threads. An absolute path is never taken for a URI or for an
 /// option.
 SQLite::Database opened(const std::filesystem::path& file, Database::Access access) {
   try {
     return SQLite::Database(std::filesystem::absolute(file).string(),
-                            flags_of(access) | SQLite::OPEN_FULLMUTEX, kPatienceMs);
+                            static_cast<int>(access) | SQLITE_OPEN_FULLMUTEX, kPatienceMs);
   } catch (const SQLite::Exception& error) {
     const std::string why = error.getErrorStr();
     if (access != Database::Access::kCreate) {

@@ -4,6 +4,7 @@
 // SQLiteCpp in the words of stores: rows hold packed bytes, errors end as core::Result at the store's public
 // functions.
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
 
 #include <filesystem>
 #include <stdexcept>
@@ -24,7 +25,11 @@ StoreFailure failure_of(const SQLite::Exception& error, core::ErrorKind kind);
 
 class Database : public SQLite::Database {
  public:
-  enum class Access { kRead, kWrite, kCreate };
+  enum class Access {
+    kRead = SQLITE_OPEN_READONLY,
+    kWrite = SQLITE_OPEN_READWRITE,
+    kCreate = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
+  };
   Database(const std::filesystem::path& file, Access access);
   void run(const std::string& sql) { exec(sql); }
   [[nodiscard]] std::int64_t number(const std::string& sql);  ///< first column of the first row, or 0

@@ -91,7 +91,11 @@ template <typename Thing>
 ByRobot<Thing> read_lists(Database& database, const std::string& table) {
   ByRobot<Thing> lists;
   Statement rows(database, ("SELECT robot, data FROM " + table + " ORDER BY robot, number").c_str());
-  while (rows.step()) decode_page(rows.unpacked(1), lists[static_cast<std::int32_t>(rows.integer(0))]);
+  while (rows.step()) {
+    const std::vector<Thing> page = decode_page<Thing>(rows.unpacked(1));
+    std::vector<Thing>& list = lists[static_cast<std::int32_t>(rows.integer(0))];
+    list.insert(list.end(), page.begin(), page.end());
+  }
   return lists;
 }
 
@@ -151,33 +155,22 @@ void StoreWriter::Impl::put_map(const MapChanges& map, std::int32_t robot) {
 }
 
 void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t robot) {
-  ByteWriter bytes;
   keyframes.begin();
   states.begin();
   for (const MapParts::KeyframePart& part : map.keyframes) {
     const Mirror::Key key = key_of(part.data->id);
-    if (!keyframes.keep(key)) {
-      bytes.clear();
-      encode(*part.data, bytes);
-      keyframes.put(key, bytes.bytes());
-    }
-    bytes.clear();
-    encode(KeyframeState{part.camera_from_world, part.parent}, bytes);
-    states.put(key, bytes.bytes());
+    if (!keyframes.keep(key)) keyframes.put(key, encoded(*part.data));
+    states.put(key, encoded(KeyframeState{part.camera_from_world, part.parent}));
   }
   keyframes.end(robot);
   states.end(robot);
 }
 
 void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) {
-  ByteWriter bytes;
   edges.begin();
   for (const auto& [number, edge] : map.edges) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
-    if (edges.keep(key)) continue;
-    bytes.clear();
-    encode(EdgeRow{number, edge}, bytes);
-    edges.put(key, bytes.bytes());
+    if (!edges.keep(key)) edges.put(key, encoded(EdgeRow{number, edge}));
   }
   for (const auto& [number, owner] : map.edge_names) edges.stay({owner, static_cast<std::int64_t>(number)});
   edges.end(robot);
@@ -193,10 +186,8 @@ void StoreWriter::Impl::put_map_row(const MapChanges& map, std::int32_t robot) {
   row.log = count(log_lines, robot);
   row.next = map.next;
   row.loops = map.loops;
-  ByteWriter bytes;
-  encode(row, bytes);
   maps.begin();
-  maps.put({std::max(robot, 0), 0}, bytes.bytes());
+  maps.put({std::max(robot, 0), 0}, encoded(row));
   if (robot < 0) maps.end();
 }
 
@@ -213,10 +204,7 @@ void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
   put(of_keyframe ? "REPLACE INTO cloud VALUES (?, ?, ?, ?)" : "REPLACE INTO frame_cloud VALUES (?, ?, ?, ?)",
       *cloud.bytes);
   if (!of_keyframe || cloud.surface == nullptr) return;
-  ByteWriter bytes;
-  encode(*cloud.surface, bytes);
-  const Bytes packed = pack(bytes.bytes());
-  put("REPLACE INTO surface VALUES (?, ?, ?, ?)", packed);
+  put("REPLACE INTO surface VALUES (?, ?, ?, ?)", pack(encoded(*cloud.surface)));
 }
 
 void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {

@@ -85,16 +85,9 @@ void Executor::run(const std::function<void()>& work) const { impl_->arena.execu
 Executor::Job::Job() = default;
 Executor::Job::Job(Job&&) noexcept = default;
 Executor::Job& Executor::Job::operator=(Job&& other) noexcept {
-  if (this != &other) {
-    if (state_) {
-      try {
-        wait();
-      } catch (...) {  // a result nobody asked for
-      }
-    }
-    state_ = std::move(other.state_);
-  }
-  return *this;
+  Job taken(std::move(other));
+  std::swap(state_, taken.state_);
+  return *this;  // what was there before is waited for
 }
 Executor::Job::~Job() {
   if (!state_) return;

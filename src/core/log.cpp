@@ -18,17 +18,9 @@ class StderrLog : public Log {
 
  private:
   static spdlog::level::level_enum level(LogLevel l) {
-    switch (l) {
-      case LogLevel::kDebug:
-        return spdlog::level::debug;
-      case LogLevel::kInfo:
-        return spdlog::level::info;
-      case LogLevel::kWarning:
-        return spdlog::level::warn;
-      case LogLevel::kError:
-        return spdlog::level::err;
-    }
-    return spdlog::level::info;
+    constexpr spdlog::level::level_enum kLevels[] = {spdlog::level::debug, spdlog::level::info,
+                                                     spdlog::level::warn, spdlog::level::err};
+    return kLevels[static_cast<std::size_t>(l)];
   }
   spdlog::logger logger_;
 };

@@ -115,4 +115,8 @@ Result<void> write_file(const std::filesystem::path& file, std::string_view byte
   return out.commit();
 }
 
+Result<void> write_file(const std::filesystem::path& file, const std::vector<std::uint8_t>& bytes) {
+  return write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
 }  // namespace plumbline::core

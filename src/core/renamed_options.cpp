@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/core/renamed_options.hpp"
 
-#include <fmt/format.h>
-
-#include <array>
-
 namespace plumbline::core {
 namespace {
 

@@ -245,7 +245,7 @@ std::optional<ConfigNode> unreadable(const std::filesystem::path& file, const st
 }
 
 Result<ConfigNode> whole(std::optional<ConfigNode> node, const ConfigProblems& problems) {
-  if (!problems.empty()) return tl::unexpected<Error>(to_error(problems));
+  if (!problems.empty()) return tl::unexpected(to_error(problems));
   return std::move(*node);
 }
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "folder_source.hpp"
-
 #include <fmt/format.h>
 
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "layout.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "plumbline/sensor/rectify.hpp"
 

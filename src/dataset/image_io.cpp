@@ -39,7 +39,7 @@ Decoded decode_other(const Bytes& file) {
 
 core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
   auto bytes = read_bytes(file);
-  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  if (!bytes) return tl::unexpected(bytes.error());
   if (bytes->empty())
     return core::input_error(fmt::format("{}: truncated or damaged: empty file", file.string()));
   Decoded image = is_png(*bytes)    ? decode_png(*bytes)
@@ -51,7 +51,7 @@ core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
 
 core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int level) {
   const auto& formats = core::part<ImageFormats>();
-  if (!formats) return tl::unexpected<core::Error>(formats.error());
+  if (!formats) return tl::unexpected(formats.error());
   Bytes bytes = (*formats)->encode_png(image, level);
   if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the image cannot be encoded as PNG");
   return bytes;

@@ -3,6 +3,7 @@
 
 // How the pairs of a recording are found on disk, one function per layout.
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,9 @@ struct StampedFile {
   std::string file;
   int line = 0;
 };
+
+/// The FrameSource behind every layout on disk.
+std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera);
 
 bool looks_like_tum(const std::filesystem::path& folder);
 bool looks_like_seven_scenes(const std::filesystem::path& folder);

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "depth_statistics.hpp"
-#include "folder_source.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/image_io.hpp"
@@ -43,10 +42,10 @@ core::Result<sensor::Camera> choose_camera(const fs::path& folder, const OpenOpt
     return name == kCameraFiles.front() ? sensor::read_camera(folder / name)
                                         : sensor::read_open3d_camera(folder / name);
   }
-  return core::usage_error(fmt::format(
-      "{}: no camera.yaml in the folder; put one there or name a calibration with --camera (shipped: "
-      "tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file)",
-      folder.string()));
+  return core::usage_error(
+      fmt::format("{}: no camera.yaml in the folder; put one there or name a calibration with --camera "
+                  "(shipped: tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file)",
+                  folder.string()));
 }
 
 /// Typical values of the devices that take images of this size, in the unit of depth that the layout's own
@@ -187,8 +186,7 @@ core::Result<void> check_depth_scale(const FrameSource& source, const std::strin
   const bool too_far = beyond > kMaxShareBeyondReach && fit > scale;
   if (*median >= 0.7 && *median <= 7.0 && !too_far) return {};
   const std::string what = fmt::format(
-      "{}: with depth_scale {} the median depth is {:.4g} m; depth_scale {} would "
-      "fit (median {:.2g} m)",
+      "{}: with depth_scale {} the median depth is {:.4g} m; depth_scale {} would fit (median {:.2g} m)",
       folder, scale, *median, fit, *median * scale / fit);
   if (*median < 0.35 || *median > 20.0) return core::input_error(what + "; correct the camera file");
   log.warning(what + "; correct the camera file unless the scene is like that");
@@ -219,8 +217,8 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   const bool none_is_there = !camera && options.camera.empty() && !has_camera_file(folder);
   if (const auto guess = none_is_there ? guessed_camera(*layout) : std::nullopt) {
     log.warning(
-        fmt::format("{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: "
-                    "a guess; put a camera.yaml there or name one with --camera",
+        fmt::format("{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: a "
+                    "guess; put a camera.yaml there or name one with --camera",
                     folder.string(), guess->name, guess->color.fx));
     camera = *guess;
   }

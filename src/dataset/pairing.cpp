@@ -60,8 +60,7 @@ std::string no_common_time(const std::string& color_name, const std::vector<Stam
   return fmt::format(
       "{} and {} have no frame in common in time: the nearest stamps are {:.3f} s apart (allowed: {:.3f} s); "
       "colour covers {:.3f} to {:.3f}, depth {:.3f} to {:.3f}; check that both lists are of one recording "
-      "and "
-      "one clock",
+      "and one clock",
       color_name, depth_name, nearest, max_gap_s, color.front().stamp, color.back().stamp,
       depth.front().stamp, depth.back().stamp);
 }
@@ -77,10 +76,10 @@ core::Result<void> check_files(const std::string& list, const std::vector<Stampe
   }
   if (missing == 0) return {};
   if (missing == files.size()) {
-    return core::input_error(fmt::format(
-        "{}:{}: names {}, which does not exist, and none of its {} files does; copy the image folder "
-        "beside the list or correct the list",
-        list, first->line, first->file, files.size()));
+    return core::input_error(
+        fmt::format("{}:{}: names {}, which does not exist, and none of its {} files does; copy the image "
+                    "folder beside the list or correct the list",
+                    list, first->line, first->file, files.size()));
   }
   log.warning(fmt::format("{}:{}: {} of {} files do not exist, these frames are skipped (first: {})", list,
                           first->line, missing, files.size(), first->file));

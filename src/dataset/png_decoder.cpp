@@ -125,16 +125,11 @@ bool unfilter(const Header& header, Bytes& pixels) {
 }
 
 bool unfilter_any(const Header& header, Bytes& pixels) {
-  switch (header.pixel_bytes()) {
-    case 1:
-      return unfilter<1>(header, pixels);
-    case 2:
-      return unfilter<2>(header, pixels);
-    case 3:
-      return unfilter<3>(header, pixels);
-    default:
-      return unfilter<4>(header, pixels);
-  }
+  const std::size_t bytes = header.pixel_bytes();
+  return bytes == 1   ? unfilter<1>(header, pixels)
+         : bytes == 2 ? unfilter<2>(header, pixels)
+         : bytes == 3 ? unfilter<3>(header, pixels)
+                      : unfilter<4>(header, pixels);
 }
 
 /// Rows without their filter bytes, in OpenCV's order of channels and this machine's order of bytes.

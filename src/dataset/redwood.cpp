@@ -83,8 +83,7 @@ std::vector<StampedFile> by_stamp(const std::map<long long, NumberedFile>& image
   std::vector<StampedFile> files;
   files.reserve(images.size());
   for (const auto& [number, image] : images) files.push_back({*image.stamp, image.file, 0});
-  std::sort(files.begin(), files.end(),
-            [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; });
+  std::sort(files.begin(), files.end(), kByStamp);
   return files;
 }
 
@@ -115,9 +114,7 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
     truth.push_back({pairs[static_cast<std::size_t>(*index)].stamp,
                      geometry::Rigid3(Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>())});
   }
-  std::stable_sort(
-      truth.begin(), truth.end(),
-      [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
+  std::stable_sort(truth.begin(), truth.end(), kByStamp);
   return truth;
 }
 
@@ -142,10 +139,9 @@ bool looks_like_redwood(const fs::path& folder) {
 core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
   const std::optional<fs::path> colors = color_folder(folder);
   if (!colors || !is_folder(folder / "depth")) {
-    return core::input_error(
-        fmt::format("{}: no {} folder (a Redwood or Open3D recording needs color/, image/ or "
-                    "rgb/, and depth/)",
-                    folder.string(), colors ? "depth/" : "colour"));
+    return core::input_error(fmt::format(
+        "{}: no {} folder (a Redwood or Open3D recording needs color/, image/ or rgb/, and depth/)",
+        folder.string(), colors ? "depth/" : "colour"));
   }
   const auto color = list_images(*colors);
   const auto depth = list_images(folder / "depth");

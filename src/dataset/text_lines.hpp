@@ -20,4 +20,7 @@ struct TextLine {
 /// carriage returns are passed over.
 core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file);
 
+/// For lists that are to be in the order of time.
+inline constexpr auto kByStamp = [](const auto& a, const auto& b) { return a.stamp < b.stamp; };
+
 }  // namespace plumbline::dataset

@@ -53,25 +53,21 @@ std::string to_text(const geometry::Trajectory& trajectory) {
 
 core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& file) {
   auto lines = read_lines(file);
-  if (!lines) return tl::unexpected<core::Error>(lines.error());
+  if (!lines) return tl::unexpected(lines.error());
   geometry::Trajectory trajectory;
   trajectory.reserve(lines->size());
   for (const TextLine& line : *lines) {
     auto pose = read_pose(file.string(), line);
-    if (!pose) return tl::unexpected<core::Error>(pose.error());
+    if (!pose) return tl::unexpected(pose.error());
     trajectory.push_back(*pose);
   }
-  std::stable_sort(
-      trajectory.begin(), trajectory.end(),
-      [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
+  std::stable_sort(trajectory.begin(), trajectory.end(), kByStamp);
   return trajectory;
 }
 
 core::Result<void> write_trajectory(const std::filesystem::path& file,
                                     const geometry::Trajectory& trajectory) {
-  core::OutputFile out(file);
-  out.write(to_text(trajectory));
-  return out.commit();
+  return core::write_file(file, to_text(trajectory));
 }
 
 }  // namespace plumbline::dataset

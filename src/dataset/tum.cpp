@@ -30,10 +30,9 @@ core::Result<double> read_stamp(const std::string& list, const TextLine& line, s
 
 /// Sorts by stamp and drops files whose stamp came before; says so.
 void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, core::Log& log) {
-  const auto by_stamp = [](const StampedFile& a, const StampedFile& b) { return a.stamp < b.stamp; };
-  if (!std::is_sorted(files.begin(), files.end(), by_stamp)) {
+  if (!std::is_sorted(files.begin(), files.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list));
-    std::stable_sort(files.begin(), files.end(), by_stamp);
+    std::stable_sort(files.begin(), files.end(), kByStamp);
   }
   const auto same = [](const StampedFile& a, const StampedFile& b) { return a.stamp == b.stamp; };
   const auto end = std::unique(files.begin(), files.end(), same);
@@ -47,7 +46,7 @@ void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, c
 /// "stamp file" per line.
 core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log& log) {
   auto lines = read_lines(list);
-  if (!lines) return tl::unexpected<core::Error>(lines.error());
+  if (!lines) return tl::unexpected(lines.error());
   std::vector<StampedFile> files;
   for (const TextLine& line : *lines) {
     if (line.words.size() < 2) {
@@ -55,16 +54,14 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
           fmt::format("{}:{}: expected 'stamp file', found one word", list.string(), line.number));
     }
     const auto stamp = read_stamp(list.string(), line, 0);
-    if (!stamp) return tl::unexpected<core::Error>(stamp.error());
+    if (!stamp) return tl::unexpected(stamp.error());
     std::string name = line.words[1];
     for (std::size_t i = 2; i < line.words.size(); ++i) name += " " + line.words[i];  // a name with blanks
     files.push_back({*stamp, (list.parent_path() / name).string(), line.number});
   }
   if (files.empty()) return core::input_error(fmt::format("{}: names no image", list.string()));
   sort_and_unique(list.string(), files, log);
-  if (auto there = check_files(list.string(), files, log); !there) {
-    return tl::unexpected<core::Error>(there.error());
-  }
+  if (auto there = check_files(list.string(), files, log); !there) return tl::unexpected(there.error());
   return files;
 }
 
@@ -73,14 +70,13 @@ core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const
   for (const char* name : {"rgb.txt", "depth.txt"}) {
     if (is_file(folder / name)) continue;
     return core::input_error(
-        fmt::format("{}: {} is missing (a TUM recording needs rgb.txt and depth.txt, or "
-                    "associations.txt)",
+        fmt::format("{}: {} is missing (a TUM recording needs rgb.txt and depth.txt, or associations.txt)",
                     folder.string(), name));
   }
   auto color = read_list(folder / "rgb.txt", log);
-  if (!color) return tl::unexpected<core::Error>(color.error());
+  if (!color) return tl::unexpected(color.error());
   auto depth = read_list(folder / "depth.txt", log);
-  if (!depth) return tl::unexpected<core::Error>(depth.error());
+  if (!depth) return tl::unexpected(depth.error());
   std::vector<PairInfo> pairs = pair_by_stamp(*color, *depth, options.max_pair_gap_s, options.depth_delay_s);
   if (pairs.empty()) {
     return core::input_error(no_common_time((folder / "rgb.txt").string(), *color,
@@ -105,7 +101,7 @@ bool depth_first(const std::string& first, const std::string& second) {
 /// "stamp file stamp file" per line. Every image is used once; the pairs are trusted, however far apart.
 core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core::Log& log) {
   auto lines = read_lines(list);
-  if (!lines) return tl::unexpected<core::Error>(lines.error());
+  if (!lines) return tl::unexpected(lines.error());
   std::vector<StampedFile> color;
   std::vector<StampedFile> depth;
   std::set<std::string> used;
@@ -115,9 +111,9 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
                                            list.string(), line.number, line.words.size()));
     }
     const auto first = read_stamp(list.string(), line, 0);
-    if (!first) return tl::unexpected<core::Error>(first.error());
+    if (!first) return tl::unexpected(first.error());
     const auto second = read_stamp(list.string(), line, 2);
-    if (!second) return tl::unexpected<core::Error>(second.error());
+    if (!second) return tl::unexpected(second.error());
     StampedFile a{*first, (list.parent_path() / line.words[1]).string(), line.number};
     StampedFile b{*second, (list.parent_path() / line.words[3]).string(), line.number};
     if (used.count(a.file) + used.count(b.file) > 0) continue;
@@ -132,18 +128,15 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
                             lines->size() - color.size(), lines->size()));
   }
   for (const auto* files : {&color, &depth}) {
-    if (auto there = check_files(list.string(), *files, log); !there) {
-      return tl::unexpected<core::Error>(there.error());
-    }
+    if (auto there = check_files(list.string(), *files, log); !there) return tl::unexpected(there.error());
   }
   std::vector<PairInfo> pairs;
   for (std::size_t i = 0; i < color.size(); ++i) {
     pairs.push_back({color[i].stamp, depth[i].stamp, color[i].file, depth[i].file});
   }
-  const auto by_stamp = [](const PairInfo& a, const PairInfo& b) { return a.stamp < b.stamp; };
-  if (!std::is_sorted(pairs.begin(), pairs.end(), by_stamp)) {
+  if (!std::is_sorted(pairs.begin(), pairs.end(), kByStamp)) {
     log.warning(fmt::format("{}: the stamps are not in order; sorted", list.string()));
-    std::stable_sort(pairs.begin(), pairs.end(), by_stamp);
+    std::stable_sort(pairs.begin(), pairs.end(), kByStamp);
   }
   return pairs;
 }
@@ -158,7 +151,7 @@ core::Result<Layout> read_tum(const fs::path& folder, const LayoutOptions& optio
   const fs::path associations = folder / "associations.txt";
   auto pairs =
       is_file(associations) ? read_associations(associations, log) : read_two_lists(folder, options, log);
-  if (!pairs) return tl::unexpected<core::Error>(pairs.error());
+  if (!pairs) return tl::unexpected(pairs.error());
   Layout layout{"tum", std::move(*pairs), std::nullopt};
   if (is_file(folder / "groundtruth.txt")) {
     auto truth = read_trajectory(folder / "groundtruth.txt");

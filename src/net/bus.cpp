@@ -1,25 +1,34 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bus.hpp"
 
+#include <fmt/format.h>
+
 namespace plumbline::net {
 
 core::Result<std::unique_ptr<RobotBus>> open_robot_bus(const NetworkOptions& options, const std::string& name,
                                                        const BusLog& log) {
-  const auto& part = core::part<BusPart>();
-  if (!part) return tl::unexpected<core::Error>(part.error());
-  return (*part)->open_robot(options, name, log);
-}
-
-core::Result<int> days_of_keys(const NetworkOptions& options) {
-  const auto& part = core::part<BusPart>();
-  if (!part) return tl::unexpected<core::Error>(part.error());
-  return (*part)->days_left(options.security);
+  return core::part<BusPart>().and_then(
+      [&](const BusPart* part) { return part->open_robot(options, name, log); });
 }
 
 core::Result<std::unique_ptr<HubBus>> open_hub_bus(const NetworkOptions& options, const BusLog& log) {
-  const auto& part = core::part<BusPart>();
-  if (!part) return tl::unexpected<core::Error>(part.error());
-  return (*part)->open_hub(options, log);
+  return core::part<BusPart>().and_then([&](const BusPart* part) { return part->open_hub(options, log); });
+}
+
+core::Result<void> warn_of_security(const NetworkOptions& options, const std::string& danger,
+                                    core::Log& log) {
+  if (options.security.empty()) {
+    if (options.interface != "lo")
+      log.warning(fmt::format("on {} without --security: {}", options.interface, danger));
+    return {};
+  }
+  constexpr int kSoon = 30;
+  return core::part<BusPart>()
+      .and_then([&](const BusPart* part) { return part->days_left(options.security); })
+      .map([&](int days) {
+        if (days < kSoon)
+          log.warning(fmt::format("the keys in {} expire in {} days", options.security.string(), days));
+      });
 }
 
 }  // namespace plumbline::net

@@ -12,13 +12,15 @@
 #include <vector>
 
 #include "plumbline/core/error.hpp"
+#include "plumbline/core/log.hpp"
 #include "plumbline/core/part.hpp"
 #include "plumbline/net/options.hpp"
 
 namespace plumbline::net {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr std::uint32_t kProtocol = 2;
-constexpr std::size_t kMostPiece = 1U << 20U;  ///< bytes; MOST_PIECE of messages.idl
 
 /// messages.idl says what the fields are.
 struct Hello {
@@ -119,7 +121,6 @@ class HubBus {
   virtual std::vector<Word> hear_hubs() = 0;  ///< also this one's own
   /// From now on takes the pieces of this robot.
   virtual core::Result<void> listen_to(const std::string& robot) = 0;
-  virtual void ignore(const std::string& robot) = 0;
   virtual std::vector<Piece> take(const std::string& robot, int most) = 0;
   /// How many times this robot has begun to hear of others; 0: it does not now. What was sent before the last
   /// time may be lost.
@@ -149,8 +150,10 @@ struct BusPart {
 /// the part is missing.
 core::Result<std::unique_ptr<RobotBus>> open_robot_bus(const NetworkOptions& options, const std::string& name,
                                                        const BusLog& log);
-/// Days until the keys that --security names expire. Errors (kUsage): they cannot be read.
-core::Result<int> days_of_keys(const NetworkOptions& options);
 core::Result<std::unique_ptr<HubBus>> open_hub_bus(const NetworkOptions& options, const BusLog& log);
+
+/// Warns of what others on the network could do without keys (`danger`, in words), and of keys that expire
+/// soon. Errors (kUsage): keys cannot be read.
+core::Result<void> warn_of_security(const NetworkOptions& options, const std::string& danger, core::Log& log);
 
 }  // namespace plumbline::net

@@ -114,22 +114,6 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
   return maps;
 }
 
-/// What others could do who are on the network, in words for the log. Errors: the keys cannot be used.
-core::Result<void> warn_of_security(const NetworkOptions& options, core::Log& log) {
-  if (options.security.empty()) {
-    if (options.interface == "lo") return {};
-    log.warning(fmt::format("on {} without --security: whoever is there can read maps and send some",
-                            options.interface));
-    return {};
-  }
-  constexpr int kSoon = 30;
-  const auto days = days_of_keys(options);
-  if (!days) return tl::unexpected<core::Error>(days.error());
-  if (*days < kSoon)
-    log.warning(fmt::format("the keys in {} expire in {} days", options.security.string(), *days));
-  return {};
-}
-
 /// Why somebody with foreign keys gets nothing only the hub learns.
 core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& options, core::Log& log) {
   const bool secured = !options.security.empty();
@@ -145,7 +129,6 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
                                                   const std::vector<RobotTraffic>& traffic,
                                                   const HubMeetings& meetings, const core::Executor& executor,
                                                   core::Log& log, const pipeline::Progress& progress) {
-  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   std::string reason;
   pipeline::FuseRequest last = request.fuse;
   last.maps = usable_maps(folder, traffic, request.robots, executor, log, reason);
@@ -158,12 +141,12 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   last.output = folder / "fused";
   last.replace = true;
   auto summary = pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
-  if (!summary) return fail(summary.error());
+  if (!summary) return tl::unexpected(summary.error());
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;
-  if (auto moved = move_up(last.output, folder); !moved) return fail(moved.error());
+  if (auto moved = move_up(last.output, folder); !moved) return tl::unexpected(moved.error());
   if (auto added = add_network(folder / "summary.json", traffic, meetings.meetings(), reason); !added) {
-    return fail(added.error());
+    return tl::unexpected(added.error());
   }
   return summary;
 }
@@ -173,21 +156,20 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
 core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core::Executor& executor,
                                            core::Log& console, const core::StopToken& stop,
                                            const Status& status, const pipeline::Progress& progress) {
-  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto options = checked(request.network, true);
-  if (!options) return fail(options.error());
-  auto output = request.resume ? maps::OutputFolder::resume(request.fuse.output, request.fuse.replace)
-                               : maps::OutputFolder::prepare(request.fuse.output, request.fuse.replace);
-  if (!output) return fail(output.error());
+  if (!options) return tl::unexpected(options.error());
+  auto output = maps::OutputFolder::prepare(request.fuse.output, request.fuse.replace, request.resume);
+  if (!output) return tl::unexpected(output.error());
   output->keep();
   const fs::path folder = output->path();
   LogFile log(folder / "hub.log", console);
-  if (auto secure = warn_of_security(*options, log); !secure) return fail(secure.error());
+  if (auto secure = warn_of_security(*options, "whoever is there can read maps and send some", log); !secure)
+    return tl::unexpected(secure.error());
   auto bus = open_logged_bus(*options, log);
-  if (!bus) return fail(bus.error());
+  if (!bus) return tl::unexpected(bus.error());
   auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);
-  if (!desk) return fail(desk.error());
-  if (auto alone = (*desk)->look_for_others(stop); !alone) return fail(alone.error());
+  if (!desk) return tl::unexpected(desk.error());
+  if (auto alone = (*desk)->look_for_others(stop); !alone) return tl::unexpected(alone.error());
   log.info(
       fmt::format("waiting for {} on {}, domain {}",
                   request.robots > 0 ? fmt::format("{} robots", request.robots) : "robots; Ctrl-C ends that",
@@ -199,7 +181,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   auto summary =
       fuse_collected(request, folder, collected.traffic, (*desk)->meetings(), executor, log, progress);
   if (!summary) return summary;
-  if (auto committed = output->commit(); !committed) return fail(committed.error());
+  if (auto committed = output->commit(); !committed) return tl::unexpected(committed.error());
   return summary;
 }
 

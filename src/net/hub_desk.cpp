@@ -33,28 +33,25 @@ core::Result<std::unique_ptr<HubDesk>> HubDesk::open(const std::filesystem::path
                                                      const HubRequest& request, std::unique_ptr<HubBus> bus,
                                                      const core::Executor& executor, core::Log& log) {
   std::unique_ptr<HubDesk> desk(new HubDesk(folder, request, std::move(bus), executor, log));
-  if (auto read = desk->read_ledger(); !read) return tl::unexpected<core::Error>(read.error());
+  if (auto read = desk->read_ledger(); !read) return tl::unexpected(read.error());
   return desk;
 }
 
 core::Result<void> HubDesk::read_ledger() {
   const auto known = ledger().all();
-  if (!known) return tl::unexpected<core::Error>(known.error());
-  std::map<std::string, std::string> texts(known->begin(), known->end());
+  if (!known) return tl::unexpected(known.error());
+  std::map<std::string, std::string> texts = *known;
   speaker_.set_id(texts["hub"].empty() ? request_.fresh_id : texts["hub"]);
   if (auto put = ledger().put({{"hub", speaker_.id()}}); !put) return put;
   for (const auto& [key, run] : *known) {
-    constexpr std::size_t kPrefix = 6;
-    const std::string ending = "/run";
-    if (key.rfind("robot/", 0) != 0 || key.size() <= kPrefix + ending.size()) continue;
-    if (key.compare(key.size() - ending.size(), ending.size(), ending) != 0) continue;
+    constexpr std::size_t kAround = 10;  // of "robot/" and "/run"
     Hello hello;
-    hello.name = key.substr(kPrefix, key.size() - kPrefix - ending.size());
-    if (!is_robot_name(hello.name)) continue;
+    hello.name = key.size() > kAround ? key.substr(6, key.size() - kAround) : "";
+    if (!is_robot_name(hello.name) || key != key_of(hello.name, "run")) continue;
     hello.run = run;
     hello.incarnation = std::strtoull(texts[key_of(hello.name, "incarnation")].c_str(), nullptr, 10);
     const auto robot = add(hello);
-    if (!robot) return tl::unexpected<core::Error>(robot.error());
+    if (!robot) return tl::unexpected(robot.error());
     (*robot)->done = texts[key_of(hello.name, "state")] == kDone;
     log_.info(fmt::format("{}: {} keyframes are here from before", hello.name, (*robot)->copy().keyframes()));
     if ((*robot)->copy().keyframes() > 0) meetings_.committed(hello.name);
@@ -64,9 +61,8 @@ core::Result<void> HubDesk::read_ledger() {
 
 core::Result<HubRobot*> HubDesk::add(const Hello& known) {
   auto robot = HubRobot::open(known, folder_ / "robots" / known.name / "map.db", request_.quota_bytes);
-  if (!robot) return tl::unexpected<core::Error>(robot.error());
-  if (auto listened = bus_->listen_to(known.name); !listened)
-    return tl::unexpected<core::Error>(listened.error());
+  if (!robot) return tl::unexpected(robot.error());
+  if (auto listened = bus_->listen_to(known.name); !listened) return tl::unexpected(listened.error());
   return &robots_.insert_or_assign(known.name, std::move(*robot)).first->second;
 }
 
@@ -86,10 +82,10 @@ core::Result<void> HubDesk::look_for_others(const core::StopToken& stop) {
       const bool first =
           word.up_s >= 0.0 || word.hub < speaker_.id();  // of two that begin together one stays
       if (word.hub == speaker_.id() || !first) continue;
-      return core::usage_error(fmt::format(
-          "another hub is there in domain {}; end that one, or choose another --domain for this one "
-          "and its robots",
-          request_.network.domain));
+      return core::usage_error(
+          fmt::format("another hub is there in domain {}; end that one, or choose another --domain for this "
+                      "one and its robots",
+                      request_.network.domain));
     }
   }
   speaker_.serve();
@@ -118,8 +114,7 @@ std::string HubDesk::refusal(const HeardHello& heard) const {
   if (known->second.hello.run != hello.run) {
     return fmt::format(
         "{}: the hub has another run of that name; give this one another --name, or begin the hub without "
-        "--resume "
-        "in another folder",
+        "--resume in another folder",
         hello.name);
   }
   return {};

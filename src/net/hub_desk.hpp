@@ -2,7 +2,6 @@
 #pragma once
 
 // The hub while it collects: who may come in, what they bring, what they are told. One thread does it all.
-#include <chrono>
 #include <filesystem>
 #include <map>
 #include <memory>

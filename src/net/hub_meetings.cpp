@@ -99,13 +99,10 @@ void HubMeetings::look_at(const std::string& robot) {
 
 /// Before it is taken: what was told follows from what is kept.
 core::Result<void> HubMeetings::keep(const Entry& entry) const {
-  core::ByteWriter bytes;
-  core::encode(entry, bytes);
-  const core::Bytes packed = core::pack(bytes.bytes());
-  core::ByteWriter head;
-  head.number(static_cast<std::uint32_t>(packed.size()));
+  const core::Bytes packed = core::pack(core::encoded(entry));
+  const core::Bytes head = core::encoded(static_cast<std::uint32_t>(packed.size()));
   std::ofstream file(log_file(), std::ios::binary | std::ios::app);
-  for (const core::Bytes* part : {&head.bytes(), &packed}) {
+  for (const core::Bytes* part : {&head, &packed}) {
     file.write(reinterpret_cast<const char*>(part->data()), static_cast<std::streamsize>(part->size()));
   }
   file.flush();

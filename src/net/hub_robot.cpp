@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -38,10 +37,9 @@ bool Presence::silent() const { return !heard_at_ || Clock::now() - *heard_at_ >
 
 core::Result<HubRobot> HubRobot::open(Hello known, const std::filesystem::path& file,
                                       std::uint64_t quota_bytes) {
-  if (auto made = core::make_folder(file.parent_path()); !made)
-    return tl::unexpected<core::Error>(made.error());
+  if (auto made = core::make_folder(file.parent_path()); !made) return tl::unexpected(made.error());
   auto copy = maps::StoreReplica::open(file);
-  if (!copy) return tl::unexpected<core::Error>(copy.error());
+  if (!copy) return tl::unexpected(copy.error());
   HubRobot robot;
   robot.hello = std::move(known);
   robot.file_ = file;
@@ -53,16 +51,11 @@ core::Result<HubRobot> HubRobot::open(Hello known, const std::filesystem::path& 
 /// Transactions above the result may be of a process that was ended with the power cut: the robot has others
 /// by these numbers now.
 std::int64_t HubRobot::lost_below(const Hello& next) const {
-  std::int64_t lowest = std::numeric_limits<std::int64_t>::max();
-  if (next.incarnation > hello.incarnation) {
-    const std::uint64_t since = next.incarnation - hello.incarnation;
-    if (since > next.began.size()) return 0;
-    for (auto began = next.began.end() - static_cast<std::ptrdiff_t>(since); began != next.began.end();
-         ++began) {
-      lowest = std::min(lowest, static_cast<std::int64_t>(*began));
-    }
-  }
-  return lowest;
+  if (next.incarnation <= hello.incarnation) return std::numeric_limits<std::int64_t>::max();
+  const std::uint64_t since = next.incarnation - hello.incarnation;
+  if (since > next.began.size()) return 0;
+  return static_cast<std::int64_t>(
+      *std::min_element(next.began.end() - static_cast<std::ptrdiff_t>(since), next.began.end()));
 }
 
 core::Result<bool> HubRobot::hear(const Hello& next) {
@@ -76,7 +69,7 @@ core::Result<bool> HubRobot::hear(const Hello& next) {
   hello = next;
   if (!lost) return false;
   forget();
-  if (auto cleared = copy_->clear(); !cleared) return tl::unexpected<core::Error>(cleared.error());
+  if (auto cleared = copy_->clear(); !cleared) return tl::unexpected(cleared.error());
   done = false;
   return true;
 }

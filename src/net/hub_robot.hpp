@@ -2,7 +2,6 @@
 #pragma once
 
 // What the hub knows of one robot, and its copy of the robot's store.
-#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -14,8 +13,6 @@
 #include "plumbline/net/hub.hpp"
 
 namespace plumbline::net {
-
-using Clock = std::chrono::steady_clock;
 
 /// Signs of life.
 class Presence {

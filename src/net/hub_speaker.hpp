@@ -2,7 +2,6 @@
 #pragma once
 
 // The hub's words, and the name in which it says them.
-#include <chrono>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,8 +11,6 @@
 #include "plumbline/core/stop.hpp"
 
 namespace plumbline::net {
-
-using Clock = std::chrono::steady_clock;
 
 class HubSpeaker {
  public:

@@ -14,7 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-core::Result<void> check_names(const std::vector<std::string>& robots) {
+/// The part that makes keys, when these names may have some.
+core::Result<const BusPart*> part_for(const std::vector<std::string>& robots) {
   std::set<std::string> names = {"ca", "hub"};
   for (const std::string& name : robots) {
     if (!is_robot_name(name)) {
@@ -26,27 +27,19 @@ core::Result<void> check_names(const std::vector<std::string>& robots) {
           fmt::format("--robots: {} is there twice, or is none that a robot may have", name));
     }
   }
-  return {};
-}
-
-core::Result<const BusPart*> part() {
-  const auto& found = core::part<BusPart>();
-  if (!found) return tl::unexpected<core::Error>(found.error());
-  return *found;
+  return core::part<BusPart>();
 }
 
 }  // namespace
 
 core::Result<void> create_keys(const fs::path& folder, const std::vector<std::string>& robots) {
-  if (auto names = check_names(robots); !names) return names;
-  const auto keys = part();
-  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  const auto keys = part_for(robots);
+  if (!keys) return tl::unexpected(keys.error());
   std::error_code ec;
   if (fs::exists(folder, ec)) {
     return core::usage_error(
         folder.string() +
-        ": is there already; more robots are added by plumbline keys add, new keys need a new "
-        "folder");
+        ": is there already; more robots are added by plumbline keys add, new keys need a new folder");
   }
   if (auto made = (*keys)->make_authority(folder); !made) return made;
   if (auto made = (*keys)->make_keys(folder, "hub"); !made) return made;
@@ -57,9 +50,8 @@ core::Result<void> create_keys(const fs::path& folder, const std::vector<std::st
 }
 
 core::Result<void> add_keys(const fs::path& folder, const std::vector<std::string>& robots) {
-  if (auto names = check_names(robots); !names) return names;
-  const auto keys = part();
-  if (!keys) return tl::unexpected<core::Error>(keys.error());
+  const auto keys = part_for(robots);
+  if (!keys) return tl::unexpected(keys.error());
   std::error_code ec;
   for (const std::string& name : robots) {
     if (fs::exists(folder / name, ec))
@@ -72,10 +64,7 @@ core::Result<void> add_keys(const fs::path& folder, const std::vector<std::strin
 }
 
 core::Result<void> revoke_keys(const fs::path& folder, const std::vector<std::string>& robots) {
-  if (auto names = check_names(robots); !names) return names;
-  const auto keys = part();
-  if (!keys) return tl::unexpected<core::Error>(keys.error());
-  return (*keys)->revoke(folder, robots);
+  return part_for(robots).and_then([&](const BusPart* keys) { return keys->revoke(folder, robots); });
 }
 
 }  // namespace plumbline::net

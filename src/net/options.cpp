@@ -2,6 +2,7 @@
 #include "plumbline/net/options.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <netinet/in.h>
@@ -80,10 +81,9 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
   if (options.interface.empty()) {
     options.interface = choose_interface();
   } else if (std::find(there.begin(), there.end(), options.interface) == there.end()) {
-    std::string names;
-    for (const std::string& name : there) names += (names.empty() ? "" : ", ") + name;
     return core::usage_error(fmt::format("--interface: there is no '{}' that is up; there are {}",
-                                         options.interface, names.empty() ? "none" : names));
+                                         options.interface,
+                                         there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", "))));
   }
   if (!made_of(options.interface, "._-@")) {
     return core::usage_error(fmt::format("--interface: '{}' cannot be used", options.interface));

@@ -2,7 +2,6 @@
 #pragma once
 
 // From a robot's own store, as it grows beside the run, to the hub.
-#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
@@ -14,8 +13,6 @@
 #include "plumbline/maps/store_replica.hpp"
 
 namespace plumbline::net {
-
-using Clock = std::chrono::steady_clock;
 
 /// The store, and how long its transactions wait for the hub.
 class StoreWatch {

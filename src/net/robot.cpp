@@ -28,21 +28,12 @@ core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request,
         "--name: letters, digits, '.', '_' and '-', the first a letter or digit, 64 at most");
   }
   const auto options = checked(request.network, false);
-  if (!options) return tl::unexpected<core::Error>(options.error());
-  if (options->interface != "lo" && options->security.empty()) {
-    log.warning(fmt::format("on {} without --security: whoever is there can read the map and speak as {}",
-                            options->interface, request.name));
-  }
-  if (!options->security.empty()) {
-    constexpr int kSoon = 30;
-    const auto days = days_of_keys(*options);
-    if (!days) return tl::unexpected<core::Error>(days.error());
-    if (*days < kSoon)
-      log.warning(fmt::format("the keys in {} expire in {} days", options->security.string(), *days));
-  }
+  if (!options) return tl::unexpected(options.error());
+  const std::string danger = "whoever is there can read the map and speak as " + request.name;
+  if (auto secure = warn_of_security(*options, danger, log); !secure) return tl::unexpected(secure.error());
   auto bus =
       open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug("DDS: " + line); });
-  if (!bus) return tl::unexpected<core::Error>(bus.error());
+  if (!bus) return tl::unexpected(bus.error());
   return std::make_unique<RobotLink>(std::move(*bus), request.name, request.fresh_id, std::move(feedback),
                                      log);
 }
@@ -124,13 +115,10 @@ fs::path earlier_run(const std::string& input) {
 
 core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& folder, core::Log& log,
                                    const core::StopToken& stop, const Status& status) {
-  if (auto heads = maps::store_heads(folder / kStore); !heads)
-    return tl::unexpected<core::Error>(heads.error());
+  if (auto heads = maps::store_heads(folder / kStore); !heads) return tl::unexpected(heads.error());
   auto link = open_link(request, nullptr, log);
-  if (!link) return tl::unexpected<core::Error>(link.error());
-  if (auto followed = (*link)->follow(folder / kStore); !followed) {
-    return tl::unexpected<core::Error>(followed.error());
-  }
+  if (!link) return tl::unexpected(link.error());
+  if (auto followed = (*link)->follow(folder / kStore); !followed) return tl::unexpected(followed.error());
   (*link)->over(folder / kStore);
   return deliver(request, folder, **link, {}, stop, false, status);
 }
@@ -140,7 +128,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
                                      const pipeline::Progress& progress) {
   const auto others = request.feedback ? std::make_shared<mapping::OtherMapsInbox>() : nullptr;
   auto link = open_link(request, others, log);
-  if (!link) return tl::unexpected<core::Error>(link.error());
+  if (!link) return tl::unexpected(link.error());
   pipeline::MapRequest map = request.map;
   map.feedback = others;
   map.prepared = [&](const fs::path& folder) {
@@ -154,7 +142,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
     if (status) status(line_of(now, rate(now.sent_bytes)));
   };
   auto summary = pipeline::map_recording(map, executor, log, stop, frames);
-  if (!summary) return tl::unexpected<core::Error>(summary.error());
+  if (!summary) return tl::unexpected(summary.error());
   std::error_code ec;
   const fs::path store = request.map.output / kStore;
   if (!fs::exists(store, ec)) {

@@ -2,9 +2,12 @@
 #include "robot_link.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -29,15 +32,7 @@ constexpr std::size_t kMostBegan = 64;
 
 std::vector<std::uint64_t> numbers_of(const std::string& text) {
   std::istringstream words(text);
-  std::vector<std::uint64_t> numbers;
-  for (std::uint64_t number = 0; words >> number;) numbers.push_back(number);
-  return numbers;
-}
-
-std::string text_of(const std::vector<std::uint64_t>& numbers) {
-  std::string text;
-  for (const std::uint64_t number : numbers) text += fmt::format("{}{}", text.empty() ? "" : " ", number);
-  return text;
+  return {std::istream_iterator<std::uint64_t>(words), std::istream_iterator<std::uint64_t>()};
 }
 
 Hello hello_of(std::string name, std::string run) {
@@ -146,28 +141,24 @@ RobotLink::RobotLink(std::unique_ptr<RobotBus> bus, std::string name, std::strin
 
 core::Result<void> RobotLink::follow(const fs::path& store) {
   const maps::Ledger ledger(store.parent_path() / "network.db");
-  const auto known = ledger.all();
-  if (!known) return tl::unexpected<core::Error>(known.error());
-  const auto text = [&](const char* name) {
-    const auto found =
-        std::find_if(known->begin(), known->end(), [&](const auto& entry) { return entry.first == name; });
-    return found == known->end() ? std::string() : found->second;
-  };
+  auto known = ledger.all();
+  if (!known) return tl::unexpected(known.error());
   std::error_code ignored;
   const auto heads = fs::exists(store, ignored) ? maps::store_heads(store) : maps::StoreHeads();
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool anew = following() && known->empty();  // the next incarnation of this run, with an empty store
   Hello next = hello_;
-  if (!text("run").empty()) next.run = text("run");
-  if (!anew) next.began = numbers_of(text("began"));
+  std::map<std::string, std::string>& texts = *known;
+  if (!texts["run"].empty()) next.run = texts["run"];
+  if (!anew) next.began = numbers_of(texts["began"]);
   next.began.push_back(heads ? static_cast<std::uint64_t>(heads->last()) : 0);
-  const std::vector<std::uint64_t> incarnation = numbers_of(text("incarnation"));
+  const std::vector<std::uint64_t> incarnation = numbers_of(texts["incarnation"]);
   if (!anew) next.incarnation = incarnation.empty() ? 0 : incarnation.front();
   ++next.incarnation;
   if (next.began.size() > kMostBegan) next.began.erase(next.began.begin());
   const auto put = ledger.put({{"run", next.run},
                                {"name", next.name},
-                               {"began", text_of(next.began)},
+                               {"began", fmt::format("{}", fmt::join(next.began, " "))},
                                {"incarnation", std::to_string(next.incarnation)}});
   if (!put) return put;
   next.map_head = next.clouds_head = 0;

@@ -3,7 +3,6 @@
 
 #include <functional>
 #include <thread>
-#include <utility>
 
 #include "plumbline/core/stop.hpp"
 

@@ -9,18 +9,10 @@ using core::KeyframeId;
 
 namespace {
 
+/// Whether two sorted lists have one in common.
 bool meet(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& b) {
-  auto i = a.begin();
-  auto j = b.begin();
-  while (i != a.end() && j != b.end()) {
-    if (*i == *j) return true;
-    if (*i < *j) {
-      ++i;
-    } else {
-      ++j;
-    }
-  }
-  return false;
+  return std::any_of(a.begin(), a.end(),
+                     [&](KeyframeId id) { return std::binary_search(b.begin(), b.end(), id); });
 }
 
 }  // namespace

@@ -152,12 +152,12 @@ std::string pinhole_yaml(const Pinhole& p, const std::string& indent) {
 
 core::Result<Camera> read_camera(const std::filesystem::path& file) {
   auto root = core::read_yaml(file);
-  if (!root) return tl::unexpected<core::Error>(root.error());
+  if (!root) return tl::unexpected(root.error());
 
   ConfigProblems problems;
   if (root->kind != ConfigNode::Kind::kMap && root->kind != ConfigNode::Kind::kNull) {
     problems.push_back({root->mark, "", "is no camera file: expected lines such as 'fx: 525.0'"});
-    return tl::unexpected<core::Error>(core::to_error(problems));
+    return tl::unexpected(core::to_error(problems));
   }
   if (root->mark.file.empty()) root->mark = {file.string(), 1, 1};
 
@@ -192,14 +192,14 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   if (slope.size() == camera.depth_slope.size()) std::copy_n(slope.begin(), 2, camera.depth_slope.begin());
   read_depth_camera(*root, camera, problems);
 
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  if (!problems.empty()) return tl::unexpected(core::to_error(problems));
   if (camera.name.empty()) camera.name = file.stem().string();
   return camera;
 }
 
 core::Result<Camera> read_open3d_camera(const std::filesystem::path& file) {
   auto root = core::read_yaml(file);  // JSON is YAML
-  if (!root) return tl::unexpected<core::Error>(root.error());
+  if (!root) return tl::unexpected(root.error());
   constexpr double millimetres = 1000.0;  // Open3D's convention for 16-bit depth
   Camera camera;
   camera.name = file.stem().string();
@@ -230,7 +230,7 @@ core::Result<Camera> read_open3d_camera(const std::filesystem::path& file) {
                           "is no camera of that size (expected: [fx, 0, 0, 0, fy, 0, cx, cy, 1])"});
     }
   }
-  if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
+  if (!problems.empty()) return tl::unexpected(core::to_error(problems));
   return camera;
 }
 

@@ -227,10 +227,7 @@ inline bool same(const maps::MapLine& a, const maps::MapLine& b) {
   return a.id == b.id && a.start == b.start && a.end == b.end && a.descriptor == b.descriptor &&
          a.visible == b.visible && a.found == b.found && same(a.observations, b.observations);
 }
-inline bool same(const maps::SurfaceEdge& a, const maps::SurfaceEdge& b) {
-  return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information;
-}
-inline bool same(const maps::LoopEdge& a, const maps::LoopEdge& b) {
+inline bool same(const maps::KeyframeEdge& a, const maps::KeyframeEdge& b) {
   return a.a == b.a && a.b == b.b && same(a.b_from_a, b.b_from_a) && a.information == b.information;
 }
 inline bool same(const features::PointFeature& a, const features::PointFeature& b) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -89,6 +90,16 @@ class Archive {
     io().list(things);
   }
   void many(std::string& text) { io().list(text); }
+  template <typename A, typename B>
+  void many(std::pair<A, B>& both) {
+    (*this)(both.first, both.second);
+  }
+  template <typename Key, typename T>
+  void many(std::map<Key, T>& things) {
+    std::vector<std::pair<Key, T>> list(things.begin(), things.end());
+    one(list);
+    if constexpr (Io::kReads) things = {list.begin(), list.end()};
+  }
   template <typename T>
   void many(T& thing) {
     fields(io(), thing);
@@ -219,6 +230,13 @@ template <typename T>
 void encode(const T& thing, ByteWriter& to) {
   to(const_cast<T&>(thing));  // a writer changes nothing
 }
+/// The bytes of one thing.
+template <typename T>
+Bytes encoded(const T& thing) {
+  ByteWriter bytes;
+  encode(thing, bytes);
+  return bytes.bytes();
+}
 /// Throws BadBytes, also when there are more bytes than the thing has.
 template <typename T>
 T decode(const Bytes& bytes) {
@@ -228,14 +246,12 @@ T decode(const Bytes& bytes) {
   from.expect_end();
   return thing;
 }
-/// Appends things that stand one behind the other.
+/// Things that stand one behind the other. Throws BadBytes.
 template <typename T>
-void decode_page(const Bytes& bytes, std::vector<T>& things) {
-  for (ByteReader from(bytes); !from.at_end();) {
-    T thing{};
-    from(thing);
-    things.push_back(std::move(thing));
-  }
+std::vector<T> decode_page(const Bytes& bytes) {
+  std::vector<T> things;
+  for (ByteReader from(bytes); !from.at_end();) from(things.emplace_back());
+  return things;
 }
 
 }  // namespace plumbline::core

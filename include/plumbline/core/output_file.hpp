@@ -3,6 +3,7 @@
 
 // A file that appears whole or not at all.
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -50,5 +51,6 @@ Result<void> make_folder(const std::filesystem::path& folder);
 
 /// A whole file at once.
 Result<void> write_file(const std::filesystem::path& file, std::string_view bytes);
+Result<void> write_file(const std::filesystem::path& file, const std::vector<std::uint8_t>& bytes);
 
 }  // namespace plumbline::core

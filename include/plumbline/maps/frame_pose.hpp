@@ -51,9 +51,6 @@ bool beyond_noise(double off_m, double off_rad, double sigma_m);
 /// World poses of the tracked frames, in the order given, as their keyframes lie in `map` now.
 geometry::Trajectory trajectory(const std::vector<FramePose>& frames, const Map& map);
 
-/// World poses of the keyframes, by id.
-geometry::Trajectory keyframe_trajectory(const Map& map);
-
 struct KeyframePose {
   core::KeyframeId id;
   double stamp = 0.0;  ///< seconds
@@ -61,6 +58,10 @@ struct KeyframePose {
 };
 
 std::vector<KeyframePose> keyframe_poses(const Map& map);  ///< by id
+/// `robot`: those of one.
+geometry::Trajectory trajectory(const std::vector<KeyframePose>& keyframes,
+                                std::optional<std::int32_t> robot = std::nullopt);
+geometry::Trajectory keyframe_trajectory(const Map& map);  ///< by id
 
 struct MapPoses {
   geometry::Trajectory trajectory;      ///< tracked frames only
@@ -70,5 +71,8 @@ struct MapPoses {
 
 /// All poses as they lie in `map` now; frames in the order given.
 MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames);
+
+/// Gives poses in another frame in the place of their map's.
+void move(MapPoses& poses, const geometry::Rigid3& frame_from_map);
 
 }  // namespace plumbline::maps

@@ -64,10 +64,8 @@ class IdMap {
       *found = std::move(value);
       return;
     }
-    auto& slots = slots_[id.robot];
-    if (static_cast<std::size_t>(id.index) >= slots.size())
-      slots.resize(static_cast<std::size_t>(id.index) + 1, kNone);
-    std::int32_t& slot = slots[static_cast<std::size_t>(id.index)];
+    reserve({id.robot, id.index + 1});
+    std::int32_t& slot = slots_[id.robot][static_cast<std::size_t>(id.index)];
     if (free_.empty()) {
       slot = static_cast<std::int32_t>(pool_.size());
       pool_.push_back(std::move(value));

@@ -92,23 +92,17 @@ struct MapLine {
   int found = 0;
 };
 
-/// How two keyframes lie to each other as their surfaces say (dense alignment). The information of
-/// xi = log(b_from_a_estimate * b_from_a^-1) may be singular: directions that the surfaces do not hold.
-struct SurfaceEdge {
+/// How two keyframes lie to each other. The information is of xi = log(b_from_a_estimate * b_from_a^-1).
+struct KeyframeEdge {
   KeyframeId a;
   KeyframeId b;
   geometry::Rigid3 b_from_a;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
 };
-
-/// A place that was seen again: how two keyframes lie to each other as their landmarks say. The information
-/// is of xi = log(b_from_a_estimate * b_from_a^-1).
-struct LoopEdge {
-  KeyframeId a;
-  KeyframeId b;
-  geometry::Rigid3 b_from_a;
-  geometry::Matrix6d information = geometry::Matrix6d::Zero();
-};
+/// As their surfaces say (dense alignment); singular where these do not hold all directions.
+using SurfaceEdge = KeyframeEdge;
+/// A place that was seen again: as their landmarks say.
+using LoopEdge = KeyframeEdge;
 
 /// The ids that come next, one of each robot that has or had such things.
 struct NextIds {

@@ -20,13 +20,10 @@ class OutputFolder {
   /// there. kOutput: cannot be created or written, or less than 64 MB are free. `is_earlier` tells what an
   /// earlier result is: what alone may be deleted.
   using IsEarlier = bool (*)(const std::filesystem::path&);
-  static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace,
-                                            IsEarlier is_earlier = is_result_folder);
-
-  /// The same, but takes over what an interrupted run left in OUT.partial, and leaves it there again unless
+  /// `takes_over`: goes on with what an interrupted run left in OUT.partial, and leaves it there again unless
   /// committed.
-  static core::Result<OutputFolder> resume(const std::filesystem::path& out, bool replace,
-                                           IsEarlier is_earlier = is_result_folder);
+  static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace,
+                                            bool takes_over = false, IsEarlier is_earlier = is_result_folder);
   /// Where results are written until they are whole.
   static std::filesystem::path partial_of(const std::filesystem::path& out);
 
@@ -40,8 +37,6 @@ class OutputFolder {
   void keep() { kept_ = true; }
 
  private:
-  static core::Result<OutputFolder> begin(const std::filesystem::path& out, bool replace,
-                                          IsEarlier is_earlier, bool takes_over);
   OutputFolder(std::filesystem::path target, std::filesystem::path partial, int lock, IsEarlier is_earlier);
   std::filesystem::path target_;
   std::filesystem::path partial_;  ///< empty: nothing to clean up

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -120,12 +121,10 @@ class MapFollower {
 class Ledger {
  public:
   explicit Ledger(std::filesystem::path file) : file_(std::move(file)) {}
-  /// None: nothing has this name, or the file is not there. Errors (kInput): damaged.
-  [[nodiscard]] core::Result<std::optional<std::string>> get(const std::string& name) const;
   /// Several at once: all or none. Makes the file when it is not there. Errors (kOutput): disk full, I/O.
-  [[nodiscard]] core::Result<void> put(const std::vector<std::pair<std::string, std::string>>& texts) const;
-  /// All of them, by name. Errors as get().
-  [[nodiscard]] core::Result<std::vector<std::pair<std::string, std::string>>> all() const;
+  [[nodiscard]] core::Result<void> put(const std::map<std::string, std::string>& texts) const;
+  /// All of them by name; none when the file is not there. Errors (kInput): damaged.
+  [[nodiscard]] core::Result<std::map<std::string, std::string>> all() const;
 
  private:
   std::filesystem::path file_;

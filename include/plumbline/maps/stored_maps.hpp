@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Finished maps as the source of a run: their clouds come one after another, as frames of a recording would.
+// Finished maps as the source of a run: their clouds come one after another.
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
-#include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/maps/store.hpp"
 
 namespace plumbline::maps {
@@ -38,7 +36,7 @@ struct StoredCloud {
 
 /// Parts stand in an order that their contents decide: the one with most keyframes first. Robots are numbered
 /// in this order; of several with one name, later ones get a number behind it.
-class StoredMaps : public dataset::FrameSource {
+class StoredMaps {
  public:
   /// `maps`: result folders, or files map.db. Errors (kInput): not there, no map.db, damaged, not finished,
   /// without keyframes; (kUsage) the same map twice.
@@ -59,22 +57,12 @@ class StoredMaps : public dataset::FrameSource {
   /// The part of that name, or that has a robot of that name. Errors (kUsage): none has.
   [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;
 
-  [[nodiscard]] const std::string& name() const override { return name_; }
-  [[nodiscard]] const std::string& format() const override { return format_; }
-  [[nodiscard]] const sensor::Camera& camera() const override { return parts_.front().robots.front().camera; }
-  [[nodiscard]] std::size_t size() const override { return clouds_.size(); }
-  [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
-  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
-  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
-
  private:
   StoredMaps() = default;
   static core::Result<StoredPart> read_part(const std::filesystem::path& map);
   core::Result<void> arrange(const core::Executor& executor);
   core::Result<void> list_clouds(std::size_t part);
 
-  std::string name_ = "fused maps";
-  std::string format_ = "map";
   std::vector<StoredPart> parts_;
   std::vector<RobotInfo> robots_;
   std::vector<StoredCloud> clouds_;

@@ -39,9 +39,11 @@ class StoredResult {
   static core::Result<StoredResult> open(const MapPlace& place) { return open(place.store, place.robot); }
 
   [[nodiscard]] const StoredMap& stored() const { return map_; }
-  [[nodiscard]] geometry::Trajectory trajectory() const;      ///< tracked frames, by robot, then time
-  [[nodiscard]] std::vector<KeyframePose> keyframes() const;  ///< by id; also such as left the map
-  [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
+  /// Tracked frames, by robot, then time.
+  [[nodiscard]] geometry::Trajectory trajectory() const { return poses().trajectory; }
+  /// By id; also such as left the map.
+  [[nodiscard]] std::vector<KeyframePose> keyframes() const { return poses().keyframes; }
+  [[nodiscard]] geometry::Trajectory keyframe_trajectory() const { return maps::trajectory(keyframes()); }
   [[nodiscard]] std::vector<LineSegment3> lines() const;
 
   /// How the run fused its clouds, as far as its configuration tells; else the defaults.
@@ -59,6 +61,7 @@ class StoredResult {
 
  private:
   StoredResult(std::filesystem::path file, StoreReader reader, StoredMap map);
+  [[nodiscard]] MapPoses poses() const;
   [[nodiscard]] core::Result<StoredViews> views() const;
 
   std::filesystem::path file_;

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <optional>
 #include <vector>
 
 #include "plumbline/maps/store.hpp"

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <vector>
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"

@@ -4,7 +4,6 @@
 // `plumbline robot` as a call: a recording is mapped, and the map sent to a hub beside it
 // (docs/method/network.md).
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 

@@ -20,8 +20,4 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                                                                const core::Executor& executor,
                                                                core::Log& log);
 
-/// Frames of `source` from `from_s` to `to_s` seconds after its first, every n-th. kUsage when none is left.
-core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
-    std::unique_ptr<dataset::FrameSource> source, double from_s, double to_s, int every);
-
 }  // namespace plumbline::pipeline

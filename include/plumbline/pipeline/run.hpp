@@ -4,8 +4,6 @@
 // Runs a checked graph on oneTBB.
 #include <filesystem>
 #include <functional>
-#include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 

@@ -121,7 +121,7 @@ constexpr std::size_t kMostUnderWay = 64;
 
 /// What a run lends to its stages; outlives them.
 struct RunContext {
-  const dataset::FrameSource* source = nullptr;
+  const dataset::FrameSource* source = nullptr;          ///< what a read stage reads; null: there is none
   const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
@@ -178,7 +178,7 @@ class Stage {
   /// One frame, when all required per-frame inputs hold a value. Stateless stages are called from several
   /// threads at a time and in any order, serial ones in frame order. An error ends the run; what concerns
   /// this frame only is not an error here: log it and leave the outputs out.
-  virtual core::Result<void> process(StageIo& io) = 0;
+  virtual core::Result<void> process(StageIo& /*io*/) { return {}; }
   /// After the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that export and
   /// do not need one another finish side by side.
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
@@ -202,6 +202,8 @@ struct StageType {
 
   /// Gives frames without taking any.
   [[nodiscard]] bool is_source() const;
+  /// Of a stage that is just made.
+  [[nodiscard]] std::vector<core::OptionSpec> options() const;
 };
 using StageTypePtr = std::shared_ptr<const StageType>;
 

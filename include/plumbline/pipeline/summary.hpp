@@ -151,23 +151,14 @@ struct RunSummary {
   double export_s = 0.0;                 ///< clouds, pictures and tables
   double pace_hz = 0.0;                  ///< that recordings were played at; 0: as fast as that went
   double behind_s = 0.0;                 ///< how long after it was due the latest frame was done
-  struct StageTime {
-    std::string name;
-    double median_ms = 0.0;
-    double p95_ms = 0.0;
-    double finish_ms = 0.0;
-  };
-  std::vector<StageTime> stages;
-  std::vector<StageTiming> parts;  ///< of stages, as "stage.part": by frame; NaN: nothing to do
+  std::vector<StageTiming> stages;       ///< in graph order
+  std::vector<StageTiming> parts;        ///< of stages, as "stage.part": by frame; NaN: nothing to do
   double peak_rss_mb = 0.0;
   int threads = 0;
   int seed = 0;
 
   [[nodiscard]] double fps() const;  ///< frames read over map_s; 0 when nothing was read
 };
-
-/// Takes over counts and times of a run.
-void add_report(const RunReport& report, RunSummary& summary);
 
 /// Sets `reason` when tracking was lost for more than 10 % of the frames, the map has torn or the cloud that
 /// was to be made is empty.
@@ -185,9 +176,6 @@ core::Result<void> write_timing(const std::filesystem::path& file, const RunRepo
 std::string camera_json(const RunSummary::Camera& camera);
 /// None: `text` is not that.
 std::optional<RunSummary::Camera> camera_from_json(const std::string& text);
-
-/// What summary.json says of a merge.
-std::string evidence_json(const RunSummary::Merge& merge);
 
 /// A few lines for people.
 std::string to_text(const RunSummary& summary);

@@ -20,6 +20,15 @@ namespace {
 constexpr const char* kHubs = "_hub";  ///< a partition that is no robot's: hubs hear each other there
 constexpr const char* kEverybody = "*";
 
+struct Topic {
+  const dds_topic_descriptor_t& type;
+  const char* name;
+};
+const Topic kHello{plumbline_wire_Hello_desc, "plumbline_hello"};
+const Topic kWord{plumbline_wire_Word_desc, "plumbline_word"};
+const Topic kPiece{plumbline_wire_Piece_desc, "plumbline_piece"};
+const Topic kFeedback{plumbline_wire_Piece_desc, "plumbline_feedback"};
+
 /// A robot is spoken to in its own partition; an entity goes with what was made in it.
 struct Entity {
   dds_entity_t handle = 0;
@@ -84,7 +93,7 @@ class Participant {
     const auto id = static_cast<dds_domainid_t>(options.domain);
     domain_ = Entity(dds_create_domain(id, domain_configuration(options, hub).c_str()));
     const auto qos = participant_qos(options);
-    if (!qos) return tl::unexpected<core::Error>(qos.error());
+    if (!qos) return tl::unexpected(qos.error());
     if (domain_.handle > 0) participant_ = Entity(dds_create_participant(id, qos->get(), nullptr));
     if (participant_.handle > 0) {
       waitset_ = dds_create_waitset(participant_.handle);
@@ -99,8 +108,7 @@ class Participant {
     const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
     return core::usage_error(
         fmt::format("the network cannot be used on interface {}, domain {} ({}); another program may have "
-                    "the port: choose "
-                    "other values with --interface, --port or --domain",
+                    "the port: choose other values with --interface, --port or --domain",
                     options.interface, options.domain, dds_strretcode(code)));
   }
   [[nodiscard]] dds_entity_t handle() const { return participant_.handle; }
@@ -111,8 +119,8 @@ class Participant {
   Entity subscriber(const std::vector<std::string>& partitions) const {
     return Entity(dds_create_subscriber(handle(), partition_qos(partitions).get(), nullptr));
   }
-  [[nodiscard]] dds_entity_t topic(const dds_topic_descriptor_t& type, const char* name) const {
-    return dds_create_topic(handle(), &type, name, nullptr, nullptr);
+  [[nodiscard]] dds_entity_t topic(const Topic& topic) const {
+    return dds_create_topic(handle(), &topic.type, topic.name, nullptr, nullptr);
   }
   /// wait() ends when it has something.
   void watch(dds_entity_t reader) const {
@@ -158,14 +166,20 @@ void take_some(dds_entity_t reader, int most, const Use& use) {
 
 constexpr int kMostWords = 256;
 constexpr int kFeedbackAtATime = 4;
-constexpr const char* kFeedback = "plumbline_feedback";
 
-std::vector<Piece> take_pieces(dds_entity_t reader, int most) {
-  std::vector<Piece> pieces;
-  take_some<plumbline_wire_Piece>(reader, most, [&](const plumbline_wire_Piece& piece, const auto&) {
-    pieces.push_back(from_wire(piece));
-  });
-  return pieces;
+template <typename Wire>
+auto take_all(dds_entity_t reader, int most) {
+  std::vector<decltype(from_wire(std::declval<const Wire&>()))> messages;
+  take_some<Wire>(reader, most,
+                  [&](const Wire& message, const auto&) { messages.push_back(from_wire(message)); });
+  return messages;
+}
+
+dds_entity_t writer_in(const Entity& publisher, dds_entity_t topic, const Qos& qos) {
+  return dds_create_writer(publisher.handle, topic, qos.get(), nullptr);
+}
+dds_entity_t reader_in(const Entity& subscriber, dds_entity_t topic, const Qos& qos) {
+  return dds_create_reader(subscriber.handle, topic, qos.get(), nullptr);
 }
 
 template <typename Wire, typename Message>
@@ -182,15 +196,9 @@ class CycloneRobot : public RobotBus {
     if (auto opened = participant_.open(options, false); !opened) return opened;
     publisher_ = participant_.publisher({name});
     subscriber_ = participant_.subscriber({name});
-    hellos_ =
-        dds_create_writer(publisher_.handle, participant_.topic(plumbline_wire_Hello_desc, "plumbline_hello"),
-                          word_qos().get(), nullptr);
-    pieces_ =
-        dds_create_writer(publisher_.handle, participant_.topic(plumbline_wire_Piece_desc, "plumbline_piece"),
-                          piece_qos().get(), nullptr);
-    words_ =
-        dds_create_reader(subscriber_.handle, participant_.topic(plumbline_wire_Word_desc, "plumbline_word"),
-                          word_qos().get(), nullptr);
+    hellos_ = writer_in(publisher_, participant_.topic(kHello), word_qos());
+    pieces_ = writer_in(publisher_, participant_.topic(kPiece), piece_qos());
+    words_ = reader_in(subscriber_, participant_.topic(kWord), word_qos());
     if (hellos_ < 0 || pieces_ < 0 || words_ < 0) {
       return core::usage_error(fmt::format(
           "the network lets nobody speak as {} here ({}); with --security, give the keys made for this name",
@@ -204,20 +212,11 @@ class CycloneRobot : public RobotBus {
   bool send(const Piece& piece) override {
     return write_message<plumbline_wire_Piece>(pieces_, piece) == DDS_RETCODE_OK;
   }
-  std::vector<Word> hear() override {
-    std::vector<Word> words;
-    take_some<plumbline_wire_Word>(words_, kMostWords, [&](const plumbline_wire_Word& word, const auto&) {
-      words.push_back(from_wire(word));
-    });
-    return words;
-  }
+  std::vector<Word> hear() override { return take_all<plumbline_wire_Word>(words_, kMostWords); }
   std::vector<Piece> hear_of_others() override {
-    if (others_pieces_ == 0) {
-      others_pieces_ =
-          dds_create_reader(subscriber_.handle, participant_.topic(plumbline_wire_Piece_desc, kFeedback),
-                            piece_qos().get(), nullptr);
-    }
-    return take_pieces(others_pieces_, kFeedbackAtATime);
+    if (others_pieces_ == 0)
+      others_pieces_ = reader_in(subscriber_, participant_.topic(kFeedback), piece_qos());
+    return take_all<plumbline_wire_Piece>(others_pieces_, kFeedbackAtATime);
   }
   bool listened_to() override {
     dds_publication_matched_status_t status;
@@ -245,13 +244,11 @@ class CycloneHub : public HubBus {
     publisher_ = participant_.publisher({kEverybody, kHubs});
     subscriber_ = participant_.subscriber({kEverybody});
     hub_subscriber_ = participant_.subscriber({kHubs});
-    const dds_entity_t words = participant_.topic(plumbline_wire_Word_desc, "plumbline_word");
-    words_ = dds_create_writer(publisher_.handle, words, word_qos().get(), nullptr);
-    hubs_ = dds_create_reader(hub_subscriber_.handle, words, word_qos().get(), nullptr);
-    hellos_ = dds_create_reader(subscriber_.handle,
-                                participant_.topic(plumbline_wire_Hello_desc, "plumbline_hello"),
-                                word_qos().get(), nullptr);
-    piece_topic_ = participant_.topic(plumbline_wire_Piece_desc, "plumbline_piece");
+    const dds_entity_t words = participant_.topic(kWord);
+    words_ = writer_in(publisher_, words, word_qos());
+    hubs_ = reader_in(hub_subscriber_, words, word_qos());
+    hellos_ = reader_in(subscriber_, participant_.topic(kHello), word_qos());
+    piece_topic_ = participant_.topic(kPiece);
     if (words_ < 0 || hubs_ < 0 || hellos_ < 0 || piece_topic_ < 0) {
       return core::usage_error("the network lets nobody be a hub here; with --security, give the hub's keys");
     }
@@ -268,22 +265,14 @@ class CycloneHub : public HubBus {
         });
     return hellos;
   }
-  std::vector<Word> hear_hubs() override {
-    std::vector<Word> words;
-    take_some<plumbline_wire_Word>(hubs_, kMostWords, [&](const plumbline_wire_Word& word, const auto&) {
-      words.push_back(from_wire(word));
-    });
-    return words;
-  }
+  std::vector<Word> hear_hubs() override { return take_all<plumbline_wire_Word>(hubs_, kMostWords); }
   core::Result<void> listen_to(const std::string& robot) override {
     if (robots_.count(robot) != 0) return {};
     Robot listener;
     listener.subscriber = participant_.subscriber({robot});
-    listener.pieces = dds_create_reader(listener.subscriber.handle, piece_topic_, piece_qos().get(), nullptr);
+    listener.pieces = reader_in(listener.subscriber, piece_topic_, piece_qos());
     listener.publisher = participant_.publisher({robot});
-    listener.feedback =
-        dds_create_writer(listener.publisher.handle, participant_.topic(plumbline_wire_Piece_desc, kFeedback),
-                          piece_qos(0).get(), nullptr);
+    listener.feedback = writer_in(listener.publisher, participant_.topic(kFeedback), piece_qos(0));
     if (listener.pieces < 0) {
       return core::usage_error(
           fmt::format("{}: cannot be listened to ({})", robot, dds_strretcode(listener.pieces)));
@@ -292,10 +281,10 @@ class CycloneHub : public HubBus {
     robots_.emplace(robot, std::move(listener));
     return {};
   }
-  void ignore(const std::string& robot) override { robots_.erase(robot); }
   std::vector<Piece> take(const std::string& robot, int most) override {
     const auto found = robots_.find(robot);
-    return found == robots_.end() ? std::vector<Piece>() : take_pieces(found->second.pieces, most);
+    return found == robots_.end() ? std::vector<Piece>()
+                                  : take_all<plumbline_wire_Piece>(found->second.pieces, most);
   }
   int begun_to_hear(const std::string& robot) override {
     const auto found = robots_.find(robot);
@@ -350,13 +339,13 @@ class CycloneHub : public HubBus {
 core::Result<std::unique_ptr<RobotBus>> open_robot(const NetworkOptions& options, const std::string& name,
                                                    const BusLog& log) {
   auto bus = std::make_unique<CycloneRobot>(log);
-  if (auto opened = bus->open(options, name); !opened) return tl::unexpected<core::Error>(opened.error());
+  if (auto opened = bus->open(options, name); !opened) return tl::unexpected(opened.error());
   return bus;
 }
 
 core::Result<std::unique_ptr<HubBus>> open_hub(const NetworkOptions& options, const BusLog& log) {
   auto bus = std::make_unique<CycloneHub>(log);
-  if (auto opened = bus->open(options); !opened) return tl::unexpected<core::Error>(opened.error());
+  if (auto opened = bus->open(options); !opened) return tl::unexpected(opened.error());
   return bus;
 }
 

@@ -82,6 +82,19 @@ Key read_key(const fs::path& file) {
   return read_pem<Key>(file, [](BIO* in) { return PEM_read_bio_PrivateKey(in, nullptr, nullptr, nullptr); });
 }
 
+Crl read_crl(const fs::path& folder) {
+  return read_pem<Crl>(folder / "ca" / kRevokedFile,
+                       [](BIO* in) { return PEM_read_bio_X509_CRL(in, nullptr, nullptr, nullptr); });
+}
+void write_certificate(const fs::path& file, X509* certificate) {
+  write_file(file, [&](BIO* out) { return PEM_write_bio_X509(out, certificate); });
+}
+void write_key(const fs::path& file, EVP_PKEY* key) {
+  write_file(file, [&](BIO* out) {
+    return PEM_write_bio_PrivateKey(out, key, nullptr, nullptr, 0, nullptr, nullptr);
+  });
+}
+
 Key new_key() {
   Key key(EVP_EC_gen("P-256"));
   demand(key != nullptr, "OpenSSL makes no key");
@@ -235,11 +248,8 @@ core::Result<void> make_authority(const fs::path& folder) {
     extend(authority.certificate.get(), authority.certificate.get(), NID_key_usage,
            "critical,keyCertSign,cRLSign,digitalSignature");
     sign(authority.certificate.get(), authority.certificate.get(), authority.key.get());
-    write_file(folder / "ca" / kKeyFile, [&](BIO* out) {
-      return PEM_write_bio_PrivateKey(out, authority.key.get(), nullptr, nullptr, 0, nullptr, nullptr);
-    });
-    write_file(folder / "ca" / kAuthorityFile,
-               [&](BIO* out) { return PEM_write_bio_X509(out, authority.certificate.get()); });
+    write_key(folder / "ca" / kKeyFile, authority.key.get());
+    write_certificate(folder / "ca" / kAuthorityFile, authority.certificate.get());
     const Crl crl(X509_CRL_new());
     write_crl(folder, authority, crl.get());
   });
@@ -253,17 +263,12 @@ core::Result<void> make_keys(const fs::path& folder, const std::string& name) {
     sign(certificate.get(), authority.certificate.get(), authority.key.get());
     const fs::path own = folder / name;
     make_folder(own);
-    write_file(own / kKeyFile, [&](BIO* out) {
-      return PEM_write_bio_PrivateKey(out, key.get(), nullptr, nullptr, 0, nullptr, nullptr);
-    });
+    write_key(own / kKeyFile, key.get());
     for (const fs::path& file : {own / kCertificateFile, folder / "ca" / "issued" / (name + ".pem")}) {
-      write_file(file, [&](BIO* out) { return PEM_write_bio_X509(out, certificate.get()); });
+      write_certificate(file, certificate.get());
     }
-    write_file(own / kAuthorityFile,
-               [&](BIO* out) { return PEM_write_bio_X509(out, authority.certificate.get()); });
-    const auto crl = read_pem<Crl>(folder / "ca" / kRevokedFile, [](BIO* in) {
-      return PEM_read_bio_X509_CRL(in, nullptr, nullptr, nullptr);
-    });
+    write_certificate(own / kAuthorityFile, authority.certificate.get());
+    const Crl crl = read_crl(folder);
     write_file(own / kRevokedFile, [&](BIO* out) { return PEM_write_bio_X509_CRL(out, crl.get()); });
     write_signed(own / kGovernanceFile, governance(), authority);
     write_signed(own / kPermissionsFile, permissions(name), authority);
@@ -273,9 +278,7 @@ core::Result<void> make_keys(const fs::path& folder, const std::string& name) {
 core::Result<void> revoke(const fs::path& folder, const std::vector<std::string>& names) {
   return guarded(core::ErrorKind::kUsage, [&] {
     const Authority authority = read_authority(folder);
-    const auto crl = read_pem<Crl>(folder / "ca" / kRevokedFile, [](BIO* in) {
-      return PEM_read_bio_X509_CRL(in, nullptr, nullptr, nullptr);
-    });
+    const Crl crl = read_crl(folder);
     for (const std::string& name : names) {
       const Certificate certificate = read_certificate(folder / "ca" / "issued" / (name + ".pem"));
       X509_REVOKED* entry = X509_REVOKED_new();

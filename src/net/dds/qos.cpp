@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "keys.hpp"
@@ -75,16 +76,13 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     }
     set(name, "file:" + (folder / file).string());
   }
-  for (const char* plugin : {"auth", "access", "crypto"}) {
-    const bool access = std::string(plugin) == "access";
+  for (const auto& [plugin, library, function] : {std::tuple{"auth", "auth", "authentication"},
+                                                  {"access", "ac", "access_control"},
+                                                  {"crypto", "crypto", "crypto"}}) {
     const std::string head = fmt::format("dds.sec.{}.library.", plugin);
-    const std::string function = access                          ? "access_control"
-                                 : std::string(plugin) == "auth" ? "authentication"
-                                                                 : "crypto";
-    set((head + "path").c_str(),
-        fmt::format("{}/libdds_security_{}.so", PLUMBLINE_DDS_PLUGINS, access ? "ac" : plugin));
-    set((head + "init").c_str(), "init_" + function);
-    set((head + "finalize").c_str(), "finalize_" + function);
+    set((head + "path").c_str(), fmt::format("{}/libdds_security_{}.so", PLUMBLINE_DDS_PLUGINS, library));
+    set((head + "init").c_str(), fmt::format("init_{}", function));
+    set((head + "finalize").c_str(), fmt::format("finalize_{}", function));
   }
   return qos;
 }

@@ -28,7 +28,7 @@ void check_stage(StageSpec& spec, const CheckContext& context, ConfigProblems& p
       const std::string key = problem.path.substr(prefix.size());
       const ConfigNode* value = spec.body->find(key);
       if (std::find(spec.set.begin(), spec.set.end(), key) != spec.set.end()) {
-        problem.mark = {"--set", 0, 0};
+        problem.mark = {kCommandLineFile, 0, 0};
         problem.path = spec.node.name + "." + key;
       } else if (value != nullptr) {
         problem.mark = value->mark;
@@ -59,7 +59,7 @@ void assemble(const std::vector<std::size_t>& order, StageSpecs& specs, Graph& g
 core::Result<Graph> build_graph(std::optional<ConfigNode> own, const std::filesystem::path& file,
                                 const StageRegistry& registry, const std::filesystem::path& pipelines_folder,
                                 const std::vector<std::string>& overrides, ConfigProblems problems) {
-  const auto refuse = [&] { return tl::unexpected<core::Error>(core::to_error(problems)); };
+  const auto refuse = [&] { return tl::unexpected(core::to_error(problems)); };
   if (!own) return refuse();
   Graph graph;
   graph.file = file;

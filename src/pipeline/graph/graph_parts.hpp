@@ -23,6 +23,9 @@ struct StageSpec {
 };
 using StageSpecs = std::vector<StageSpec>;
 
+/// The "file" of marks of values that stand on the command line.
+inline constexpr const char* kCommandLineFile = "--set";
+
 inline const std::vector<std::string> kTopKeys{"description", "include", "remove", "stages", "taps", "run"};
 
 /// Index of the stage of that name; specs.size() when there is none.

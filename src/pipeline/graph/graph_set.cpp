@@ -5,7 +5,6 @@
 #include <string>
 #include <utility>
 
-#include "graph/command_line.hpp"
 #include "graph/graph_parts.hpp"
 #include "plumbline/core/renamed_options.hpp"
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "graph/option_levels.hpp"
 
+#include <iterator>
 #include <map>
 #include <set>
+#include <sstream>
 #include <string>
 
 namespace plumbline::pipeline {
@@ -10,147 +12,62 @@ namespace {
 
 using Keys = std::map<std::string, std::set<std::string>>;  ///< by stage
 
+std::set<std::string> keys_in(const std::string& text) {
+  std::istringstream stream(text);
+  return {std::istream_iterator<std::string>(stream), std::istream_iterator<std::string>()};
+}
+
 /// For those who know what they do.
 const Keys kAdvanced{
-    {"features",
-     {"orb.levels", "orb.fast_threshold_min", "orb.min_corner", "line.min_gradient", "line.border",
-      "line.max_count", "line.join", "line.depth_samples"}},
+    {"features", keys_in("orb.levels orb.fast_threshold_min orb.min_corner line.min_gradient line.border "
+                         "line.max_count line.join line.depth_samples")},
     {"track",
-     {"min_surface",
-      "match.max_hamming",
-      "match.ratio",
-      "match.align",
-      "match.max_line_hamming",
-      "local.surface_keyframes",
-      "local.voxel",
-      "solver.point_weight",
-      "solver.line_weight",
-      "solver.plane_weight",
-      "solver.photometric_weight",
-      "keyframe.min_features",
-      "keyframe.cone_max_wait",
-      "keyframe.cone_max_shared",
-      "keyframe.cone_min_points",
-      "keyframe.cone_min_lines",
-      "landmark.min_found",
-      "landmark.min_keyframes",
-      "landmark.max_turn_rate",
-      "fuse",
-      "fuse.keyframes",
-      "fuse.radius",
-      "triangulate.keyframes",
-      "bundle.max_iterations",
-      "match.aligned_sigma",
-      "bundle.line_sigma",
-      "bundle.depth_factor",
-      "edges.min_overlap",
-      "surface.min_depth",
-      "loops.robust",
-      "loops.bundle",
-      "loops.max_alternative",
-      "vocabulary.branching",
-      "vocabulary.levels",
-      "verify.min_overlap",
-      "verify.max_contradiction",
-      "verify.rounds"}},
-    {"merge", {"few_pairs", "few_inliers", "few_extent", "verifications", "lag"}},
-    {"cloud", {"free_space_every", "smooth_position", "base"}},
+     keys_in(
+         "min_surface match.max_hamming match.ratio match.align match.max_line_hamming "
+         "local.surface_keyframes local.voxel solver.point_weight solver.line_weight solver.plane_weight "
+         "solver.photometric_weight keyframe.min_features keyframe.cone_max_wait keyframe.cone_max_shared "
+         "keyframe.cone_min_points keyframe.cone_min_lines landmark.min_found landmark.min_keyframes "
+         "landmark.max_turn_rate fuse fuse.keyframes fuse.radius triangulate.keyframes bundle.max_iterations "
+         "match.aligned_sigma bundle.line_sigma bundle.depth_factor edges.min_overlap surface.min_depth "
+         "loops.robust loops.bundle loops.max_alternative vocabulary.branching vocabulary.levels "
+         "verify.min_overlap verify.max_contradiction verify.rounds")},
+    {"merge", keys_in("few_pairs few_inliers few_extent verifications lag")},
+    {"cloud", keys_in("free_space_every smooth_position base")},
     {"refine",
-     {"pairs.min_overlap", "pairs.per_map", "icp.samples", "icp.iterations", "icp.max_rms", "icp.max_shift",
-      "icp.max_turn", "adjust.observations", "adjust.iterations", "adjust.aligned_sigma", "adjust.line_sigma",
-      "adjust.depth_factor", "adjust.surface_weight", "adjust.turn_rate", "adjust.gate"}},
-    {"fuse", {"min_cos_incidence", "depth_field.views"}},
+     keys_in("pairs.min_overlap pairs.per_map icp.samples icp.iterations icp.max_rms icp.max_shift "
+             "icp.max_turn adjust.observations adjust.iterations adjust.aligned_sigma adjust.line_sigma "
+             "adjust.depth_factor adjust.surface_weight adjust.turn_rate adjust.gate")},
+    {"fuse", keys_in("min_cos_incidence depth_field.views")},
 };
 
 /// What nobody has been seen to set: accepted, and listed nowhere.
 const Keys kInternal{
     {"features",
-     {"line.border_either", "line.exact_nfa", "orb.spread", "line.join_gap", "line.join_angle",
-      "line.join_offset", "line.depth_side", "line.depth_inlier_sigmas", "line.depth_min_inlier_share",
-      "line.depth_min_coverage", "line.depth_min_inliers", "line.depth_ransac_rounds",
-      "line.depth_pixel_sigma"}},
+     keys_in("line.border_either line.exact_nfa orb.spread line.join_gap line.join_angle line.join_offset "
+             "line.depth_side line.depth_inlier_sigmas line.depth_min_inlier_share line.depth_min_coverage "
+             "line.depth_min_inliers line.depth_ransac_rounds line.depth_pixel_sigma")},
     {"track",
-     {"match.max_point_angle",
-      "match.max_line_angle",
-      "local.overlap_angle",
-      "solver.point_loss",
-      "solver.line_loss",
-      "solver.plane_loss",
-      "solver.photometric_loss",
-      "keyframe.cone_min_change",
-      "landmark.min_visible",
-      "landmark.min_age",
-      "triangulate.max_hamming",
-      "triangulate.max_sigma",
-      "triangulate.line_views",
-      "bundle.rounds",
-      "bundle.tolerance",
-      "bundle.point_loss",
-      "bundle.line_loss",
-      "bundle.edge_loss",
-      "surface.max_incidence",
-      "loops.max_translation",
-      "loops.max_rotation",
-      "vocabulary.split",
-      "vocabulary.iterations",
-      "places.min_absolute",
-      "places.votes",
-      "places.consistent",
-      "places.candidates",
-      "places.islands",
-      "verify.min_found",
-      "verify.min_evidence",
-      "verify.min_cells",
-      "verify.neighbours",
-      "keyframe.cone_balance",
-      "keyframe.cone_scaled",
-      "keyframe.cone_epsilon",
-      "keyframe.urgent",
-      "thumbnails",
-      "motion_prior",
-      "pnp_start",
-      "landmark.by_keyframes",
-      "bundle.depth_rows",
-      "solver.depth_rows",
-      "verify.depth_rows",
-      "verify.align",
-      "verify.joint",
-      "match.min_line_ratio"}},
+     keys_in(
+         "match.max_point_angle match.max_line_angle local.overlap_angle solver.point_loss solver.line_loss "
+         "solver.plane_loss solver.photometric_loss keyframe.cone_min_change landmark.min_visible "
+         "landmark.min_age triangulate.max_hamming triangulate.max_sigma triangulate.line_views "
+         "bundle.rounds bundle.tolerance bundle.point_loss bundle.line_loss bundle.edge_loss "
+         "surface.max_incidence loops.max_translation loops.max_rotation vocabulary.split "
+         "vocabulary.iterations places.min_absolute places.votes places.consistent places.candidates "
+         "places.islands verify.min_found verify.min_evidence verify.min_cells verify.neighbours "
+         "keyframe.cone_balance keyframe.cone_scaled keyframe.cone_epsilon keyframe.urgent thumbnails "
+         "motion_prior pnp_start landmark.by_keyframes bundle.depth_rows "
+         "solver.depth_rows verify.depth_rows verify.align verify.joint match.min_line_ratio")},
     {"merge",
-     {"min_span",
-      "min_turn",
-      "max_translation",
-      "max_rotation",
-      "drift",
-      "max_alternative",
-      "alternative_share",
-      "max_seen_through",
-      "min_confirmed",
-      "robust",
-      "vocabulary.branching",
-      "vocabulary.levels",
-      "vocabulary.split",
-      "vocabulary.iterations",
-      "places.min_score",
-      "places.min_absolute",
-      "places.votes",
-      "places.consistent",
-      "places.candidates",
-      "places.islands",
-      "verify.min_inliers",
-      "verify.min_overlap",
-      "verify.max_contradiction",
-      "verify.min_found",
-      "verify.min_evidence",
-      "verify.min_cells",
-      "verify.neighbours",
-      "verify.depth_rows",
-      "verify.align",
-      "verify.joint"}},
-    {"refine",
-     {"adjust.depth_rows", "local_map.angle", "icp.min_information", "icp.correlation", "icp.min_sigma",
-      "adjust.pose_graph", "adjust.bundle", "adjust.rounds", "adjust.tolerance"}},
-    {"fuse", {"depth_field.views_per_view", "depth_field.min_gain"}},
+     keys_in("min_span min_turn max_translation max_rotation drift max_alternative alternative_share "
+             "max_seen_through min_confirmed robust vocabulary.branching vocabulary.levels vocabulary.split "
+             "vocabulary.iterations places.min_score places.min_absolute places.votes places.consistent "
+             "places.candidates places.islands verify.min_inliers verify.min_overlap "
+             "verify.max_contradiction verify.min_found verify.min_evidence verify.min_cells "
+             "verify.neighbours verify.depth_rows verify.align verify.joint")},
+    {"refine", keys_in("adjust.depth_rows local_map.angle icp.min_information icp.correlation icp.min_sigma "
+                       "adjust.pose_graph adjust.bundle adjust.rounds adjust.tolerance")},
+    {"fuse", keys_in("depth_field.views_per_view depth_field.min_gain")},
 };
 
 bool lists(const Keys& keys, const std::string& stage, const std::string& key) {

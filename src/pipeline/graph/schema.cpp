@@ -13,13 +13,6 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kDraft = "http://json-schema.org/draft-07/schema#";
 constexpr const char* kPortPattern = "^[a-z][a-z0-9_]*(\\.[a-z][a-z0-9_]*)?$";
 
-core::OptionTable options_of(const StageType& type, const std::unique_ptr<Stage>& stage) {
-  core::OptionTable table;
-  if (stage == nullptr) throw std::logic_error("stage type makes nothing: " + type.name);
-  stage->declare(table);
-  return table;
-}
-
 Json inputs_schema(const StageType& type) {
   Json properties = Json::object();
   Json required = Json::array();
@@ -36,13 +29,12 @@ Json inputs_schema(const StageType& type) {
 
 /// A stage that stands alone; of one that changes an included stage nothing is required.
 Json stage_body(const StageType& type, bool alone) {
-  const std::unique_ptr<Stage> stage = type.make();
   Json properties;
   properties["type"] = {{"const", type.name}};
   properties["inputs"] = inputs_schema(type);
   const bool needs_inputs = properties["inputs"].contains("required");
   if (!alone) properties["inputs"].erase("required");
-  properties.update(core::options_schema(options_of(type, stage).specs()));
+  properties.update(core::options_schema(type.options()));
   Json body = {{"description", type.help},
                {"type", "object"},
                {"additionalProperties", false},
@@ -82,9 +74,7 @@ Json taps_schema(const StageRegistry& registry) {
                         {"pattern", kPortPattern},
                         {"description", "stage or stage.port whose values are written"}};
   for (const StageTypePtr& tap : registry.taps()) {
-    const std::unique_ptr<Stage> stage = tap->make();
-    const core::OptionTable table = options_of(*tap, stage);
-    for (const core::OptionSpec& spec : table.specs()) {
+    for (const core::OptionSpec& spec : tap->options()) {
       if (!properties.contains(spec.key)) properties[spec.key] = core::option_schema(spec);
     }
   }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <system_error>
 
-#include "graph/command_line.hpp"
+#include "graph/graph_parts.hpp"
 
 namespace plumbline::pipeline {
 
@@ -34,6 +34,13 @@ bool StageType::is_source() const {
   const auto per_frame = [](const Port& port) { return port.type.rate == Rate::kFrame; };
   return std::none_of(inputs.begin(), inputs.end(), per_frame) &&
          std::any_of(outputs.begin(), outputs.end(), per_frame);
+}
+
+std::vector<core::OptionSpec> StageType::options() const {
+  const std::unique_ptr<Stage> stage = make();
+  core::OptionTable table;
+  stage->declare(table);
+  return table.specs();
 }
 
 void StageRegistry::add(StageType type) {

@@ -12,11 +12,9 @@ constexpr const char* kIntroduction =
     "<!-- Made by `plumbline pipelines describe`; a test compares. -->\n"
     "# Stages\n\n"
     "What may stand under `stages:` of a [pipeline file](../guide/pipelines.md). Lengths, angles and times "
-    "may carry "
-    "a "
-    "unit\n"
-    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. "
-    "`plumbline pipelines describe STAGE --all`\n"
+    "may carry a unit\n"
+    "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. `plumbline pipelines "
+    "describe STAGE --all`\n"
     "shows more options, for those who know what they do.\n";
 
 constexpr const char* kTaps =
@@ -42,16 +40,9 @@ std::string ports(const StageType& type) {
   return text;
 }
 
-std::vector<core::OptionSpec> options(const StageType& type) {
-  const std::unique_ptr<Stage> stage = type.make();
-  core::OptionTable table;
-  stage->declare(table);
-  return table.specs();
-}
-
 std::string tap_row(const StageType& tap) {
   std::string file;
-  for (const core::OptionSpec& spec : options(tap)) {
+  for (const core::OptionSpec& spec : tap.options()) {
     if (spec.key == "file") file = spec.help;
   }
   return fmt::format("| {} | {} | {} |\n", tap.name, file, tap.help);
@@ -61,7 +52,7 @@ std::string tap_row(const StageType& tap) {
 
 std::vector<core::OptionSpec> shown_options(const StageType& type, bool all) {
   std::vector<core::OptionSpec> shown;
-  for (core::OptionSpec& spec : options(type)) {
+  for (core::OptionSpec& spec : type.options()) {
     const OptionLevel level = option_level(type.name, spec.key);
     if (level == OptionLevel::kBasic || (all && level == OptionLevel::kAdvanced))
       shown.push_back(std::move(spec));

@@ -35,10 +35,9 @@ core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
   if (!graph) return graph;
   for (const std::string& warning : graph->warnings) log.warning(warning);
   if (graph->source().type->name == "maps") return graph;
-  return core::usage_error(
-      fmt::format("{}: begins with a {} stage; finished maps are fused by a pipeline that "
-                  "begins with a maps stage",
-                  graph->file.string(), graph->source().type->name));
+  return core::usage_error(fmt::format(
+      "{}: begins with a {} stage; finished maps are fused by a pipeline that begins with a maps stage",
+      graph->file.string(), graph->source().type->name));
 }
 
 core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& request,
@@ -46,15 +45,13 @@ core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& req
   if (request.maps.empty()) return core::usage_error("name a map");
   auto maps = maps::StoredMaps::open(request.maps, executor);
   if (!maps || request.anchor.empty()) return maps;
-  if (const auto part = (*maps)->find_part(request.anchor); !part)
-    return tl::unexpected<core::Error>(part.error());
+  if (const auto part = (*maps)->find_part(request.anchor); !part) return tl::unexpected(part.error());
   return maps;
 }
 
 RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph,
                       const std::filesystem::path& folder) {
   RunContext context;
-  context.source = &maps;
   context.stored_maps = &maps;
   context.robots = &maps.robots();
   context.keeps_clouds = keeps_clouds(graph);
@@ -70,25 +67,24 @@ RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, 
 core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core::Executor& executor,
                                           core::Log& log, const core::StopToken& stop,
                                           const Progress& progress) {
-  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   const auto began = RunClock::now();
   auto graph = load_fusion(request, log);
-  if (!graph) return fail(graph.error());
+  if (!graph) return tl::unexpected(graph.error());
   const auto maps = open_maps(request, executor);
-  if (!maps) return fail(maps.error());
+  if (!maps) return tl::unexpected(maps.error());
   auto output = maps::OutputFolder::prepare(request.output, request.replace);
-  if (!output) return fail(output.error());
+  if (!output) return tl::unexpected(output.error());
   RunContext context = context_of(request, **maps, *graph, output->path());
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
   if (auto ok = core::write_file(output->path() / "config.yaml", context.configuration); !ok)
-    return fail(ok.error());
+    return tl::unexpected(ok.error());
   const auto report = run_graph(*graph, context, progress);
-  if (!report) return fail(report.error());
+  if (!report) return tl::unexpected(report.error());
   RunSummary summary = summary_of_run(*graph, *report, request, executor);
   summary.input = context.input;
-  if (auto ok = commit_result(summary, *output, began); !ok) return fail(ok.error());
+  if (auto ok = commit_result(summary, *output, began); !ok) return tl::unexpected(ok.error());
   return summary;
 }
 

@@ -33,8 +33,7 @@ class SelectedFrames : public dataset::FrameSource {
   std::vector<std::size_t> indices_;
 };
 
-}  // namespace
-
+/// Frames of `source` from `from_s` to `to_s` seconds after its first, every n-th. kUsage when none is left.
 core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
     std::unique_ptr<dataset::FrameSource> source, double from_s, double to_s, int every) {
   if (every < 1)
@@ -51,6 +50,8 @@ core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
   if (indices.size() == source->size()) return source;
   return std::make_unique<SelectedFrames>(std::move(source), std::move(indices));
 }
+
+}  // namespace
 
 core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string& input,
                                                                const dataset::OpenOptions& options,

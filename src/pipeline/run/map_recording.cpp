@@ -102,7 +102,7 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
     open.cameras_folder = request.pipelines_folder / "cameras";
     if (!cameras.empty()) open.known = cameras[i];
     auto recording = open_input(inputs[i], open, scenes, executor, log);
-    if (!recording) return tl::unexpected<core::Error>(recording.error());
+    if (!recording) return tl::unexpected(recording.error());
     all.push_back(std::move(*recording));
   }
   return std::make_unique<RobotRecordings>(std::move(all));
@@ -134,10 +134,9 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
 core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
   if (!request.resume) return {};
   if (!keeps_map(graph) || !tracks(graph)) {
-    return core::usage_error(
-        fmt::format("{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave "
-                    "out --resume",
-                    graph.file.string()));
+    return core::usage_error(fmt::format(
+        "{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave out --resume",
+        graph.file.string()));
   }
   if (!request.debug_video.empty()) {
     return core::usage_error(
@@ -174,7 +173,7 @@ class MapRun {
   /// Everything is checked, nothing begun.
   core::Result<void> open() {
     auto graph = load_pipeline(request_);
-    if (!graph) return tl::unexpected<core::Error>(graph.error());
+    if (!graph) return tl::unexpected(graph.error());
     graph_ = std::move(*graph);
     if (cameras_.given.empty()) {
       for (const std::string& warning : graph_.warnings) log_.warning(warning);
@@ -186,24 +185,24 @@ class MapRun {
 
   core::Result<RunSummary> run(const core::StopToken& stop, const Progress& progress,
                                RunClock::time_point began) {
-    const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
-    if (auto prepared = prepare(); !prepared) return fail(prepared.error());
+    if (auto prepared = prepare(); !prepared) return tl::unexpected(prepared.error());
     RunContext context = context_of(stop);
     if (!cameras_.used.empty() || context.cameras == nullptr) {
-      if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok) return fail(ok.error());
+      if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok)
+        return tl::unexpected(ok.error());
     }
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress);
-    if (cameras_.again) return fail(report.error());
-    if (!report) return fail(with_what_is_kept(report.error(), *output_));
-    if (auto ok = cameras_.settle(context); !ok) return fail(ok.error());
+    if (cameras_.again) return tl::unexpected(report.error());
+    if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
+    if (auto ok = cameras_.settle(context); !ok) return tl::unexpected(ok.error());
     RunSummary summary = summary_of(*report);
     if (auto ok = write_timing(output_->path() / "timing.csv", *report, summary.parts, *source_); !ok)
-      return fail(with_what_is_kept(ok.error(), *output_));
+      return tl::unexpected(with_what_is_kept(ok.error(), *output_));
     if (auto ok = commit_result(summary, *output_, began); !ok)
-      return fail(with_what_is_kept(ok.error(), *output_));
+      return tl::unexpected(with_what_is_kept(ok.error(), *output_));
     if (debug_) {
-      if (auto committed = debug_->commit(); !committed) return fail(committed.error());
+      if (auto committed = debug_->commit(); !committed) return tl::unexpected(committed.error());
     }
     return summary;
   }
@@ -211,7 +210,7 @@ class MapRun {
  private:
   core::Result<void> open_source() {
     auto source = open_inputs(request_, cameras_.used, executor_, log_);
-    if (!source) return tl::unexpected<core::Error>(source.error());
+    if (!source) return tl::unexpected(source.error());
     source_ = std::move(*source);
     if (!cameras_.given.empty()) return {};
     for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
@@ -225,14 +224,13 @@ class MapRun {
 
   /// The folders that are written into, and what lies there already.
   core::Result<void> prepare() {
-    auto output = request_.resume ? maps::OutputFolder::resume(request_.output, request_.replace)
-                                  : maps::OutputFolder::prepare(request_.output, request_.replace);
-    if (!output) return tl::unexpected<core::Error>(output.error());
+    auto output = maps::OutputFolder::prepare(request_.output, request_.replace, request_.resume);
+    if (!output) return tl::unexpected(output.error());
     output_.emplace(std::move(*output));
     if (request_.resume) {
       auto opened =
           open_resumed(output_->path(), config_text(request_, graph_, 0), input_text(*source_), *source_);
-      if (!opened) return tl::unexpected<core::Error>(opened.error());
+      if (!opened) return tl::unexpected(opened.error());
       resumed_ = std::move(*opened);
       report_resumed(output_->path(), resumed_, log_);
     }
@@ -241,7 +239,7 @@ class MapRun {
     if (request_.debug_video.empty()) return {};
     auto debug =
         DebugFolder::prepare(request_.debug_video, request_.output, output_->path(), request_.replace);
-    if (!debug) return tl::unexpected<core::Error>(debug.error());
+    if (!debug) return tl::unexpected(debug.error());
     debug_.emplace(std::move(*debug));
     return {};
   }
@@ -308,7 +306,7 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
   CameraDecision cameras;
   while (true) {
     MapRun run(request, executor, log, cameras);
-    if (auto opened = run.open(); !opened) return tl::unexpected<core::Error>(opened.error());
+    if (auto opened = run.open(); !opened) return tl::unexpected(opened.error());
     auto summary = run.run(stop, progress, began);
     if (!std::exchange(cameras.again, false)) return summary;
     request.resume = false;  // what is there was made with another camera

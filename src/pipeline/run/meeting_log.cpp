@@ -5,12 +5,10 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <nlohmann/json.hpp>
-#include <system_error>
-
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/viz/snapshot.hpp"
+#include "run/summary_json.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -19,15 +17,6 @@ using core::KeyframeId;
 using geometry::Rigid3;
 using mapping::MeetingEvent;
 using mapping::MeetingStep;
-
-geometry::Trajectory keyframe_poses(const maps::Map& map, std::size_t robot) {
-  geometry::Trajectory poses;
-  for (const KeyframeId id : map.keyframe_ids()) {
-    if (static_cast<std::size_t>(id.robot) != robot) continue;
-    poses.push_back({map.keyframe(id).stamp, map.camera_from_world(id).inverse()});
-  }
-  return poses;
-}
 
 /// Surfaces that keyframes hold and landmarks, each with its robot.
 viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::string>& names) {
@@ -52,11 +41,12 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
     add(point.position, point.normal, id.robot);
   }
   scene.cloud = cloud;
+  const std::vector<maps::KeyframePose> keyframes = maps::keyframe_poses(preview.map);
   for (const std::size_t robot : preview.parts) {
     viz::CameraPath path;
     path.name = names[robot];
     path.color = viz::category_color(robot);
-    path.trajectory = keyframe_poses(preview.map, robot);
+    path.trajectory = maps::trajectory(keyframes, static_cast<std::int32_t>(robot));
     scene.paths.push_back(std::move(path));
   }
   return scene;
@@ -64,15 +54,12 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
 
 std::string text_of(const RunSummary::Meeting& meeting, const MeetingEvent& event,
                     const std::vector<std::string>& names) {
-  nlohmann::ordered_json robots = nlohmann::ordered_json::array();
+  Json robots = Json::array();
   for (std::size_t i = 0; i < event.preview->parts.size(); ++i) {
-    const Eigen::Matrix4d world = event.preview->anchor_from_part[i].isometry().matrix();
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-    for (int row = 0; row < 4; ++row)
-      rows.push_back({world(row, 0), world(row, 1), world(row, 2), world(row, 3)});
-    robots.push_back({{"name", names[event.preview->parts[i]]}, {"frame_from_robot", rows}});
+    robots.push_back({{"name", names[event.preview->parts[i]]},
+                      {"frame_from_robot", rows(event.preview->anchor_from_part[i])}});
   }
-  nlohmann::ordered_json json = {
+  Json json = {
       {"number", meeting.number},
       {"preview", true},
       {"a", meeting.a},
@@ -83,10 +70,9 @@ std::string text_of(const RunSummary::Meeting& meeting, const MeetingEvent& even
       {"frame_of", names[event.preview->parts.front()]},
       {"robots", robots},
       {"pairs_refused_by_graph", event.preview->rejected},
-      {"evidence",
-       nlohmann::ordered_json::parse(evidence_json({meeting.a, meeting.b, -1.0, -1.0, event.evidence}))}};
+      {"evidence", merge_of({meeting.a, meeting.b, -1.0, -1.0, event.evidence})}};
   if (meeting.time_s >= 0.0) json["time_s"] = meeting.time_s;
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
@@ -131,9 +117,10 @@ core::Result<void> MeetingLog::write(const MeetingEvent& event, const std::vecto
   const std::filesystem::path folder =
       output_ / "meetings" / fmt::format("{:04}_{}_{}", meeting.number, meeting.a, meeting.b);
   if (auto made = core::make_folder(folder); !made) return made;
+  const std::vector<maps::KeyframePose> keyframes = maps::keyframe_poses(event.preview->map);
   for (const std::size_t robot : event.preview->parts) {
     auto written = dataset::write_trajectory(folder / (names[robot] + ".txt"),
-                                             keyframe_poses(event.preview->map, robot));
+                                             maps::trajectory(keyframes, static_cast<std::int32_t>(robot)));
     if (!written) return written;
   }
   viz::Scene scene = scene_of(*event.preview, names);

@@ -5,7 +5,7 @@ namespace plumbline::pipeline {
 
 core::Result<Graph> load_pipeline(const RunRequest& request) {
   const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
-  if (!file) return tl::unexpected<core::Error>(file.error());
+  if (!file) return tl::unexpected(file.error());
   StageRegistry registry;
   register_stages(registry);
   registry.filters() = request.filters;
@@ -17,7 +17,12 @@ RunSummary summary_of_run(const Graph& graph, const RunReport& report, const Run
   RunSummary summary;
   summary.pipeline = request.pipeline;
   summary.threads = executor.threads();
-  add_report(report, summary);
+  summary.stopped = report.stopped;
+  summary.frames.available = report.frames_available;
+  summary.map_s = report.map_s;
+  summary.behind_s = report.behind_s;
+  summary.export_s = report.export_s;
+  summary.stages = report.stages;
   for (const Node& node : graph.nodes) node.stage->summarise(summary);
   return summary;
 }

@@ -86,7 +86,7 @@ class Runner {
   core::Result<RunReport> run() {
     for (Node& node : graph_.nodes) {
       auto started = guarded(node.name, [&] { return node.stage->start(context_); });
-      if (!started) return tl::unexpected<core::Error>(started.error());
+      if (!started) return tl::unexpected(started.error());
     }
     total_ = graph_.source().stage->frames();
     report_.frames_available = total_;
@@ -103,12 +103,12 @@ class Runner {
       context_.executor->run([this] { stream(); });
     }
     report_.behind_s = pace_->behind_s();
-    if (failure_.any()) return tl::unexpected<core::Error>(failure_.error());
+    if (failure_.any()) return tl::unexpected(failure_.error());
     report_.frames = started_;
     report_.stopped = report_.frames < total_;
     for (StageTiming& stage : report_.stages) stage.frame_ms.resize(report_.frames);
     report_.rss_mb.resize(report_.frames);
-    if (auto finished = finish(start); !finished) return tl::unexpected<core::Error>(finished.error());
+    if (auto finished = finish(start); !finished) return tl::unexpected(finished.error());
     return std::move(report_);
   }
 

@@ -20,8 +20,8 @@ namespace {
 constexpr double kMostLostPercent = 10.0;
 
 /// Every candidate that was verified: what was found, and why it is no loop.
-nlohmann::ordered_json trials_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+Json trials_of(const RunSummary& summary) {
+  Json list = Json::array();
   for (const mapping::LoopTrial& trial : summary.loops.trials) {
     const mapping::PlaceVerification& e = trial.loop.evidence;
     list.push_back({{"query", trial.loop.query.index},
@@ -44,25 +44,25 @@ nlohmann::ordered_json trials_of(const RunSummary& summary) {
   return list;
 }
 
-nlohmann::ordered_json robots_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+Json robots_of(const RunSummary& summary) {
+  Json list = Json::array();
   for (const RunSummary::Robot& robot : summary.robots)
     list.push_back({{"name", robot.name}, {"keyframes", robot.keyframes}});
   return list;
 }
 
-nlohmann::ordered_json sigma_json(const Sigma& sigma) {
+Json sigma_json(const Sigma& sigma) {
   const auto rounded_finely = [](double value) { return std::round(value * 1e6) / 1e6; };
   return {{"median", rounded_finely(sigma.median)}, {"p90", rounded_finely(sigma.p90)}};
 }
 
-nlohmann::ordered_json cloud_of(const RunSummary& summary) {
+Json cloud_of(const RunSummary& summary) {
   const auto list_of = [](const std::vector<RunSummary::LeftOut>& parts) {
-    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    Json list = Json::array();
     for (const auto& part : parts) list.push_back({{"by", part.by}, {"points", part.points}});
     return list;
   };
-  nlohmann::ordered_json cloud = {{"points", summary.cloud_points}, {"voxel_m", summary.voxel_m}};
+  Json cloud = {{"points", summary.cloud_points}, {"voxel_m", summary.voxel_m}};
   if (!summary.left_out_of_map.empty()) cloud["left_out_of_map"] = list_of(summary.left_out_of_map);
   if (summary.cloud_sigma_m.median > 0.0) cloud["sigma_m"] = sigma_json(summary.cloud_sigma_m);
   if (summary.measured_points == 0) return cloud;
@@ -95,8 +95,8 @@ std::string left_out_of_map_text(const RunSummary& summary) {
   return text.empty() ? text : text + ", of the merged cloud";
 }
 
-nlohmann::ordered_json fits_of(const optimize::BundleFits& fits) {
-  nlohmann::ordered_json all = nlohmann::ordered_json::object();
+Json fits_of(const optimize::BundleFits& fits) {
+  Json all = Json::object();
   for (const auto& [name, fit] :
        {std::pair{"points", fits.points}, std::pair{"lines", fits.lines}, std::pair{"edges", fits.edges}}) {
     if (fit.all > 0) all[name] = {{"all", fit.all}, {"fitting", fit.fitting}, {"rms", rounded(fit.rms)}};
@@ -104,8 +104,8 @@ nlohmann::ordered_json fits_of(const optimize::BundleFits& fits) {
   return all;
 }
 
-nlohmann::ordered_json path_of(const RunSummary& summary) {
-  nlohmann::ordered_json tears = nlohmann::ordered_json::array();
+Json path_of(const RunSummary& summary) {
+  Json tears = Json::array();
   for (const maps::PathStep& step : summary.path.check.tears) {
     tears.push_back({{"stamp", step.stamp},
                      {"robot", step.to.robot},
@@ -120,14 +120,14 @@ nlohmann::ordered_json path_of(const RunSummary& summary) {
           {"tears", tears}};
 }
 
-nlohmann::ordered_json frames_of(const RunSummary::Frames& frames) {
+Json frames_of(const RunSummary::Frames& frames) {
   return {{"available", frames.available},       {"read", frames.read},
           {"resumed", frames.resumed},           {"unreadable", frames.unreadable},
           {"tracked", frames.tracked},           {"lost", frames.lost},
           {"longest_loss", frames.longest_loss}, {"tracked_percent", rounded(frames.tracked_percent())}};
 }
 
-nlohmann::ordered_json loops_of(const RunSummary& summary) {
+Json loops_of(const RunSummary& summary) {
   return {{"candidates", summary.loops.candidates},
           {"verified", summary.loops.verified},
           {"accepted", summary.loops.accepted},
@@ -135,7 +135,7 @@ nlohmann::ordered_json loops_of(const RunSummary& summary) {
           {"list", trials_of(summary)}};
 }
 
-nlohmann::ordered_json feedback_of(const RunSummary::Feedback& feedback) {
+Json feedback_of(const RunSummary::Feedback& feedback) {
   return {{"on", true},
           {"keyframes_received", feedback.keyframes},
           {"relocalised", feedback.relocalised},
@@ -143,7 +143,7 @@ nlohmann::ordered_json feedback_of(const RunSummary::Feedback& feedback) {
           {"note", "this map depends on what the network brought and when: another run gives other bytes"}};
 }
 
-nlohmann::ordered_json refine_of(const RunSummary& s) {
+Json refine_of(const RunSummary& s) {
   const mapping::RefinementSummary& refine = s.refine;
   return {{"local_maps", refine.local_maps},
           {"tried", refine.tried},
@@ -158,14 +158,14 @@ nlohmann::ordered_json refine_of(const RunSummary& s) {
           {"after", fits_of(refine.after)}};
 }
 
-nlohmann::ordered_json timing_of(const RunSummary& summary) {
-  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
-  for (const RunSummary::StageTime& stage : summary.stages) {
-    stages[stage.name] = {{"median", rounded(stage.median_ms)},
-                          {"p95", rounded(stage.p95_ms)},
+Json timing_of(const RunSummary& summary) {
+  Json stages = Json::object();
+  for (const StageTiming& stage : summary.stages) {
+    stages[stage.name] = {{"median", rounded(stage.quantile_ms(0.5))},
+                          {"p95", rounded(stage.quantile_ms(0.95))},
                           {"finish", rounded(stage.finish_ms)}};
   }
-  nlohmann::ordered_json parts = nlohmann::ordered_json::object();
+  Json parts = Json::object();
   for (const StageTiming& part : summary.parts) {
     const auto times =
         std::count_if(part.frame_ms.begin(), part.frame_ms.end(), [](float ms) { return !std::isnan(ms); });
@@ -190,8 +190,7 @@ std::string torn_text(const maps::PathCheck& check) {
                                         [](const auto& a, const auto& b) { return a.off_m < b.off_m; });
   return fmt::format(
       "the map is torn: at {:.3f} s, between keyframes {} and {}, the path jumps by {:.1f} cm and {:.1f} "
-      "degrees "
-      "that the tracker did not see{}",
+      "degrees that the tracker did not see{}",
       worst.stamp, worst.from.index, worst.to.index, 100.0 * worst.off_m, worst.off_rad * 180.0 / M_PI,
       check.tears.size() > 1 ? fmt::format("; {} such places in all", check.tears.size()) : "");
 }
@@ -207,18 +206,6 @@ double RunSummary::fps() const {
   return map_s > 0.0 ? static_cast<double>(frames.read - frames.resumed) / map_s : 0.0;
 }
 
-void add_report(const RunReport& report, RunSummary& summary) {
-  summary.stopped = report.stopped;
-  summary.frames.available = report.frames_available;
-  summary.map_s = report.map_s;
-  summary.behind_s = report.behind_s;
-  summary.export_s = report.export_s;
-  summary.stages.clear();
-  for (const StageTiming& stage : report.stages) {
-    summary.stages.push_back({stage.name, stage.quantile_ms(0.5), stage.quantile_ms(0.95), stage.finish_ms});
-  }
-}
-
 void judge(RunSummary& summary) {
   const RunSummary::Frames& frames = summary.frames;
   const std::size_t all = frames.read + frames.unreadable;
@@ -227,8 +214,7 @@ void judge(RunSummary& summary) {
   if (all > 0 && lost_percent > kMostLostPercent) {
     summary.reason = fmt::format(
         "{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would be trusted): {} lost, {} unreadable; "
-        "the "
-        "longest loss is {} frames",
+        "the longest loss is {} frames",
         all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
         frames.longest_loss);
   } else if (!summary.path.check.tears.empty()) {
@@ -247,7 +233,7 @@ void judge(RunSummary& summary) {
 }
 
 core::Result<void> write_summary(const std::filesystem::path& file, const RunSummary& s) {
-  nlohmann::ordered_json json = {
+  Json json = {
       {"input", s.input},
       {"pipeline", s.pipeline},
       {"trustworthy", s.reason.empty()},
@@ -273,8 +259,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"seed", s.seed}};
   if (s.feedback.on) json["feedback"] = feedback_of(s.feedback);
   // Names of files need not be UTF-8: replace what JSON cannot hold.
-  return core::write_file(file,
-                          json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+  return core::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,

@@ -5,8 +5,8 @@
 namespace plumbline::pipeline {
 namespace {
 
-nlohmann::ordered_json camera_of(const RunSummary::Camera& camera) {
-  nlohmann::ordered_json numbers = nlohmann::ordered_json::array();
+Json camera_of(const RunSummary::Camera& camera) {
+  Json numbers = Json::array();
   for (const mapping::CameraFinding& f : camera.findings) {
     numbers.push_back({{"name", f.name},
                        {"given", f.given},
@@ -22,14 +22,14 @@ nlohmann::ordered_json camera_of(const RunSummary::Camera& camera) {
 
 }  // namespace
 
-nlohmann::ordered_json cameras_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+Json cameras_of(const RunSummary& summary) {
+  Json list = Json::array();
   for (const RunSummary::Camera& camera : summary.cameras) list.push_back(camera_of(camera));
   return list;
 }
 
 std::string camera_json(const RunSummary::Camera& camera) {
-  return camera_of(camera).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return camera_of(camera).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try {
@@ -50,14 +50,14 @@ std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try 
   return std::nullopt;
 }
 
-nlohmann::ordered_json depth_fields_of(const RunSummary& summary) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+Json depth_fields_of(const RunSummary& summary) {
+  Json list = Json::array();
   for (const RunSummary::DepthField& found : summary.depth_fields) {
-    nlohmann::ordered_json entry = {{"robot", found.robot},
-                                    {"used", found.report.used},
-                                    {"samples", found.report.samples},
-                                    {"before", rounded(found.report.before)},
-                                    {"after", rounded(found.report.after)}};
+    Json entry = {{"robot", found.robot},
+                  {"used", found.report.used},
+                  {"samples", found.report.samples},
+                  {"before", rounded(found.report.before)},
+                  {"after", rounded(found.report.after)}};
     if (found.report.used) {
       const auto& c = found.field.coefficients();
       entry["most_at_2m"] = rounded(found.report.most_at_2m);

@@ -10,12 +10,14 @@
 
 namespace plumbline::pipeline {
 
+using Json = nlohmann::ordered_json;
+
 /// Numbers are for people: 4 decimals are more than any of them is good for.
 inline double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 /// The 4 x 4 matrix, row by row.
-inline nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
-  nlohmann::ordered_json matrix = nlohmann::ordered_json::array();
+inline Json rows(const geometry::Rigid3& transform) {
+  Json matrix = Json::array();
   const Eigen::Matrix4d values = transform.isometry().matrix();
   for (int row = 0; row < 4; ++row) {
     matrix.push_back({values(row, 0), values(row, 1), values(row, 2), values(row, 3)});
@@ -23,9 +25,10 @@ inline nlohmann::ordered_json rows(const geometry::Rigid3& transform) {
   return matrix;
 }
 
-nlohmann::ordered_json cameras_of(const RunSummary& summary);
-nlohmann::ordered_json depth_fields_of(const RunSummary& summary);
-nlohmann::ordered_json merges_of(const RunSummary& summary);
-nlohmann::ordered_json meetings_of(const RunSummary& summary);
+Json cameras_of(const RunSummary& summary);
+Json depth_fields_of(const RunSummary& summary);
+Json merge_of(const RunSummary::Merge& merge);
+Json merges_of(const RunSummary& summary);
+Json meetings_of(const RunSummary& summary);
 
 }  // namespace plumbline::pipeline

@@ -4,9 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 
-#include "graph/command_line.hpp"
+#include "graph/graph_parts.hpp"
 #include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::pipeline {

@@ -10,7 +10,7 @@ namespace plumbline::pipeline {
 core::Result<cloud::CloudPtr> cloud_of(const KeyframeCloud& keyframe) {
   if (keyframe.cloud != nullptr) return keyframe.cloud;
   const auto stored = store_cloud_of(keyframe);
-  if (!stored) return tl::unexpected<core::Error>(stored.error());
+  if (!stored) return tl::unexpected(stored.error());
   return cloud::decode_cloud(stored->bytes->data(), stored->bytes->size());
 }
 
@@ -18,7 +18,7 @@ core::Result<maps::StoreCloud> store_cloud_of(const KeyframeCloud& keyframe) {
   maps::StoreCloud cloud{keyframe.id, keyframe.frame, keyframe.compact, keyframe.surface};
   if (cloud.bytes != nullptr) return cloud;
   auto bytes = keyframe.stored();
-  if (!bytes) return tl::unexpected<core::Error>(bytes.error());
+  if (!bytes) return tl::unexpected(bytes.error());
   cloud.bytes = std::make_shared<std::vector<std::uint8_t>>(std::move(*bytes));
   return cloud;
 }

@@ -8,7 +8,6 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/image_io.hpp"
@@ -62,14 +61,14 @@ core::Result<DebugFolder> DebugFolder::prepare(const fs::path& folder, const fs:
   }
   const fs::path relative = inside(out, folder);
   if (relative.empty()) {
-    auto own = maps::OutputFolder::prepare(folder, replace, is_debug_folder);
-    if (!own) return tl::unexpected<core::Error>(own.error());
+    auto own = maps::OutputFolder::prepare(folder, replace, false, is_debug_folder);
+    if (!own) return tl::unexpected(own.error());
     result.path_ = own->path();
     result.own_.emplace(std::move(*own));
     return result;
   }
   result.path_ = out_path / relative;
-  if (auto made = core::make_folder(result.path_); !made) return tl::unexpected<core::Error>(made.error());
+  if (auto made = core::make_folder(result.path_); !made) return tl::unexpected(made.error());
   return result;
 }
 
@@ -85,10 +84,8 @@ core::Result<void> write_debug_picture(const fs::path& folder, std::size_t numbe
   const cv::Mat picture = tracking::draw_overlay(shown, features, track, slam.map(), camera);
   constexpr int kQuick = 1;
   const auto png = dataset::encode_png(picture, kQuick);
-  if (!png) return tl::unexpected<core::Error>(png.error());
-  core::OutputFile file(folder / picture_name(number));
-  file.write(png->data(), png->size());
-  return file.commit();
+  if (!png) return tl::unexpected(png.error());
+  return core::write_file(folder / picture_name(number), *png);
 }
 
 }  // namespace plumbline::pipeline

@@ -155,7 +155,6 @@ std::size_t stored_keyframes(const fs::path& folder) {
 core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, const std::string& configuration,
                                                      const std::string& input,
                                                      const RobotRecordings& recordings) {
-  const auto fail = [](const core::Error& error) { return tl::unexpected<core::Error>(error); };
   ResumedRun run;
   run.store = folder / maps::kStoreFile;
   if (is_blank(run.store)) {
@@ -163,31 +162,32 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
     return std::nullopt;
   }
   const auto reader = maps::StoreReader::open(run.store);
-  if (!reader) return fail(reader.error());
+  if (!reader) return tl::unexpected(reader.error());
   auto maps = reader->load_each();
-  if (!maps) return fail(maps.error());
+  if (!maps) return tl::unexpected(maps.error());
   if (maps->size() == 1 && maps->front().map.keyframe_count() == 0) {
     remove_store(run.store);
     return std::nullopt;
   }
   const maps::StoreHeader& header = reader->header();
-  if (auto same = check_same(run.store, "recording", header.input, input); !same) return fail(same.error());
+  if (auto same = check_same(run.store, "recording", header.input, input); !same)
+    return tl::unexpected(same.error());
   for (const RobotInfo& robot : header.robots) {
     sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
     camera.depth_delay_s = 0.0;  // belongs to the recording's stamps
     if (auto same = check_same(run.store, "camera", sensor::to_yaml(robot.camera), sensor::to_yaml(camera));
         !same) {
-      return fail(same.error());
+      return tl::unexpected(same.error());
     }
   }
   if (auto same = check_same(run.store, "configuration", header.configuration, configuration); !same) {
-    return fail(same.error());
+    return tl::unexpected(same.error());
   }
   for (const maps::StoredMap& stored : *maps) {
-    if (auto rows = add_rows(run.store, stored.log, run.rows); !rows) return fail(rows.error());
+    if (auto rows = add_rows(run.store, stored.log, run.rows); !rows) return tl::unexpected(rows.error());
   }
   take_maps(std::move(*maps), recordings.robots().size(), run);
-  if (auto found = find_done(recordings, run); !found) return fail(found.error());
+  if (auto found = find_done(recordings, run); !found) return tl::unexpected(found.error());
   return run;
 }
 

@@ -87,10 +87,9 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
     map->frame_poses.insert(map->frame_poses.end(), parts[p].frame_poses.begin(), parts[p].frame_poses.end());
   }
   take_poses_from_map(*map);
-  log.debug(
-      fmt::format("fused {} maps: {} pairs of keyframes, {} taken for wrong; {} points and {} lines were "
-                  "doubles",
-                  fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
+  log.debug(fmt::format(
+      "fused {} maps: {} pairs of keyframes, {} taken for wrong; {} points and {} lines were doubles",
+      fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
   result.refused = static_cast<std::size_t>(fused.refused);
   if (fused.refused > 0) log.warning("merge: maps are laid into one frame, but not bent: " + fused.refusal);
   result.map = map;

@@ -99,7 +99,7 @@ class CloudStage : public Stage {
     core::Result<cloud::CloudPtr> made =
         gives_cloud ? filtered(*frame, camera, track->keyframe)
                     : cloud::depth_view(*frame, camera, options_.min_depth_m, options_.max_depth_m);
-    if (!made) return tl::unexpected<core::Error>(made.error());
+    if (!made) return tl::unexpected(made.error());
     cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
@@ -140,12 +140,9 @@ class CloudStage : public Stage {
 }  // namespace
 
 StageType cloud_stage() {
-  return {"cloud",
-          "Turns a keyframe's depth into a filtered cloud with colour and normals",
-          Mode::kStateless,
-          {{"frame", frame_port()}, {"track", track_port()}},
-          {{"cloud", keyframe_cloud_port()}},
-          [] { return std::make_unique<CloudStage>(); }};
+  return stage_type<CloudStage>(
+      "cloud", "Turns a keyframe's depth into a filtered cloud with colour and normals", Mode::kStateless,
+      {{"frame", frame_port()}, {"track", track_port()}}, {{"cloud", keyframe_cloud_port()}});
 }
 
 }  // namespace plumbline::pipeline

@@ -39,12 +39,9 @@ class FeaturesStage : public Stage {
 }  // namespace
 
 StageType features_stage() {
-  return {"features",
-          "Finds ORB points and LSD lines with their descriptors and depth",
-          Mode::kStateless,
-          {{"frame", frame_port()}},
-          {{"features", features_port()}},
-          [] { return std::make_unique<FeaturesStage>(); }};
+  return stage_type<FeaturesStage>(
+      "features", "Finds ORB points and LSD lines with their descriptors and depth", Mode::kStateless,
+      {{"frame", frame_port()}}, {{"features", features_port()}});
 }
 
 }  // namespace plumbline::pipeline

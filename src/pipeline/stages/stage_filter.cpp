@@ -28,7 +28,6 @@ class FilterStage : public Stage {
     context_ = &context;
     return {};
   }
-  core::Result<void> process(StageIo& /*io*/) override { return {}; }  // its input comes at the end
 
   core::Result<void> finish(StageIo& io) override {
     const auto input = io.input<DenseCloud>("cloud");
@@ -39,7 +38,7 @@ class FilterStage : public Stage {
     context.columns = &input->columns;
     context.made_columns = &dense->columns;
     auto filtered = filters_.chain().apply(input->cloud, context, &reports_);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!filtered) return tl::unexpected(filtered.error());
     if (!reports_.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
     dense->cloud = std::move(*filtered);
     dense->voxel_m = input->voxel_m;
@@ -64,12 +63,8 @@ class FilterStage : public Stage {
 }  // namespace
 
 StageType filter_stage() {
-  return {"filter",
-          "Runs a filter chain on the merged cloud",
-          Mode::kSerial,
-          {{"cloud", cloud_port()}},
-          {{"cloud", cloud_port()}},
-          [] { return std::make_unique<FilterStage>(); }};
+  return stage_type<FilterStage>("filter", "Runs a filter chain on the merged cloud", Mode::kSerial,
+                                 {{"cloud", cloud_port()}}, {{"cloud", cloud_port()}});
 }
 
 }  // namespace plumbline::pipeline

@@ -5,12 +5,10 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -33,17 +31,16 @@ class FuseStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice<Up>("up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
-                     "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own "
-                     "up on average), z up "
-                     "as the first camera was held, or the frame of the poses as they are");
-    table.choice<Yaw>(
-        "yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
-        "Where x points unless up is none: along the walls, as near as can be to where the first "
-        "camera looks, or just there");
-    table.boolean("depth_field", find_depth_field_,
-                  "Find out from overlapping views what the depth camera gets wrong everywhere alike, and "
-                  "correct it");
+    table.choice<Up>(
+        "up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
+        "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own up on "
+        "average), z up as the first camera was held, or the frame of the poses as they are");
+    table.choice<Yaw>("yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
+                      "Where x points unless up is none: along the walls, as near as can be to where the "
+                      "first camera looks, or just there");
+    table.boolean(
+        "depth_field", find_depth_field_,
+        "Find out from overlapping views what the depth camera gets wrong everywhere alike, and correct it");
     depth_field_.declare(table);
     table.boolean("keyframe_clouds", keyframe_clouds_,
                   "Write the cloud of every keyframe to keyframes/, in the frame of the results");
@@ -62,7 +59,7 @@ class FuseStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
     auto clouds = WaitingClouds::create(context);
-    if (!clouds) return tl::unexpected<core::Error>(clouds.error());
+    if (!clouds) return tl::unexpected(clouds.error());
     clouds_.emplace(std::move(*clouds));
     return {};
   }
@@ -75,11 +72,11 @@ class FuseStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     const auto map = io.input<MapResult>("map");
     const auto stored = clouds_->open();
-    if (!stored) return tl::unexpected<core::Error>(stored.error());
+    if (!stored) return tl::unexpected(stored.error());
     const auto views = views_of(**stored, *map, clouds_->arrivals());
-    if (!views) return tl::unexpected<core::Error>(views.error());
+    if (!views) return tl::unexpected(views.error());
     auto fused = fuse(*map, *views);
-    if (!fused) return tl::unexpected<core::Error>(fused.error());
+    if (!fused) return tl::unexpected(fused.error());
     auto dense = std::make_shared<DenseCloud>();
     dense->voxel_m = options_.voxels.voxel_m;
     report_.frame = find_up(up_, yaw_, fused->cloud, map->trajectory);
@@ -91,12 +88,12 @@ class FuseStage : public Stage {
       const auto written = maps::write_keyframe_clouds(
           context_->output_folder / "keyframes", *views, report_.frame.output_from_map,
           [&](std::size_t i) { return read_corrected(*views, i); });
-      if (!written) return tl::unexpected<core::Error>(written.error());
+      if (!written) return tl::unexpected(written.error());
     }
     clouds_->clear();
     auto filtered =
         filters_.chain().apply(std::move(*fused), dense->voxel_m, *context_->executor, &report_.filters);
-    if (!filtered) return tl::unexpected<core::Error>(filtered.error());
+    if (!filtered) return tl::unexpected(filtered.error());
     if (!report_.filters.empty())
       context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(report_.filters));
     dense->cloud = std::move(filtered->cloud);
@@ -122,7 +119,7 @@ class FuseStage : public Stage {
 
  private:
   core::Result<cloud::FusedCloud> fuse(const MapResult& map, const maps::StoredViews& stored) {
-    if (auto found = find_fields(map, stored); !found) return tl::unexpected<core::Error>(found.error());
+    if (auto found = find_fields(map, stored); !found) return tl::unexpected(found.error());
     cloud::FusionViews views;
     views.world_from_camera = stored.world_from_camera;
     views.cameras = cameras_of(stored);
@@ -167,7 +164,7 @@ class FuseStage : public Stage {
       cloud::DepthFieldReport report;
       const auto field = cloud::find_depth_field(own, stored.world_from_camera, read, camera, depth_field_,
                                                  *context_->executor, &report);
-      if (!field) return tl::unexpected<core::Error>(field.error());
+      if (!field) return tl::unexpected(field.error());
       state_->depth_fields[robot] = *field;
       std::string name;
       for (const RobotInfo& info : map.robots) {
@@ -175,8 +172,8 @@ class FuseStage : public Stage {
       }
       report_.depth_fields.push_back({name, report, *field});
       context_->log->debug(fmt::format(
-          "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field "
-          "explains: {}",
+          "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field explains: "
+          "{}",
           name.empty() ? "" : " of ", name, report.samples, report.before, report.after,
           report.used ? fmt::format("up to {:.0f} mm at 2 m", 1e3 * report.most_at_2m) : "not used"));
     }
@@ -187,8 +184,7 @@ class FuseStage : public Stage {
   [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
     if (cloud || context_->stored_maps == nullptr) return cloud;
-    return tl::unexpected<core::Error>(
-        context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
+    return tl::unexpected(context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
   }
   [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(const maps::StoredViews& views,
                                                              std::size_t i) const {
@@ -221,12 +217,9 @@ class FuseStage : public Stage {
 }  // namespace
 
 StageType fuse_stage() {
-  return {"fuse",
-          "Merges the keyframes' clouds at their final poses into one cloud with thin walls",
-          Mode::kSerial,
-          {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
-          {{"cloud", cloud_port()}},
-          [] { return std::make_unique<FuseStage>(); }};
+  return stage_type<FuseStage>(
+      "fuse", "Merges the keyframes' clouds at their final poses into one cloud with thin walls",
+      Mode::kSerial, {{"cloud", keyframe_cloud_port()}, {"map", map_port()}}, {{"cloud", cloud_port()}});
 }
 
 }  // namespace plumbline::pipeline

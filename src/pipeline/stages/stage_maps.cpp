@@ -18,7 +18,7 @@ class MapsStage : public Stage {
     }
     return {};
   }
-  [[nodiscard]] std::size_t frames() const override { return maps_->size(); }
+  [[nodiscard]] std::size_t frames() const override { return maps_->clouds().size(); }
 
   /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
   core::Result<void> process(StageIo& io) override {
@@ -30,7 +30,7 @@ class MapsStage : public Stage {
     result->stored = [maps = maps_, index = io.frame()] { return maps->cloud_bytes(index); };
     if (stored.id.valid()) {
       if (auto read = read_surface(io.frame(), *result); !read) {
-        return tl::unexpected<core::Error>(maps_->damaged(stored.id, {}, read.error()));
+        return tl::unexpected(maps_->damaged(stored.id, {}, read.error()));
       }
     }
     io.output<KeyframeCloud>("cloud", result);
@@ -50,10 +50,10 @@ class MapsStage : public Stage {
   /// As it was kept with the map, if it was.
   core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
     const auto kept = maps_->surface_bytes(index);
-    if (!kept) return tl::unexpected<core::Error>(kept.error());
+    if (!kept) return tl::unexpected(kept.error());
     if (kept->empty()) return {};
     auto surface = maps::unpack_surface(*kept);
-    if (!surface) return tl::unexpected<core::Error>(surface.error());
+    if (!surface) return tl::unexpected(surface.error());
     result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
     return {};
   }
@@ -64,12 +64,9 @@ class MapsStage : public Stage {
 }  // namespace
 
 StageType maps_stage() {
-  return {"maps",
-          "Reads finished maps of robots, with the clouds that are stored with them",
-          Mode::kStateless,
-          {},
-          {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}},
-          [] { return std::make_unique<MapsStage>(); }};
+  return stage_type<MapsStage>(
+      "maps", "Reads finished maps of robots, with the clouds that are stored with them", Mode::kStateless,
+      {}, {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}});
 }
 
 }  // namespace plumbline::pipeline

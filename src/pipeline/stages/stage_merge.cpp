@@ -159,12 +159,10 @@ class MergeStage : public Stage {
 }  // namespace
 
 StageType merge_stage() {
-  return {"merge",
-          "Finds where maps of several robots overlap, lays them into one frame and adjusts them together",
-          Mode::kSerial,
-          {{"track", track_port(), false}, {"maps", maps_port()}},
-          {{"map", map_port()}},
-          [] { return std::make_unique<MergeStage>(); }};
+  return stage_type<MergeStage>(
+      "merge",
+      "Finds where maps of several robots overlap, lays them into one frame and adjusts them together",
+      Mode::kSerial, {{"track", track_port(), false}, {"maps", maps_port()}}, {{"map", map_port()}});
 }
 
 }  // namespace plumbline::pipeline

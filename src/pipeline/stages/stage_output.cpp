@@ -6,10 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <memory>
-#include <optional>
 #include <sstream>
-#include <system_error>
 #include <vector>
 
 #include "plumbline/cloud/cloud_io.hpp"
@@ -73,7 +70,6 @@ class OutputStage : public Stage {
     context_ = &context;
     return {};
   }
-  core::Result<void> process(StageIo& /*io*/) override { return {}; }  // all its inputs come at the end
 
   core::Result<void> finish(StageIo& io) override {
     const auto dense = io.input<DenseCloud>("cloud");
@@ -105,12 +101,7 @@ class OutputStage : public Stage {
  private:
   /// Poses and lines in the output's frame.
   static MapResult moved(MapResult map, const geometry::Rigid3& output_from_map) {
-    for (geometry::StampedPose& pose : map.trajectory) {
-      pose.world_from_camera = output_from_map * pose.world_from_camera;
-    }
-    for (maps::KeyframePose& keyframe : map.keyframes) {
-      keyframe.world_from_camera = output_from_map * keyframe.world_from_camera;
-    }
+    maps::move(map, output_from_map);
     for (auto& [start, end] : map.lines) {
       start = output_from_map * start;
       end = output_from_map * end;
@@ -132,20 +123,11 @@ class OutputStage : public Stage {
     return {};
   }
 
-  static geometry::Trajectory keyframe_trajectory(const MapResult& map, std::optional<std::int32_t> robot) {
-    geometry::Trajectory poses;
-    for (const maps::KeyframePose& keyframe : map.keyframes) {
-      if (!robot || keyframe.id.robot == *robot)
-        poses.push_back({keyframe.stamp, keyframe.world_from_camera});
-    }
-    return poses;
-  }
-
   /// Several robots: each in its own folder.
   static core::Result<void> write_trajectories(const std::filesystem::path& folder, const MapResult& map) {
     if (map.robots.size() < 2) {
       auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory);
-      return written ? dataset::write_trajectory(folder / "keyframes.txt", keyframe_trajectory(map, {}))
+      return written ? dataset::write_trajectory(folder / "keyframes.txt", maps::trajectory(map.keyframes))
                      : written;
     }
     for (const RobotInfo& robot : map.robots) {
@@ -153,7 +135,8 @@ class OutputStage : public Stage {
       if (auto made = core::make_folder(own); !made) return made;
       auto written = dataset::write_trajectory(own / "trajectory.txt", trajectory_of(map, robot.number));
       if (!written) return written;
-      written = dataset::write_trajectory(own / "keyframes.txt", keyframe_trajectory(map, robot.number));
+      written =
+          dataset::write_trajectory(own / "keyframes.txt", maps::trajectory(map.keyframes, robot.number));
       if (!written) return written;
     }
     return {};
@@ -205,7 +188,7 @@ class OutputStage : public Stage {
     if (auto made = core::make_folder(folder); !made) return made;
     viz::Scene scene;
     scene.cloud = dense.cloud;
-    scene.title = context_->source->name();
+    scene.title = context_->source != nullptr ? context_->source->name() : "fused maps";
     if (map.robots.size() < 2) {
       viz::CameraPath path;
       path.trajectory = map.trajectory;
@@ -268,13 +251,9 @@ class OutputStage : public Stage {
 }  // namespace
 
 StageType output_stage() {
-  return {"output",
-          "Writes the result folder: clouds, trajectories, lines, tables and pictures",
-          Mode::kSerial,
-          {{"map", map_port()}, {"cloud", cloud_port()}},
-          {},
-          [] { return std::make_unique<OutputStage>(); },
-          true};
+  return stage_type<OutputStage>("output",
+                                 "Writes the result folder: clouds, trajectories, lines, tables and pictures",
+                                 Mode::kSerial, {{"map", map_port()}, {"cloud", cloud_port()}}, {}, true);
 }
 
 }  // namespace plumbline::pipeline

@@ -32,14 +32,13 @@ class PosesStage : public Stage {
     recordings_ = context.recordings;
     ways_.resize(recordings_->robots().size());
     if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
-      return core::usage_error(
-          fmt::format("{}: are poses of one recording; write {} where the file's name "
-                      "has the robot's: poses/{}.txt",
-                      file_, kRobot, kRobot));
+      return core::usage_error(fmt::format(
+          "{}: are poses of one recording; write {} where the file's name has the robot's: poses/{}.txt",
+          file_, kRobot, kRobot));
     }
     for (const RobotInfo& robot : recordings_->robots()) {
       auto poses = poses_of(robot);
-      if (!poses) return tl::unexpected<core::Error>(poses.error());
+      if (!poses) return tl::unexpected(poses.error());
       ways_[static_cast<std::size_t>(robot.number)].poses = std::move(*poses);
     }
     return {};
@@ -140,12 +139,9 @@ class PosesStage : public Stage {
 }  // namespace
 
 StageType poses_stage() {
-  return {"poses",
-          "Takes poses from files or the recordings' truth instead of tracking",
-          Mode::kSerial,
-          {{"frame", frame_port()}},
-          {{"track", track_port()}, {"map", map_port()}},
-          [] { return std::make_unique<PosesStage>(); }};
+  return stage_type<PosesStage>(
+      "poses", "Takes poses from files or the recordings' truth instead of tracking", Mode::kSerial,
+      {{"frame", frame_port()}}, {{"track", track_port()}, {"map", map_port()}});
 }
 
 }  // namespace plumbline::pipeline

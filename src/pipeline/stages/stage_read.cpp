@@ -79,12 +79,9 @@ class ReadStage : public Stage {
 }  // namespace
 
 StageType read_stage() {
-  return {"read",
-          "Reads the recording: decodes, undistorts and registers colour and depth",
-          Mode::kStateless,
-          {},
-          {{"frame", frame_port()}},
-          [] { return std::make_unique<ReadStage>(); }};
+  return stage_type<ReadStage>("read",
+                               "Reads the recording: decodes, undistorts and registers colour and depth",
+                               Mode::kStateless, {}, {{"frame", frame_port()}});
 }
 
 }  // namespace plumbline::pipeline

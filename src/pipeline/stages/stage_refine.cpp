@@ -29,7 +29,7 @@ class RefineStage : public Stage {
     const auto keyframe = io.input<KeyframeCloud>("cloud");
     if (!keyframe->id.valid()) return {};
     auto surface = surface_of(*keyframe);
-    if (!surface) return tl::unexpected<core::Error>(surface.error());
+    if (!surface) return tl::unexpected(surface.error());
     const std::lock_guard<std::mutex> lock(one_at_a_time_);
     surfaces_[keyframe->id] = std::move(*surface);
     return {};
@@ -72,19 +72,19 @@ class RefineStage : public Stage {
       return keyframe.surface->samples;
     }
     const auto cloud = cloud_of(keyframe);
-    if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+    if (!cloud) return tl::unexpected(cloud.error());
     return mapping::coarse_surface(**cloud, options_.local_maps.voxel_m);
   }
   /// Of the keyframes of the run that this one goes on from.
   core::Result<void> read_surfaces(const ResumedRun& run) {
     if (!wants_surfaces()) return {};
     const auto store = maps::StoreReader::open(run.store);
-    if (!store) return tl::unexpected<core::Error>(store.error());
+    if (!store) return tl::unexpected(store.error());
     const auto ids = store->cloud_ids();
-    if (!ids) return tl::unexpected<core::Error>(ids.error());
+    if (!ids) return tl::unexpected(ids.error());
     for (const core::KeyframeId id : *ids) {
       const auto cloud = store->cloud(id);
-      if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+      if (!cloud) return tl::unexpected(cloud.error());
       surfaces_[id] = mapping::coarse_surface(**cloud, options_.local_maps.voxel_m);
     }
     return {};
@@ -103,12 +103,9 @@ class RefineStage : public Stage {
 }  // namespace
 
 StageType refine_stage() {
-  return {"refine",
-          "Aligns local maps with each other and adjusts the whole map once more",
-          Mode::kStateless,
-          {{"cloud", keyframe_cloud_port()}, {"map", map_port()}},
-          {{"map", map_port()}},
-          [] { return std::make_unique<RefineStage>(); }};
+  return stage_type<RefineStage>(
+      "refine", "Aligns local maps with each other and adjusts the whole map once more", Mode::kStateless,
+      {{"cloud", keyframe_cloud_port()}, {"map", map_port()}}, {{"map", map_port()}});
 }
 
 }  // namespace plumbline::pipeline

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // store: the maps as map.db while the run goes, so that a run that ends early has lost nothing.
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -50,7 +49,7 @@ class StoreStage : public Stage {
     std::vector<maps::StoreCloud> clouds;
     if (cloud != nullptr && (cloud->id.valid() || cloud->frame.valid())) {
       auto waiting = store_cloud_of(*cloud);
-      if (!waiting) return tl::unexpected<core::Error>(waiting.error());
+      if (!waiting) return tl::unexpected(waiting.error());
       clouds.push_back(std::move(*waiting));
     }
     if (track != nullptr) {
@@ -82,7 +81,7 @@ class StoreStage : public Stage {
 
  private:
   core::Result<void> take(core::Result<maps::StoreWriter> writer) {
-    if (!writer) return tl::unexpected<core::Error>(writer.error());
+    if (!writer) return tl::unexpected(writer.error());
     writer_.emplace(std::move(*writer));
     return {};
   }
@@ -105,16 +104,13 @@ class StoreStage : public Stage {
 }  // namespace
 
 StageType store_stage() {
-  return {"store",
-          "Keeps the maps in map.db as the run goes, one transaction a keyframe",
-          Mode::kSerial,
-          {{"track", track_port(), false},
-           {"cloud", keyframe_cloud_port(), false},
-           {"map", map_port()},
-           {"result", cloud_port(), false}},
-          {},
-          [] { return std::make_unique<StoreStage>(); },
-          true};
+  return stage_type<StoreStage>(
+      "store", "Keeps the maps in map.db as the run goes, one transaction a keyframe", Mode::kSerial,
+      {{"track", track_port(), false},
+       {"cloud", keyframe_cloud_port(), false},
+       {"map", map_port()},
+       {"result", cloud_port(), false}},
+      {}, true);
 }
 
 }  // namespace plumbline::pipeline

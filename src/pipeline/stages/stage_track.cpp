@@ -41,8 +41,7 @@ class TrackStage : public Stage {
     options_.declare(table);
     table.choice("camera.refine", refine_, {"auto", "live", "off"},
                  "Whether a run looks for a better camera in its own map, after 40 keyframes, 10 s or at its "
-                 "end: auto "
-                 "begins again with it, live goes on with it 160 frames later");
+                 "end: auto begins again with it, live goes on with it 160 frames later");
   }
 
   core::Result<void> start(const RunContext& context) override {
@@ -250,13 +249,11 @@ class TrackStage : public Stage {
 }  // namespace
 
 StageType track_stage() {
-  return {"track",
-          "Tracks each robot's camera with points, lines and depth, and keeps its map of keyframes and "
-          "landmarks",
-          Mode::kSerial,
-          {{"frame", frame_port()}, {"features", features_port()}},
-          {{"track", track_port()}, {"maps", maps_port()}},
-          [] { return std::make_unique<TrackStage>(); }};
+  return stage_type<TrackStage>(
+      "track",
+      "Tracks each robot's camera with points, lines and depth, and keeps its map of keyframes and landmarks",
+      Mode::kSerial, {{"frame", frame_port()}, {"features", features_port()}},
+      {{"track", track_port()}, {"maps", maps_port()}});
 }
 
 }  // namespace plumbline::pipeline

@@ -2,7 +2,9 @@
 #pragma once
 
 // The stage types of this library, one file each: stage_<name>.cpp. registry.cpp lists them.
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plumbline/pipeline/data.hpp"
@@ -15,6 +17,19 @@ struct FrameReport;
 namespace plumbline::pipeline {
 
 struct RunSummary;
+
+/// The type of the stages that T is.
+template <typename T>
+StageType stage_type(std::string name, std::string help, Mode mode, std::vector<Port> inputs,
+                     std::vector<Port> outputs, bool exports = false) {
+  return {std::move(name),
+          std::move(help),
+          mode,
+          std::move(inputs),
+          std::move(outputs),
+          [] { return std::make_unique<T>(); },
+          exports};
+}
 
 StageType read_stage();
 StageType features_stage();

@@ -24,13 +24,11 @@ std::string columns_of(const mapping::BundleReport& b) {
 }  // namespace
 
 const char* const kRowColumns =
-    "stamp,reference,keyframe,relocalised,points,points_rms,lines,lines_rms,surface,surface_rms,photometric,"
-    "photometric_rms,min_"
-    "eigenvalue,"
-    "weak_directions,frames_since_keyframe,shared,overlap,parallax,rotation_rad,mapper_idle,cone_candidate,"
-    "cone_shared,cone_matched,cone_all,cone_changed,cone_theta,cone_beta,cone_alpha,cone_initial,cone_"
-    "adaptive,"
-    "cone_ecog,cone_offset,wanted,urgent,bundle,bundle_cost,bundle_outliers,bundle_refused";
+    "stamp,reference,keyframe,relocalised,points,points_rms,lines,lines_rms,surface,surface_rms,"
+    "photometric,photometric_rms,min_eigenvalue,weak_directions,frames_since_keyframe,shared,overlap,"
+    "parallax,rotation_rad,mapper_idle,cone_candidate,cone_shared,cone_matched,cone_all,cone_changed,"
+    "cone_theta,cone_beta,cone_alpha,cone_initial,cone_adaptive,cone_ecog,cone_offset,wanted,urgent,"
+    "bundle,bundle_cost,bundle_outliers,bundle_refused";
 
 std::string row_columns(const mapping::FrameReport& r) {
   const mapping::KeyframeDecision& d = r.decision;

@@ -4,7 +4,6 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>

@@ -30,7 +30,7 @@ core::Result<WaitingClouds> WaitingClouds::create(const RunContext& context) {
     clouds.file_ = context.output_folder / fmt::format(".clouds-{}.db", i);
   }
   auto writer = maps::StoreWriter::create(clouds.file_, {}, maps::StoreUse::kInOneGo);
-  if (!writer) return tl::unexpected<core::Error>(writer.error());
+  if (!writer) return tl::unexpected(writer.error());
   clouds.writer_.emplace(std::move(*writer));
   return clouds;
 }
@@ -40,12 +40,12 @@ core::Result<void> WaitingClouds::append(const KeyframeCloud& cloud) {
   if (!cloud.id.valid()) arrivals_.emplace(cloud.frame, arrivals_.size() + 1);
   if (!writer_) return {};
   const auto waiting = store_cloud_of(cloud);
-  return waiting ? writer_->add_cloud(*waiting) : tl::unexpected<core::Error>(waiting.error());
+  return waiting ? writer_->add_cloud(*waiting) : tl::unexpected(waiting.error());
 }
 
 core::Result<const maps::StoreReader*> WaitingClouds::open() {
   auto reader = maps::StoreReader::open(file_);
-  if (!reader) return tl::unexpected<core::Error>(reader.error());
+  if (!reader) return tl::unexpected(reader.error());
   reader_.emplace(std::move(*reader));
   return &*reader_;
 }

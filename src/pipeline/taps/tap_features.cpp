@@ -2,8 +2,6 @@
 // Tap of features: a table a frame.
 #include <fmt/format.h>
 
-#include <memory>
-
 #include "plumbline/core/output_file.hpp"
 #include "stages/stages.hpp"
 #include "taps/tap_file.hpp"
@@ -13,14 +11,14 @@ namespace {
 
 class FeaturesTap : public Tap {
  public:
-  FeaturesTap() : Tap(TapFile::Count::kFrames, {".csv"}) {}
+  FeaturesTap() : Tap(Count::kFrames, {".csv"}) {}
   core::Result<void> process(StageIo& io) override {
-    if (file_.skips(io.frame())) return {};
+    if (skips(io.frame())) return {};
     const auto features = io.input<features::FrameFeatures>("in");
-    core::OutputFile out(file_.path(io.frame()));
+    core::OutputFile out(path(io.frame()));
     out.write(
-        "kind,x_px,y_px,end_x_px,end_y_px,depth_m,octave,angle_deg,response,"
-        "start_x_m,start_y_m,start_z_m,end_x_m,end_y_m,end_z_m\n");
+        "kind,x_px,y_px,end_x_px,end_y_px,depth_m,octave,angle_deg,response,start_x_m,start_y_m,start_z_m,"
+        "end_x_m,end_y_m,end_z_m\n");
     for (const features::PointFeature& p : features->points) {
       const std::string depth = p.depth > 0.0F ? fmt::format("{:.4f}", p.depth) : "";
       out.write(fmt::format("point,{:.2f},{:.2f},,,{},{},{:.2f},{:.6g},,,,,,\n", p.pixel.x(), p.pixel.y(),
@@ -46,15 +44,10 @@ class FeaturesTap : public Tap {
 }  // namespace
 
 StageType features_tap() {
-  return {
-      "features",
-      "Points and lines of a frame, one a line: pixels, depth, and the 3D ends (camera frame) of lines that "
-      "have them",
-      Mode::kStateless,
-      {{"in", features_port()}},
-      {},
-      [] { return std::make_unique<FeaturesTap>(); },
-      true};
+  return tap_type<FeaturesTap>(features_port(),
+                               "Points and lines of a frame, one a line: pixels, depth, and the 3D ends "
+                               "(camera frame) of lines that have them",
+                               Mode::kStateless);
 }
 
 }  // namespace plumbline::pipeline

@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <system_error>
 
 #include "plumbline/core/output_file.hpp"
 
@@ -13,7 +12,7 @@ namespace plumbline::pipeline {
 
 namespace fs = std::filesystem;
 
-void TapFile::declare(core::OptionTable& table) {
+void Tap::declare(core::OptionTable& table) {
   table.text("file", file_,
              count_ == Count::kOne
                  ? fmt::format("Below the result folder; ends with {}", fmt::join(endings_, " or "))
@@ -22,8 +21,8 @@ void TapFile::declare(core::OptionTable& table) {
   if (count_ == Count::kFrames) table.integer("every", every_, {1, 100000}, "", "Every n-th frame");
 }
 
-void TapFile::check(const core::ConfigMark& mark, const std::string& path,
-                    core::ConfigProblems& problems) const {
+void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
+                core::ConfigProblems& problems) {
   const auto refuse = [&](std::string what) { problems.push_back({mark, path + ".file", std::move(what)}); };
   const std::string example = (count_ != Count::kOne ? "tap/*" : "tap") + endings_[0];
   if (file_.empty()) return refuse(fmt::format("a tap needs a file, e.g. file: {}", example));
@@ -48,17 +47,17 @@ void TapFile::check(const core::ConfigMark& mark, const std::string& path,
   }
 }
 
-std::string TapFile::with(const std::string& middle) const {
+std::string Tap::with(const std::string& middle) const {
   const fs::path file(file_);
   return (file.parent_path() / (file.stem().string() + middle + ending())).string();
 }
 
-core::Result<void> TapFile::start(const RunContext& context) {
+core::Result<void> Tap::start(const RunContext& context) {
   result_folder_ = context.output_folder;
-  return core::make_folder(folder());
+  return core::make_folder(path().parent_path());
 }
 
-fs::path TapFile::path(std::size_t number, const std::string& middle) const {
+fs::path Tap::path(std::size_t number, const std::string& middle) const {
   std::string name = with(middle);
   const std::size_t star = name.find('*');
   if (star != std::string::npos) name.replace(star, 1, fmt::format("{:06}", number));

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Tap of frames: PNG images as rectified. Named frame-*.png they are a recording that can be read again.
-#include <fmt/format.h>
 
 #include <cmath>
-#include <memory>
 #include <opencv2/core/mat.hpp>
 
 #include "plumbline/core/output_file.hpp"
@@ -19,35 +17,31 @@ core::Result<void> write_png(const std::filesystem::path& file, const cv::Mat& i
   constexpr int kQuick = 1;
   const auto bytes = dataset::encode_png(image, kQuick);
   if (!bytes) return core::failure(bytes.error().kind, file.string() + ": " + bytes.error().message);
-  core::OutputFile out(file);
-  out.write(bytes->data(), bytes->size());
-  return out.commit();
+  return core::write_file(file, *bytes);
 }
 
 class FrameTap : public Tap {
  public:
-  FrameTap() : Tap(TapFile::Count::kFrames, {".png"}) {}
+  FrameTap() : Tap(Count::kFrames, {".png"}) {}
   [[nodiscard]] std::vector<std::string> files() const override {
-    return {file_.with(".color"), file_.with(".depth"), camera_name()};
+    return {with(".color"), with(".depth"), camera_name()};
   }
 
   core::Result<void> start(const RunContext& context) override {
-    if (auto made = file_.start(context); !made) return made;
+    if (auto made = Tap::start(context); !made) return made;
     sensor::Camera camera = context.source->camera();
     camera.distortion = {};  // frames are rectified and registered
     camera.depth_slope = {};
     camera.color_from_depth.reset();
     camera.depth.reset();
     depth_scale_ = camera.depth_scale;
-    core::OutputFile out(file_.folder() / "camera.yaml");
-    out.write(sensor::to_yaml(camera));
-    return out.commit();
+    return core::write_file(path().parent_path() / "camera.yaml", sensor::to_yaml(camera));
   }
 
   core::Result<void> process(StageIo& io) override {
-    if (file_.skips(io.frame())) return {};
+    if (skips(io.frame())) return {};
     const auto frame = io.input<sensor::RgbdFrame>("in");
-    if (auto written = write_png(file_.path(io.frame(), ".color"), frame->color); !written) return written;
+    if (auto written = write_png(path(io.frame(), ".color"), frame->color); !written) return written;
     constexpr double kLargest = 65534.0;  // 65535 means no measurement
     cv::Mat raw(frame->depth.size(), CV_16UC1);
     for (int row = 0; row < raw.rows; ++row) {
@@ -58,12 +52,12 @@ class FrameTap : public Tap {
             units > 0.0 && units <= kLargest ? static_cast<std::uint16_t>(units) : std::uint16_t{0};
       }
     }
-    return write_png(file_.path(io.frame(), ".depth"), raw);
+    return write_png(path(io.frame(), ".depth"), raw);
   }
 
  private:
   [[nodiscard]] std::string camera_name() const {
-    return (std::filesystem::path(file_.name()).parent_path() / "camera.yaml").string();
+    return (std::filesystem::path(with("")).parent_path() / "camera.yaml").string();
   }
 
   double depth_scale_ = 5000.0;
@@ -72,15 +66,10 @@ class FrameTap : public Tap {
 }  // namespace
 
 StageType frame_tap() {
-  return {
-      "frame",
-      "Colour and depth (16 bit, at the camera's depth_scale) with a camera.yaml beside; as frame-*.png a "
-      "recording of its own",
-      Mode::kStateless,
-      {{"in", frame_port()}},
-      {},
-      [] { return std::make_unique<FrameTap>(); },
-      true};
+  return tap_type<FrameTap>(frame_port(),
+                            "Colour and depth (16 bit, at the camera's depth_scale) with a camera.yaml "
+                            "beside; as frame-*.png a recording of its own",
+                            Mode::kStateless);
 }
 
 }  // namespace plumbline::pipeline

@@ -82,14 +82,14 @@ TEST_F(OutputFolders, WhatAKilledRunLeftIsTakenOver) {
   std::ofstream(folder_ / "out.partial" / ".plumbline-unfinished") << "x";
   std::ofstream(folder_ / "out.partial" / "map.db") << "half";
   {
-    const auto out = OutputFolder::resume(folder_ / "out", false);
+    const auto out = OutputFolder::prepare(folder_ / "out", false, true);
     ASSERT_TRUE(out) << out.error().message;
     EXPECT_EQ(out->path(), OutputFolder::partial_of(folder_ / "out"));
     EXPECT_TRUE(fs::exists(out->path() / "map.db"));
-    EXPECT_FALSE(OutputFolder::resume(folder_ / "out", false)) << "one at a time";
+    EXPECT_FALSE(OutputFolder::prepare(folder_ / "out", false, true)) << "one at a time";
   }
   EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "map.db")) << "it failed, and the next one may go on";
-  auto out = OutputFolder::resume(folder_ / "out", false);
+  auto out = OutputFolder::prepare(folder_ / "out", false, true);
   ASSERT_TRUE(out) << out.error().message;
   ASSERT_TRUE(out->commit());
   EXPECT_TRUE(fs::exists(folder_ / "out" / "map.db"));
@@ -100,9 +100,9 @@ TEST_F(OutputFolders, WhatAKilledRunLeftIsTakenOver) {
 TEST_F(OutputFolders, WhatIsNobodysIsNotTakenOver) {
   fs::create_directories(folder_ / "out.partial");
   std::ofstream(folder_ / "out.partial" / "thesis.txt") << "x";
-  EXPECT_EQ(OutputFolder::resume(folder_ / "out", false).error().kind, core::ErrorKind::kUsage);
+  EXPECT_EQ(OutputFolder::prepare(folder_ / "out", false, true).error().kind, core::ErrorKind::kUsage);
   EXPECT_TRUE(fs::exists(folder_ / "out.partial" / "thesis.txt"));
-  const auto fresh = OutputFolder::resume(folder_ / "other", false);
+  const auto fresh = OutputFolder::prepare(folder_ / "other", false, true);
   ASSERT_TRUE(fresh) << "nothing there is no error";
 }
 

@@ -123,8 +123,7 @@ TEST_F(Nonsense, IsNamed) {
            "its head is damaged");  // 8 kB that would unpack to 65 MB
   contains(refusal("point",
                    [&](StoreRow& row) {
-                     std::vector<MapPoint> points;
-                     decode_page(unpacked(row), points);
+                     auto points = decode_page<MapPoint>(unpacked(row));
                      points.push_back(points.back());
                      put(row, [&](ByteWriter& to) {
                        for (const MapPoint& p : points) encode(p, to);
@@ -133,8 +132,7 @@ TEST_F(Nonsense, IsNamed) {
            "a landmark is there twice");
   contains(refusal("point",
                    [&](StoreRow& row) {
-                     std::vector<MapPoint> points;
-                     decode_page(unpacked(row), points);
+                     auto points = decode_page<MapPoint>(unpacked(row));
                      points.front().observations.front().keyframe.index = 2147483647;
                      put(row, [&](ByteWriter& to) {
                        for (const MapPoint& p : points) encode(p, to);

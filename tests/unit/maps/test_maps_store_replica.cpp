@@ -236,12 +236,11 @@ TEST(StoreReplica, MutatedRowsAreRefusedAndDoNoHarm) {
 TEST(Ledger, KeepsTexts) {
   const StoreFolder folder;
   const Ledger ledger(folder.path / "network.db");
-  EXPECT_EQ(ledger.get("run").value(), std::nullopt);
+  EXPECT_TRUE(ledger.all()->empty());
   ASSERT_TRUE(ledger.put({{"run", "7f"}, {"hub", "a'; DROP TABLE text"}}));
   ASSERT_TRUE(ledger.put({{"run", "80"}}));
-  EXPECT_EQ(ledger.get("run").value(), "80");
-  EXPECT_EQ(ledger.get("hub").value(), "a'; DROP TABLE text");
-  EXPECT_EQ(ledger.all()->size(), 2U);
+  const std::map<std::string, std::string> kept{{"run", "80"}, {"hub", "a'; DROP TABLE text"}};
+  EXPECT_EQ(ledger.all().value(), kept);
   EXPECT_EQ(Ledger(folder.path / "none" / "network.db").put({{"a", "b"}}).error().kind,
             core::ErrorKind::kOutput);
   StoreWorld world(35);
