@@ -66,6 +66,7 @@ core::Result<void> Session::equip(pipeline::RunRequest& request) const {
 }
 
 int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output) {
+  console().end_progress();
   if (!summary) return fail(summary.error());
   if (!quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), output.string());
   if (summary->reason.empty()) return 0;
@@ -85,6 +86,14 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
                       "Folder of the shipped pipelines and cameras");
   command->callback([&session, run = std::move(run)] { session.command = run; });
   return command;
+}
+
+CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
+                      std::function<core::Result<void>()> run) {
+  return add_command(parent, session, name, help, [&session, run = std::move(run)]() -> int {
+    const auto done = run();
+    return done ? 0 : session.fail(done.error());
+  });
 }
 
 void add_plugin_option(CLI::App& command, Session& session) {
@@ -127,20 +136,10 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(kFooter);
   Session session;
-  add_map(app, session);
-  add_fuse(app, session);
-  add_hub(app, session);
-  add_robot(app, session);
-  add_keys(app, session);
-  add_calibrate(app, session);
-  add_info(app, session);
-  add_render(app, session);
-  add_export(app, session);
-  add_report(app, session);
-  add_evaluate(app, session);
-  add_synth(app, session);
-  add_filter(app, session);
-  add_pipelines(app, session);
+  for (const auto add : {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_info, add_render,
+                         add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines}) {
+    add(app, session);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

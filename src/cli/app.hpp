@@ -39,7 +39,7 @@ struct Session {
   const core::Executor& executor();
   /// Prints the error and gives its exit code.
   int fail(const core::Error& error);
-  /// Tells what a run came to, which wrote `output`, and gives its exit code.
+  /// Ends the progress of a run, tells what it came to, which wrote `output`, and gives its exit code.
   int finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output);
 
  private:
@@ -50,6 +50,9 @@ struct Session {
 /// A command below `parent` with --help, --version, -q, -v, --threads and --pipelines-dir.
 CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
                       std::function<int()> run);
+/// The same; the exit code is 0, or that of the error, which is printed.
+CLI::App* add_command(CLI::App& parent, Session& session, const std::string& name, const std::string& help,
+                      std::function<core::Result<void>()> run);
 /// --plugin FILE.so, for commands that use filters.
 void add_plugin_option(CLI::App& command, Session& session);
 /// -p, --set, --plugin and --force.

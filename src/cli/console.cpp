@@ -18,14 +18,7 @@ constexpr std::size_t kBarWidth = 30;
 void put(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
 
 const char* label(core::LogLevel level) {
-  switch (level) {
-    case core::LogLevel::kWarning:
-      return "warning: ";
-    case core::LogLevel::kError:
-      return "error: ";
-    default:
-      return "";
-  }
+  return level == core::LogLevel::kWarning ? "warning: " : level == core::LogLevel::kError ? "error: " : "";
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 // Messages and progress on stderr that do not run into each other; stdout is for results.
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <mutex>
 #include <string>
 
@@ -20,6 +21,10 @@ class Console : public core::Log {
 
   /// A bar with rate and time left on a terminal, a line every few seconds elsewhere; nothing when quiet.
   void progress(std::size_t done, std::size_t total, const char* what);
+  /// progress() for those who only tell how much is done.
+  [[nodiscard]] std::function<void(std::size_t, std::size_t)> counting(const char* what) {
+    return [this, what](std::size_t done, std::size_t total) { progress(done, total, what); };
+  }
   /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet. While
   /// there is a bar, it stands behind that.
   void status(const std::string& line);

@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <iterator>
 #include <memory>
-#include <system_error>
 
 #include "plumbline/cloud/ply.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -37,7 +36,8 @@ double color_end_m(const std::vector<float>& errors) {
   return 10.0 * decade;
 }
 
-cloud::PlyData as_ply(const ErrorCloud& cloud, double end_m) {
+cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m,
+                      double end_m) {
   cloud::PlyData ply;
   const auto add_vectors = [&ply](const std::vector<Eigen::Vector3f>& vectors,
                                   const std::array<const char*, 3>& names) {
@@ -51,7 +51,7 @@ cloud::PlyData as_ply(const ErrorCloud& cloud, double end_m) {
   add_vectors(cloud.points, {"x", "y", "z"});
   if (!cloud.normals.empty()) add_vectors(cloud.normals, {"nx", "ny", "nz"});
   std::array<std::vector<std::uint8_t>, 3> rgb;
-  for (const float e : cloud.error_m) {
+  for (const float e : error_m) {
     const viz::Rgb c = viz::sequential_color(static_cast<double>(e) / end_m);
     rgb[0].push_back(c.r);
     rgb[1].push_back(c.g);
@@ -60,15 +60,14 @@ cloud::PlyData as_ply(const ErrorCloud& cloud, double end_m) {
   ply.add("red", std::move(rgb[0]));
   ply.add("green", std::move(rgb[1]));
   ply.add("blue", std::move(rgb[2]));
-  ply.add("error", cloud.error_m);
+  ply.add("error", error_m);
   ply.comments = {"error: distance in metres",
                   fmt::format("colours: 0 (dark blue) to {:g} mm and more (yellow)", 1000.0 * end_m)};
   return ply;
 }
 
-viz::Scene as_scene(const ErrorCloud& cloud) {
+viz::Scene as_scene(const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m) {
   viz::Scene scene;
-  scene.title = cloud.title;
   auto points = std::make_shared<pcl::PointCloud<pcl::PointXYZRGBNormal>>();
   points->resize(cloud.points.size());
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
@@ -78,28 +77,25 @@ viz::Scene as_scene(const ErrorCloud& cloud) {
   }
   scene.cloud = points;
   scene.scalar_label = "error (mm)";
-  scene.scalars.reserve(cloud.error_m.size());
-  for (const float e : cloud.error_m) scene.scalars.push_back(1000.0F * e);
-  for (const geometry::Trajectory& camera : cloud.cameras) {
-    viz::CameraPath path;
-    path.trajectory = camera;
-    path.color = {90, 94, 102};
-    scene.paths.push_back(std::move(path));
-  }
+  for (const float e : error_m) scene.scalars.push_back(1000.0F * e);
   return scene;
 }
 
 }  // namespace
 
-core::Result<void> write_error_cloud(const ErrorCloud& cloud, const std::filesystem::path& folder,
-                                     const std::string& name) {
-  if (auto made = core::make_folder(folder); !made) return made;
-  const double end_m = color_end_m(cloud.error_m);
-  if (auto done = cloud::write_ply(folder / (name + ".ply"), as_ply(cloud, end_m)); !done) return done;
+core::Result<void> write_error_cloud(const std::filesystem::path& file, const std::string& title,
+                                     const evaluate::SurfaceSamples& cloud, const std::vector<float>& error_m,
+                                     const std::vector<geometry::Trajectory>& cameras) {
+  if (auto made = core::make_folder(file.parent_path()); !made) return made;
+  const double end_m = color_end_m(error_m);
+  if (auto done = cloud::write_ply(file.string() + ".ply", as_ply(cloud, error_m, end_m)); !done) return done;
+  viz::Scene scene = as_scene(cloud, error_m);
+  scene.title = title;
+  for (const geometry::Trajectory& camera : cameras) scene.paths.push_back({"", camera, {90, 94, 102}, {}});
   viz::SnapshotOptions options;
   options.color = viz::ColorMode::kError;
   options.scalar_range = {0.0, 1000.0 * end_m};
-  return viz::render_snapshot(as_scene(cloud), options, folder / (name + ".png"));
+  return viz::render_snapshot(scene, options, file.string() + ".png");
 }
 
 }  // namespace plumbline::cli

@@ -38,41 +38,30 @@ std::string value_name(const core::OptionSpec& spec) {
 
 }  // namespace
 
-OptionFlags::OptionFlags(CLI::App& app, core::OptionTable& table, const std::vector<std::string>& left_out)
-    : table_(table) {
-  for (const core::OptionSpec& spec : table.specs()) {
-    if (std::find(left_out.begin(), left_out.end(), spec.key) != left_out.end()) continue;
-    auto flag = std::make_unique<Flag>();
-    flag->key = spec.key;
-    flag->type = spec.type;
+void OptionFlags::add_flags() {
+  for (const core::OptionSpec& spec : table_.specs()) {
     const bool shows_default = !spec.default_value.empty() && spec.default_value != "\"\"";
-    flag->option =
-        app.add_option(
-               flag_name(spec.key), flag->text,
-               shows_default ? fmt::format("{} (default: {})", spec.help, spec.default_value) : spec.help)
-            ->type_name(value_name(spec));
-    flags_.push_back(std::move(flag));
+    const std::string help =
+        shows_default ? fmt::format("{} (default: {})", spec.help, spec.default_value) : spec.help;
+    command_->add_option(flag_name(spec.key), help)->type_name(value_name(spec));
   }
 }
 
 core::Result<void> OptionFlags::apply() {
   core::ConfigProblems problems;
-  for (const auto& flag : flags_) {
-    if (flag->option->count() == 0) continue;
+  for (const core::OptionSpec& spec : table_.specs()) {
+    const std::string name = flag_name(spec.key);
+    const CLI::Option& flag = *command_->get_option(name);
+    if (flag.count() == 0) continue;
     core::ConfigNode value;
     value.kind = core::ConfigNode::Kind::kScalar;
-    value.scalar = flag->text;
-    if (flag->type == core::OptionType::kNumbers) {
-      auto list = core::parse_yaml(flag->text, "");
-      if (list) value = std::move(*list);
+    value.scalar = flag.as<std::string>();
+    if (spec.type == core::OptionType::kNumbers) {
+      if (auto list = core::parse_yaml(value.scalar, "")) value = std::move(*list);
     }
     core::ConfigProblems found;
-    table_.set(flag->key, value, "", found);
-    for (core::ConfigProblem& problem : found) {
-      problem.mark = {};
-      problem.path = flag_name(flag->key);
-      problems.push_back(std::move(problem));
-    }
+    table_.set(spec.key, value, "", found);
+    for (core::ConfigProblem& problem : found) problems.push_back({{}, name, std::move(problem.what)});
   }
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
   return {};

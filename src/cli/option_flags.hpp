@@ -3,9 +3,6 @@
 
 // Declared options as flags of a command: `max_depth` becomes --max-depth VALUE.
 #include <CLI/CLI.hpp>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/options.hpp"
@@ -14,21 +11,22 @@ namespace plumbline::cli {
 
 class OptionFlags {
  public:
-  /// Adds a flag for every option of `table` but those in `left_out`. Table and app outlive this.
-  OptionFlags(CLI::App& app, core::OptionTable& table, const std::vector<std::string>& left_out = {});
+  /// Adds a flag for each of the `options`, which outlive this, as does the command.
+  template <typename Options>
+  void add(CLI::App& command, Options& options) {
+    command_ = &command;
+    options.declare(table_);
+    add_flags();
+  }
 
   /// Sets what was given on the command line; all problems at once, each naming its flag.
   core::Result<void> apply();
 
  private:
-  struct Flag {
-    std::string key;
-    core::OptionType type;
-    std::string text;
-    CLI::Option* option = nullptr;
-  };
-  core::OptionTable& table_;
-  std::vector<std::unique_ptr<Flag>> flags_;
+  void add_flags();
+
+  CLI::App* command_ = nullptr;
+  core::OptionTable table_;
 };
 
 }  // namespace plumbline::cli

@@ -20,10 +20,8 @@ core::Result<fs::path> find_pipelines_folder(const std::string& chosen) {
   for (const fs::path& folder : {installed, fs::path(PLUMBLINE_SOURCE_PIPELINES)}) {
     if (fs::is_directory(folder, ec)) return folder;
   }
-  return core::usage_error(
-      fmt::format("{}: the shipped pipelines are not there; name their folder with "
-                  "--pipelines-dir",
-                  installed.string()));
+  return core::usage_error(fmt::format(
+      "{}: the shipped pipelines are not there; name their folder with --pipelines-dir", installed.string()));
 }
 
 std::string display_name(const fs::path& path) {

@@ -26,16 +26,16 @@ void on_signal(int signal) {
 
 }  // namespace
 
-void stop_on_signals(const core::StopToken& stop) {
-  static core::StopToken kept;
-  kept = stop;
-  stop_token = &kept;
+const core::StopToken& stop_on_signals() {
+  static const core::StopToken stop;
+  stop_token = &stop;
   struct sigaction action = {};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  return stop;
 }
 
 void ignore_write_signals() {

@@ -5,9 +5,8 @@
 
 namespace plumbline::cli {
 
-/// From now on the first Ctrl-C (or SIGTERM) asks `stop` to end the run in order, the second ends the
-/// program.
-void stop_on_signals(const core::StopToken& stop);
+/// What from now on the first Ctrl-C (or SIGTERM) asks to end the run in order; the second ends the program.
+const core::StopToken& stop_on_signals();
 
 /// A full disk's or a closed pipe's signal becomes an error of the write, which can be told.
 void ignore_write_signals();

@@ -3,7 +3,6 @@
 
 // A surface that distances are measured to, be it triangles or samples.
 #include <Eigen/Core>
-#include <cstdint>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"

@@ -31,8 +31,6 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
 std::vector<Eigen::Vector3f> known_normals(const std::vector<Eigen::Vector3f>& given, const PointIndex& index,
                                            const core::Executor& executor);
 
-void move(const geometry::Rigid3& target_from_source, SurfaceSamples& samples);
-
 double surface_area(const TriangleMesh& mesh);
 
 }  // namespace plumbline::evaluate

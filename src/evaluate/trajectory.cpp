@@ -81,8 +81,7 @@ std::string too_few_message(std::size_t matched, std::size_t needed, const Traje
   }
   return fmt::format(
       "only {} of {} poses have truth within {} s of their stamp, {} are needed ({}): is the truth complete, "
-      "or "
-      "max_dt too small?",
+      "or max_dt too small?",
       matched, estimate.size(), max_dt_s, needed, ranges);
 }
 
@@ -225,8 +224,7 @@ void add_warnings(const std::vector<Match>& matches, TrajectoryReport& report) {
   if (report.align == TrajectoryAlignment::kSe3 && !positions_fix_rotation(matches)) {
     report.warnings.push_back(
         "the matched positions lie on one line or at one place: the alignment's rotation is not determined, "
-        "and "
-        "ATE says little");
+        "and ATE says little");
   }
   if (2 * report.matched < report.estimated) {
     report.warnings.push_back(

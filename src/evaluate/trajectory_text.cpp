@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 
 namespace plumbline::evaluate {
@@ -15,15 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* name_of(TrajectoryAlignment align) {
-  switch (align) {
-    case TrajectoryAlignment::kNone:
-      return "none";
-    case TrajectoryAlignment::kSe3:
-      return "se3";
-    case TrajectoryAlignment::kStart:
-      return "start";
-  }
-  return "";
+  return align == TrajectoryAlignment::kNone ? "none" : align == TrajectoryAlignment::kSe3 ? "se3" : "start";
 }
 
 Json json_of(const Statistics& s) {
@@ -49,43 +42,6 @@ std::string row(const std::string& name, const Statistics& s, const char* unit) 
   return fmt::format("{:<22} {:>10.6f} {:>10.6f} {:>10.6f} {:>10.6f} {:>10.6f} {:>10.6f}  {}\n", name, s.rmse,
                      s.mean, s.median, s.min, s.max, s.std, unit);
 }
-
-}  // namespace
-
-core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list) {
-  std::ifstream in(list);
-  if (!in) return core::input_error(fmt::format("{}: cannot be read", list.string()));
-  std::vector<double> stamps;
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    std::istringstream fields(line);
-    std::string first;
-    if (!(fields >> first) || first[0] == '#') continue;
-    std::istringstream value(first);
-    value.imbue(std::locale::classic());
-    double stamp = 0.0;
-    if (!(value >> stamp) || !value.eof() || !std::isfinite(stamp)) {
-      return core::input_error(
-          fmt::format("{}:{}: '{}' is not a time stamp in seconds", list.string(), number, first));
-    }
-    stamps.push_back(stamp);
-  }
-  if (stamps.empty()) return core::input_error(fmt::format("{}: lists no frames", list.string()));
-  std::sort(stamps.begin(), stamps.end());
-  return stamps;
-}
-
-Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& r) {
-  constexpr double kDegrees = 180.0 / 3.14159265358979323846;
-  const double pitch = std::asin(std::clamp(-r(2, 0), -1.0, 1.0));
-  if (std::abs(r(2, 0)) >
-      1.0 - 1e-12) {  // gimbal lock: roll and yaw turn about one axis, all of it is called yaw
-    return Eigen::Vector3d(0.0, pitch, std::atan2(-r(0, 1), r(1, 1))) * kDegrees;
-  }
-  return Eigen::Vector3d(std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))) * kDegrees;
-}
-
-namespace {
 
 Json json_of(const TrajectoryReport& r) {
   Json per_axis = Json::object();
@@ -117,6 +73,27 @@ Json json_of(const TrajectoryReport& r) {
 }
 
 }  // namespace
+
+core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list) {
+  std::ifstream in(list);
+  if (!in) return core::input_error(fmt::format("{}: cannot be read", list.string()));
+  std::vector<double> stamps;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    std::istringstream fields(line);
+    std::string first;
+    if (!(fields >> first) || first[0] == '#') continue;
+    const auto stamp = core::to_number(first);
+    if (!stamp || !std::isfinite(*stamp)) {
+      return core::input_error(
+          fmt::format("{}:{}: '{}' is not a time stamp in seconds", list.string(), number, first));
+    }
+    stamps.push_back(*stamp);
+  }
+  if (stamps.empty()) return core::input_error(fmt::format("{}: lists no frames", list.string()));
+  std::sort(stamps.begin(), stamps.end());
+  return stamps;
+}
 
 std::string to_json(const TrajectoryReport& r) { return json_of(r).dump(2) + "\n"; }
 

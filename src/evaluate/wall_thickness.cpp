@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -15,13 +16,14 @@
 #include "plumbline/core/random.hpp"
 #include "plumbline/evaluate/statistics.hpp"
 #include "point_index.hpp"
-#include "voxel_buckets.hpp"
 
 namespace plumbline::evaluate {
 namespace {
 
 using Points = std::vector<Eigen::Vector3f>;
 using PointIndices = std::vector<std::uint32_t>;
+using Voxel = std::array<std::int64_t, 3>;
+using Voxels = std::map<Voxel, PointIndices>;  ///< those that hold points, ordered by x, y, z
 
 constexpr std::size_t kLeastPatchPoints = 20;
 constexpr std::size_t kLeastCellPoints = 8;
@@ -100,21 +102,31 @@ std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& v
   return best;
 }
 
+Voxels voxels_of(const Points& points, double edge_m) {
+  Voxels voxels;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Array3d at = (points[i].cast<double>() / edge_m).array().floor().max(-1e15).min(1e15);
+    const Eigen::Array<std::int64_t, 3, 1> cell = at.cast<std::int64_t>();
+    voxels[{cell.x(), cell.y(), cell.z()}].push_back(static_cast<std::uint32_t>(i));
+  }
+  return voxels;
+}
+
 class PatchMeasure {
  public:
-  PatchMeasure(const SurfaceSamples& cloud, double spacing_m, const WallThicknessOptions& options)
-      : cloud_(cloud), options_(options), buckets_(cloud.points, options.patch_m) {
+  PatchMeasure(const SurfaceSamples& cloud, const Voxels& voxels, double spacing_m,
+               const WallThicknessOptions& options)
+      : cloud_(cloud), voxels_(voxels), options_(options) {
     const double cell = std::max(options.cell_m, 4.0 * spacing_m);  // some 16 points a cell and layer
     cells_ =
         std::clamp(static_cast<std::size_t>(options.patch_m / cell + 1e-9), std::size_t{1}, std::size_t{50});
   }
 
-  [[nodiscard]] std::size_t voxels() const { return buckets_.size(); }
-
-  [[nodiscard]] std::optional<WallPatch> measure(std::size_t voxel) const {
-    const PointIndices own = buckets_.points_of(voxel);
+  /// `seed`: of the random choices.
+  [[nodiscard]] std::optional<WallPatch> measure(const Voxel& voxel, std::uint64_t seed) const {
+    const PointIndices& own = voxels_.at(voxel);
     if (own.size() < kLeastPatchPoints) return std::nullopt;
-    auto plane = main_plane(cloud_.points, own, options_.flatness_m, core::SplitMix(voxel));
+    auto plane = main_plane(cloud_.points, own, options_.flatness_m, core::SplitMix(seed));
     if (!plane) return std::nullopt;
     const PointIndices main = within(cloud_.points, own, *plane, options_.flatness_m);
     if (main.size() < kLeastPatchPoints) return std::nullopt;
@@ -147,17 +159,21 @@ class PatchMeasure {
 
   /// Points around the patch, before and behind it; those of neighbouring voxels too, since a wall's second
   /// layer may lie just beyond the voxel's border.
-  [[nodiscard]] PointIndices gather(std::size_t voxel, const LocalPlane& plane) const {
+  [[nodiscard]] PointIndices gather(const Voxel& voxel, const LocalPlane& plane) const {
     constexpr double kMargin = 1.2;  // the plane still turns a little
     PointIndices near;
-    buckets_.for_neighborhood(voxel, [&](std::uint32_t i) {
+    const auto take = [&](std::uint32_t i) {
       const Eigen::Vector3d d = cloud_.points[i].cast<double>() - plane.center;
       const double h = plane.normal.dot(d);
       if (std::abs(h) > kMargin * options_.max_spacing_m) return;
       if ((d - h * plane.normal).squaredNorm() > kMargin * 0.5 * options_.patch_m * options_.patch_m) return;
       if (!cloud_.normals.empty() && !(cloud_.normals[i].cast<double>().dot(plane.normal) > 0.5)) return;
       near.push_back(i);
-    });
+    };
+    for (int k = 0; k < 27; ++k) {
+      const auto found = voxels_.find({voxel[0] + k / 9 - 1, voxel[1] + k / 3 % 3 - 1, voxel[2] + k % 3 - 1});
+      if (found != voxels_.end()) std::for_each(found->second.begin(), found->second.end(), take);
+    }
     return near;
   }
 
@@ -230,8 +246,8 @@ class PatchMeasure {
   }
 
   const SurfaceSamples& cloud_;
+  const Voxels& voxels_;
   const WallThicknessOptions& options_;
-  VoxelBuckets buckets_;
   std::size_t cells_ = 1;  ///< along one side of a patch
 };
 
@@ -247,10 +263,13 @@ void WallThicknessOptions::declare(core::OptionTable& table) {
 
 std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_m,
                                     const WallThicknessOptions& options, const core::Executor& executor) {
-  const PatchMeasure measure(cloud, spacing_m, options);
-  std::vector<std::optional<WallPatch>> found(measure.voxels());
+  const Voxels voxels = voxels_of(cloud.points, options.patch_m);
+  const PatchMeasure measure(cloud, voxels, spacing_m, options);
+  std::vector<Voxel> places;
+  for (const auto& [place, points] : voxels) places.push_back(place);
+  std::vector<std::optional<WallPatch>> found(places.size());
   for_chunks(executor, found.size(), 16, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) found[i] = measure.measure(i);
+    for (std::size_t i = first; i < last; ++i) found[i] = measure.measure(places[i], i);
   });
   std::vector<WallPatch> patches;
   for (const auto& patch : found) {
@@ -275,11 +294,6 @@ WallThickness thickness_of(const std::vector<WallPatch>& patches) {
   wall.p90_mm = s.p90;
   if (s.count > 0) wall.layered_percent = 100.0 * static_cast<double>(layered) / static_cast<double>(s.count);
   return wall;
-}
-
-WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
-                             const WallThicknessOptions& options, const core::Executor& executor) {
-  return thickness_of(wall_patches(cloud, spacing_m, options, executor));
 }
 
 }  // namespace plumbline::evaluate

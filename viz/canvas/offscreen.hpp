@@ -5,9 +5,10 @@
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkSmartPointer.h>
 
+#include <filesystem>
 #include <memory>
+#include <opencv2/core/mat.hpp>
 
-#include "canvas/image.hpp"
 #include "plumbline/core/error.hpp"
 
 namespace plumbline::viz {
@@ -22,8 +23,8 @@ class OffscreenWindow {
   OffscreenWindow& operator=(const OffscreenWindow&) = delete;
 
   [[nodiscard]] vtkGenericOpenGLRenderWindow* window() const { return window_; }
-  /// Renders what the window holds and reads it back.
-  Image draw();
+  /// Renders what the window holds and reads it back: RGB, rows from the bottom to the top.
+  cv::Mat3b draw();
 
  private:
   OffscreenWindow() = default;
@@ -32,5 +33,8 @@ class OffscreenWindow {
   std::unique_ptr<Context> context_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> window_;
 };
+
+/// RGB, rows from the bottom to the top. The file appears whole or not at all; errors name it.
+core::Result<void> write_png(const cv::Mat3b& picture, const std::filesystem::path& file);
 
 }  // namespace plumbline::viz

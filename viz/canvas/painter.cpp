@@ -3,33 +3,13 @@
 
 #include <vtkBrush.h>
 #include <vtkContext2D.h>
-#include <vtkContextActor.h>
-#include <vtkContextItem.h>
-#include <vtkContextScene.h>
-#include <vtkNew.h>
-#include <vtkObjectFactory.h>
 #include <vtkPen.h>
 #include <vtkTextProperty.h>
 
 #include <cmath>
-#include <utility>
-
-#include "canvas/overlay_actor.hpp"
 
 namespace plumbline::viz {
 namespace {
-
-class CallbackItem : public vtkContextItem {
- public:
-  static CallbackItem* New();
-  vtkTypeMacro(CallbackItem, vtkContextItem);
-  bool Paint(vtkContext2D* painter) override {
-    if (paint) paint(painter);
-    return true;
-  }
-  std::function<void(vtkContext2D*)> paint;
-};
-vtkStandardNewMacro(CallbackItem);
 
 unsigned char alpha(double opacity) { return static_cast<unsigned char>(std::lround(255.0 * opacity)); }
 
@@ -98,14 +78,6 @@ double Painter::text_width(const std::string& text, double size_px, bool bold) {
   float bounds[4] = {0.0F, 0.0F, 0.0F, 0.0F};
   context_->ComputeStringBounds(text.c_str(), bounds);
   return static_cast<double>(bounds[2]);
-}
-
-vtkSmartPointer<vtkContextActor> make_overlay(std::function<void(vtkContext2D*)> paint) {
-  vtkNew<CallbackItem> item;
-  item->paint = std::move(paint);
-  auto actor = vtkSmartPointer<vtkContextActor>::New();
-  actor->GetScene()->AddItem(item);
-  return actor;
 }
 
 }  // namespace plumbline::viz

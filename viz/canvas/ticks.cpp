@@ -16,8 +16,8 @@ double nice_number_below(double limit) {
   return decade;
 }
 
-Ticks nice_ticks(double low, double high, double wish) {
-  Ticks ticks;
+std::vector<Tick> nice_ticks(double low, double high, double wish) {
+  std::vector<Tick> ticks;
   const double span = high - low;
   if (!(span > 0.0) || !std::isfinite(span) || !(wish > 0.0)) return ticks;
   // The step nearest to the wish rather than the one below it, which may give twice as many.
@@ -28,9 +28,8 @@ Ticks nice_ticks(double low, double high, double wish) {
   const bool scientific = step >= 1e6 || step < 1e-6;
   for (double k = std::ceil(low / step - 1e-6); k * step <= high + 1e-6 * span; k += 1.0) {
     const double value = k == 0.0 ? 0.0 : k * step;  // no "-0"
-    ticks.values.push_back(value);
-    ticks.labels.push_back(scientific ? fmt::format("{:.3g}", value)
-                                      : fmt::format("{:.{}f}", value, decimals));
+    ticks.push_back(
+        {value, scientific ? fmt::format("{:.3g}", value) : fmt::format("{:.{}f}", value, decimals)});
   }
   return ticks;
 }

@@ -48,9 +48,7 @@ core::Result<void> draw_graph(const std::string& dot, const std::filesystem::pat
     return core::failure(core::ErrorKind::kInternal, "Graphviz could not draw the graph");
   }
   const std::unique_ptr<char, void (*)(char*)> owner(bytes, gvFreeRenderData);
-  core::OutputFile out(file);
-  out.write(bytes, length);
-  return out.commit();
+  return core::write_file(file, {bytes, length});
 }
 
 }  // namespace plumbline::viz

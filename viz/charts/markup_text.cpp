@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
 #include <cstdint>
 
 #include "plumbline/viz/svg_chart.hpp"
@@ -28,28 +29,17 @@ std::size_t character_at(std::string_view text) {
 }  // namespace
 
 std::string markup_text(std::string_view text) {
+  static constexpr std::string_view kMarkup = "&<>\"'";
+  static constexpr std::array<const char*, 5> kEntities{"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
   std::string out;
   out.reserve(text.size());
   while (!text.empty()) {
     const std::size_t length = character_at(text);
-    switch (text.front()) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += length > 0 ? text.substr(0, length) : std::string_view("\xEF\xBF\xBD");
+    const std::size_t markup = kMarkup.find(text.front());
+    if (markup != std::string_view::npos) {
+      out += kEntities[markup];
+    } else {
+      out += length > 0 ? text.substr(0, length) : std::string_view("\xEF\xBF\xBD");
     }
     text.remove_prefix(length > 0 ? length : 1);
   }

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "canvas/ticks.hpp"
-#include "charts/axis_extent.hpp"
 #include "plumbline/viz/color.hpp"
 
 namespace plumbline::viz {
@@ -15,6 +15,34 @@ namespace {
 
 constexpr double kLeft = 64.0, kRight = 14.0, kTop = 8.0, kBelow = 22.0, kLabelBelow = 18.0;
 constexpr double kLeast = 260.0, kMost = 760.0;  ///< height of a plot whose axes have one scale, px
+
+/// Of the finite values.
+struct Extent {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  void include(double v) {
+    if (!std::isfinite(v)) return;
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+  void include(const std::vector<double>& values) {
+    for (const double v : values) include(v);
+  }
+  [[nodiscard]] bool empty() const { return !(low <= high); }
+  [[nodiscard]] AxisRange padded(double part) const {
+    if (empty()) return {0.0, 1.0};
+    const double span = high - low;
+    const double pad = span > 0.0 ? part * span : std::max(0.5, 0.1 * std::abs(low));
+    return {low - pad, high + pad};
+  }
+};
+
+/// About its middle.
+void widen(AxisRange& range, double factor) {
+  const double middle = 0.5 * (range.first + range.second);
+  const double half = 0.5 * (range.second - range.first) * factor;
+  range = {middle - half, middle + half};
+}
 
 /// The rectangle inside the axes, and what it shows.
 struct Plot {
@@ -116,19 +144,19 @@ std::string axes(const SvgChart& chart, const Plot& plot) {
   const double x_wish = (plot.x.second - plot.x.first) * 90.0 / plot.width;
   const double y_wish = chart.equal_aspect ? x_wish : (plot.y.second - plot.y.first) * 42.0 / plot.height;
   std::string grid, words;
-  const Ticks across = nice_ticks(plot.x.first, plot.x.second, x_wish);
-  for (std::size_t i = 0; i < across.values.size(); ++i) {
-    const double x = kLeft + plot.px(across.values[i]);
+  const auto say = [&words](double x, double y, const char* anchor, const std::string& text) {
+    words += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", x, y, anchor, text);
+  };
+  for (const Tick& tick : nice_ticks(plot.x.first, plot.x.second, x_wish)) {
+    const double x = kLeft + plot.px(tick.value);
     grid += fmt::format("M{:.1f},{:.1f}v{:.1f}", x, kTop, plot.height);
-    words += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", x,
-                         kTop + plot.height + 16.0, across.labels[i]);
+    say(x, kTop + plot.height + 16.0, "middle", tick.label);
   }
-  const Ticks up = chart.y_ticks ? nice_ticks(plot.y.first, plot.y.second, y_wish) : Ticks{};
-  for (std::size_t i = 0; i < up.values.size(); ++i) {
-    const double y = kTop + plot.py(up.values[i]);
+  for (const Tick& tick :
+       chart.y_ticks ? nice_ticks(plot.y.first, plot.y.second, y_wish) : std::vector<Tick>{}) {
+    const double y = kTop + plot.py(tick.value);
     grid += fmt::format("M{:.1f},{:.1f}h{:.1f}", kLeft, y, plot.width);
-    words += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", kLeft - 6.0,
-                         y + 4.0, up.labels[i]);
+    say(kLeft - 6.0, y + 4.0, "end", tick.label);
   }
   if (!chart.y_label.empty()) {
     words +=
@@ -136,9 +164,7 @@ std::string axes(const SvgChart& chart, const Plot& plot) {
                     kTop + 0.5 * plot.height, markup_text(chart.y_label));
   }
   if (!chart.x_label.empty()) {
-    words +=
-        fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>",
-                    kLeft + 0.5 * plot.width, kTop + plot.height + kBelow + 11.0, markup_text(chart.x_label));
+    say(kLeft + 0.5 * plot.width, kTop + plot.height + kBelow + 11.0, "middle", markup_text(chart.x_label));
   }
   return (grid.empty() ? "" : "<path class=\"grid\" d=\"" + grid + "\"/>") + words;
 }
@@ -306,8 +332,8 @@ std::string svg_chart_style() {
       ".dot{fill:var(--k)}.ring{fill:var(--ground);stroke:var(--k);stroke-width:2}"
       ".band-lost{fill:#d92d20;opacity:.28}.band-unreadable{fill:#f79009;opacity:.35}"
       ".band-tracked{fill:#12925a;opacity:.55}"
-      ".legend{list-style:none;display:flex;flex-wrap:wrap;gap:.1em 1.3em;margin:0 0 .2em;padding:0 0 0 "
-      "3.6em;"
+      ".legend{list-style:none;display:flex;flex-wrap:wrap;gap:.1em 1.3em;margin:0 0 .2em;"
+      "padding:0 0 0 3.6em;"
       "font-size:.85em;color:var(--muted)}.legend li{display:flex;align-items:center;gap:.45em}"
       ".truth{--k:#868c94;stroke-dasharray:5 4}.lost{--k:#d92d20;stroke-dasharray:3 4}"
       ".loop{--k:#aa4499;stroke-width:1}.plain{--k:#6b7280}\n";

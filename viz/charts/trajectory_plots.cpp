@@ -9,6 +9,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "plumbline/core/output_file.hpp"
 
@@ -68,13 +69,6 @@ struct LengthUnit {
   double per_metre = 1.0;
   const char* name = "m";
 };
-LengthUnit unit_for(const std::vector<double>& metres) {
-  const std::vector<double> known = finite(metres);
-  const double most = known.empty() ? 1.0 : *std::max_element(known.begin(), known.end());
-  if (most < 0.1) return {1000.0, "mm"};
-  return most < 1.0 ? LengthUnit{100.0, "cm"} : LengthUnit{};
-}
-
 std::vector<double> in_unit(std::vector<double> metres, const LengthUnit& unit) {
   for (double& v : metres) v *= unit.per_metre;
   return metres;
@@ -170,13 +164,19 @@ std::string titled(const std::string& what, const std::vector<TrajectoryComparis
   return named ? what + ": " + comparisons[0].name : what;
 }
 
-LengthUnit unit_for(const std::vector<TrajectoryComparison>& comparisons) {
-  std::vector<double> all;
+/// The greatest error of all estimates, so that one colour means one error in all charts; none: not known.
+std::optional<double> greatest_error(const std::vector<TrajectoryComparison>& comparisons) {
+  std::optional<double> most;
   for (const auto& c : comparisons) {
-    const auto errors = errors_of(c);
-    all.insert(all.end(), errors.begin(), errors.end());
+    for (const double error : finite(errors_of(c))) most = std::max(most.value_or(0.0), error);
   }
-  return unit_for(all);
+  return most;
+}
+
+LengthUnit unit_for(const std::vector<TrajectoryComparison>& comparisons) {
+  const double most = greatest_error(comparisons).value_or(1.0);
+  if (most < 0.1) return {1000.0, "mm"};
+  return most < 1.0 ? LengthUnit{100.0, "cm"} : LengthUnit{};
 }
 
 std::string estimate_kind(std::size_t index) { return fmt::format("k{}", index % 8); }
@@ -192,15 +192,6 @@ core::Result<void> check(const TrajectoryComparison& comparison) {
 }
 
 constexpr std::size_t kErrorClasses = 5;
-
-/// The greatest error of all estimates, so that one colour means one error in all charts.
-double greatest_error(const std::vector<TrajectoryComparison>& comparisons) {
-  double most = 0.0;
-  for (const auto& c : comparisons) {
-    for (const double error : finite(errors_of(c))) most = std::max(most, error);
-  }
-  return most;
-}
 
 /// A path as one line for each class of error.
 void add_colored_path(const TrajectoryComparison& comparison, const std::vector<double>& x,
@@ -261,7 +252,7 @@ SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& un
 }  // namespace
 
 std::vector<SvgChart> path_charts(const std::vector<TrajectoryComparison>& comparisons) {
-  const double greatest_m = greatest_error(comparisons);
+  const double greatest_m = greatest_error(comparisons).value_or(0.0);
   std::vector<SvgChart> charts;
   for (const auto& c : comparisons) charts.push_back(path_chart(c, unit_for(comparisons), greatest_m));
   return charts;

@@ -11,7 +11,6 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "report_sections.hpp"
-#include "report_style.hpp"
 
 namespace plumbline::report {
 namespace {
@@ -72,9 +71,8 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
        {"configuration", "Configuration", configuration_html(*data)},
        {"files", "Files", files_html(*data, file)}},
       fmt::format("Written by plumbline {} from the result folder {}.", core::version(), data->name));
-  core::OutputFile out(file);
-  out.write(page);
-  if (auto written = out.commit(); !written) return tl::unexpected<core::Error>(written.error());
+  if (auto written = core::write_file(file, page); !written)
+    return tl::unexpected<core::Error>(written.error());
   return ReportSummary{file, page.size(), std::move(data->missing)};
 }
 

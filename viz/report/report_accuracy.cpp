@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <limits>
 #include <system_error>
 
 #include "plumbline/dataset/trajectory_io.hpp"
@@ -103,9 +102,8 @@ std::string error_chart(const ReportData& data) {
   chart.height_px = 190;
   for (const ReportPath& path : data.paths) {
     if (!path.accuracy) continue;
-    viz::SvgLine line;
-    line.label = path.robot.empty() ? "distance to the truth" : path.robot;
-    line.kind = robot_kind(path.number);
+    viz::SvgLine line{
+        path.robot.empty() ? "distance to the truth" : path.robot, robot_kind(path.number), {}, {}};
     for (const evaluate::PoseError& pose : path.accuracy->poses) {
       line.x.push_back(pose.stamp - data.start_s);
       line.y.push_back(1e3 * pose.distance_m);
@@ -133,21 +131,12 @@ std::string saved_html(const ReportData& data) {
     if (name.rfind("evaluation", 0) == 0 && it->path().extension() == ".json") names.push_back(name);
   }
   std::sort(names.begin(), names.end());
-  HtmlTable paths({{"evaluation of a path"},
-                   {"ATE rmse (mm)", true},
-                   {"median (mm)", true},
-                   {"max (mm)", true},
-                   {"orientation rmse (deg)", true},
-                   {"RPE per frame (mm)", true},
-                   {"RPE per second (mm)", true},
-                   {"tracked (%)", true}});
-  HtmlTable clouds({{"evaluation of a cloud"},
-                    {"accuracy median (mm)", true},
-                    {"rmse (mm)", true},
-                    {"completeness median (mm)", true},
-                    {"rmse (mm)", true},
-                    {"F at 10 mm", true},
-                    {"walls' thickness, rms (mm)", true}});
+  HtmlTable paths(
+      "evaluation of a path|>ATE rmse (mm)|>median (mm)|>max (mm)|>orientation rmse (deg)"
+      "|>RPE per frame (mm)|>RPE per second (mm)|>tracked (%)");
+  HtmlTable clouds(
+      "evaluation of a cloud|>accuracy median (mm)|>rmse (mm)|>completeness median (mm)|>rmse (mm)"
+      "|>F at 10 mm|>walls' thickness, rms (mm)");
   std::string out;
   for (const std::string& name : names) {
     std::ifstream stream(data.folder / name, std::ios::binary);
@@ -189,8 +178,7 @@ core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
   if (pairs.empty()) {
     return core::input_error(
         fmt::format("--truth {}: there is no groundtruth.txt that fits; name a recording with truth, a "
-                    "folder with one for each "
-                    "robot, or a file in TUM format",
+                    "folder with one for each robot, or a file in TUM format",
                     truth.string()));
   }
   if (pairs.size() > 1) data.joint_m = joint_error(pairs);

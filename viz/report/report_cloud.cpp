@@ -3,12 +3,14 @@
 #include "report_cloud.hpp"
 
 #include <fmt/format.h>
+#include <pcl/common/point_tests.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <opencv2/core/mat.hpp>
 
 #include "plumbline/dataset/image_io.hpp"
@@ -19,8 +21,6 @@ namespace {
 
 constexpr double kOuter = 0.005;
 constexpr int kPlanPixels = 800;  ///< of the longer side
-
-bool finite(const cloud::Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 /// Share of the points that each robot saw most.
 void add_robots(const ReportData& data, Facts& facts) {
@@ -75,7 +75,7 @@ cv::Mat counted(const ReportData& data, const Eigen::Vector3d& low, const Eigen:
   };
   cv::Mat counts = cv::Mat::zeros(cells(up), cells(across), CV_32S);
   for (const cloud::Point& p : *data.cloud->cloud) {
-    if (!finite(p)) continue;
+    if (!pcl::isXYZFinite(p)) continue;
     const Eigen::Vector3d at = p.getVector3fMap().cast<double>();
     const double column = (at[across] - low[across]) / cell_m;
     const double row = (at[up] - low[up]) / cell_m;
@@ -87,15 +87,10 @@ cv::Mat counted(const ReportData& data, const Eigen::Vector3d& low, const Eigen:
 
 /// What a cell must count to be as dark as it gets: 97 of 100 cells that count anything count less.
 double darkest(const cv::Mat& counts) {
-  std::vector<int> known;
-  for (auto it = counts.begin<int>(); it != counts.end<int>(); ++it) {
-    if (*it > 0) known.push_back(*it);
-  }
-  if (known.empty()) return 1.0;
-  const auto place =
-      known.begin() + static_cast<std::ptrdiff_t>(0.97 * static_cast<double>(known.size() - 1));
-  std::nth_element(known.begin(), place, known.end());
-  return std::max(1, *place);
+  std::vector<double> known;
+  std::copy_if(counts.begin<int>(), counts.end<int>(), std::back_inserter(known),
+               [](int n) { return n > 0; });
+  return std::max(1.0, lower_quantile(std::move(known), 0.97));
 }
 
 }  // namespace
@@ -103,7 +98,7 @@ double darkest(const cv::Mat& counts) {
 std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud) {
   std::array<std::vector<float>, 3> values;
   for (const cloud::Point& p : cloud) {
-    if (!finite(p)) continue;
+    if (!pcl::isXYZFinite(p)) continue;
     values[0].push_back(p.x);
     values[1].push_back(p.y);
     values[2].push_back(p.z);
@@ -157,7 +152,7 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
 std::string cloud_html(const ReportData& data) {
   const double voxel_m = number_at(data.summary, "/cloud/voxel_m");
   Facts facts{
-      {"Points", count_text(number_at(data.summary, "/cloud/points"))},
+      {"Points", count_at(data.summary, "/cloud/points")},
       {"Voxel size", voxel_m > 0.0 ? number_text(1e3 * voxel_m, 1, "mm") : "no cloud was to be made"}};
   add_left_out(data, "/cloud/left_out", "Left out of what keyframes measured, points", facts);
   add_left_out(data, "/cloud/left_out_of_map", "Left out of the merged cloud, points", facts);
@@ -171,8 +166,7 @@ std::string cloud_html(const ReportData& data) {
       facts.emplace_back(
           "Standard deviation along the normal, of poses and depth",
           fmt::format("{} in the middle, below {} for 90 % of the points",
-                      number_text(1e3 * sigma_m, 1, "mm"),
-                      number_text(1e3 * number_at(data.summary, "/cloud/sigma_m/p90"), 1, "mm")));
+                      number_text(1e3 * sigma_m, 1, "mm"), mm_at(data.summary, "/cloud/sigma_m/p90")));
     }
     add_robots(data, facts);
     const double counted = number_at(data.summary, "/cloud/points");

@@ -4,9 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <fstream>
-#include <sstream>
 #include <system_error>
 
 #include "report_sections.hpp"
@@ -29,15 +26,6 @@ std::vector<double> values_of(const CsvTable& table, std::size_t column) {
   return values;
 }
 
-double quantile_or_zero(std::vector<double> values, double q) {
-  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
-               values.end());
-  if (values.empty()) return 0.0;
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 /// The stages that take most time of a frame.
 std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
   constexpr std::size_t kMost = 5;
@@ -49,8 +37,8 @@ std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
         name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
     if (!stage) continue;
     TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
-    column.median = quantile_or_zero(column.values, 0.5);
-    if (quantile_or_zero(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
+    column.median = lower_quantile(column.values, 0.5);
+    if (lower_quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
   }
   const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
   std::stable_sort(columns.begin(), columns.end(), slower);
@@ -62,7 +50,7 @@ std::string time_charts(const ReportData& data) {
   if (!data.timing_table) return {};
   const CsvTable& table = *data.timing_table;
   std::vector<double> time_s = values_of(table, table.column("stamp"));
-  const double start_s = quantile_or_zero(time_s, 0.0);
+  const double start_s = lower_quantile(time_s, 0.0);
   for (double& t : time_s) t -= start_s;
   viz::SvgChart chart;
   chart.title = "Milliseconds of each stage per frame";
@@ -70,8 +58,8 @@ std::string time_charts(const ReportData& data) {
   chart.height_px = 180;
   double usual = 0.0, most = 0.0;
   for (TimedColumn& column : slowest_stages(table)) {
-    usual = std::max(usual, quantile_or_zero(column.values, 0.98));
-    most = std::max(most, quantile_or_zero(column.values, 1.0));
+    usual = std::max(usual, lower_quantile(column.values, 0.98));
+    most = std::max(most, lower_quantile(column.values, 1.0));
     chart.lines.push_back({column.name, robot_kind(chart.lines.size()), time_s, std::move(column.values)});
   }
   std::string out;
@@ -85,23 +73,19 @@ std::string time_charts(const ReportData& data) {
   memory.y_label = "memory (MB)";
   memory.lines.push_back(
       {"memory held when a frame was done", "k5", time_s, values_of(table, table.column("rss_mb"))});
-  const bool known = quantile_or_zero(memory.lines[0].y, 1.0) > 0.0;
+  const bool known = lower_quantile(memory.lines[0].y, 1.0) > 0.0;
   return known ? out + svg_chart(memory) : out;
 }
 
 std::string stages_table(const Json& summary) {
-  HtmlTable table({{"stage"},
-                   {"a frame, median (ms)", true},
-                   {"95 % of frames (ms)", true},
-                   {"at the end (ms)", true},
-                   {"times", true}});
+  HtmlTable table("stage|>a frame, median (ms)|>95 % of frames (ms)|>at the end (ms)|>times");
   for (const auto& [name, stage] : list_at(summary, "/timing/stages_ms").items()) {
     table.row({name, number_text(number_at(stage, "/median"), 2), number_text(number_at(stage, "/p95"), 2),
                number_text(number_at(stage, "/finish"), 0), ""});
   }
   for (const auto& [name, part] : list_at(summary, "/timing/parts_ms").items()) {
     table.row({name, number_text(number_at(part, "/median"), 2), number_text(number_at(part, "/p95"), 2), "",
-               count_text(number_at(part, "/times"))},
+               count_at(part, "/times")},
               "no");
   }
   return table.html();
@@ -151,23 +135,21 @@ std::string cost_html(const ReportData& data) {
                                                 number_text(number_at(s, "/timing/pace_hz"), 1),
                                                 seconds("/timing/behind_s")));
   }
-  facts.emplace_back("Threads", count_text(number_at(s, "/timing/threads")));
+  facts.emplace_back("Threads", count_at(s, "/timing/threads"));
   facts.emplace_back("Memory at most", number_text(number_at(s, "/memory/peak_rss_mb"), 0, "MB"));
   if (number_at(s, "/frames/resumed") > 0.0) {
     facts.emplace_back("Not counted",
                        fmt::format("{} frames that an earlier run had mapped before it was interrupted",
-                                   count_text(number_at(s, "/frames/resumed"))));
+                                   count_at(s, "/frames/resumed")));
   }
   return facts_html(facts) + stages_table(s) + time_charts(data);
 }
 
 std::string configuration_html(const ReportData& data) {
-  std::ifstream stream(data.folder / "config.yaml", std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (text.str().empty()) return note("config.yaml is empty.");
+  const std::string text = read_bytes(data.folder / "config.yaml");
+  if (text.empty()) return note("config.yaml is empty.");
   return note("Every option with its value, defaults included; itself a pipeline file for -p.") +
-         folded("config.yaml", "<pre>" + viz::markup_text(text.str()) + "</pre>\n");
+         folded("config.yaml", "<pre>" + viz::markup_text(text) + "</pre>\n");
 }
 
 std::string files_html(const ReportData& data, const fs::path& left_out) {
@@ -184,7 +166,7 @@ std::string files_html(const ReportData& data, const fs::path& left_out) {
     all += files.back().second;
   }
   std::sort(files.begin(), files.end());
-  HtmlTable table({{"file"}, {"size", true}, {"bytes", true}, {"what it is"}});
+  HtmlTable table("file|>size|>bytes|what it is");
   for (std::size_t i = 0; i < std::min(kMost, files.size()); ++i) {
     table.row(
         {files[i].first, bytes_text(files[i].second), count_text(files[i].second), what_is(files[i].first)});

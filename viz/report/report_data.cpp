@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <map>
 #include <system_error>
@@ -123,24 +121,29 @@ void add_cloud(ReportData& data) {
 
 }  // namespace
 
-double number_at(const Json& json, const std::string& place) {
+/// Null where there is nothing.
+static const Json& value_at(const Json& json, const std::string& place) {
+  static const Json nothing;
   const Json::json_pointer pointer(place);
-  if (!json.contains(pointer)) return kNaN;
-  const Json& value = json.at(pointer);
+  return json.contains(pointer) ? json.at(pointer) : nothing;
+}
+
+double number_at(const Json& json, const std::string& place) {
+  const Json& value = value_at(json, place);
   return value.is_number() ? value.get<double>() : kNaN;
 }
 
+bool flag_at(const Json& json, const std::string& place) { return value_at(json, place) == true; }
+
 std::string text_at(const Json& json, const std::string& place) {
-  const Json::json_pointer pointer(place);
-  if (!json.contains(pointer)) return {};
-  const Json& value = json.at(pointer);
+  const Json& value = value_at(json, place);
   return value.is_string() ? value.get<std::string>() : std::string();
 }
 
 const Json& list_at(const Json& json, const std::string& place) {
   static const Json nothing = Json::array();
-  const Json::json_pointer pointer(place);
-  return json.contains(pointer) && json.at(pointer).is_structured() ? json.at(pointer) : nothing;
+  const Json& value = value_at(json, place);
+  return value.is_structured() ? value : nothing;
 }
 
 double ReportPath::length_m() const {

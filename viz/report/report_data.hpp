@@ -91,6 +91,8 @@ core::Result<void> add_truth(const std::filesystem::path& truth, ReportData& dat
 
 /// A number of the summary by its place ("/frames/read"); NaN where there is none.
 double number_at(const nlohmann::ordered_json& json, const std::string& place);
+/// Whether there is a true at a place.
+bool flag_at(const nlohmann::ordered_json& json, const std::string& place);
 std::string text_at(const nlohmann::ordered_json& json, const std::string& place);
 /// The list at a place; an empty one where there is none.
 const nlohmann::ordered_json& list_at(const nlohmann::ordered_json& json, const std::string& place);

@@ -1,27 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "report_fit.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "plumbline/optimize/pose_terms.hpp"
+#include "report_table.hpp"
 
 namespace plumbline::report {
 namespace {
 
-FamilyFit summarise(std::vector<double> distances) {
-  FamilyFit fit;
-  fit.observations = distances.size();
-  if (distances.empty()) return fit;
-  const auto quantile = [&](double q) {
-    const auto place = static_cast<std::ptrdiff_t>(q * static_cast<double>(distances.size() - 1));
-    std::nth_element(distances.begin(), distances.begin() + place, distances.end());
-    return distances[static_cast<std::size_t>(place)];
-  };
-  fit.median = quantile(0.5);
-  fit.p90 = quantile(0.9);
-  return fit;
+FamilyFit summarise(const std::vector<double>& distances) {
+  if (distances.empty()) return {};
+  return {distances.size(), lower_quantile(distances, 0.5), lower_quantile(distances, 0.9)};
 }
 
 }  // namespace
@@ -67,7 +58,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
       lines.push_back(std::abs(r.y()));
     }
   }
-  return {summarise(std::move(points)), summarise(std::move(depths)), summarise(std::move(lines))};
+  return {summarise(points), summarise(depths), summarise(lines)};
 }
 
 }  // namespace plumbline::report

@@ -23,12 +23,9 @@ std::string banner(const char* kind, const std::string& title, const std::string
 
 std::string verdict_html(const ReportData& data) {
   const auto& s = data.summary;
-  const bool trusted =
-      s.contains("trustworthy") && s["trustworthy"].is_boolean() && s["trustworthy"].get<bool>();
-  const bool stopped = s.contains("stopped") && s["stopped"].is_boolean() && s["stopped"].get<bool>();
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
   std::string out;
-  if (!trusted) {
+  if (!flag_at(s, "/trustworthy")) {
     const std::string reason = text_at(s, "/reason");
     out += banner("bad", "Not trustworthy (exit code 4)",
                   reason.empty() ? "The run told no reason." : "Reason: " + reason + ".");
@@ -37,15 +34,15 @@ std::string verdict_html(const ReportData& data) {
         "warn", "Trustworthy, with gaps (exit code 0)",
         fmt::format("{} of {} frames have no pose; the longest loss is {} frames.", count_text(without),
                     count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
-                    count_text(number_at(s, "/frames/longest_loss"))));
+                    count_at(s, "/frames/longest_loss")));
   } else {
     out += banner("good", "Trustworthy (exit code 0)", "Nothing the run found speaks against this result.");
   }
-  if (stopped) {
+  if (flag_at(s, "/stopped")) {
     out += banner("warn", "Stopped early",
                   fmt::format("The run was ended after {} of {} frames; this is what was mapped by then.",
                               count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
-                              count_text(number_at(s, "/frames/available"))));
+                              count_at(s, "/frames/available")));
   }
   if (!data.missing.empty()) {
     std::string list;
@@ -68,8 +65,8 @@ std::string figures_html(const ReportData& data) {
   return tiles_html(
       {{"of the frames tracked", number_text(number_at(s, "/frames/tracked_percent"), 1, "%")},
        {"path", number_text(length_m, 2, "m")},
-       {"keyframes", count_text(number_at(s, "/keyframes"))},
-       {"cloud points", count_text(number_at(s, "/cloud/points"))},
+       {"keyframes", count_at(s, "/keyframes")},
+       {"cloud points", count_at(s, "/cloud/points")},
        {"extent of the cloud", extent_text(data)},
        data.fused_afterwards
            ? std::pair{std::string("to fuse"), number_text(number_at(s, "/timing/wall_s"), 1, "s")}
@@ -78,16 +75,13 @@ std::string figures_html(const ReportData& data) {
 
 std::string frames_text(const ReportData& data) {
   const auto& s = data.summary;
-  std::string text =
-      fmt::format("{} of {} read, {} tracked", count_text(number_at(s, "/frames/read")),
-                  count_text(number_at(s, "/frames/available")), count_text(number_at(s, "/frames/tracked")));
-  if (number_at(s, "/frames/lost") > 0)
-    text += fmt::format(", {} lost", count_text(number_at(s, "/frames/lost")));
+  std::string text = fmt::format("{} of {} read, {} tracked", count_at(s, "/frames/read"),
+                                 count_at(s, "/frames/available"), count_at(s, "/frames/tracked"));
+  if (number_at(s, "/frames/lost") > 0) text += fmt::format(", {} lost", count_at(s, "/frames/lost"));
   if (number_at(s, "/frames/unreadable") > 0)
-    text += fmt::format(", {} unreadable", count_text(number_at(s, "/frames/unreadable")));
+    text += fmt::format(", {} unreadable", count_at(s, "/frames/unreadable"));
   if (number_at(s, "/frames/resumed") > 0)
-    text += fmt::format("; {} of them by the run that this one went on from",
-                        count_text(number_at(s, "/frames/resumed")));
+    text += fmt::format("; {} of them by the run that this one went on from", count_at(s, "/frames/resumed"));
   return text;
 }
 
@@ -122,10 +116,9 @@ std::string facts(const ReportData& data) {
        {"Duration of the recording", duration_text(data.end_s - data.start_s)},
        {"Pipeline", text_at(s, "/pipeline")},
        {"Frame of the results", frame_of_results(data)},
-       {"Landmarks", fmt::format("{} points, {} lines", count_text(number_at(s, "/landmarks/points")),
-                                 count_text(number_at(s, "/landmarks/lines")))},
-       {"Threads, seed", fmt::format("{}, {}", count_text(number_at(s, "/timing/threads")),
-                                     count_text(number_at(s, "/seed")))},
+       {"Landmarks", fmt::format("{} points, {} lines", count_at(s, "/landmarks/points"),
+                                 count_at(s, "/landmarks/lines"))},
+       {"Threads, seed", fmt::format("{}, {}", count_at(s, "/timing/threads"), count_at(s, "/seed"))},
        {"Version", "plumbline " + text_at(s, "/version")}});
 }
 
@@ -138,12 +131,10 @@ std::string lost_html(const ReportData& data) {
     return a.lost + a.unreadable > b.lost + b.unreadable;
   };
   std::stable_sort(stretches.begin(), stretches.end(), longer);
-  std::vector<Column> columns{{"from (s)", true},   {"to (s)", true},
-                              {"frames", true},     {"lost", true},
-                              {"unreadable", true}, {"between the poses around (m)", true}};
+  std::string columns = ">from (s)|>to (s)|>frames|>lost|>unreadable|>between the poses around (m)";
   const bool several = data.frames.size() > 1;
-  if (several) columns.push_back({"robot"});
-  HtmlTable table(std::move(columns));
+  if (several) columns += "|robot";
+  HtmlTable table(columns);
   for (std::size_t i = 0; i < std::min(kMost, stretches.size()); ++i) {
     const LostStretch& l = stretches[i];
     const auto number = [](std::size_t n) { return count_text(static_cast<double>(n)); };

@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report_style.hpp"
-
 namespace plumbline::report {
 namespace {
 
 using viz::markup_text;
 const char* const kUnknown = "\u2013";
 const char* const kThinSpace = "\u202F";
+
+bool of_numbers(const std::string& column) { return column.rfind('>', 0) == 0; }
 
 }  // namespace
 
@@ -59,11 +59,19 @@ std::string base64(std::string_view bytes) {
   return out;
 }
 
+HtmlTable::HtmlTable(const std::string& columns) {
+  for (std::size_t from = 0; from <= columns.size();) {
+    const std::size_t to = std::min(columns.find('|', from), columns.size());
+    columns_.push_back(columns.substr(from, to - from));
+    from = to + 1;
+  }
+}
+
 void HtmlTable::row(const std::vector<std::string>& cells, const std::string& kind) {
   body_ += kind.empty() ? "<tr>" : "<tr class=\"" + kind + "\">";
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const std::string text = i < cells.size() ? markup_text(cells[i]) : std::string();
-    body_ += (columns_[i].number ? "<td class=\"n\">" : "<td>") + text + "</td>";
+    body_ += (of_numbers(columns_[i]) ? "<td class=\"n\">" : "<td>") + text + "</td>";
   }
   body_ += "</tr>\n";
   ++rows_;
@@ -72,8 +80,9 @@ void HtmlTable::row(const std::vector<std::string>& cells, const std::string& ki
 std::string HtmlTable::html() const {
   if (rows_ == 0) return {};
   std::string out = "<div class=\"scroll\"><table><thead><tr>";
-  for (const Column& column : columns_) {
-    out += (column.number ? "<th class=\"n\">" : "<th>") + markup_text(column.name) + "</th>";
+  for (const std::string& column : columns_) {
+    const bool number = of_numbers(column);
+    out += (number ? "<th class=\"n\">" : "<th>") + markup_text(column.substr(number ? 1 : 0)) + "</th>";
   }
   return out + "</tr></thead>\n<tbody>" + body_ + "</tbody></table></div>\n";
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 // Pieces of an HTML page. All text that is given is escaped here, but where it is called HTML.
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,14 +20,11 @@ std::string bytes_text(double bytes);
 
 std::string base64(std::string_view bytes);
 
-struct Column {
-  std::string name;     ///< with its unit
-  bool number = false;  ///< stands to the right
-};
-
 class HtmlTable {
  public:
-  explicit HtmlTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
+  /// The columns' heads, with units and '|' between; those of numbers, which stand to the right, begin with
+  /// '>': "file|>size".
+  explicit HtmlTable(const std::string& columns);
   /// `kind`: CSS class of the row.
   void row(const std::vector<std::string>& cells, const std::string& kind = {});
   [[nodiscard]] std::size_t rows() const { return rows_; }
@@ -36,7 +32,7 @@ class HtmlTable {
   [[nodiscard]] std::string html() const;
 
  private:
-  std::vector<Column> columns_;
+  std::vector<std::string> columns_;
   std::size_t rows_ = 0;
   std::string body_;
 };
@@ -71,6 +67,12 @@ struct Section {
   std::string title;
   std::string html;  ///< empty: the part is left out
 };
+
+/// By this a report is known as one.
+inline const char* const kReportGenerator = "plumbline report";
+
+/// CSS of the page: light, dark and on paper.
+const char* report_style();
 
 /// The whole page.
 std::string page_html(const std::string& title, const std::string& head_html,

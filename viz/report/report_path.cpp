@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "plumbline/core/numbers.hpp"
 #include "report_cloud.hpp"
@@ -35,15 +34,6 @@ class PathChart {
     chart_.y_label = data.z_up ? "y (m)" : "z (m)";
     chart_.equal_aspect = true;
     chart_.background = plan_of(data);
-    lost_.kind = "lost";
-    lost_.label = "no poses";
-    start_.kind = "plain";
-    start_.label = "start";
-    start_.radius_px = 5.0;
-    start_.ring = true;
-    end_.kind = "plain";
-    end_.label = "end";
-    end_.radius_px = 5.0;
   }
 
   std::string draw() {
@@ -69,16 +59,10 @@ class PathChart {
     series.x.push_back(kNaN);
     series.y.push_back(kNaN);
   }
-  /// Where nothing else is drawn, the robot's name is the legend.
-  [[nodiscard]] std::string label(const ReportPath& path) const {
-    return path.robot.empty() ? "path" : path.robot;
-  }
 
   void add(const ReportPath& path) {
     if (path.poses.empty()) return;
-    viz::SvgLine line;
-    line.label = label(path);
-    line.kind = robot_kind(path.number);
+    viz::SvgLine line{path.robot.empty() ? "path" : path.robot, robot_kind(path.number), {}, {}};
     const double most_s = longest_step(path.poses);
     for (std::size_t i = 0; i < path.poses.size(); ++i) {
       const Eigen::Vector3d& here = path.poses[i].world_from_camera.translation;
@@ -91,10 +75,7 @@ class PathChart {
       put(line, here);
     }
     chart_.lines.push_back(std::move(line));
-    viz::SvgDots keyframes;
-    keyframes.label = path.robot.empty() ? "keyframes" : "";
-    keyframes.kind = robot_kind(path.number);
-    keyframes.radius_px = 2.0;
+    viz::SvgDots keyframes{path.robot.empty() ? "keyframes" : "", robot_kind(path.number), {}, {}, 2.0};
     for (const geometry::StampedPose& pose : path.keyframes)
       put(keyframes, pose.world_from_camera.translation);
     chart_.dots.push_back(std::move(keyframes));
@@ -104,9 +85,7 @@ class PathChart {
 
   void add_truth(const ReportPath& path) {
     if (!path.accuracy) return;
-    viz::SvgLine line;
-    line.kind = "truth";
-    line.label = truth_reported_ ? "" : "truth";
+    viz::SvgLine line{truth_reported_ ? "" : "truth", "truth", {}, {}};
     truth_reported_ = true;
     const geometry::Rigid3 estimate_from_truth = path.accuracy->truth_from_estimate.inverse();
     for (const evaluate::PoseError& pose : path.accuracy->poses) {
@@ -117,9 +96,8 @@ class PathChart {
 
   void add_loops() {
     if (data_.loops.empty()) return;
-    viz::SvgLine line;
-    line.kind = "loop";
-    line.label = data_.paths.size() > 1 ? "places recognised again, also by another robot" : "loops";
+    const bool several = data_.paths.size() > 1;
+    viz::SvgLine line{several ? "places recognised again, also by another robot" : "loops", "loop", {}, {}};
     for (const auto& [a, b] : data_.loops) {
       put(line, a);
       put(line, b);
@@ -130,11 +108,7 @@ class PathChart {
 
   /// Where the path jumps though the tracker saw no jump.
   void add_tears() {
-    viz::SvgDots torn;
-    torn.label = "torn";
-    torn.kind = "lost";
-    torn.radius_px = 7.0;
-    torn.ring = true;
+    viz::SvgDots torn{"torn", "lost", {}, {}, 7.0, true};
     for (const auto& tear : tears_of(data_.summary)) {
       for (const ReportPath& path : data_.paths) {
         if (data_.paths.size() > 1 && path.number != static_cast<std::size_t>(tear.value("robot", 0)))
@@ -152,8 +126,9 @@ class PathChart {
   const ReportData& data_;
   std::pair<int, int> axes_;
   viz::SvgChart chart_;
-  viz::SvgLine lost_;
-  viz::SvgDots start_, end_;
+  viz::SvgLine lost_{"no poses", "lost", {}, {}};
+  viz::SvgDots start_{"start", "plain", {}, {}, 5.0, true};
+  viz::SvgDots end_{"end", "plain", {}, {}, 5.0, false};
   bool truth_reported_ = false;
 };
 

@@ -2,10 +2,7 @@
 // The pictures of a report.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <fstream>
-#include <sstream>
 #include <system_error>
 
 #include "plumbline/viz/snapshot.hpp"
@@ -27,13 +24,6 @@ constexpr std::array<Caption, 7> kCaptions{{{"iso", "From aslant; surfaces that 
                                             {"left", "From the left, true to scale"},
                                             {"right", "From the right, true to scale"},
                                             {"bottom", "From below, true to scale"}}};
-
-std::string read_bytes(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << stream.rdbuf();
-  return bytes.str();
-}
 
 /// Empty when the file is no whole PNG.
 std::string picture_html(const fs::path& file, const std::string& caption) {

@@ -26,6 +26,15 @@ std::string configuration_html(const ReportData& data);
 /// `left_out`: the report itself.
 std::string files_html(const ReportData& data, const std::filesystem::path& left_out);
 
+/// Numbers of the summary by their place, as text.
+inline std::string count_at(const nlohmann::ordered_json& json, const std::string& place) {
+  return count_text(number_at(json, place));
+}
+/// Of a length in metres.
+inline std::string mm_at(const nlohmann::ordered_json& json, const std::string& place) {
+  return number_text(1e3 * number_at(json, place), 1, "mm");
+}
+
 /// CSS classes of a robot's marks.
 inline std::string robot_kind(std::size_t robot) { return "k" + std::to_string(robot % 8); }
 /// A table of LostStretch, longest losses first; at most a screen full.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "report_style.hpp"
+#include "report_html.hpp"
 
 namespace plumbline::report {
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -14,13 +15,11 @@ namespace plumbline::report {
 
 core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf())) {
+  CsvTable table;
+  table.text_ = read_bytes(file);
+  if (table.text_.empty()) {
     return core::input_error(fmt::format("{} is not there or cannot be read", name));
   }
-  CsvTable table;
-  table.text_ = text.str();
   std::size_t line = 0;
   for (std::size_t begin = 0; begin < table.text_.size(); ++line) {
     const std::size_t end = std::min(table.text_.find('\n', begin), table.text_.size());
@@ -56,6 +55,22 @@ std::string_view CsvTable::text(std::size_t row, std::size_t column) const {
 
 double CsvTable::number(std::size_t row, std::size_t column) const {
   return core::to_number(text(row, column)).value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+double lower_quantile(std::vector<double> values, double q) {
+  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
+               values.end());
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+std::string read_bytes(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << stream.rdbuf();
+  return bytes.str();
 }
 
 }  // namespace plumbline::report

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// frames.csv and timing.csv read back.
+// Files of a result read back: tables (frames.csv and timing.csv), and what is said of their columns.
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -34,5 +34,11 @@ class CsvTable {
   std::vector<std::string> columns_;
   std::vector<Cell> cells_;
 };
+
+/// The q-quantile of the numbers among the values, its rank rounded down; NaN when there are none.
+double lower_quantile(std::vector<double> values, double q);
+
+/// A whole file; empty when it cannot be read.
+std::string read_bytes(const std::filesystem::path& file);
 
 }  // namespace plumbline::report

@@ -186,8 +186,7 @@ std::string tracking_html(const ReportData& data) {
   return summary.html() +
          note(
              "Rms of the residuals that fit, in standard deviations of the noise model: near 1 when it is "
-             "right. "
-             "Rotations count by what they move 2 m away.") +
+             "right. Rotations count by what they move 2 m away.") +
          charts + note("Red: tracking was lost. Orange: the frame could not be read.");
 }
 

@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 
+#include "canvas/ticks.hpp"
+
 namespace plumbline::viz {
 namespace {
 
@@ -167,6 +169,26 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
       continue;
     }
     painter.text(tip + 17.0 * s * direction.normalized(), names[i], kTextSize, colors[i], Anchor::kCentre);
+  }
+}
+
+/// A vertical bar from `corner` (lower left) upwards, ticks to its right.
+void draw_color_bar(Painter& painter, const ColorScale& scale, const Eigen::Vector2d& corner, double height,
+                    double text_px) {
+  constexpr int kSteps = 128;
+  const double s = painter.scale();
+  const double width = text_px * s;
+  const double step = height / kSteps;
+  for (int i = 0; i < kSteps; ++i) {
+    const bool last = i + 1 == kSteps;  // overlap, so that no seam shows between the steps
+    painter.rectangle(corner + Eigen::Vector2d(0.0, i * step), {width, last ? step : 2.0 * step},
+                      sequential_color((i + 0.5) / kSteps));
+  }
+  const double span = scale.high - scale.low;
+  for (const Tick& tick : nice_ticks(scale.low, scale.high, span / 5.0)) {
+    const double y = corner.y() + height * (tick.value - scale.low) / span;
+    painter.polyline({{corner.x() + width, y}, {corner.x() + width + 6.0 * s, y}}, kInk, 1.5);
+    painter.text({corner.x() + width + 11.0 * s, y}, tick.label, 0.88 * text_px, kInk);
   }
 }
 

@@ -4,7 +4,6 @@
 // What is drawn over the points of a snapshot: camera paths, title, legend, scale bar, axes, colour bar.
 #include <string>
 
-#include "canvas/color_bar.hpp"
 #include "canvas/painter.hpp"
 #include "scene/point_style.hpp"
 #include "scene/view_frame.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/point_style.hpp"
 
+#include <pcl/common/point_tests.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -8,8 +9,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <unordered_map>
 
+#include "plumbline/cloud/cell_map.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::viz {
@@ -23,7 +24,6 @@ constexpr double kSurroundedAway = -0.4;
 
 Eigen::Vector3d position(const Point& p) { return {p.x, p.y, p.z}; }
 Eigen::Vector3d normal(const Point& p) { return {p.normal_x, p.normal_y, p.normal_z}; }
-bool finite(const Point& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 Rgb scaled(const Rgb& color, double factor) {
   const auto channel = [factor](std::uint8_t v) {
@@ -125,8 +125,8 @@ class Surroundings {
     const auto& cloud = *scene.cloud;
     for (std::size_t i = 0; i < cloud.size(); i += step) {
       const Eigen::Vector3d n = normal(cloud[i]);
-      if (finite(cloud[i]) && n.allFinite())
-        sums_.try_emplace(cell(cloud[i]), Eigen::Vector3d::Zero()).first->second += n;
+      if (pcl::isXYZFinite(cloud[i]) && n.allFinite())
+        sums_.try_emplace(cell(cloud[i]), Eigen::Vector3d::Zero()).first.value() += n;
     }
   }
   [[nodiscard]] Eigen::Vector3d direction(const Point& p) const {
@@ -137,13 +137,9 @@ class Surroundings {
  private:
   static std::uint64_t cell(const Point& p) {
     constexpr double kSide_m = 0.15;
-    const auto part = [](float v) {
-      return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / kSide_m)) + (1 << 20)) &
-             0x1fffffU;
-    };
-    return part(p.x) << 42U | part(p.y) << 21U | part(p.z);
+    return cloud::pack_cell(cloud::cell_of(position(p) / kSide_m));
   }
-  std::unordered_map<std::uint64_t, Eigen::Vector3d> sums_;
+  cloud::CellMap<Eigen::Vector3d> sums_;
 };
 
 }  // namespace
@@ -159,7 +155,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   if (cull) surroundings.emplace(scene, step);
   for (std::size_t i = 0; i < cloud.size(); i += step) {
     const Point& p = cloud[i];
-    if (!finite(p)) continue;
+    if (!pcl::isXYZFinite(p)) continue;
     all.push_back(static_cast<std::uint32_t>(i));
     if (!cull) continue;
     const Eigen::Vector3d to_viewer = projection.to_viewer(position(p));

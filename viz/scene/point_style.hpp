@@ -4,10 +4,8 @@
 // Which points of a cloud a picture shows, how large and in what colour.
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "canvas/color_bar.hpp"
 #include "scene/view_frame.hpp"
 
 namespace plumbline::viz {
@@ -25,6 +23,14 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
 
 /// Typical distance between neighbouring points of the surfaces, metres; 0 for fewer than two points.
 double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points);
+
+/// What a colour bar explains.
+struct ColorScale {
+  bool shown = false;
+  double low = 0.0;
+  double high = 1.0;
+  std::string label;
+};
 
 struct PointColors {
   std::vector<Rgb> colors;  ///< one per chosen point

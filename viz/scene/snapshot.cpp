@@ -9,8 +9,11 @@
 #include <vtkCellArray.h>
 #include <vtkContext2D.h>
 #include <vtkContextActor.h>
+#include <vtkContextItem.h>
+#include <vtkContextScene.h>
 #include <vtkFloatArray.h>
 #include <vtkNew.h>
+#include <vtkObjectFactory.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
@@ -24,10 +27,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <opencv2/imgproc.hpp>
 
-#include "canvas/image.hpp"
 #include "canvas/offscreen.hpp"
-#include "canvas/overlay_actor.hpp"
 #include "scene/overlay.hpp"
 #include "scene/point_style.hpp"
 #include "scene/view_frame.hpp"
@@ -51,6 +53,28 @@ struct Band {
   int first = 0;
   int height = 0;
 };
+
+/// What is drawn over the points, in a band.
+class Overlay : public vtkContextItem {
+ public:
+  static Overlay* New();
+  vtkTypeMacro(Overlay, vtkContextItem);
+  bool Paint(vtkContext2D* context) override {
+    vtkNew<vtkTransform2D> to_band;
+    to_band->Translate(0.0, -band->first);
+    context->PushMatrix();
+    context->AppendTransform(to_band);
+    Painter painter(context, kSupersampling * content->options->height_px / 1200.0);
+    draw_paths(painter, *content);
+    draw_annotations(painter, *content);
+    context->PopMatrix();
+    return true;
+  }
+
+  const OverlayContent* content = nullptr;
+  const Band* band = nullptr;
+};
+vtkStandardNewMacro(Overlay);
 
 core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
   if (options.width_px < 64 || options.height_px < 64 || options.width_px > 8192 ||
@@ -145,26 +169,15 @@ void place_camera(vtkRenderer& renderer, const Projection& projection, const Ban
 }
 
 /// Draws band by band what `renderer` of `window` holds; `band` tells the overlay which one.
-Image draw_bands(OffscreenWindow& window, vtkRenderer& renderer, const Projection& projection,
-                 const SnapshotOptions& options, Band& band) {
-  Image picture;
-  picture.width = options.width_px;
-  picture.height = options.height_px;
-  const auto row = 3 * static_cast<std::size_t>(options.width_px);
-  picture.rgb.resize(row * static_cast<std::size_t>(options.height_px));
-  for (int first_px = 0; first_px < options.height_px; first_px += kBand_px) {
+cv::Mat3b draw_bands(OffscreenWindow& window, vtkRenderer& renderer, const Projection& projection,
+                     const SnapshotOptions& options, Band& band) {
+  cv::Mat3b picture(options.height_px, options.width_px);
+  for (int first_px = 0; first_px < picture.rows; first_px += kBand_px) {
     band.first = kSupersampling * first_px - kMargin;
     place_camera(renderer, projection, band);
-    const Image large = window.draw();
-    const auto large_row = 3 * static_cast<std::size_t>(large.width);
-    Image inner;
-    inner.width = large.width;
-    inner.height = kSupersampling * std::min(kBand_px, options.height_px - first_px);
-    const auto begin = large.rgb.begin() + static_cast<std::ptrdiff_t>(large_row * kMargin);
-    inner.rgb.assign(begin, begin + static_cast<std::ptrdiff_t>(large_row) * inner.height);
-    const Image small = downsample(inner, kSupersampling);
-    std::copy(small.rgb.begin(), small.rgb.end(),
-              picture.rgb.begin() + static_cast<std::ptrdiff_t>(row) * first_px);
+    cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
+    const cv::Mat3b large = window.draw().rowRange(kMargin, kMargin + kSupersampling * part.rows);
+    cv::resize(large, part, part.size(), 0.0, 0.0, cv::INTER_AREA);
   }
   return picture;
 }
@@ -296,16 +309,12 @@ core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& op
   (*window)->window()->AddRenderer(renderer);
   add_points(*renderer, scene, points, styled.colors, options, projection, spacing_m);
   add_segments(*renderer, scene, projection, spacing_m);
-  renderer->AddActor(make_overlay([&content, &options, &band](vtkContext2D* context) {
-    vtkNew<vtkTransform2D> to_band;
-    to_band->Translate(0.0, -band.first);
-    context->PushMatrix();
-    context->AppendTransform(to_band);
-    Painter painter(context, kSupersampling * options.height_px / 1200.0);
-    draw_paths(painter, content);
-    draw_annotations(painter, content);
-    context->PopMatrix();
-  }));
+  vtkNew<Overlay> overlay;
+  overlay->content = &content;
+  overlay->band = &band;
+  vtkNew<vtkContextActor> over_points;
+  over_points->GetScene()->AddItem(overlay);
+  renderer->AddActor(over_points);
   return write_png(draw_bands(**window, *renderer, projection, options, band), file);
 }
 

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <system_error>
 #include <vector>
 
 #include "plumbline/core/output_file.hpp"
@@ -57,7 +56,8 @@ SceneExtent extent_of(const Scene& scene) {
 }  // namespace
 
 core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
-                                    const std::filesystem::path& folder, const TurntableProgress& progress) {
+                                    const std::filesystem::path& folder,
+                                    const std::function<void(std::size_t, std::size_t)>& progress) {
   if (pictures < 2) return core::usage_error("turntable: at least 2 pictures make one turn");
   if (auto made = core::make_folder(folder); !made) return made;
   SnapshotOptions view = options;
@@ -74,7 +74,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
     const Eigen::Vector3d away = -std::cos(turn) * axes.forward + std::sin(turn) * axes.right;
     view.viewpoint.eye = extent.centre + distance * (std::cos(kPitch) * away + std::sin(kPitch) * axes.up);
     if (auto drawn = render_snapshot(scene, view, folder / fmt::format("{:04}.png", k)); !drawn) return drawn;
-    if (progress) progress(k + 1, pictures);
+    if (progress) progress(static_cast<std::size_t>(k) + 1, static_cast<std::size_t>(pictures));
   }
   return {};
 }

@@ -119,42 +119,37 @@ static Eigen::Vector3d iso_forward(const SceneAxes& axes) {
          std::sin(kIsoPitch) * axes.up;
 }
 
-Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes) {
-  Projection view;
-  view.up = axes.up;
-  view.orthographic = options.view != View::kIso && options.view != View::kExplicit;
-  double field_of_view = kIsoFieldOfView;
+static Eigen::Vector3d forward_of(const SnapshotOptions& options, const SceneAxes& axes) {
   switch (options.view) {
     case View::kIso:
-      view.forward = iso_forward(axes);
-      break;
+      return iso_forward(axes);
     case View::kTop:
-      view.forward = -axes.up;
-      view.up = axes.forward;
-      break;
+      return -axes.up;
     case View::kBottom:
-      view.forward = axes.up;
-      view.up = axes.forward;
-      break;
+      return axes.up;
     case View::kFront:
-      view.forward = axes.forward;
-      break;
+      return axes.forward;
     case View::kBack:
-      view.forward = -axes.forward;
-      break;
+      return -axes.forward;
     case View::kLeft:
-      view.forward = axes.right;
-      break;
+      return axes.right;
     case View::kRight:
-      view.forward = -axes.right;
-      break;
+      return -axes.right;
     case View::kExplicit:
-      view.forward = (options.viewpoint.target - options.viewpoint.eye).normalized();
-      view.up = options.viewpoint.up;
-      view.eye = options.viewpoint.eye;
-      field_of_view = options.viewpoint.field_of_view_deg * kDegree;
       break;
   }
+  return (options.viewpoint.target - options.viewpoint.eye).normalized();
+}
+
+Projection view_directions(const SnapshotOptions& options, const SceneAxes& axes) {
+  Projection view;
+  const bool given = options.view == View::kExplicit;
+  const bool plan = options.view == View::kTop || options.view == View::kBottom;
+  view.forward = forward_of(options, axes);
+  view.up = given ? options.viewpoint.up : plan ? axes.forward : axes.up;
+  if (given) view.eye = options.viewpoint.eye;
+  view.orthographic = options.view != View::kIso && !given;
+  const double field_of_view = given ? options.viewpoint.field_of_view_deg * kDegree : kIsoFieldOfView;
   view.right = view.forward.cross(view.up).normalized();
   view.up = view.right.cross(view.forward);
   view.width_px = options.width_px;

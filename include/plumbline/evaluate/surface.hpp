@@ -4,7 +4,6 @@
 // Surfaces that clouds are measured against, in memory and from PLY files.
 #include <Eigen/Core>
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -12,6 +11,7 @@
 
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/core/error.hpp"
+#include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::evaluate {
 
@@ -48,6 +48,9 @@ core::Result<SurfaceSamples> load_cloud(const std::filesystem::path& file);
 /// Points and normals of a cloud in memory, in its order; a normal is zero where it is unknown, all are left
 /// out when none is known.
 SurfaceSamples samples_of(const cloud::Cloud& cloud);
+
+/// Moves points and normals.
+void move(const geometry::Rigid3& target_from_source, SurfaceSamples& samples);
 
 /// Points spread evenly over the mesh, about one per spacing_m^2, with the normals of their triangles.
 /// Deterministic.

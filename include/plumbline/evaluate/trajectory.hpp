@@ -84,9 +84,6 @@ core::Result<TrajectoryReport> evaluate_trajectory(const geometry::Trajectory& e
 /// Stamps of a list such as TUM's rgb.txt: the first column of every line that is not a comment; sorted.
 core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path& list);
 
-/// Roll, pitch, yaw in degrees of R = Rz(yaw) Ry(pitch) Rx(roll); pitch in [-90, 90]. For drawing.
-Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation);
-
 /// One JSON object: ate_m {rmse, mean, median, min, max, sse, std}, rpe {per_frame, per_second}, matched, ...
 std::string to_json(const TrajectoryReport& report);
 /// A table for people, several lines.

@@ -52,8 +52,4 @@ std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_
 
 WallThickness thickness_of(const std::vector<WallPatch>& patches);
 
-/// Both at once. `spacing_m`: typical distance to the nearest neighbour. Points must be finite.
-WallThickness wall_thickness(const SurfaceSamples& cloud, double spacing_m,
-                             const WallThicknessOptions& options, const core::Executor& executor);
-
 }  // namespace plumbline::evaluate

@@ -4,6 +4,7 @@
 // A world as its YAML file describes it: flat faces, lamps and the ways robots take through it.
 // World frame: metres, z up, the floor at z = 0 by custom.
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -29,6 +30,10 @@ struct Face {
   int object = -1;  ///< index into Scene::objects
 
   [[nodiscard]] Eigen::Vector3d at(double u, double v) const { return origin + u * u_axis + v * v_axis; }
+  /// Of the polygon, (u, v).
+  [[nodiscard]] Eigen::AlignedBox2d bounds() const;
+  /// Whether (u, v) lies in the polygon; `slack`: twice the area, m^2, by which an edge may be missed.
+  [[nodiscard]] bool contains(const Eigen::Vector2d& uv, double slack = 0.0) const;
 };
 
 /// What a face belongs to, for messages.

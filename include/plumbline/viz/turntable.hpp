@@ -10,14 +10,11 @@
 
 namespace plumbline::viz {
 
-/// Pictures drawn so far, pictures in all.
-using TurntableProgress = std::function<void(int, int)>;
-
 /// Draws `pictures` views from evenly spaced directions all round, looking down at 35 degrees, all of one
-/// scale: folder/0000.png, 0001.png ... `options.view` is not used. `progress` may be empty. Errors as
-/// render_snapshot's, and kUsage for fewer than 2 pictures.
+/// scale: folder/0000.png, 0001.png ... `options.view` is not used. `progress` gets the pictures drawn so far
+/// and in all, and may be empty. Errors as render_snapshot's, and kUsage for fewer than 2 pictures.
 core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& options, int pictures,
                                     const std::filesystem::path& folder,
-                                    const TurntableProgress& progress = {});
+                                    const std::function<void(std::size_t, std::size_t)>& progress = {});
 
 }  // namespace plumbline::viz

@@ -129,9 +129,8 @@ core::Result<void> calibrate(const CalibrateRequest& request, Session& session) 
   const bool any = std::any_of(findings.begin(), findings.end(), [](const auto& f) { return f.used; });
   if (!any && !session.quiet) fmt::print("the given camera fits; nothing better was found\n");
   if (request.output.empty()) return {};
-  core::OutputFile file(request.output);
-  file.write("# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera));
-  if (auto written = file.commit(); !written) return written;
+  const std::string yaml = "# found by plumbline calibrate\n" + sensor::to_yaml(calibration->camera);
+  if (auto written = core::write_file(request.output, yaml); !written) return written;
   if (!session.quiet) fmt::print("written        {}\n", request.output.string());
   return {};
 }
@@ -143,10 +142,7 @@ void add_calibrate(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "calibrate",
                   "Find focal length, lens, shutter and depth errors of a camera from its recordings",
-                  [&session, request] {
-                    const auto done = calibrate(*request, session);
-                    return done ? 0 : session.fail(done.error());
-                  });
+                  [&session, request] { return calibrate(*request, session); });
   command->add_option("RECORDING", request->inputs, "Recordings of one camera, or synth:SCENE?...")
       ->required();
   command->add_option("-o,--output", request->output, "camera.yaml to write")->type_name("FILE");

@@ -26,8 +26,7 @@ struct TrajectoryRequest {
   fs::path plots;
   bool json = false;
   evaluate::TrajectoryOptions options;
-  core::OptionTable table;
-  std::unique_ptr<OptionFlags> flags;
+  OptionFlags flags;
 };
 
 /// What an estimate is called: its result folder or robot, else the file.
@@ -92,7 +91,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
 }
 
 core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) {
-  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (auto applied = request.flags.apply(); !applied) return applied;
   const auto reports = measure_paths(request);
   if (!reports) return tl::unexpected<core::Error>(reports.error());
   const bool single = reports->size() == 1;
@@ -115,12 +114,9 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
 
 void add_trajectory(CLI::App& group, Session& session) {
   const auto request = std::make_shared<TrajectoryRequest>();
-  request->options.declare(request->table);
-  CLI::App* command = add_command(group, session, "trajectory",
-                                  "Absolute and relative pose error against truth", [&session, request] {
-                                    const auto done = evaluate_paths(*request, session.console());
-                                    return done ? 0 : session.fail(done.error());
-                                  });
+  CLI::App* command =
+      add_command(group, session, "trajectory", "Absolute and relative pose error against truth",
+                  [&session, request] { return evaluate_paths(*request, session.console()); });
   command
       ->add_option("EST... GT", request->files,
                    "One or several estimates (TUM format, or result folders), and last the true poses (TUM "
@@ -134,7 +130,7 @@ void add_trajectory(CLI::App& group, Session& session) {
       ->add_option("--plot", request->plots,
                    "Write charts into this folder as SVG: path, error, poses, error_distribution")
       ->type_name("DIR");
-  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+  request->flags.add(*command, request->options);
 }
 
 }  // namespace

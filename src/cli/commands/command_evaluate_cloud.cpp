@@ -26,8 +26,7 @@ struct CloudRequest {
   fs::path output;
   bool json = false;
   evaluate::CloudOptions options;
-  core::OptionTable table;
-  std::unique_ptr<OptionFlags> flags;
+  OptionFlags flags;
   const CLI::App* command = nullptr;
 };
 
@@ -58,27 +57,22 @@ core::Result<void> write_error_clouds(const evaluate::SurfaceSamples& cloud,
                                       const evaluate::CloudReport& report,
                                       const std::vector<evaluate::TrajectoryPair>& pairs,
                                       const fs::path& folder) {
-  ErrorCloud accuracy;
-  accuracy.title = "Distance of the cloud to the true surface";
-  accuracy.points = cloud.points;
-  accuracy.normals = cloud.normals;
-  const geometry::Rigid3& moved = report.alignment.reference_from_cloud;
-  for (Eigen::Vector3f& p : accuracy.points) p = (moved * p.cast<double>()).cast<float>();
-  for (Eigen::Vector3f& n : accuracy.normals) n = (moved.rotation * n.cast<double>()).cast<float>();
-  accuracy.error_m = report.error_m;
-  for (const evaluate::TrajectoryPair& pair : pairs) accuracy.cameras.push_back(pair.truth);
-  if (auto done = write_error_cloud(accuracy, folder, "accuracy"); !done) return done;
-  ErrorCloud completeness;
-  completeness.title = "Distance of the true surface to the cloud";
-  completeness.points = report.reference_samples;
-  completeness.normals = report.reference_normals;
-  completeness.error_m = report.reference_error_m;
-  completeness.cameras = accuracy.cameras;
-  return write_error_cloud(completeness, folder, "completeness");
+  std::vector<geometry::Trajectory> cameras;
+  for (const evaluate::TrajectoryPair& pair : pairs) cameras.push_back(pair.truth);
+  evaluate::SurfaceSamples moved = cloud;
+  evaluate::move(report.alignment.reference_from_cloud, moved);
+  if (auto done = write_error_cloud(folder / "accuracy", "Distance of the cloud to the true surface", moved,
+                                    report.error_m, cameras);
+      !done) {
+    return done;
+  }
+  return write_error_cloud(folder / "completeness", "Distance of the true surface to the cloud",
+                           {report.reference_samples, report.reference_normals, {}}, report.reference_error_m,
+                           cameras);
 }
 
 core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
-  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (auto applied = request.flags.apply(); !applied) return applied;
   if (!request.trajectories.empty() && request.command->count("--align") == 0) {
     request.options.align = evaluate::CloudAlignment::kSe3;  // who names a start wants to be aligned
   }
@@ -120,12 +114,9 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
 
 void add_evaluate_cloud(CLI::App& group, Session& session) {
   const auto request = std::make_shared<CloudRequest>();
-  request->options.declare(request->table);
-  CLI::App* command = add_command(group, session, "cloud",
-                                  "Accuracy, completeness, wall thickness of a cloud", [&session, request] {
-                                    const auto done = evaluate_surfaces(*request, session);
-                                    return done ? 0 : session.fail(done.error());
-                                  });
+  CLI::App* command =
+      add_command(group, session, "cloud", "Accuracy, completeness, wall thickness of a cloud",
+                  [&session, request] { return evaluate_surfaces(*request, session); });
   command->add_option("CLOUD", request->cloud, "A PLY file, or a result folder")->required();
   command->add_option(
       "REFERENCE", request->reference,
@@ -144,7 +135,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
                    "accuracy.{ply,png}, completeness.{ply,png}")
       ->type_name("DIR");
   command->add_flag("--json", request->json, "Print JSON");
-  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+  request->flags.add(*command, request->options);
   request->command = command;
 }
 

@@ -28,8 +28,7 @@ struct ExportRequest {
   std::string voxel;                ///< of a cloud that is laid down anew; empty: as it was mapped
   bool mesh = false;
   cloud::MeshOptions mesh_options;
-  core::OptionTable table;
-  std::unique_ptr<OptionFlags> flags;
+  OptionFlags flags;
 };
 
 /// Whether the run wrote this file, so that the store need not be asked.
@@ -132,8 +131,8 @@ core::Result<void> export_mesh(const maps::MapPlace& place, const ExportRequest&
   return cloud::write_mesh(request.output, *mesh);
 }
 
-core::Result<void> run_export(const ExportRequest& request, const core::Executor& executor) {
-  if (auto applied = request.flags->apply(); !applied) return applied;
+core::Result<void> run_export(ExportRequest& request, const core::Executor& executor) {
+  if (auto applied = request.flags.apply(); !applied) return applied;
   if (request.output.empty() && request.keyframes.empty()) {
     return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
   }
@@ -161,11 +160,8 @@ core::Result<void> run_export(const ExportRequest& request, const core::Executor
 
 void add_export(CLI::App& app, Session& session) {
   const auto request = std::make_shared<ExportRequest>();
-  CLI::App* command =
-      add_command(app, session, "export", "Write parts of a map in other formats", [&session, request] {
-        const auto done = run_export(*request, session.executor());
-        return done ? 0 : session.fail(done.error());
-      });
+  CLI::App* command = add_command(app, session, "export", "Write parts of a map in other formats",
+                                  [&session, request] { return run_export(*request, session.executor()); });
   command->add_option("MAP", request->input, "A result folder, also of a run that was interrupted, or map.db")
       ->required();
   command->add_option("-o,--output", request->output, "File to write")->type_name("FILE.ply|.pcd|.obj|.txt");
@@ -186,8 +182,7 @@ void add_export(CLI::App& app, Session& session) {
       ->excludes(what)
       ->excludes(trajectory);
   command->add_flag("--mesh", request->mesh, "Write the cloud as a mesh, .ply or .obj")->excludes(what);
-  request->mesh_options.declare(request->table);
-  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+  request->flags.add(*command, request->mesh_options);
 }
 
 }  // namespace plumbline::cli

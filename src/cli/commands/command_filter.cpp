@@ -140,11 +140,8 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
 
 void add_filter(CLI::App& app, Session& session) {
   const auto request = std::make_shared<FilterRequest>();
-  CLI::App* command =
-      add_command(app, session, "filter", "Run a filter chain on a cloud file", [&session, request] {
-        const auto done = filter(*request, session);
-        return done ? 0 : session.fail(done.error());
-      });
+  CLI::App* command = add_command(app, session, "filter", "Run a filter chain on a cloud file",
+                                  [&session, request] { return filter(*request, session); });
   command->add_option("CHAIN", request->chain, "Filter chain: a file or a shipped name")->required();
   command
       ->add_option(
@@ -160,11 +157,8 @@ void add_filter(CLI::App& app, Session& session) {
       *add_command(*group, session, "list", "All filters", [&session] { return list_filters(session); }),
       session);
   const auto name = std::make_shared<std::string>();
-  CLI::App* describe =
-      add_command(*group, session, "describe", "One filter: options and an example", [&session, name] {
-        const auto done = describe_filter(*name, session);
-        return done ? 0 : session.fail(done.error());
-      });
+  CLI::App* describe = add_command(*group, session, "describe", "One filter: options and an example",
+                                   [&session, name] { return describe_filter(*name, session); });
   describe->add_option("NAME", *name, "Type of the filter")->required();
   add_plugin_option(*describe, session);
   CLI::App* check =

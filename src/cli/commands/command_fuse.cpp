@@ -11,13 +11,9 @@ namespace {
 
 int fuse(Session& session, pipeline::FuseRequest request) {
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
-  const core::StopToken stop;
-  stop_on_signals(stop);
   Console& console = session.console();
-  const auto summary = pipeline::fuse_stored_maps(
-      request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
-  console.end_progress();
+  const auto summary = pipeline::fuse_stored_maps(request, session.executor(), console, stop_on_signals(),
+                                                  console.counting("clouds"));
   return session.finish(summary, request.output);
 }
 

@@ -13,10 +13,8 @@ namespace {
 
 const char* const kTwoTerminals =
     "In one terminal:    plumbline hub -o building --robots 2 --interface lo\n"
-    "In another one:     plumbline robot 'synth:room?frames=240&seed=1' --to 6 --name r0 "
-    "--interface lo &\n"
-    "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 "
-    "--interface lo\n"
+    "In another one:     plumbline robot 'synth:room?frames=240&seed=1' --to 6 --name r0 --interface lo &\n"
+    "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 --interface lo\n"
     "Hub and robots may start in any order; docs/guide/network.md has more.";
 
 int hub(Session& session, net::HubRequest request, double quota_gb) {
@@ -27,13 +25,10 @@ int hub(Session& session, net::HubRequest request, double quota_gb) {
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to go on with");
     return 0;
   }
-  const core::StopToken stop;
-  stop_on_signals(stop);
   Console& console = session.console();
   const auto summary = net::run_hub(
-      request, session.executor(), console, stop, [&](const std::string& line) { console.status(line); },
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "clouds"); });
-  console.end_progress();
+      request, session.executor(), console, stop_on_signals(),
+      [&](const std::string& line) { console.status(line); }, console.counting("clouds"));
   return session.finish(summary, request.fuse.output);
 }
 

@@ -160,11 +160,8 @@ core::Result<void> info(Session& session, InfoRequest& request) {
 
 void add_info(CLI::App& app, Session& session) {
   const auto request = std::make_shared<InfoRequest>();
-  CLI::App* command =
-      add_command(app, session, "info", "Say what a recording, a map or a cloud holds", [&session, request] {
-        const auto done = info(session, *request);
-        return done ? 0 : session.fail(done.error());
-      });
+  CLI::App* command = add_command(app, session, "info", "Say what a recording, a map or a cloud holds",
+                                  [&session, request] { return info(session, *request); });
   command
       ->add_option("INPUT", request->input,
                    "A recording, a result folder, map.db, a cloud file or synth:SCENE")

@@ -2,7 +2,6 @@
 // plumbline keys create|add|revoke DIR --robots r0,r1
 #include <fmt/format.h>
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>

@@ -22,13 +22,9 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
       fmt::print("{}: is finished; there is nothing to go on with\n", request.output.string());
     return 0;
   }
-  const core::StopToken stop;
-  stop_on_signals(stop);
   Console& console = session.console();
-  const auto summary = pipeline::map_recording(
-      request, session.executor(), console, stop,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
-  console.end_progress();
+  const auto summary = pipeline::map_recording(request, session.executor(), console, stop_on_signals(),
+                                               console.counting("frames"));
   return session.finish(summary, request.output);
 }
 

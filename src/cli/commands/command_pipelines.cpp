@@ -52,18 +52,16 @@ core::Result<pipeline::StageTypePtr> find_stage(const std::string& name,
   return core::usage_error(fmt::format("there is no stage '{}'{}", name, core::hint(name, registry.names())));
 }
 
-int list(Session& session) {
+int list(Session& session, const PipelinesRequest& /*request*/, const pipeline::StageRegistry& registry) {
   const auto folder = session.pipelines_folder();
   if (!folder) return session.fail(folder.error());
-  const auto registry = all_stages(session);
-  if (!registry) return session.fail(registry.error());
   fmt::print("pipelines:\n");
   for (const std::string& name : pipeline::pipeline_names(*folder)) {
-    const auto graph = load({name, {}, {}, false, false}, *registry, session);
+    const auto graph = load({name, {}, {}, false, false}, registry, session);
     fmt::print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
   }
   fmt::print("stages:\n");
-  for (const pipeline::StageTypePtr& type : registry->types())
+  for (const pipeline::StageTypePtr& type : registry.types())
     fmt::print("  {:<14} {}\n", type->name, type->help);
   return 0;
 }
@@ -78,14 +76,12 @@ void describe_ports(const std::vector<pipeline::Port>& ports, const char* title)
   }
 }
 
-int describe(Session& session, const PipelinesRequest& request) {
-  const auto registry = all_stages(session);
-  if (!registry) return session.fail(registry.error());
+int describe(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   if (request.name.empty()) {
-    fmt::print("{}", pipeline::stages_reference(*registry, request.all));
+    fmt::print("{}", pipeline::stages_reference(registry, request.all));
     return 0;
   }
-  const auto type = find_stage(request.name, *registry);
+  const auto type = find_stage(request.name, registry);
   if (!type) return session.fail(type.error());
   if (request.markdown) {
     fmt::print("{}", pipeline::stage_reference(**type, request.all));
@@ -103,47 +99,35 @@ int describe(Session& session, const PipelinesRequest& request) {
   return 0;
 }
 
-int check(Session& session, const PipelinesRequest& request) {
-  const auto registry = all_stages(session);
-  if (!registry) return session.fail(registry.error());
-  const auto graph = load(request, *registry, session);
+int check(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
+  const auto graph = load(request, registry, session);
   if (!graph) return session.fail(graph.error());
   fmt::print("{}: {} stages, nothing wrong\n", request.name, graph->stage_count());
   if (session.verbose) fmt::print("{}", pipeline::to_yaml(*graph));
   return 0;
 }
 
-int schema(Session& session, const PipelinesRequest& request) {
-  const auto registry = all_stages(session);
-  if (!registry) return session.fail(registry.error());
+int schema(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
   if (request.name.empty()) {
-    fmt::print("{}", pipeline::pipeline_schema(*registry));
+    fmt::print("{}", pipeline::pipeline_schema(registry));
     return 0;
   }
-  const auto type = find_stage(request.name, *registry);
+  const auto type = find_stage(request.name, registry);
   if (!type) return session.fail(type.error());
-  fmt::print("{}", pipeline::stage_schema(**type, *registry));
+  fmt::print("{}", pipeline::stage_schema(**type, registry));
   return 0;
 }
 
-int graph(Session& session, const PipelinesRequest& request) {
-  const auto registry = all_stages(session);
-  if (!registry) return session.fail(registry.error());
-  const auto loaded = load(request, *registry, session);
+int graph(Session& session, const PipelinesRequest& request, const pipeline::StageRegistry& registry) {
+  const auto loaded = load(request, registry, session);
   if (!loaded) return session.fail(loaded.error());
   const std::string dot = pipeline::to_dot(*loaded);
   if (request.output.empty()) {
     fmt::print("{}", dot);
     return 0;
   }
-  core::Result<void> written;
-  if (request.output.extension() == ".dot") {
-    core::OutputFile out(request.output);
-    out.write(dot);
-    written = out.commit();
-  } else {
-    written = viz::draw_graph(dot, request.output);
-  }
+  const bool as_text = request.output.extension() == ".dot";
+  const auto written = as_text ? core::write_file(request.output, dot) : viz::draw_graph(dot, request.output);
   return written ? 0 : session.fail(written.error());
 }
 
@@ -172,14 +156,15 @@ void add_pipelines(CLI::App& app, Session& session) {
   CLI::App* group = add_group(app, "pipelines", "What pipelines and stages there are");
   const auto request = std::make_shared<PipelinesRequest>();
   const auto command = [&](const char* name, const char* help,
-                           int (*run)(Session&, const PipelinesRequest&)) {
-    return add_command(*group, session, name, help,
-                       [&session, request, run] { return run(session, *request); });
+                           int (*run)(Session&, const PipelinesRequest&, const pipeline::StageRegistry&)) {
+    return add_command(*group, session, name, help, [&session, request, run] {
+      const auto registry = all_stages(session);
+      return registry ? run(session, *request, *registry) : session.fail(registry.error());
+    });
   };
-  add_plugin_option(*add_command(*group, session, "list",
-                                 "The shipped pipelines, and the stages that pipelines are made of",
-                                 [&session] { return list(session); }),
-                    session);
+  CLI::App* listed =
+      command("list", "The shipped pipelines, and the stages that pipelines are made of", list);
+  add_plugin_option(*listed, session);
   CLI::App* described =
       command("describe", "A stage: ports and options; without STAGE the whole reference", describe);
   described->add_option("STAGE", request->name, "Type of a stage");

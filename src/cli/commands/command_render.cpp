@@ -34,8 +34,7 @@ struct RenderRequest {
   bool lines = false;
   int turntable = 0;  ///< pictures all round; 0: one picture
   viz::SnapshotOptions options;
-  core::OptionTable table;
-  std::unique_ptr<OptionFlags> flags;
+  OptionFlags flags;
 };
 
 /// "1600x1200"
@@ -142,9 +141,7 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
   fs::path folder = request.output;
   if (film) folder += ".pictures";
   auto drawn =
-      viz::render_turntable(scene, request.options, request.turntable, folder, [&](int done, int total) {
-        console.progress(static_cast<std::size_t>(done), static_cast<std::size_t>(total), "pictures");
-      });
+      viz::render_turntable(scene, request.options, request.turntable, folder, console.counting("pictures"));
   console.end_progress();
   if (!film) return drawn;
   if (drawn) drawn = make_film(folder, kPicturesPerSecond, request.output);
@@ -154,7 +151,7 @@ core::Result<void> turn(const RenderRequest& request, const viz::Scene& scene, C
 }
 
 core::Result<void> render(RenderRequest& request, Session& session) {
-  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (auto applied = request.flags.apply(); !applied) return applied;
   if (!request.size.empty()) {
     if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
   }
@@ -185,12 +182,8 @@ core::Result<void> render(RenderRequest& request, Session& session) {
 
 void add_render(CLI::App& app, Session& session) {
   const auto request = std::make_shared<RenderRequest>();
-  request->options.declare(request->table);
-  CLI::App* command =
-      add_command(app, session, "render", "Draw a map or cloud; needs no display", [&session, request] {
-        const auto done = render(*request, session);
-        return done ? 0 : session.fail(done.error());
-      });
+  CLI::App* command = add_command(app, session, "render", "Draw a map or cloud; needs no display",
+                                  [&session, request] { return render(*request, session); });
   command->add_option("INPUT", request->input, "A result folder, map.db, or a PLY, PCD or XYZ file")
       ->required();
   command->add_option("-o,--output", request->output, "Picture to write")
@@ -205,7 +198,7 @@ void add_render(CLI::App& app, Session& session) {
       ->check(CLI::Range(2, 3600))
       ->type_name("N");
   command->add_flag("--lines", request->lines, "Draw the map's 3D lines, too");
-  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+  request->flags.add(*command, request->options);
 }
 
 }  // namespace plumbline::cli

@@ -30,8 +30,7 @@ int robot(Session& session, net::RobotRequest request) {
   request.fresh_id = fresh_id();
   request.hand_in = fmt::format("--name {}{}", request.name, network_arguments(request.network));
   if (request.map.output.empty()) request.map.output = request.name;
-  const core::StopToken stop;
-  stop_on_signals(stop);
+  const core::StopToken& stop = stop_on_signals();
   Console& console = session.console();
   const auto status = [&](const std::string& line) { console.status(line); };
   std::filesystem::path earlier = net::earlier_run(request.map.input);
@@ -44,8 +43,7 @@ int robot(Session& session, net::RobotRequest request) {
     return finish(session, outcome, earlier);
   }
   const auto outcome =
-      net::run_robot(request, session.executor(), console, stop, status,
-                     [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
+      net::run_robot(request, session.executor(), console, stop, status, console.counting("frames"));
   console.end_progress();
   return finish(session, outcome, request.map.output);
 }

@@ -18,12 +18,11 @@ struct SynthRequest {
   std::string scene;
   std::filesystem::path output;
   synth::SynthOptions options;
-  core::OptionTable table;
-  std::unique_ptr<OptionFlags> flags;
+  OptionFlags flags;
 };
 
 core::Result<void> film(SynthRequest& request, Session& session) {
-  if (auto applied = request.flags->apply(); !applied) return applied;
+  if (auto applied = request.flags.apply(); !applied) return applied;
   if (auto checked = synth::check(request.options); !checked) return checked;
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
@@ -34,12 +33,9 @@ core::Result<void> film(SynthRequest& request, Session& session) {
     return core::usage_error(
         fmt::format("{}: is there already and not empty; name a new folder", request.output.string()));
   }
-  const core::StopToken stop;
-  stop_on_signals(stop);
   Console& console = session.console();
-  const auto summary = synth::write_recordings(
-      *scene, request.options, request.output, session.executor(), stop, console,
-      [&](std::size_t done, std::size_t total) { console.progress(done, total, "frames"); });
+  const auto summary = synth::write_recordings(*scene, request.options, request.output, session.executor(),
+                                               stop_on_signals(), console, console.counting("frames"));
   console.end_progress();
   if (!summary) return tl::unexpected<core::Error>(summary.error());
   if (!session.quiet) {
@@ -54,17 +50,14 @@ core::Result<void> film(SynthRequest& request, Session& session) {
 
 void add_synth(CLI::App& app, Session& session) {
   const auto request = std::make_shared<SynthRequest>();
-  request->options.declare(request->table);
-  CLI::App* command = add_command(app, session, "synth",
-                                  "Film a generated world: recordings with exact truth", [&session, request] {
-                                    const auto done = film(*request, session);
-                                    return done ? 0 : session.fail(done.error());
-                                  });
+  CLI::App* command =
+      add_command(app, session, "synth", "Film a generated world: recordings with exact truth",
+                  [&session, request] { return film(*request, session); });
   command->add_option("SCENE", request->scene, "Shipped scene or file")->required();
   command->add_option("-o,--output", request->output, "Folder for the recordings")
       ->required()
       ->type_name("DIR");
-  request->flags = std::make_unique<OptionFlags>(*command, request->table);
+  request->flags.add(*command, request->options);
 }
 
 }  // namespace plumbline::cli

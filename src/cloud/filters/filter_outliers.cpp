@@ -90,8 +90,7 @@ class RadiusOutlierFilter : public Filter {
 FilterInfo statistical_outlier_filter() {
   return {"statistical_outlier", "Removes points that lie further from their neighbours than most do.",
           "PCL's StatisticalOutlierRemoval. Points without measurement are left out of the statistics; the "
-          "result is "
-          "a list, not organised.",
+          "result is a list, not organised.",
           "- type: statistical_outlier\n  neighbours: 16\n  deviations: 2\n",
           [] { return std::make_unique<StatisticalOutlierFilter>(); }};
 }

@@ -31,26 +31,11 @@ std::vector<std::string> FilterRegistry::types() const {
 
 FilterRegistry builtin_filters() {
   FilterRegistry registry;
-  registry.add(approximate_voxel_grid_filter());
-  registry.add(clusters_filter());
-  registry.add(color_filter());
-  registry.add(crop_box_filter());
-  registry.add(curvature_filter());
-  registry.add(flying_pixels_filter());
-  registry.add(incidence_angle_filter());
-  registry.add(merge_filter());
-  registry.add(mls_filter());
-  registry.add(normal_consistency_filter());
-  registry.add(normals_filter());
-  registry.add(pass_through_filter());
-  registry.add(plane_filter());
-  registry.add(radius_outlier_filter());
-  registry.add(random_sampling_filter());
-  registry.add(statistical_outlier_filter());
-  registry.add(tee_filter());
-  registry.add(transform_filter());
-  registry.add(uniform_sampling_filter());
-  registry.add(voxel_grid_filter());
+  const auto add = [&registry](auto... info) { (registry.add(info()), ...); };
+  add(approximate_voxel_grid_filter, clusters_filter, color_filter, crop_box_filter, curvature_filter,
+      flying_pixels_filter, incidence_angle_filter, merge_filter, mls_filter, normal_consistency_filter,
+      normals_filter, pass_through_filter, plane_filter, radius_outlier_filter, random_sampling_filter,
+      statistical_outlier_filter, tee_filter, transform_filter, uniform_sampling_filter, voxel_grid_filter);
   return registry;
 }
 

@@ -253,10 +253,8 @@ class ClustersFilter : public Filter {
 FilterInfo plane_filter() {
   return {"plane", "Finds the largest planes and keeps, removes or colours their points.",
           "PCL's SACSegmentation, one plane after the other in what is left; `refine: spread` is the rule of "
-          "PCL's "
-          "program pcl_sac_segmentation_plane. The same cloud gives the same planes. Only the points "
-          "themselves count: a plane goes through everything near it, also through "
-          "furniture that it cuts.",
+          "PCL's program pcl_sac_segmentation_plane. The same cloud gives the same planes. Only the points "
+          "themselves count: a plane goes through everything near it, also through furniture that it cuts.",
           "- type: plane\n  distance: 2 cm\n  planes: 2\n  mode: remove\n",
           [] { return std::make_unique<PlaneFilter>(); }};
 }
@@ -267,8 +265,7 @@ FilterInfo clusters_filter() {
       "PCL's EuclideanClusterExtraction: two points are in one cluster when steps of at most `distance` lead "
       "from one to the other. With `leaf` the steps lead over the means of PCL's VoxelGrid, and every point "
       "goes with the mean of its cell: a distance of twice the leaf joins neighbouring cells. `count: 0` "
-      "with "
-      "`mode: keep` removes what hangs in the air, as `filters/map.yaml` does: pieces of fewer than "
+      "with `mode: keep` removes what hangs in the air, as `filters/map.yaml` does: pieces of fewer than "
       "`min_points` points.",
       "- type: clusters\n  distance: 5 cm\n  min_points: 200\n  count: 1\n  mode: keep\n",
       [] { return std::make_unique<ClustersFilter>(); }};

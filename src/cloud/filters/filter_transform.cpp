@@ -41,8 +41,7 @@ class TransformFilter : public Filter {
 FilterInfo transform_filter() {
   return {"transform", "Moves the cloud, its normals and its viewpoint.",
           "PCL's transformPointCloudWithNormals; an organised cloud stays organised. A viewpoint given by "
-          "the run "
-          "does not move with it.",
+          "the run does not move with it.",
           "- type: transform\n  rotation: [-90 deg, 0 deg, 0 deg]\n  translation: [0 m, 0 m, 1.2 m]\n",
           [] { return std::make_unique<TransformFilter>(); }};
 }

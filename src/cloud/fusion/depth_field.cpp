@@ -13,6 +13,7 @@
 
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::cloud {
@@ -169,13 +170,6 @@ void add_disagreement(const std::vector<const Rows*>& of, const DepthField& fiel
       all.push_back(std::abs(row.residual + jacobian(row).dot(field.coefficients())) / row.sigma);
     }
   }
-}
-
-double median(std::vector<double>& values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The largest change of a depth of 2 m along any ray that was compared, metres.
@@ -362,8 +356,8 @@ core::Result<DepthField> find_depth_field(const std::vector<std::size_t>& views,
 
   auto disagreement = cross_validate(comparisons, count, camera, executor);
   if (!disagreement) return DepthField();
-  found.before = median(disagreement->before);
-  found.after = median(disagreement->after);
+  found.before = core::median(std::move(disagreement->before));
+  found.after = core::median(std::move(disagreement->after));
   found.used = found.after <= (1.0 - options.least_gain) * found.before;
   if (!found.used) return DepthField();
   const DepthField field = fitted(all, camera, executor);

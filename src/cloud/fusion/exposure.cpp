@@ -5,7 +5,6 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "io/scalar.hpp"
 #include "plumbline/cloud/cell_map.hpp"

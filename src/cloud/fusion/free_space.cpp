@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -21,10 +22,14 @@ constexpr int kPasses = 3;         // the side of a person is 0.3 m deep
 
 enum class Verdict : std::uint8_t { kStays, kDoubtful, kHardlySeen, kGoes };
 
-struct Votes {
-  int free = 0;
-  int surface = 0;
-  int hidden = 0;
+/// How many views say what about a place.
+class Votes {
+ public:
+  int& operator[](Evidence evidence) { return of_[static_cast<std::size_t>(evidence)]; }
+  int operator[](Evidence evidence) const { return of_[static_cast<std::size_t>(evidence)]; }
+
+ private:
+  std::array<int, 4> of_{};
 };
 
 /// A view whose furthest measurement may reach into a box.
@@ -61,29 +66,17 @@ void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vec
   for (const NearView& view : views) {
     const DepthLimits limits(*view.raster);
     for (const std::uint32_t s : asked) {
-      switch (limits.evidence(view.rotation * positions[s] + view.translation)) {
-        case Evidence::kFree:
-          ++votes[s].free;
-          break;
-        case Evidence::kSurface:
-          ++votes[s].surface;
-          break;
-        case Evidence::kHidden:
-          ++votes[s].hidden;
-          break;
-        case Evidence::kNone:
-          break;
-      }
+      ++votes[s][limits.evidence(view.rotation * positions[s] + view.translation)];
     }
   }
 }
 
 Verdict judge(const Votes& v) {
+  const int free = v[Evidence::kFree], surface = v[Evidence::kSurface], hidden = v[Evidence::kHidden];
   // One view against another is enough when no third one knows better.
-  if (v.free > 0 && 2 * v.free >= v.surface && (v.free > 1 || v.surface < 2)) return Verdict::kGoes;
-  const bool rarely_seen = v.hidden >= 3 && 3 * v.surface <= v.hidden;
-  if (rarely_seen) return Verdict::kHardlySeen;
-  return v.free > 0 ? Verdict::kDoubtful : Verdict::kStays;
+  if (free > 0 && 2 * free >= surface && (free > 1 || surface < 2)) return Verdict::kGoes;
+  if (hidden >= 3 && 3 * surface <= hidden) return Verdict::kHardlySeen;
+  return free > 0 ? Verdict::kDoubtful : Verdict::kStays;
 }
 
 /// Of every surfel. Depth views are tested only where clouds leave a doubt.
@@ -93,7 +86,8 @@ std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const 
   std::iota(asked.begin(), asked.end(), 0U);
   count(asked, positions, views.clouds, votes);
   const auto clear = [&](std::uint32_t s) {
-    return judge(votes[s]) == Verdict::kGoes || (votes[s].free == 0 && votes[s].surface >= kSolid);
+    return judge(votes[s]) == Verdict::kGoes ||
+           (votes[s][Evidence::kFree] == 0 && votes[s][Evidence::kSurface] >= kSolid);
   };
   asked.erase(std::remove_if(asked.begin(), asked.end(), clear), asked.end());
   count(asked, positions, views.depth_views, votes);

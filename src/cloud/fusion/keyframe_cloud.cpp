@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "finite.hpp"
 #include "fusion/inverse_depth.hpp"
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -42,9 +44,7 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
     }
   }
   if (bends.size() < kFew) return 1.0F;
-  const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
-  std::nth_element(bends.begin(), middle, bends.end());
-  const float share = *middle / (0.5F * kMedianOfNormal);
+  const float share = core::median(std::move(bends)) / (0.5F * kMedianOfNormal);
   return std::min(1.0F, share * share);
 }
 

@@ -5,6 +5,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -109,9 +112,7 @@ void Surfels::measure_noise() {
   }
   noise_share_ = 1.0F;
   if (shares.size() < kFewSurfels) return;
-  const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
-  std::nth_element(shares.begin(), middle, shares.end());
-  noise_share_ = std::min(1.0F, kGenerous * std::sqrt(*middle));
+  noise_share_ = std::min(1.0F, kGenerous * std::sqrt(core::median(std::move(shares))));
 }
 
 void Surfels::fit_plane(Surfel& surfel) const {

@@ -24,6 +24,9 @@ Point blank_point(bool color) {
   return p;
 }
 
+/// Of x, y and z, where `x` stands for x.
+int axis_of(Meaning meaning, Meaning x) { return static_cast<int>(meaning) - static_cast<int>(x); }
+
 bool holds(const std::vector<Meaning>& meanings, std::initializer_list<Meaning> wanted) {
   return std::all_of(wanted.begin(), wanted.end(), [&meanings](Meaning m) {
     return std::find(meanings.begin(), meanings.end(), m) != meanings.end();
@@ -108,31 +111,19 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, dou
   const auto number = static_cast<float>(value);
   switch (meaning) {
     case Meaning::kX:
-      p.x = number;
-      break;
     case Meaning::kY:
-      p.y = number;
-      break;
     case Meaning::kZ:
-      p.z = number;
+      p.data[axis_of(meaning, Meaning::kX)] = number;
       break;
     case Meaning::kNormalX:
-      p.normal_x = number;
-      break;
     case Meaning::kNormalY:
-      p.normal_y = number;
-      break;
     case Meaning::kNormalZ:
-      p.normal_z = number;
+      p.data_n[axis_of(meaning, Meaning::kNormalX)] = number;
       break;
     case Meaning::kRed:
-      p.r = to_byte(value);
-      break;
     case Meaning::kGreen:
-      p.g = to_byte(value);
-      break;
     case Meaning::kBlue:
-      p.b = to_byte(value);
+      (meaning == Meaning::kRed ? p.r : meaning == Meaning::kGreen ? p.g : p.b) = to_byte(value);
       break;
     case Meaning::kCurvature:
       p.curvature = number;

@@ -2,6 +2,7 @@
 #include "plumbline/cloud/mesh.hpp"
 
 #include <fmt/format.h>
+#include <pcl/common/io.h>
 #include <pcl/conversions.h>
 #include <pcl/kdtree/kdtree_flann.h>
 #include <pcl/point_cloud.h>
@@ -12,7 +13,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -45,19 +45,6 @@ core::Result<int> depth_for(const Cloud& cloud, double resolution_m) {
   if (depth <= kDeepest) return depth;
   return core::usage_error(fmt::format("mesh: {:g} m is too fine for {:.1f} m; use {:.3f} m or more",
                                        resolution_m, side, side / (1 << kDeepest)));
-}
-
-/// Positions and normals only.
-std::shared_ptr<pcl::PointCloud<pcl::PointNormal>> without_color(const Cloud& cloud) {
-  auto input = std::make_shared<pcl::PointCloud<pcl::PointNormal>>();
-  input->reserve(cloud.size());
-  for (const Point& p : cloud.points) {
-    pcl::PointNormal q;
-    q.getVector3fMap() = p.getVector3fMap();
-    q.getNormalVector3fMap() = p.getNormalVector3fMap();
-    input->push_back(q);
-  }
-  return input;
 }
 
 /// x, y and z of a PCL mesh.
@@ -164,7 +151,9 @@ core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options) 
   if (!depth) return tl::unexpected<core::Error>(depth.error());
   const auto& pcl = pcl_functions();
   if (!pcl) return tl::unexpected<core::Error>(pcl.error());
-  const pcl::PolygonMesh mesh = (*pcl)->poisson(without_color(*points), *depth);
+  const auto surface = std::make_shared<pcl::PointCloud<pcl::PointNormal>>();
+  pcl::copyPointCloud(*points, *surface);
+  const pcl::PolygonMesh mesh = (*pcl)->poisson(surface, *depth);
   return dressed(vertices_of(mesh), mesh, points, options.reach_m);
 }
 

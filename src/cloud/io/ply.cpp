@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "io/ply_header.hpp"
@@ -30,18 +31,20 @@ class Body {
     return true;
   }
 
-  bool list(const PlyProperty& property, std::vector<double>& items) {
+  bool list(const PlyProperty& property) {
     double count = 0.0;
     if (!scalar(property.count_type, count)) return false;
     if (!(count >= 0.0) || count != std::floor(count)) return refuse("list length is not a natural number");
     if (count > kLongestList) return refuse("list with more than 65536 items");
-    items.resize(static_cast<std::size_t>(count));
-    for (double& item : items) {
+    items_.resize(static_cast<std::size_t>(count));
+    for (double& item : items_) {
       if (!scalar(property.type, item)) return false;
     }
     return true;
   }
 
+  /// Of the list that was read last.
+  [[nodiscard]] const std::vector<double>& items() const { return items_; }
   [[nodiscard]] bool ascii() const { return ascii_; }
   [[nodiscard]] bool swap() const { return swap_; }
   [[nodiscard]] ByteReader& reader() { return reader_; }
@@ -66,6 +69,7 @@ class Body {
   bool ascii_;
   bool swap_;
   std::string word_;
+  std::vector<double> items_;
   std::string problem_;
 };
 
@@ -110,6 +114,20 @@ bool has_lists(const PlyElement& element) {
                      [](const auto& p) { return p.list; });
 }
 
+/// Reads record by record what is no list, and lists into the body's items; visit(row, property, value) says
+/// whether to go on. Returns how many records were read.
+template <typename Visit>
+std::uint64_t read_records(Body& body, const PlyElement& element, const Visit& visit) {
+  for (std::uint64_t row = 0; row < element.count; ++row) {
+    for (const auto& property : element.properties) {
+      double value = 0.0;
+      if (!(property.list ? body.list(property) : body.scalar(property.type, value))) return row;
+      if (!visit(row, property, value)) return row;
+    }
+  }
+  return element.count;
+}
+
 /// Returns how many vertices were read.
 std::uint64_t read_vertices(Body& body, const PlyElement& element, PlyData& data) {
   const std::vector<Sink> sinks = make_columns(element, data);
@@ -130,21 +148,11 @@ std::uint64_t read_vertices(Body& body, const PlyElement& element, PlyData& data
     }
     return data.vertex_count;
   }
-  std::vector<double> items;
-  for (std::size_t row = 0; row < data.vertex_count; ++row) {
-    std::size_t column = 0;
-    for (const auto& property : element.properties) {
-      double value = 0.0;
-      if (property.list) {
-        if (!body.list(property, items)) return row;
-      } else if (body.scalar(property.type, value)) {
-        store(sinks[column++], row, value);
-      } else {
-        return row;
-      }
-    }
-  }
-  return data.vertex_count;
+  std::size_t column = 0;
+  return read_records(body, element, [&](std::uint64_t row, const PlyProperty& property, double value) {
+    if (!property.list) store(sinks[column++ % sinks.size()], static_cast<std::size_t>(row), value);
+    return true;
+  });
 }
 
 bool to_index(double value, std::size_t vertices, std::uint32_t& index) {
@@ -167,58 +175,30 @@ bool add_polygon(Body& body, const std::vector<double>& corners, PlyData& data) 
 }
 
 std::uint64_t read_faces(Body& body, const PlyElement& element, PlyData& data) {
-  std::vector<double> items;
-  for (std::uint64_t row = 0; row < element.count; ++row) {
-    for (const auto& property : element.properties) {
-      double ignored = 0.0;
-      if (!property.list) {
-        if (!body.scalar(property.type, ignored)) return row;
-        continue;
-      }
-      if (!body.list(property, items)) return row;
-      const bool corners = property.name == "vertex_indices" || property.name == "vertex_index";
-      if (corners && !add_polygon(body, items, data)) return row;
-    }
-  }
-  return element.count;
+  return read_records(body, element, [&](std::uint64_t, const PlyProperty& property, double) {
+    const bool corners = property.name == "vertex_indices" || property.name == "vertex_index";
+    return !property.list || !corners || add_polygon(body, body.items(), data);
+  });
 }
 
 std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
-  std::vector<double> items;
-  bool colored = false;
-  for (std::uint64_t row = 0; row < element.count; ++row) {
-    std::array<std::uint32_t, 2> edge{};
-    std::array<std::uint8_t, 3> color{};
-    for (const auto& property : element.properties) {
-      double value = 0.0;
-      if (property.list ? !body.list(property, items) : !body.scalar(property.type, value)) return row;
-      const bool first = property.name == "vertex1";
-      if (first || property.name == "vertex2") {
-        if (!to_index(value, data.vertex_count, edge[first ? 0 : 1])) {
-          body.refuse(fmt::format("vertex index {} is not below {}", value, data.vertex_count));
-          return row;
-        }
-      }
-      if (property.name == "red") color[0] = to_byte(value);
-      if (property.name == "green") color[1] = to_byte(value);
-      if (property.name == "blue") color[2] = to_byte(value);
-      colored = colored || property.name == "red";
+  const auto count = static_cast<std::size_t>(element.count);
+  const bool colored = std::any_of(element.properties.begin(), element.properties.end(),
+                                   [](const auto& property) { return property.name == "red"; });
+  data.edges.resize(count);
+  data.edge_colors.resize(colored ? count : 0);
+  return read_records(body, element, [&](std::uint64_t row, const PlyProperty& property, double value) {
+    const bool first = property.name == "vertex1";
+    if ((first || property.name == "vertex2") &&
+        !to_index(value, data.vertex_count, data.edges[row][first ? 0 : 1])) {
+      return body.refuse(fmt::format("vertex index {} is not below {}", value, data.vertex_count));
     }
-    data.edges.push_back(edge);
-    if (colored) data.edge_colors.push_back(color);
-  }
-  return element.count;
-}
-
-std::uint64_t skip(Body& body, const PlyElement& element) {
-  std::vector<double> items;
-  for (std::uint64_t row = 0; row < element.count; ++row) {
-    for (const auto& property : element.properties) {
-      double ignored = 0.0;
-      if (property.list ? !body.list(property, items) : !body.scalar(property.type, ignored)) return row;
+    for (std::size_t k = 0; k < 3 && colored; ++k) {
+      constexpr std::array<const char*, 3> kChannels{"red", "green", "blue"};
+      if (property.name == kChannels[k]) data.edge_colors[row][k] = to_byte(value);
     }
-  }
-  return element.count;
+    return true;
+  });
 }
 
 /// "" or what is wrong with the records of one element.
@@ -240,7 +220,7 @@ std::string read_element(Body& body, const PlyElement& element, PlyData& data) {
   } else if (element.name == "edge") {
     rows = read_edges(body, element, data);
   } else {
-    rows = skip(body, element);
+    rows = read_records(body, element, [](auto&&...) { return true; });
   }
   if (rows == element.count) return "";
   const std::string place = fmt::format("'{}' {} of {}: ", element.name, rows + 1, element.count);

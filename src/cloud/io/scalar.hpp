@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -27,57 +26,46 @@ enum class ScalarType {
   kFloat64
 };
 
-inline std::size_t size_of(ScalarType type) {
+/// Calls body(T()) with the C++ type T of a scalar.
+template <typename Body>
+auto with_type(ScalarType type, const Body& body) {
   switch (type) {
     case ScalarType::kInt8:
+      return body(std::int8_t());
     case ScalarType::kUint8:
-      return 1;
+      return body(std::uint8_t());
     case ScalarType::kInt16:
+      return body(std::int16_t());
     case ScalarType::kUint16:
-      return 2;
+      return body(std::uint16_t());
+    case ScalarType::kInt32:
+      return body(std::int32_t());
+    case ScalarType::kUint32:
+      return body(std::uint32_t());
     case ScalarType::kInt64:
+      return body(std::int64_t());
     case ScalarType::kUint64:
+      return body(std::uint64_t());
+    case ScalarType::kFloat32:
+      return body(float());
     case ScalarType::kFloat64:
-      return 8;
-    default:
-      return 4;
+      break;
   }
+  return body(double());
 }
 
-template <typename T>
-double load_as(const std::uint8_t* bytes, bool big_endian) {
-  std::array<std::uint8_t, sizeof(T)> raw{};
-  std::memcpy(raw.data(), bytes, sizeof(T));
-  if (big_endian) std::reverse(raw.begin(), raw.end());
-  T value;
-  std::memcpy(&value, raw.data(), sizeof(T));
-  return static_cast<double>(value);
+inline std::size_t size_of(ScalarType type) {
+  return with_type(type, [](auto value) { return sizeof(value); });
 }
 
 inline double load(ScalarType type, const std::uint8_t* bytes, bool big_endian) {
-  switch (type) {
-    case ScalarType::kInt8:
-      return load_as<std::int8_t>(bytes, big_endian);
-    case ScalarType::kUint8:
-      return load_as<std::uint8_t>(bytes, big_endian);
-    case ScalarType::kInt16:
-      return load_as<std::int16_t>(bytes, big_endian);
-    case ScalarType::kUint16:
-      return load_as<std::uint16_t>(bytes, big_endian);
-    case ScalarType::kInt32:
-      return load_as<std::int32_t>(bytes, big_endian);
-    case ScalarType::kUint32:
-      return load_as<std::uint32_t>(bytes, big_endian);
-    case ScalarType::kInt64:
-      return load_as<std::int64_t>(bytes, big_endian);
-    case ScalarType::kUint64:
-      return load_as<std::uint64_t>(bytes, big_endian);
-    case ScalarType::kFloat32:
-      return load_as<float>(bytes, big_endian);
-    case ScalarType::kFloat64:
-      return load_as<double>(bytes, big_endian);
-  }
-  return 0.0;
+  return with_type(type, [&](auto value) {
+    std::array<std::uint8_t, sizeof(value)> raw{};
+    std::memcpy(raw.data(), bytes, sizeof(value));
+    if (big_endian) std::reverse(raw.begin(), raw.end());
+    std::memcpy(&value, raw.data(), sizeof(value));
+    return static_cast<double>(value);
+  });
 }
 
 /// A whole word as a number, nan and inf included, whatever the locale.

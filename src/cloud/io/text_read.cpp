@@ -4,6 +4,8 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <cmath>
+
 #include "io/byte_reader.hpp"
 #include "io/cloud_table.hpp"
 #include "io/scalar.hpp"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::cloud {
@@ -56,9 +57,7 @@ double spread_of(const std::vector<Match>& matches, const Eigen::Vector3d& middl
 double scale_of(const std::vector<Match>& matches) {
   std::vector<double> errors;
   for (const Match& m : matches) errors.push_back(std::abs(m.distance));
-  const auto median = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), median, errors.end());
-  return std::max(1.0, 1.4826 * *median);
+  return std::max(1.0, 1.4826 * core::median(std::move(errors)));
 }
 
 double huber(double ratio) {
@@ -129,9 +128,7 @@ void ConstrainedPointToPlane::estimateRigidTransformation(const SurfaceCloud& so
                                                           const pcl::Indices& of_source,
                                                           const SurfaceCloud& target,
                                                           Matrix4& transformation) const {
-  transformation =
-      step(SurfaceCloud(source, of_source), target, in_order(std::min(of_source.size(), target.size())))
-          .transformation;
+  estimateRigidTransformation(SurfaceCloud(source, of_source), target, transformation);
 }
 
 void ConstrainedPointToPlane::estimateRigidTransformation(const SurfaceCloud& source,
@@ -139,9 +136,7 @@ void ConstrainedPointToPlane::estimateRigidTransformation(const SurfaceCloud& so
                                                           const SurfaceCloud& target,
                                                           const pcl::Indices& of_target,
                                                           Matrix4& transformation) const {
-  transformation = step(SurfaceCloud(source, of_source), SurfaceCloud(target, of_target),
-                        in_order(std::min(of_source.size(), of_target.size())))
-                       .transformation;
+  estimateRigidTransformation(source, of_source, SurfaceCloud(target, of_target), transformation);
 }
 
 void ConstrainedPointToPlane::estimateRigidTransformation(const SurfaceCloud& source,

@@ -3,45 +3,24 @@
 
 // What surfaces are made of: how they look and how a depth sensor's infrared light likes them.
 #include <cstdint>
+#include <opencv2/core.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "plumbline/synth/options.hpp"
 
 namespace plumbline::synth {
 
-enum class Print {
-  kPlain,
-  kPlaster,
-  kCeiling,
-  kCarpet,
-  kPlanks,
-  kWood,
-  kBrick,
-  kCloth,
-  kFabric,
-  kRug,
-  kMetal,
-  kScreen,
-  kPoster,
-  kPicture,
-  kWhiteboard,
-  kSign,
-  kBooks,
-  kPaper,
-  kCover,
-  kDoor,
-  kWindow,
-  kTiles,
-  kCardboard,
-  kLino,
-  kLeaf,
-  kHall
-};
+struct Material;
+
+/// Pictures are reflectances, B G R, 0-1.
+using Canvas = cv::Mat_<cv::Vec3f>;
+using DrawTexture = Canvas(const Material& m, cv::Size size, std::uint64_t seed);
 
 struct Material {
-  const char* name;
-  Print print;
+  std::string_view name;
+  DrawTexture* draw;
   float red, green, blue;  ///< mean reflectance, 0-1
   double tile_m;           ///< one copy of the texture covers so much
   int pixels;              ///< edge of the texture image

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the drawing of textures is made of. Pictures are reflectances, B G R, 0-1. Private to the module.
+// What the drawing of textures is made of. Private to the module.
 #include <cstdint>
 #include <opencv2/core.hpp>
 
 #include "materials/materials.hpp"
 
 namespace plumbline::synth {
-
-using Canvas = cv::Mat_<cv::Vec3f>;
 
 // ---- texture_fields.cpp ----
 

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 
 #include "render/depth_sensor.hpp"
@@ -22,26 +22,6 @@ namespace {
 /// was never seen better than that is not held against a map.
 constexpr double kLeastSine = 0.342;
 
-struct Bounds {
-  Vector2d lo, hi;
-};
-Bounds bounds(const Face& face) {
-  Bounds b{face.polygon[0], face.polygon[0]};
-  for (const Vector2d& p : face.polygon) {
-    b.lo = b.lo.cwiseMin(p);
-    b.hi = b.hi.cwiseMax(p);
-  }
-  return b;
-}
-
-bool in_polygon(const Face& face, const Vector2d& p) {
-  for (std::size_t i = 0; i < face.polygon.size(); ++i) {
-    const Vector2d &a = face.polygon[i], &b = face.polygon[(i + 1) % face.polygon.size()];
-    if ((b - a).x() * (p - a).y() - (b - a).y() * (p - a).x() < -1e-9) return false;
-  }
-  return true;
-}
-
 /// Whether nothing but emptiness lies before a spot: the outside of the world.
 bool faces_nowhere(const World& world, const Face& face, const Vector3d& p) {
   int misses = 0;
@@ -55,45 +35,35 @@ bool faces_nowhere(const World& world, const Face& face, const Vector3d& p) {
   return misses >= 7;
 }
 
-#pragma pack(push, 1)
 struct PlySample {
-  float x, y, z, nx, ny, nz;
+  std::array<float, 3> position, normal;
   std::uint8_t red, green, blue, visible;
 };
-#pragma pack(pop)
+static_assert(sizeof(PlySample) == 28);
 
 PlySample make_sample(const World& world, std::size_t index, double u, double v, const Vector3d& p,
                       bool visible) {
-  const Face& face = world.scene.faces[index];
-  PlySample s{};
-  s.x = static_cast<float>(p.x());
-  s.y = static_cast<float>(p.y());
-  s.z = static_cast<float>(p.z());
-  s.nx = static_cast<float>(face.normal.x());
-  s.ny = static_cast<float>(face.normal.y());
-  s.nz = static_cast<float>(face.normal.z());
   const cv::Vec3b c = surface_color(world, index, u, v);
-  s.blue = c[0];
-  s.green = c[1];
-  s.red = c[2];
-  s.visible = visible ? 1 : 0;
+  PlySample s{{}, {}, c[2], c[1], c[0], visible ? std::uint8_t{1} : std::uint8_t{0}};
+  Eigen::Vector3f::Map(s.position.data()) = p.cast<float>();
+  Eigen::Vector3f::Map(s.normal.data()) = world.scene.faces[index].normal.cast<float>();
   return s;
 }
 
 std::vector<PlySample> sample_face(const World& world, const Visibility& visibility, std::size_t index,
                                    double spacing) {
   const Face& face = world.scene.faces[index];
-  const Bounds b = bounds(face);
+  const Eigen::AlignedBox2d b = face.bounds();
   std::vector<PlySample> out;
   // The middle of the grid's cells, whole cells over the face, so that no edge is favoured.
-  const int nu = std::max(1, static_cast<int>(std::lround((b.hi.x() - b.lo.x()) / spacing)));
-  const int nv = std::max(1, static_cast<int>(std::lround((b.hi.y() - b.lo.y()) / spacing)));
-  const double du = (b.hi.x() - b.lo.x()) / nu, dv = (b.hi.y() - b.lo.y()) / nv;
+  const int nu = std::max(1, static_cast<int>(std::lround((b.max().x() - b.min().x()) / spacing)));
+  const int nv = std::max(1, static_cast<int>(std::lround((b.max().y() - b.min().y()) / spacing)));
+  const double du = (b.max().x() - b.min().x()) / nu, dv = (b.max().y() - b.min().y()) / nv;
   std::vector<signed char> outside(static_cast<std::size_t>((nu / 16 + 1) * (nv / 16 + 1)), -1);
   for (int j = 0; j < nv; ++j) {
     for (int i = 0; i < nu; ++i) {
-      const Vector2d uv(b.lo.x() + (i + 0.5) * du, b.lo.y() + (j + 0.5) * dv);
-      if (!in_polygon(face, uv)) continue;
+      const Vector2d uv(b.min().x() + (i + 0.5) * du, b.min().y() + (j + 0.5) * dv);
+      if (!face.contains(uv, 1e-9)) continue;
       const Vector3d p = face.at(uv.x(), uv.y()), before = p + 0.002 * face.normal;
       const bool visible = visibility.seen(index, uv.x(), uv.y());
       if (!visible) {
@@ -113,9 +83,9 @@ Visibility::Visibility(std::shared_ptr<const World> world, double spacing)
     : world_(std::move(world)), block_(std::max(0.02, spacing)) {
   std::size_t count = 0;
   for (const Face& face : world_->scene.faces) {
-    const Bounds b = bounds(face);
-    const Grid grid{b.lo.x(), b.lo.y(), 1 + static_cast<int>((b.hi.x() - b.lo.x()) / block_),
-                    1 + static_cast<int>((b.hi.y() - b.lo.y()) / block_), count};
+    const Eigen::AlignedBox2d b = face.bounds();
+    const Grid grid{b.min().x(), b.min().y(), 1 + static_cast<int>((b.max().x() - b.min().x()) / block_),
+                    1 + static_cast<int>((b.max().y() - b.min().y()) / block_), count};
     count += static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows);
     grids_.push_back(grid);
   }
@@ -154,13 +124,13 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     if (present[index] == 0) continue;
     const Face& face = world_->scene.faces[index];
     const Grid& g = grids_[index];
-    const Bounds b = bounds(face);
+    const Eigen::AlignedBox2d b = face.bounds();
     for (int j = 0; j < g.rows; ++j) {
       for (int i = 0; i < g.columns; ++i) {
         std::atomic<std::uint8_t>& flag = flags_[g.at(i, j)];
         if (flag.load(std::memory_order_relaxed) != 0) continue;
         const double ua = g.u0 + i * block_, va = g.v0 + j * block_;
-        const double ub = std::min(ua + block_, b.hi.x()), vb = std::min(va + block_, b.hi.y());
+        const double ub = std::min(ua + block_, b.max().x()), vb = std::min(va + block_, b.max().y());
         const Vector3d middle = face.at(0.5 * (ua + ub), 0.5 * (va + vb));
         if (!sees(index, middle)) continue;
         const Vector3d ray = (middle - world_from_camera.translation).normalized();
@@ -188,10 +158,7 @@ void Visibility::add(const SynthSource& source, const core::Executor& executor, 
 
 double default_spacing(const Scene& scene) {
   double area = 0.0;
-  for (const Face& face : scene.faces) {
-    const Bounds b = bounds(face);
-    area += (b.hi - b.lo).prod();
-  }
+  for (const Face& face : scene.faces) area += face.bounds().volume();
   return std::max(0.005, std::ceil(1000.0 * std::sqrt(area / 2.0e7)) / 1000.0);
 }
 
@@ -209,8 +176,7 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
   std::ofstream out(file, std::ios::binary);
   out << fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment samples of the true surfaces, {:.4f} m apart; visible = "
-      "1 where "
-      "a camera saw the spot within range\nelement vertex {}\n",
+      "1 where a camera saw the spot within range\nelement vertex {}\n",
       spacing, counts.samples);
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
   for (const char* name : {"red", "green", "blue", "visible"}) out << "property uchar " << name << "\n";

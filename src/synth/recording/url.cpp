@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <cstdlib>
-
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::synth {

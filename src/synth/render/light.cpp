@@ -101,13 +101,9 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
 
 LightMap light_face(const World& world, std::size_t index) {
   const Face& face = world.scene.faces[index];
-  double u0 = 1e9, v0 = 1e9, u1 = -1e9, v1 = -1e9;
-  for (const Eigen::Vector2d& uv : face.polygon) {
-    u0 = std::min(u0, uv.x());
-    v0 = std::min(v0, uv.y());
-    u1 = std::max(u1, uv.x());
-    v1 = std::max(v1, uv.y());
-  }
+  const Eigen::AlignedBox2d bounds = face.bounds();
+  const double u0 = bounds.min().x(), v0 = bounds.min().y();
+  const double u1 = bounds.max().x(), v1 = bounds.max().y();
   const double w = std::max(u1 - u0, 1e-4), h = std::max(v1 - v0, 1e-4);
   const double pitch = std::max(0.06, std::max(w, h) / 80.0);
   LightMap map;

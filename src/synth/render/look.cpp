@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Who is in front: the face behind every pixel.
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "render/ray_batch.hpp"

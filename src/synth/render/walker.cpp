@@ -28,14 +28,6 @@ void add_walker(Builder& b, const Walker& walker) {
 
 namespace {
 
-bool inside(const Face& face, double u, double v) {
-  for (std::size_t i = 0; i < face.polygon.size(); ++i) {
-    const Eigen::Vector2d &a = face.polygon[i], &b = face.polygon[(i + 1) % face.polygon.size()];
-    if ((b - a).x() * (v - a.y()) - (b - a).y() * (u - a.x()) < 0.0) return false;
-  }
-  return true;
-}
-
 float inverse_depth(const View& view, int face, float x, float y) {
   if (face < 0) return 0.0F;
   const FaceView& f = view.faces[static_cast<std::size_t>(face)];
@@ -55,7 +47,7 @@ int MovingFaces::in_front(const View& view, int fixed, float x, float y) const {
     const Face& face = world_.scene.faces[spot.face];
     const Vector3d d =
         view.world_from_camera.translation + ray / static_cast<double>(here) - spot.shift - face.origin;
-    if (!inside(face, d.dot(face.u_axis), d.dot(face.v_axis))) continue;
+    if (!face.contains({d.dot(face.u_axis), d.dot(face.v_axis)})) continue;
     best = static_cast<int>(spot.face);
     nearest = here;
   }

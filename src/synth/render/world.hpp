@@ -2,8 +2,6 @@
 #pragma once
 
 // A scene made ready to render. Private to the module.
-#include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "materials/materials.hpp"

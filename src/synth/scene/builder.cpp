@@ -18,6 +18,24 @@ Rigid3 upright(const Vector3d& origin, double yaw_rad) {
   return frame;
 }
 
+Rigid3 placed(const Rigid3& frame, const Vector3d& at, const Eigen::AngleAxisd& turn) {
+  return {Eigen::Matrix3d(frame.rotation * turn.toRotationMatrix()), frame * at};
+}
+
+Eigen::AlignedBox2d Face::bounds() const {
+  Eigen::AlignedBox2d box;
+  for (const Vector2d& uv : polygon) box.extend(uv);
+  return box;
+}
+
+bool Face::contains(const Vector2d& uv, double slack) const {
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    if ((b - a).x() * (uv - a).y() - (b - a).y() * (uv - a).x() < -slack) return false;
+  }
+  return true;
+}
+
 void Builder::begin_object(const std::string& type, const std::string& name, const core::ConfigMark& mark) {
   Object object;
   object.type = type;
@@ -33,24 +51,19 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   face.u_axis = (u_hint - u_hint.dot(face.normal) * face.normal).normalized();
   face.v_axis = face.normal.cross(face.u_axis);
   face.origin = corners[0];
-  double min_u = 0.0, min_v = 0.0, max_u = 0.0, max_v = 0.0;
   for (const Vector3d& corner : corners) {
     const Vector3d d = corner - face.origin;
-    const Vector2d uv(d.dot(face.u_axis), d.dot(face.v_axis));
-    face.polygon.push_back(uv);
-    min_u = std::min(min_u, uv.x());
-    min_v = std::min(min_v, uv.y());
-    max_u = std::max(max_u, uv.x());
-    max_v = std::max(max_v, uv.y());
+    face.polygon.emplace_back(d.dot(face.u_axis), d.dot(face.v_axis));
   }
+  const Eigen::AlignedBox2d bounds = face.bounds();
   // Texture coordinates count from the lower left corner of the polygon's bounding rectangle.
-  face.origin = face.at(min_u, min_v);
-  for (Vector2d& uv : face.polygon) uv -= Vector2d(min_u, min_v);
+  face.origin = face.at(bounds.min().x(), bounds.min().y());
+  for (Vector2d& uv : face.polygon) uv -= bounds.min();
   face.material = skin.material;
   face.seed = skin.seed >= 0 ? skin.seed : seed_;
   if (skin.stretched) {
-    face.stretch_u = max_u - min_u;
-    face.stretch_v = max_v - min_v;
+    face.stretch_u = bounds.sizes().x();
+    face.stretch_v = bounds.sizes().y();
   }
   face.object = static_cast<int>(scene_.objects.size()) - 1;
   scene_.faces.push_back(std::move(face));

@@ -13,6 +13,10 @@ namespace plumbline::synth {
 /// Upright frame: origin at (x, y, z), x axis turned by yaw from the world's x.
 geometry::Rigid3 upright(const Eigen::Vector3d& origin, double yaw_rad);
 
+/// The frame at `at` of another one, turned there.
+geometry::Rigid3 placed(const geometry::Rigid3& frame, const Eigen::Vector3d& at,
+                        const Eigen::AngleAxisd& turn);
+
 /// Which texture a face carries.
 struct Skin {
   std::string material;

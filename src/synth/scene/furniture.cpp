@@ -37,16 +37,12 @@ void add_desk(Builder& b, const Rigid3& f, const Vector3d& size, const std::stri
 
 void add_chair(Builder& b, const Rigid3& f, const std::string& material) {
   b.box(f, {-0.24, -0.23, 0.44}, {0.24, 0.23, 0.51}, {material});
-  Rigid3 back = f;
-  back.translation = f * Vector3d(0.0, 0.22, 0.56);
-  back.rotation = f.rotation * Eigen::AngleAxisd(-0.15, Vector3d::UnitX()).toRotationMatrix();
+  const Rigid3 back = placed(f, {0.0, 0.22, 0.56}, {-0.15, Vector3d::UnitX()});
   b.box(back, {-0.22, 0.0, 0.0}, {0.22, 0.05, 0.48}, {material});
   b.box(f, {-0.03, 0.20, 0.42}, {0.03, 0.235, 0.60}, {"plastic_black"});
   b.cylinder(f, {0.0, 0.0, 0.08}, 0.028, 0.028, 0.36, 10, {"metal"});
   for (int i = 0; i < 5; ++i) {
-    Rigid3 arm = f;
-    arm.rotation =
-        f.rotation * Eigen::AngleAxisd(2.0 * M_PI * i / 5.0 + 0.3, Vector3d::UnitZ()).toRotationMatrix();
+    const Rigid3 arm = placed(f, Vector3d::Zero(), {2.0 * M_PI * i / 5.0 + 0.3, Vector3d::UnitZ()});
     b.box(arm, {0.02, -0.02, 0.06}, {0.30, 0.02, 0.09}, {"plastic_black"});
     b.box(arm, {0.26, -0.02, 0.0}, {0.30, 0.02, 0.06}, {"plastic_black"});
   }
@@ -108,15 +104,11 @@ void add_sofa(Builder& b, const Rigid3& f, const Vector3d& size, const std::stri
   for (int i = 0; i < cushions; ++i) {
     const double x0 = -x + arm + width * i + 0.006, x1 = x0 + width - 0.012;
     b.box(f, {x0, -y - 0.01, 0.30}, {x1, y - 0.22, 0.44}, {material});
-    Rigid3 tilted = f;
-    tilted.translation = f * Vector3d(0.0, y - 0.24, 0.44);
-    tilted.rotation = f.rotation * Eigen::AngleAxisd(-0.18, Vector3d::UnitX()).toRotationMatrix();
+    const Rigid3 tilted = placed(f, {0.0, y - 0.24, 0.44}, {-0.18, Vector3d::UnitX()});
     b.box(tilted, {x0, -0.12, 0.0}, {x1, 0.0, h - 0.50}, {material});
   }
-  Rigid3 pillow = f;
-  pillow.translation = f * Vector3d(-x + arm + 0.24, y - 0.36, 0.45);
-  pillow.rotation = f.rotation * Eigen::AngleAxisd(0.35, Vector3d::UnitZ()).toRotationMatrix() *
-                    Eigen::AngleAxisd(-0.45, Vector3d::UnitX()).toRotationMatrix();
+  const Rigid3 turned = placed(f, {-x + arm + 0.24, y - 0.36, 0.45}, {0.35, Vector3d::UnitZ()});
+  const Rigid3 pillow = placed(turned, Vector3d::Zero(), {-0.45, Vector3d::UnitX()});
   b.box(pillow, {-0.2, -0.06, 0.0}, {0.2, 0.05, 0.36}, {"rug"});
 }
 
@@ -140,10 +132,8 @@ void add_plant(Builder& b, const Rigid3& f, double height) {
     const double z = rng.uniform(pot + 0.1 * height, 0.85 * height), yaw = rng.uniform(0.0, 2.0 * M_PI);
     const double length = rng.uniform(0.16, 0.34), width = rng.uniform(0.05, 0.1),
                  rise = rng.uniform(-0.2, 0.9);
-    Rigid3 leaf = f;
-    leaf.translation = f * Vector3d(0.0, 0.0, z);
-    leaf.rotation = f.rotation * Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix() *
-                    Eigen::AngleAxisd(-rise, Vector3d::UnitY()).toRotationMatrix();
+    const Rigid3 turned = placed(f, {0.0, 0.0, z}, {yaw, Vector3d::UnitZ()});
+    const Rigid3 leaf = placed(turned, Vector3d::Zero(), {-rise, Vector3d::UnitY()});
     const double t = 0.0015;
     for (const double s : {-1.0, 1.0}) {  // both sides of the leaf
       std::vector<Vector3d> p = {{0.02, 0.0, s * t},
@@ -188,11 +178,9 @@ void add_clutter(Builder& b, const Rigid3& f, double width, double depth, int co
   static const std::array<const char*, 5> kCovers = {"cover", "paper", "cardboard", "cover", "plastic_blue"};
   for (int i = 0; i < count; ++i) {
     const double cell = width / count;
-    Rigid3 item = f;
-    item.translation = f * Vector3d(-0.5 * width + cell * (i + rng.uniform(0.35, 0.65)),
-                                    rng.uniform(-0.32, 0.32) * depth, 0.0);
-    item.rotation =
-        f.rotation * Eigen::AngleAxisd(rng.uniform(-0.6, 0.6), Vector3d::UnitZ()).toRotationMatrix();
+    const Vector3d at(-0.5 * width + cell * (i + rng.uniform(0.35, 0.65)), rng.uniform(-0.32, 0.32) * depth,
+                      0.0);
+    const Rigid3 item = placed(f, at, {rng.uniform(-0.6, 0.6), Vector3d::UnitZ()});
     const double kind = rng.uniform();
     if (kind < 0.25) {
       b.cylinder(item, Vector3d::Zero(), 0.038, 0.042, rng.uniform(0.09, 0.13), 14,

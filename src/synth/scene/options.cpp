@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdlib>
 
 #include "plumbline/core/config.hpp"
 #include "plumbline/core/numbers.hpp"

@@ -61,9 +61,8 @@ void add_glass(Builder& b, const Rigid3& frame, const Opening& o) {
 
 void add_leaf(Builder& b, const Rigid3& frame, const Wall& wall, const Opening& o) {
   if (o.open_rad < 0.0) return;
-  Rigid3 hinge = frame;
-  hinge.translation = frame * Vector3d(o.at + 0.01, -0.5 * wall.thickness, o.bottom);
-  hinge.rotation = frame.rotation * Eigen::AngleAxisd(-o.open_rad, Vector3d::UnitZ()).toRotationMatrix();
+  const Rigid3 hinge =
+      placed(frame, {o.at + 0.01, -0.5 * wall.thickness, o.bottom}, {-o.open_rad, Vector3d::UnitZ()});
   const double w = o.width - 0.02, h = o.height - 0.02;
   const Skin leaf{o.material, true};
   b.box(hinge, {0.0, 0.0, 0.01}, {w, 0.04, h}, leaf, &leaf);

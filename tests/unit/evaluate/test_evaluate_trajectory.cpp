@@ -328,18 +328,6 @@ TEST(EvaluateTrajectory, JsonHasTheDocumentedKeys) {
   EXPECT_NE(to_text(*report).find("ATE"), std::string::npos);
 }
 
-TEST(RollPitchYaw, TurnsBackIntoTheRotation) {
-  const auto rotation = [](double roll, double pitch, double yaw) {
-    return Eigen::Matrix3d(Eigen::AngleAxisd(yaw / kDegrees, Eigen::Vector3d::UnitZ()) *
-                           Eigen::AngleAxisd(pitch / kDegrees, Eigen::Vector3d::UnitY()) *
-                           Eigen::AngleAxisd(roll / kDegrees, Eigen::Vector3d::UnitX()));
-  };
-  EXPECT_LT((evaluate::roll_pitch_yaw_deg(rotation(10, -20, 150)) - Eigen::Vector3d(10, -20, 150)).norm(),
-            1e-9);
-  const Eigen::Vector3d lock = evaluate::roll_pitch_yaw_deg(rotation(30, 90, 0));
-  EXPECT_LT((rotation(lock(0), lock(1), lock(2)) - rotation(30, 90, 0)).norm(), 1e-6);
-}
-
 TEST(ReadFrameStamps, ReadsAListAndNamesABadLine) {
   const auto file = std::filesystem::temp_directory_path() / "plumbline_frames_list.txt";
   std::ofstream(file) << "# colour\n1.5 rgb/b.png\n\n0.5 rgb/a.png\n";

@@ -13,7 +13,7 @@ using namespace plumbline::evaluate;
 using namespace plumbline::evaluate::worlds;
 
 WallThickness thickness(const SurfaceSamples& cloud, double spacing) {
-  return wall_thickness(cloud, spacing, {}, core::Executor(2));
+  return thickness_of(wall_patches(cloud, spacing, {}, core::Executor(2)));
 }
 
 TEST(WallThickness, OfATruePlaneIsZero) {

@@ -117,10 +117,11 @@ TEST(SvgChart, OneScaleForBothAxesOfAPlan) {
 }
 
 TEST(Ticks, AreRoundAndLabelledAlike) {
-  const Ticks ticks = nice_ticks(-0.25, 1.0, 0.2);
-  EXPECT_EQ(ticks.labels, (std::vector<std::string>{"-0.2", "0.0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
-  EXPECT_TRUE(nice_ticks(1.0, 1.0, 0.1).values.empty());
-  EXPECT_TRUE(nice_ticks(0.0, kNaN, 0.1).values.empty());
+  std::vector<std::string> labels;
+  for (const Tick& tick : nice_ticks(-0.25, 1.0, 0.2)) labels.push_back(tick.label);
+  EXPECT_EQ(labels, (std::vector<std::string>{"-0.2", "0.0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
+  EXPECT_TRUE(nice_ticks(1.0, 1.0, 0.1).empty());
+  EXPECT_TRUE(nice_ticks(0.0, kNaN, 0.1).empty());
 }
 
 TEST(SvgDocument, HoldsChartsSideBySideWithTitlesAndLegends) {
