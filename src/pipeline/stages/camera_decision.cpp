@@ -51,16 +51,15 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
 
 }  // namespace
 
-/// What two questions found, one after the other, against what was given at first.
-static RunSummary::Camera both(const RunSummary::Camera& first, RunSummary::Camera second) {
-  for (std::size_t i = 0; i < first.findings.size(); ++i) {
-    mapping::CameraFinding& f = second.findings[i];
-    if (!f.used && first.findings[i].used) f.found = f.given;
-    f.used = f.used || first.findings[i].used;
-    f.given = first.findings[i].given;
+/// What an earlier question found stays, and all is told against what was given at first.
+static void keep_earlier(const std::vector<mapping::CameraFinding>& earlier,
+                         std::vector<mapping::CameraFinding>& findings) {
+  for (std::size_t i = 0; i < earlier.size(); ++i) {
+    mapping::CameraFinding& f = findings[i];
+    if (!f.used && earlier[i].used) f.found = f.given;
+    f.used = f.used || earlier[i].used;
+    f.given = earlier[i].given;
   }
-  second.gain = 1.0 - (1.0 - first.gain) * (1.0 - second.gain);
-  return second;
 }
 
 void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& run,
@@ -71,8 +70,8 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
   said.resize(used.size());
   news.resize(used.size());
   mapping::CalibrationOptions options;
-  if (asked == 0) options.least_gain = kLeastGain;
   options.earlier = said[number].findings;
+  if (found_text(options.earlier).empty()) options.least_gain = kLeastGain;
   if (guess) {
     options.focal_prior = 0.1;
     options.centre_prior_px = 20.0;
@@ -89,10 +88,9 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
   }
   const bool better = !found_text(found->findings).empty();
   if (asked > 0 && !better) return;
-  RunSummary::Camera now = camera;
-  now.findings = found->findings;
-  now.gain = found->gain;
-  camera = both(camera, std::move(now));
+  camera.findings = found->findings;
+  keep_earlier(options.earlier, camera.findings);
+  camera.gain = 1.0 - (1.0 - camera.gain) * (1.0 - found->gain);
   if (!better) return;
   news[number] = found_text(camera.findings);
   used[number] = found->camera;
