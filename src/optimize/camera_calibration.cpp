@@ -7,6 +7,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <utility>
+
+#include "ceres_solve.hpp"
 
 namespace plumbline::optimize {
 namespace {
@@ -150,12 +153,9 @@ bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
   solver.linear_solver_ordering.reset(ordering);
-  solver.num_threads = 1;  // sums in a fixed order
   solver.max_num_iterations = 50;
   solver.function_tolerance = 1e-5;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &ceres_problem, &summary);
+  const ceres::Solver::Summary summary = solve(std::move(solver), ceres_problem);
   ceres_problem.SetParameterBlockVariable(unknowns.change());
   return summary.IsSolutionUsable();
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A round of bundle adjustment by Ceres.
+
 #include <ceres/ceres.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <utility>
 
 #include "bundle_solver.hpp"
+#include "ceres_solve.hpp"
 #include "ceres_terms.hpp"
 
 namespace plumbline::optimize {
@@ -69,17 +71,14 @@ class MapRound {
         problem_.poses.size() <= kMostDense ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
     solver.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
     solver.linear_solver_ordering = ordering_;
-    solver.num_threads = 1;  // sums in a fixed order
     solver.max_num_iterations = options_.max_iterations;
     solver.initial_trust_region_radius = options_.first_radius;
     solver.function_tolerance = options_.tolerance;
     solver.parameter_tolerance = 1e-7;
-    solver.logging_type = ceres::SILENT;
     double cost = 0.0;
     if (!ceres_.Evaluate({}, &cost, nullptr, nullptr, nullptr))  // or Ceres would print that it cannot
       return {0.0, 0.0, 0, false, "the cost is not a number: an observation or a pose is none"};
-    ceres::Solver::Summary solved;
-    ceres::Solve(solver, &ceres_, &solved);
+    const ceres::Solver::Summary solved = optimize::solve(std::move(solver), ceres_);
     if (!solved.IsSolutionUsable()) return {0.0, 0.0, 0, false, solved.message};
     unknowns_.write_back(problem_, state_);
     return {solved.initial_cost, solved.final_cost, static_cast<int>(solved.iterations.size()), true,

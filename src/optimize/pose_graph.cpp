@@ -10,6 +10,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "ceres_solve.hpp"
 #include "ceres_terms.hpp"
 
 namespace plumbline::optimize {
@@ -55,15 +56,11 @@ class Solver {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
-    options.num_threads = 1;  // sums in a fixed order
     options.max_num_iterations = max_iterations;
     options.initial_trust_region_radius = 1e8;  // relative poses are nearly linear: hardly damped
     options.function_tolerance = tolerance;
     options.parameter_tolerance = 1e-9;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &ceres_, &summary);
-    return summary;
+    return optimize::solve(std::move(options), ceres_);
   }
 
   /// Squared error of an edge as the poses are now, without its weight.
