@@ -62,6 +62,7 @@ TEST_F(CameraRefinement, AWrongFocalLengthIsFoundAndTheRunBeginsAgain) {
   for (const auto& n : told[0]["numbers"]) used = used || (n["name"] == "fx" && n["used"]);
   EXPECT_TRUE(used) << told;
   EXPECT_EQ(told[0]["asked"], 2) << told;
+  for (const auto& n : told[0]["numbers"]) EXPECT_TRUE(!n["used"] || n["gain"] > 0.0) << n;
   // Whoever begins with what was found gets the same, whatever the number of threads.
   for (const char* threads : {"1", "3"}) {
     const std::string again = std::string("again") + threads;

@@ -57,6 +57,7 @@ static void keep_earlier(const std::vector<mapping::CameraFinding>& earlier,
   for (std::size_t i = 0; i < earlier.size(); ++i) {
     mapping::CameraFinding& f = findings[i];
     if (!f.used && earlier[i].used) f.found = f.given;
+    if (earlier[i].used) f.gain = earlier[i].gain;
     f.used = f.used || earlier[i].used;
     f.given = earlier[i].given;
   }
