@@ -5,17 +5,6 @@
 
 #include "plumbline/core/archive.hpp"
 
-namespace plumbline::cloud {
-
-template <typename Io>
-void fields(Io& io, DepthField& field) {
-  DepthField::Terms coefficients = field.coefficients();
-  io(coefficients);
-  if constexpr (Io::kReads) field = DepthField(coefficients);
-}
-
-}  // namespace plumbline::cloud
-
 namespace plumbline::maps {
 
 std::vector<geometry::Matrix6d> FusionState::covariances_of(const std::vector<std::int32_t>& robots,
@@ -30,14 +19,9 @@ std::vector<geometry::Matrix6d> FusionState::covariances_of(const std::vector<st
   return result;
 }
 
-void FusionState::correct(std::int32_t robot, cloud::Cloud& camera_cloud) const {
-  const auto field = depth_fields.find(robot);
-  if (field != depth_fields.end()) field->second.correct(camera_cloud);
-}
-
 template <typename Io>
 void fields(Io& io, FusionState& state) {
-  io(state.depth_fields, state.covariances);
+  io(state.covariances);
 }
 
 std::vector<std::uint8_t> to_bytes(const FusionState& state) { return core::encoded(state); }

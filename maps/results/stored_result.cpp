@@ -130,11 +130,7 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   for (const std::int32_t robot : stored->robots) {
     all.cameras.push_back(camera_of(map_.header.robots, robot).color);
   }
-  all.read = [&](std::size_t i) {
-    auto cloud = stored->read(i);
-    if (cloud) state.correct(stored->robots[i], **cloud);
-    return cloud;
-  };
+  all.read = [&](std::size_t i) { return stored->read(i); };
   all.covariances = state.covariances_of(stored->robots, stored->stamps);
   auto fused = cloud::fuse_views(all, options, executor);
   if (!fused) return fused;

@@ -8,8 +8,6 @@ const std::vector<RenamedOption> kRenamedOptions{
     {"cloud", "looks", "free_space_every"},
     {"cloud", "between", "intermediate_every"},
     {"fuse", "settle", "plane_projection"},
-    {"fuse", "depth_field.partners", "depth_field.views_per_view"},
-    {"fuse", "depth_field.least_gain", "depth_field.min_gain"},
     {"refine", "icp.floor", "icp.min_sigma"},
     {"refine", "icp.min_hold", "icp.min_information"},
     {"refine", "adjust.first_gate", "adjust.gate"},

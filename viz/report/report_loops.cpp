@@ -228,14 +228,6 @@ std::string refinement_html(const ReportData& data) {
                                        mm_at(s, "/refine/max_shift_m"))},
        {"Standard deviation of keyframes beside the first", sigma_text(s)}});
   out += adjustment_html(s);
-  HtmlTable depth("depth camera|correction|>samples|>residual before (σ)|>after (σ)|>at most, at 2 m (mm)");
-  for (const Json& d : list_at(s, "/depth_fields")) {
-    const std::string robot = text_at(d, "/robot");
-    depth.row({robot.empty() ? "the only one" : robot, flag_at(d, "/used") ? "found and used" : "none needed",
-               count_at(d, "/samples"), number_text(number_at(d, "/before"), 3),
-               number_text(number_at(d, "/after"), 3), number_text(1e3 * number_at(d, "/most_at_2m"), 1)});
-  }
-  if (depth.rows() > 0) out += "<h3>Systematic error of the depth cameras</h3>\n" + depth.html();
   return out + cameras_html(s) + fit_html(data);
 }
 

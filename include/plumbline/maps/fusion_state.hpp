@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 
@@ -17,15 +16,12 @@ namespace plumbline::maps {
 inline const char* const kFusionAttachment = "fusion";  ///< its name in a store
 
 struct FusionState {
-  std::map<std::int32_t, cloud::DepthField> depth_fields;  ///< by robot, of its camera
   /// Of keyframes' poses, by robot and stamp; empty: not known.
   std::map<std::pair<std::int32_t, double>, geometry::Matrix6d> covariances;
 
   /// Of views: as those of the keyframes, and between these as that of the one before; empty: not known.
   [[nodiscard]] std::vector<geometry::Matrix6d> covariances_of(const std::vector<std::int32_t>& robots,
                                                                const std::vector<double>& stamps) const;
-  /// Corrects the cloud of a view.
-  void correct(std::int32_t robot, cloud::Cloud& camera_cloud) const;
 };
 
 std::vector<std::uint8_t> to_bytes(const FusionState& state);

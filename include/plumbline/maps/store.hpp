@@ -20,7 +20,7 @@
 namespace plumbline::maps {
 
 /// Stores of other formats are refused.
-constexpr int kStoreFormat = 7;
+constexpr int kStoreFormat = 8;
 constexpr const char* kStoreFile = "map.db";  ///< in a result folder
 
 /// A robot of a map.

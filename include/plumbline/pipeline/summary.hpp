@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/rigid3.hpp"
@@ -93,13 +92,6 @@ struct RunSummary {
     std::size_t from_frame = 0;  ///< what was found is used from this frame on; 0: from the first
   };
   std::vector<Camera> cameras;
-  /// What was found of a depth camera's systematic error.
-  struct DepthField {
-    std::string robot;  ///< empty: the only one
-    cloud::DepthFieldReport report;
-    cloud::DepthField field;
-  };
-  std::vector<DepthField> depth_fields;
   /// Two maps that were held against each other.
   struct Merge {
     std::string a;

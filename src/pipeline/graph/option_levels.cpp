@@ -37,7 +37,7 @@ const Keys kAdvanced{
      keys_in("pairs.min_overlap pairs.per_map icp.samples icp.iterations icp.max_rms icp.max_shift "
              "icp.max_turn adjust.observations adjust.iterations adjust.aligned_sigma adjust.line_sigma "
              "adjust.depth_factor adjust.surface_weight adjust.turn_rate adjust.gate")},
-    {"fuse", keys_in("min_cos_incidence depth_field.views")},
+    {"fuse", keys_in("min_cos_incidence")},
 };
 
 /// What nobody has been seen to set: accepted, and listed nowhere.
@@ -67,7 +67,6 @@ const Keys kInternal{
              "verify.neighbours verify.depth_rows verify.align verify.joint")},
     {"refine", keys_in("adjust.depth_rows local_map.angle icp.min_information icp.correlation icp.min_sigma "
                        "adjust.pose_graph adjust.bundle adjust.rounds adjust.tolerance")},
-    {"fuse", keys_in("depth_field.views_per_view depth_field.min_gain")},
 };
 
 bool lists(const Keys& keys, const std::string& stage, const std::string& key) {

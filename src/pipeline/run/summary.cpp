@@ -252,7 +252,6 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"cloud", cloud_of(s)},
       {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
       {"camera", cameras_of(s)},
-      {"depth_fields", depth_fields_of(s)},
       {"timing", timing_of(s)},
       {"memory", {{"peak_rss_mb", rounded(s.peak_rss_mb)}}},
       {"version", core::version()},

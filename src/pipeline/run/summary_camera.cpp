@@ -50,22 +50,4 @@ std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try 
   return std::nullopt;
 }
 
-Json depth_fields_of(const RunSummary& summary) {
-  Json list = Json::array();
-  for (const RunSummary::DepthField& found : summary.depth_fields) {
-    Json entry = {{"robot", found.robot},
-                  {"used", found.report.used},
-                  {"samples", found.report.samples},
-                  {"before", rounded(found.report.before)},
-                  {"after", rounded(found.report.after)}};
-    if (found.report.used) {
-      const auto& c = found.field.coefficients();
-      entry["most_at_2m"] = rounded(found.report.most_at_2m);
-      entry["coefficients"] = std::vector<double>(c.data(), c.data() + c.size());
-    }
-    list.push_back(entry);
-  }
-  return list;
-}
-
 }  // namespace plumbline::pipeline

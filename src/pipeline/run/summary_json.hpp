@@ -26,7 +26,6 @@ inline Json rows(const geometry::Rigid3& transform) {
 }
 
 Json cameras_of(const RunSummary& summary);
-Json depth_fields_of(const RunSummary& summary);
 Json merge_of(const RunSummary::Merge& merge);
 Json merges_of(const RunSummary& summary);
 Json meetings_of(const RunSummary& summary);

@@ -14,7 +14,6 @@
 
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
-#include "plumbline/cloud/depth_field.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/stored_maps.hpp"
@@ -38,10 +37,6 @@ class FuseStage : public Stage {
     table.choice<Yaw>("yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
                       "Where x points unless up is none: along the walls, as near as can be to where the "
                       "first camera looks, or just there");
-    table.boolean(
-        "depth_field", find_depth_field_,
-        "Find out from overlapping views what the depth camera gets wrong everywhere alike, and correct it");
-    depth_field_.declare(table);
     table.boolean("keyframe_clouds", keyframe_clouds_,
                   "Write the cloud of every keyframe to keyframes/, in the frame of the results");
     filters_.declare(table, "Filter chain for the merged cloud; empty: none");
@@ -87,7 +82,7 @@ class FuseStage : public Stage {
     if (keyframe_clouds_) {
       const auto written = maps::write_keyframe_clouds(
           context_->output_folder / "keyframes", *views, report_.frame.output_from_map,
-          [&](std::size_t i) { return read_corrected(*views, i); });
+          [&](std::size_t i) { return read(*views, i); });
       if (!written) return tl::unexpected(written.error());
     }
     clouds_->clear();
@@ -114,12 +109,10 @@ class FuseStage : public Stage {
     summary.up = report_.frame.up;
     summary.yaw = report_.frame.yaw;
     summary.output_from_map = report_.frame.output_from_map;
-    summary.depth_fields = report_.depth_fields;
   }
 
  private:
   core::Result<cloud::FusedCloud> fuse(const MapResult& map, const maps::StoredViews& stored) {
-    if (auto found = find_fields(map, stored); !found) return tl::unexpected(found.error());
     cloud::FusionViews views;
     views.world_from_camera = stored.world_from_camera;
     views.cameras = cameras_of(stored);
@@ -133,7 +126,7 @@ class FuseStage : public Stage {
       state_->covariances[{keyframe.id.robot, keyframe.stamp}] = map.accuracy[i].covariance;
     }
     views.covariances = state_->covariances_of(stored.robots, stored.stamps);
-    views.read = [&](std::size_t i) { return read_corrected(stored, i); };
+    views.read = [&](std::size_t i) { return read(stored, i); };
     cloud::FusionReport report;
     auto fused = cloud::fuse_views(views, options_, *context_->executor, &report);
     context_->log->debug(fmt::format(
@@ -151,61 +144,23 @@ class FuseStage : public Stage {
     return cameras;
   }
 
-  /// One depth field for each robot's camera.
-  core::Result<void> find_fields(const MapResult& map, const maps::StoredViews& stored) {
-    if (!find_depth_field_) return {};
-    std::map<std::int32_t, std::vector<std::size_t>> views;
-    for (std::size_t i = 0; i < stored.size(); ++i) views[stored.robots[i]].push_back(i);
-    const cloud::ReadView read = [&](std::size_t i) { return read_raw(stored, i); };
-    for (auto& [robot, own] : views) {
-      std::stable_sort(own.begin(), own.end(),
-                       [&](std::size_t a, std::size_t b) { return stored.stamps[a] < stored.stamps[b]; });
-      const sensor::Pinhole camera = maps::camera_of(*context_->robots, robot).color;
-      cloud::DepthFieldReport report;
-      const auto field = cloud::find_depth_field(own, stored.world_from_camera, read, camera, depth_field_,
-                                                 *context_->executor, &report);
-      if (!field) return tl::unexpected(field.error());
-      state_->depth_fields[robot] = *field;
-      std::string name;
-      for (const RobotInfo& info : map.robots) {
-        if (info.number == robot) name = info.name;
-      }
-      report_.depth_fields.push_back({name, report, *field});
-      context_->log->debug(fmt::format(
-          "depth field{}{}: {} samples, disagreement {:.3f} sigma, {:.3f} without what the field explains: "
-          "{}",
-          name.empty() ? "" : " of ", name, report.samples, report.before, report.after,
-          report.used ? fmt::format("up to {:.0f} mm at 2 m", 1e3 * report.most_at_2m) : "not used"));
-    }
-    return {};
-  }
-
   /// Of finished maps, what cannot be used is reported with the name of its own file.
-  [[nodiscard]] core::Result<cloud::CloudPtr> read_raw(const maps::StoredViews& views, std::size_t i) const {
+  [[nodiscard]] core::Result<cloud::CloudPtr> read(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
     if (cloud || context_->stored_maps == nullptr) return cloud;
     return tl::unexpected(context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
-  }
-  [[nodiscard]] core::Result<cloud::CloudPtr> read_corrected(const maps::StoredViews& views,
-                                                             std::size_t i) const {
-    auto cloud = read_raw(views, i);
-    if (cloud) state_->correct(views.robots[i], **cloud);
-    return cloud;
   }
 
   const RunContext* context_ = nullptr;
   cloud::DenseFusionOptions options_;
   Up up_ = Up::kFloor;
   Yaw yaw_ = Yaw::kWalls;
-  bool find_depth_field_ = true;
-  cloud::DepthFieldOptions depth_field_;
   bool keyframe_clouds_ = false;
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;
   std::shared_ptr<maps::FusionState> state_ = std::make_shared<maps::FusionState>();
   /// What the summary says.
   struct Report {
-    std::vector<RunSummary::DepthField> depth_fields;
     std::vector<cloud::FilterReport> filters;  ///< of the merged cloud
     UpFrame frame;
     std::size_t points = 0;

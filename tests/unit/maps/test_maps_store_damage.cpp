@@ -212,8 +212,8 @@ TEST(MapStoreDamage, ForeignAndNewerFilesAreRefused) {
   expect_no_store(file, "SQLite file, but no map store");
   std::filesystem::remove(file);
   write_store(file, 1);
-  run_sql(file, "PRAGMA user_version = 8");
-  expect_no_store(file, "format 8, this program reads up to 7; use a newer Plumbline");
+  run_sql(file, "PRAGMA user_version = 99");
+  expect_no_store(file, "format 99, this program reads up to [0-9]+; use a newer Plumbline");
 }
 
 TEST(MapStoreDamage, WritersRefuseWhatTheyMayNotWrite) {
