@@ -2,6 +2,7 @@
 #include "app.hpp"
 
 #include <fmt/format.h>
+#include <pcl/console/print.h>
 
 #include <algorithm>
 #include <exception>
@@ -146,7 +147,8 @@ int run(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : static_cast<int>(core::ErrorKind::kUsage);
   }
   ignore_write_signals();
-  cv::setNumThreads(1);  // threads come from the executor alone
+  cv::setNumThreads(1);                                     // threads come from the executor alone
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what fails is told by the step that called PCL
   try {
     return session.command();
   } catch (const std::bad_alloc&) {

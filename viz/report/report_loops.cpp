@@ -137,9 +137,7 @@ std::string sigma_text(const Json& s) {
                      mm_at(s, "/refine/sigma_position_m/p90"));
 }
 
-}  // namespace
-
-std::string loops_html(const ReportData& data) {
+std::string closings_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/loops/list");
   if (data.fused_afterwards && list.empty()) return {};  // closed when each map was made
   if (number_at(data.summary, "/loops/candidates") == 0.0 && list.empty()) {
@@ -171,6 +169,20 @@ std::string loops_html(const ReportData& data) {
              "Found: landmarks of the match that are where they should be. Overlap and contradiction: of the "
              "surfaces. Correction: how far closing the loop would move the keyframe, after the way since.");
 }
+
+/// Of a robot that was told what others have mapped.
+std::string feedback_html(const Json& summary) {
+  if (!flag_at(summary, "/feedback/on")) return {};
+  return "<h3>By maps of other robots</h3>\n" +
+         facts_html({{"Keyframes received", count_at(summary, "/feedback/keyframes_received")},
+                     {"Frames relocalised", count_at(summary, "/feedback/relocalised")},
+                     {"Loops that moved the map", count_at(summary, "/feedback/loops")}}) +
+         note(text_at(summary, "/feedback/note"));
+}
+
+}  // namespace
+
+std::string loops_html(const ReportData& data) { return closings_html(data) + feedback_html(data.summary); }
 
 std::string merges_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/merges");

@@ -46,8 +46,7 @@ class TrackStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    recordings_ = context.recordings;
-    for (const RobotInfo& robot : recordings_->robots()) {
+    for (const RobotInfo& robot : recordings().robots()) {
       slams_.push_back(std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                        *context.executor, *context.log));
       if (context.feedback != nullptr) slams_.back()->use(context.feedback);
@@ -70,7 +69,7 @@ class TrackStage : public Stage {
   core::Result<void> process(StageIo& io) override {
     const auto frame = io.input<sensor::RgbdFrame>("frame");
     const auto features = io.input<features::FrameFeatures>("features");
-    const RobotInfo& robot = recordings_->robot(recordings_->robot_of(io.frame()));
+    const RobotInfo& robot = recordings().robot(recordings().robot_of(io.frame()));
     const auto number = static_cast<std::size_t>(robot.number);
     if (refine_ == "live") set_shutters(io.frame());
     mapping::Slam& slam = *slams_[number];
@@ -120,7 +119,7 @@ class TrackStage : public Stage {
     if (undecided() && !context_->stop.stop_requested()) {
       if (auto decided = decide_now(); !decided) return decided;
     }
-    for (const RobotInfo& robot : recordings_->robots()) {
+    for (const RobotInfo& robot : recordings().robots()) {
       mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       if (several() && slam.map().keyframe_count() == 0) {
         return core::input_error(
@@ -136,7 +135,7 @@ class TrackStage : public Stage {
 
   void summarise(RunSummary& summary) const override {
     count_frames(rows_, summary);
-    for (const RobotInfo& robot : recordings_->robots()) {
+    for (const RobotInfo& robot : recordings().robots()) {
       const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       const mapping::LoopCounts& loops = slam.loop_counts();
       summary.loops.candidates += static_cast<std::size_t>(loops.candidates);
@@ -160,6 +159,7 @@ class TrackStage : public Stage {
   }
 
  private:
+  [[nodiscard]] const RobotRecordings& recordings() const { return *context_->recordings; }
   [[nodiscard]] bool several() const { return slams_.size() > 1; }
   [[nodiscard]] std::size_t count(mapping::KeyframeCause cause) const {
     const auto found = causes_.find(cause);
@@ -167,7 +167,7 @@ class TrackStage : public Stage {
   }
   /// Of the cameras: all have seen enough, or it is time.
   [[nodiscard]] bool knows_enough(std::size_t frame) const {
-    return recordings_->time_of(frame) - recordings_->time_of(0) >= kCamera_s ||
+    return recordings().time_of(frame) - recordings().time_of(0) >= kCamera_s ||
            std::all_of(slams_.begin(), slams_.end(),
                        [](const auto& slam) { return slam->map().keyframe_count() >= kCameraKeyframes; });
   }
@@ -179,7 +179,7 @@ class TrackStage : public Stage {
       std::vector<maps::FramePose> poses;
     };
     auto robots = std::make_shared<std::vector<Robot>>();
-    for (const RobotInfo& robot : recordings_->robots()) {
+    for (const RobotInfo& robot : recordings().robots()) {
       const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       robots->push_back({robot, slam.map(), slam.frame_poses()});
     }
@@ -199,7 +199,7 @@ class TrackStage : public Stage {
   /// Asked beside the tracker; frames go on as they are until the answer is due, and some more.
   core::Result<void> decide_live(std::size_t frame) {
     if (live_ == nullptr) {
-      if (frame + kAnswerFrames + kUseFrames >= recordings_->size()) return {};
+      if (frame + kAnswerFrames + kUseFrames >= recordings().size()) return {};
       live_ = std::make_unique<LiveAnswer>();
       live_->due = frame + kAnswerFrames;
       live_->job = context_->executor->submit([ask = question(live_->decision)] { ask(core::Executor(1)); });
@@ -223,7 +223,7 @@ class TrackStage : public Stage {
     const CameraDecision* found = context_->cameras;
     const bool better = found != nullptr && found->made && found->from > 0 && frame >= found->from;
     for (std::size_t r = 0; r < slams_.size(); ++r)
-      slams_[r]->set_shutter((better ? found->used[r] : recordings_->robots()[r].camera).readout_s);
+      slams_[r]->set_shutter((better ? found->used[r] : recordings().robots()[r].camera).readout_s);
   }
   void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
     if (!bundle.keyframe.valid()) return;
@@ -234,7 +234,6 @@ class TrackStage : public Stage {
   }
 
   const RunContext* context_ = nullptr;
-  const RobotRecordings* recordings_ = nullptr;
   mapping::SlamOptions options_;
   std::string refine_ = "auto";
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
