@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "plumbline/cloud/ply.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/viz/color.hpp"
 #include "plumbline/viz/snapshot.hpp"
@@ -22,13 +23,9 @@ namespace {
 
 /// Upper end of the colours: the 98th percentile, rounded up to 1, 2 or 5 times a power of ten.
 double color_end_m(const std::vector<float>& errors) {
-  std::vector<float> known;
-  std::copy_if(errors.begin(), errors.end(), std::back_inserter(known),
-               [](float e) { return std::isfinite(e); });
-  if (known.empty()) return 0.001;
-  const auto at = known.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(known.size() - 1));
-  std::nth_element(known.begin(), at, known.end());
-  const double wanted = std::max(1e-6, static_cast<double>(*at));
+  const float most = core::quantile(errors, 0.98);
+  if (std::isnan(most)) return 0.001;
+  const double wanted = std::max(1e-6, static_cast<double>(most));
   const double decade = std::pow(10.0, std::floor(std::log10(wanted)));
   for (const double factor : {1.0, 2.0, 5.0}) {
     if (factor * decade >= wanted * (1.0 - 1e-9)) return factor * decade;

@@ -129,12 +129,24 @@ std::string did_you_mean(const std::string& word, const std::vector<std::string>
   return nearest(word, candidates, [](const std::string& c) { return c.substr(c.rfind('.') + 1); });
 }
 
+static std::string joined(const std::vector<std::string>& names) {
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 std::string hint(const std::string& word, const std::vector<std::string>& allowed) {
-  constexpr std::size_t kReadable = 16;  // names; nobody looks for one among a hundred when it was guessed
+  constexpr std::size_t kReadable = 16;  // names; nobody looks for one among a hundred
   const std::string near = did_you_mean(word, allowed);
-  if (!near.empty() && allowed.size() > kReadable) return fmt::format("; did you mean {}?", near);
-  return fmt::format("{} (allowed: {})", near.empty() ? "" : fmt::format("; did you mean {}?", near),
-                     allowed.empty() ? "nothing" : fmt::format("{}", fmt::join(allowed, ", ")));
+  const std::string meant = near.empty() ? "" : fmt::format("; did you mean {}?", near);
+  if (allowed.size() <= kReadable)
+    return fmt::format("{} (allowed: {})", meant, allowed.empty() ? "nothing" : joined(allowed));
+  if (!near.empty()) return meant;
+  std::vector<std::string> groups;  // "bundle.*" for all of them
+  for (const std::string& name : allowed) {
+    const std::size_t dot = name.find('.');
+    const std::string group = dot == std::string::npos ? name : name.substr(0, dot) + ".*";
+    if (std::find(groups.begin(), groups.end(), group) == groups.end()) groups.push_back(group);
+  }
+  return fmt::format(" (allowed: {})", joined(groups));
 }
 
 std::string to_flow_yaml(const ConfigNode& node) {

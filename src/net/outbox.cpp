@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "plumbline/core/hash.hpp"
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -71,13 +72,7 @@ std::int64_t StoreWatch::behind(const maps::StoreHeads& held) {
   return noticed_.empty() ? 0 : std::max<std::int64_t>(1, noticed_.back().first.last() - held.last());
 }
 
-double StoreWatch::lag_s(double quantile) const {
-  if (lags_s_.empty()) return 0.0;
-  std::vector<double> values = lags_s_;
-  const auto at = static_cast<std::ptrdiff_t>(quantile * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
+double StoreWatch::lag_s(double quantile) const { return core::quantile(lags_s_, quantile, 0.0); }
 
 Parcel::Parcel(maps::StoreShare share, std::int64_t after, maps::StoreTransaction transaction)
     : share_(share),

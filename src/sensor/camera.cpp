@@ -244,13 +244,8 @@ core::Result<Camera> find_camera(const std::string& name_or_file,
   if (std::filesystem::is_regular_file(name_or_file, ignored)) return read_camera(name_or_file);
 
   const std::vector<std::string> names = shipped_names(cameras_folder);
-  std::string all;
-  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
-  const std::string near = core::did_you_mean(name_or_file, names);
-  return core::usage_error(
-      fmt::format("camera '{}': neither a file nor a shipped calibration (shipped: {}{})", name_or_file,
-                  all.empty() ? "none found in " + cameras_folder.string() : all,
-                  near.empty() ? "" : "; did you mean " + near + "?"));
+  return core::usage_error(fmt::format("camera '{}': neither a file nor a calibration of {}{}", name_or_file,
+                                       cameras_folder.string(), core::hint(name_or_file, names)));
 }
 
 std::string to_yaml(const Camera& camera) {

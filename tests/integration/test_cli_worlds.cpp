@@ -137,6 +137,7 @@ TEST_F(Worlds, WrongScenesAreRefused) {
   expect_refused("synth through.yaml -o x", 2, {"through.yaml:6", "goes through north", "move a waypoint"});
   expect_refused("synth room -o x --frames 0", 2, {"frames", "zero frames"});
   expect_refused("map 'synth:room?frames=0' -o x", 2, {"frames", "zero frames"});
+  expect_refused("map 'synth:room?frames=5' -o x --camera tum_fr1", 2, {"its own camera", "plumbline synth"});
 }
 
 TEST_F(Worlds, CloudsThatCannotBeMeasured) {

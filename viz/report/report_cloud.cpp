@@ -13,6 +13,7 @@
 #include <iterator>
 #include <opencv2/core/mat.hpp>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/image_io.hpp"
 #include "report_sections.hpp"
 
@@ -90,7 +91,7 @@ double darkest(const cv::Mat& counts) {
   std::vector<double> known;
   std::copy_if(counts.begin<int>(), counts.end<int>(), std::back_inserter(known),
                [](int n) { return n > 0; });
-  return std::max(1.0, lower_quantile(std::move(known), 0.97));
+  return std::max(1.0, core::quantile(std::move(known), 0.97));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <array>
 #include <system_error>
 
+#include "plumbline/core/numbers.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -37,8 +38,8 @@ std::vector<TimedColumn> slowest_stages(const CsvTable& table) {
         name.size() > 3 && name.substr(name.size() - 3) == "_ms" && name.find('.') == std::string::npos;
     if (!stage) continue;
     TimedColumn column{name.substr(0, name.size() - 3), values_of(table, c), 0.0};
-    column.median = lower_quantile(column.values, 0.5);
-    if (lower_quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
+    column.median = core::quantile(column.values, 0.5);
+    if (core::quantile(column.values, 0.95) >= kWorthShowing_ms) columns.push_back(std::move(column));
   }
   const auto slower = [](const TimedColumn& a, const TimedColumn& b) { return a.median > b.median; };
   std::stable_sort(columns.begin(), columns.end(), slower);
@@ -50,7 +51,7 @@ std::string time_charts(const ReportData& data) {
   if (!data.timing_table) return {};
   const CsvTable& table = *data.timing_table;
   std::vector<double> time_s = values_of(table, table.column("stamp"));
-  const double start_s = lower_quantile(time_s, 0.0);
+  const double start_s = core::quantile(time_s, 0.0);
   for (double& t : time_s) t -= start_s;
   viz::SvgChart chart;
   chart.title = "Milliseconds of each stage per frame";
@@ -58,8 +59,8 @@ std::string time_charts(const ReportData& data) {
   chart.height_px = 180;
   double usual = 0.0, most = 0.0;
   for (TimedColumn& column : slowest_stages(table)) {
-    usual = std::max(usual, lower_quantile(column.values, 0.98));
-    most = std::max(most, lower_quantile(column.values, 1.0));
+    usual = std::max(usual, core::quantile(column.values, 0.98));
+    most = std::max(most, core::quantile(column.values, 1.0));
     chart.lines.push_back({column.name, robot_kind(chart.lines.size()), time_s, std::move(column.values)});
   }
   std::string out;
@@ -73,7 +74,7 @@ std::string time_charts(const ReportData& data) {
   memory.y_label = "memory (MB)";
   memory.lines.push_back(
       {"memory held when a frame was done", "k5", time_s, values_of(table, table.column("rss_mb"))});
-  const bool known = lower_quantile(memory.lines[0].y, 1.0) > 0.0;
+  const bool known = core::quantile(memory.lines[0].y, 1.0) > 0.0;
   return known ? out + svg_chart(memory) : out;
 }
 

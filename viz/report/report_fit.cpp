@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/optimize/pose_terms.hpp"
 #include "report_table.hpp"
 
@@ -12,7 +13,7 @@ namespace {
 
 FamilyFit summarise(const std::vector<double>& distances) {
   if (distances.empty()) return {};
-  return {distances.size(), lower_quantile(distances, 0.5), lower_quantile(distances, 0.9)};
+  return {distances.size(), core::quantile(distances, 0.5), core::quantile(distances, 0.9)};
 }
 
 }  // namespace

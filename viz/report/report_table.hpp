@@ -35,9 +35,6 @@ class CsvTable {
   std::vector<Cell> cells_;
 };
 
-/// The q-quantile of the numbers among the values, its rank rounded down; NaN when there are none.
-double lower_quantile(std::vector<double> values, double q);
-
 /// A whole file; empty when it cannot be read.
 std::string read_bytes(const std::filesystem::path& file);
 

@@ -5,21 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/core/numbers.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
 namespace {
-
-/// The q-quantile of the numbers among them; NaN when there are none.
-double quantile(std::vector<double> values, double q) {
-  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
-               values.end());
-  if (values.empty()) return kNaN;
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
 
 /// Charts of one robot; all share the axis of time.
 class RobotCharts {
@@ -59,8 +49,8 @@ class RobotCharts {
           number_text(100.0 * static_cast<double>(n) / static_cast<double>(frames_.rows.size()), 1, "%"));
     };
     const auto family = [&](const char* name) {
-      return fmt::format("{}; rms {}", number_text(quantile(column(name), 0.5), 0),
-                         number_text(quantile(column(std::string(name) + "_rms"), 0.5), 2, "σ"));
+      return fmt::format("{}; rms {}", number_text(core::quantile(column(name), 0.5), 0),
+                         number_text(core::quantile(column(std::string(name) + "_rms"), 0.5), 2, "σ"));
     };
     table.robot(frames_.robot);
     table.value("Frames", count(frames_.rows.size()));
@@ -72,7 +62,7 @@ class RobotCharts {
     table.value("Lines that fit, median", family("lines"));
     table.value("Samples of surfaces that fit, median", family("surface"));
     table.value("Standard deviation in the weakest direction, median",
-                number_text(quantile(weakest_mm(), 0.5), 2, "mm"));
+                number_text(core::quantile(weakest_mm(), 0.5), 2, "mm"));
   }
 
  private:
@@ -153,8 +143,8 @@ class RobotCharts {
     chart.y_label = y_label;
     chart.x_range = viz::AxisRange{0.0, end_s_};
     if (last) chart.x_label = "time (s)";
-    const double usual = quantile(lines.front().y, 0.98);
-    const double most = quantile(lines.front().y, 1.0);
+    const double usual = core::quantile(lines.front().y, 0.98);
+    const double most = core::quantile(lines.front().y, 1.0);
     if (cut && most > 3.0 * usual) chart.y_range = viz::AxisRange{0.0, 2.0 * usual};
     for (const viz::SvgBand& band : bands_) {
       if (band.kind != "tracked") chart.bands.push_back(band);

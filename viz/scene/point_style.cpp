@@ -46,8 +46,8 @@ std::pair<double, double> value_range(std::vector<double> values) {
   values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
                values.end());
   if (values.empty()) return {0.0, 1.0};
-  const double low = quantile(values, 0.02);
-  const double high = quantile(values, 0.98);
+  const double low = core::quantile(values, 0.02, 0.0);
+  const double high = core::quantile(values, 0.98, 0.0);
   if (high - low > 1e-9 * std::max(std::abs(low), std::abs(high))) return {low, high};
   const double half = std::max(0.5 * std::abs(low), 0.5);
   return {low - half, low + half};
@@ -98,9 +98,9 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       std::vector<double> heights;
       heights.reserve(points.size());
       for (const auto i : points) heights.push_back(position(cloud[i]).dot(axes.up));
-      const double floor = quantile(heights, 0.01);
+      const double floor = core::quantile(heights, 0.01, 0.0);
       for (double& h : heights) h -= floor;
-      const double top = std::max(0.1, quantile(heights, 0.98));
+      const double top = std::max(0.1, core::quantile(heights, 0.98, 0.0));
       return color_by_value(heights, options.scalar_range.value_or(std::make_pair(0.0, top)), "height (m)");
     }
     case ColorMode::kError:
@@ -206,8 +206,8 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
     for (std::size_t i = 0; i < points.size(); i += step) {
       values.push_back(position((*scene.cloud)[points[i]])[axis]);
     }
-    low[axis] = quantile(values, 0.01);
-    high[axis] = quantile(values, 0.99);
+    low[axis] = core::quantile(values, 0.01, 0.0);
+    high[axis] = core::quantile(values, 0.99, 0.0);
   }
   const double side = std::max((high - low).maxCoeff() / kCells, 1e-4);
   std::vector<std::uint32_t> count(static_cast<std::size_t>(kCells) * kCells * kCells, 0);

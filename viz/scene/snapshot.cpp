@@ -30,6 +30,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "canvas/offscreen.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "scene/overlay.hpp"
 #include "scene/point_style.hpp"
 #include "scene/view_frame.hpp"
@@ -146,7 +147,7 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   std::vector<double> depths;
   for (const auto& p : sample) depths.push_back((p - directions.eye).dot(directions.forward));
   directions.near_m = 0.05;
-  directions.far_m = std::max(1.0, 1.5 * quantile(depths, 0.99));
+  directions.far_m = std::max(1.0, 1.5 * core::quantile(depths, 0.99, 0.0));
   return directions;
 }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "scene/view_frame.hpp"
 
@@ -44,12 +45,12 @@ SceneExtent extent_of(const Scene& scene) {
     std::vector<double> values;
     values.reserve(points.size());
     for (const auto& p : points) values.push_back(p[axis]);
-    extent.centre[axis] = 0.5 * (quantile(values, 0.01) + quantile(values, 0.99));
+    extent.centre[axis] = 0.5 * (core::quantile(values, 0.01, 0.0) + core::quantile(values, 0.99, 0.0));
   }
   std::vector<double> distances;
   distances.reserve(points.size());
   for (const auto& p : points) distances.push_back((p - extent.centre).norm());
-  extent.radius_m = std::max(0.1, quantile(distances, 0.97));
+  extent.radius_m = std::max(0.1, core::quantile(distances, 0.97, 0.0));
   return extent;
 }
 

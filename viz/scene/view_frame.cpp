@@ -6,6 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "plumbline/core/numbers.hpp"
+
 namespace plumbline::viz {
 namespace {
 
@@ -32,7 +34,7 @@ Interval extent(const std::vector<Eigen::Vector3d>& points, const std::vector<Ei
   for (const auto& p : points) values.push_back(p.dot(axis));
   Interval interval;
   if (!values.empty()) {
-    interval = {quantile(values, 0.002), quantile(values, 0.998)};
+    interval = {core::quantile(values, 0.002, 0.0), core::quantile(values, 0.998, 0.0)};
   } else if (!must_see.empty()) {
     interval = {must_see.front().dot(axis), must_see.front().dot(axis)};
   }
@@ -62,19 +64,12 @@ double fit_distance(const Projection& projection, const Eigen::Vector3d& centre,
   std::vector<double> distances;
   distances.reserve(points.size());
   for (const auto& p : points) distances.push_back(needed(p));
-  double distance = quantile(std::move(distances), 0.996);
+  double distance = core::quantile(std::move(distances), 0.996, 0.0);
   for (const auto& p : must_see) distance = std::max(distance, needed(p));
   return std::max(distance, 0.3);
 }
 
 }  // namespace
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  const auto at = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
-  return values[at];
-}
 
 std::vector<Eigen::Vector3d> evened(const std::vector<Eigen::Vector3d>& points) {
   constexpr double kCells = 60.0;

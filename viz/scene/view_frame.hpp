@@ -51,7 +51,4 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
 /// more than sparse ones far away, which would be cut off otherwise.
 std::vector<Eigen::Vector3d> evened(const std::vector<Eigen::Vector3d>& points);
 
-/// The q-quantile; 0 for no values.
-double quantile(std::vector<double> values, double q);
-
 }  // namespace plumbline::viz

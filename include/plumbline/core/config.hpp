@@ -67,7 +67,7 @@ std::string to_flow_yaml(const ConfigNode& node);
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates);
 
 /// What follows "unknown key": "; did you mean voxel? (allowed: voxel, filters)". Of many that are allowed
-/// only the one that is near, if one is.
+/// only the one that is near, if one is, else their groups: "(allowed: voxel, filters.*)".
 std::string hint(const std::string& word, const std::vector<std::string>& allowed);
 
 }  // namespace plumbline::core

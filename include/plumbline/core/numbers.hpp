@@ -4,7 +4,9 @@
 // Numbers from text, and the middle of many.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -27,6 +29,19 @@ T median(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// The q-quantile of the finite values, its rank rounded to the nearest; `none` when there are none. q in 0
+/// .. 1.
+template <typename T>
+T quantile(std::vector<T> values, double q, T none = std::numeric_limits<T>::quiet_NaN()) {
+  values.erase(std::remove_if(values.begin(), values.end(), [](T v) { return !std::isfinite(v); }),
+               values.end());
+  if (values.empty()) return none;
+  const auto place =
+      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
 }
 
 }  // namespace plumbline::core

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "plumbline/core/error.hpp"
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/mapping/camera_calibration.hpp"
@@ -28,15 +29,9 @@ struct Sigma {
   double p90 = 0.0;
 };
 template <typename T>
-Sigma sigma_of(std::vector<T> values) {
-  if (values.empty()) return {};
-  const auto at = [&](double share) {
-    const auto place =
-        values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), place, values.end());
-    return static_cast<double>(*place);
-  };
-  return {at(0.5), at(0.9)};
+Sigma sigma_of(const std::vector<T>& values) {
+  return {static_cast<double>(core::quantile(values, 0.5, T(0))),
+          static_cast<double>(core::quantile(values, 0.9, T(0)))};
 }
 
 struct RunSummary {

@@ -120,10 +120,8 @@ core::Result<void> describe_filter(const std::string& name, const Session& sessi
   if (!registry) return tl::unexpected<core::Error>(registry.error());
   const cloud::FilterInfo* info = registry->find(name);
   if (info == nullptr) {
-    const std::string near = core::did_you_mean(name, registry->types());
-    return core::usage_error(fmt::format("there is no filter '{}' (allowed: {}{})", name,
-                                         fmt::join(registry->types(), ", "),
-                                         near.empty() ? "" : "; did you mean " + near + "?"));
+    return core::usage_error(
+        fmt::format("there is no filter '{}'{}", name, core::hint(name, registry->types())));
   }
   fmt::print("{}: {}\n\n{}\n\noptions:\n", info->type, info->summary, info->details);
   core::OptionTable table;

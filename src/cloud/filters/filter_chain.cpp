@@ -21,11 +21,6 @@ constexpr const char* kNoRange =
     "{type: pass_through, field: z, min: 0.3, max: 4}";
 constexpr const char* kNameCharacters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
 
-std::string near_word(const std::string& word, const std::vector<std::string>& candidates) {
-  const std::string near = core::did_you_mean(word, candidates);
-  return near.empty() ? "" : fmt::format("; did you mean {}?", near);
-}
-
 /// Reports keys of `map` that are not in `known`.
 void refuse_unknown_keys(const ConfigNode& map, const std::string& path,
                          const std::vector<std::string>& known, ConfigProblems& problems) {
@@ -33,8 +28,7 @@ void refuse_unknown_keys(const ConfigNode& map, const std::string& path,
     const std::string& key = map.entries[i].first;
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     problems.push_back(
-        {map.key_marks[i], path.empty() ? key : path + "." + key,
-         fmt::format("unknown key (allowed: {}{})", fmt::join(known, ", "), near_word(key, known))});
+        {map.key_marks[i], path.empty() ? key : path + "." + key, "unknown key" + core::hint(key, known)});
   }
 }
 
@@ -55,10 +49,9 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
     problems.push_back({entry.mark, path, "is not a filter (a map that begins with type: NAME)"});
     return nullptr;
   }
-  const std::string types = fmt::format("{}", fmt::join(registry.types(), ", "));
   const ConfigNode* type = entry.find("type");
   if (type == nullptr) {
-    problems.push_back({entry.mark, path, fmt::format("has no type (allowed: {})", types)});
+    problems.push_back({entry.mark, path, "has no type" + core::hint("", registry.types())});
     return nullptr;
   }
   const FilterInfo* info = registry.find(type->scalar);
@@ -66,8 +59,8 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
     problems.push_back({type->mark, path + ".type",
                         type->scalar == "range"
                             ? kNoRange
-                            : fmt::format("'{}' is not a filter (allowed: {}{})", type->scalar.substr(0, 40),
-                                          types, near_word(type->scalar, registry.types()))});
+                            : fmt::format("'{}' is not a filter{}", type->scalar.substr(0, 40),
+                                          core::hint(type->scalar, registry.types()))});
     return nullptr;
   }
   return info;

@@ -59,6 +59,12 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                                                                const core::Executor& executor,
                                                                core::Log& log) {
   if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);
+  if (!options.camera.empty()) {
+    return core::usage_error(
+        fmt::format("{}: has its own camera, '{}' cannot take its place; write the world to a folder "
+                    "(plumbline synth), and map that with --camera",
+                    input, options.camera));
+  }
   auto source = synth::open_synth(input, scenes_folder, executor, log);
   if (!source) return source;
   return select_frames(std::move(*source), options.from_s, options.to_s, options.every);

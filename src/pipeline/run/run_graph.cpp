@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 
+#include "plumbline/core/numbers.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "run/pace.hpp"
@@ -266,13 +267,7 @@ class Runner {
 }  // namespace
 
 double StageTiming::quantile_ms(double q) const {
-  std::vector<float> worked;
-  std::copy_if(frame_ms.begin(), frame_ms.end(), std::back_inserter(worked),
-               [](float ms) { return !std::isnan(ms); });
-  if (worked.empty()) return 0.0;
-  std::sort(worked.begin(), worked.end());
-  const double position = q * static_cast<double>(worked.size() - 1);
-  return static_cast<double>(worked[static_cast<std::size_t>(std::llround(position))]);
+  return static_cast<double>(core::quantile(frame_ms, q, 0.0F));
 }
 
 core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress) {

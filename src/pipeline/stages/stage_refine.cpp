@@ -60,8 +60,8 @@ class RefineStage : public Stage {
       position.push_back(keyframe.sigma_position_m());
       rotation.push_back(keyframe.sigma_rotation_rad());
     }
-    summary.sigma_position_m = sigma_of(std::move(position));
-    summary.sigma_rotation_rad = sigma_of(std::move(rotation));
+    summary.sigma_position_m = sigma_of(position);
+    summary.sigma_rotation_rad = sigma_of(rotation);
   }
 
  private:

@@ -397,10 +397,7 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
     const auto& [type, body] = item.entries.front();
     const auto reader = object_readers().find(type);
     if (reader == object_readers().end()) {
-      const std::string near = core::did_you_mean(type, types);
-      problems.push_back({item.mark, path + "." + type,
-                          fmt::format("is no kind of thing (allowed: {}{})", fmt::join(types, ", "),
-                                      near.empty() ? "" : fmt::format("; did you mean {}?", near))});
+      problems.push_back({item.mark, path + "." + type, "is no kind of thing" + core::hint(type, types)});
       continue;
     }
     reader->second({body, path + "." + type, type, builder, problems});

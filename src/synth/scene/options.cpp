@@ -80,10 +80,8 @@ core::Result<Event> parse_event(const std::string& text) {
     if (name == k.name) kind = &k;
   }
   if (kind == nullptr) {
-    const std::string near = core::did_you_mean(name, names);
-    return core::usage_error(fmt::format("events: '{}' is no kind of event (allowed: {}{})", name,
-                                         fmt::join(names, ", "),
-                                         near.empty() ? "" : fmt::format("; did you mean {}?", near)));
+    return core::usage_error(
+        fmt::format("events: '{}' is no kind of event{}", name, core::hint(name, names)));
   }
   Event event{kind->kind, 0.0, 0.0, kind->default_value};
   const bool formed =

@@ -193,10 +193,8 @@ core::Result<Scene> load_scene(const std::string& name_or_file, const std::files
     file = scenes_folder / (name_or_file + ".yaml");
     if (!std::filesystem::exists(file)) {
       const std::vector<std::string> names = scene_names(scenes_folder);
-      const std::string near = core::did_you_mean(name_or_file, names);
-      return core::usage_error(fmt::format("unknown scene '{}' (there are: {}{}; or give a YAML file)",
-                                           name_or_file, fmt::join(names, ", "),
-                                           near.empty() ? "" : fmt::format("; did you mean {}?", near)));
+      return core::usage_error(fmt::format("'{}' is neither a YAML file nor a scene{}", name_or_file,
+                                           core::hint(name_or_file, names)));
     }
   }
   auto root = core::read_yaml(file);

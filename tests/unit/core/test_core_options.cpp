@@ -164,6 +164,8 @@ TEST(Options, ForgottenGroupsAreSuggested) {
   for (char c = 'a'; c <= 'z'; ++c) many.push_back(std::string("filter_") + c);
   EXPECT_EQ(hint("voxl", many), "; did you mean voxel?");
   EXPECT_NE(hint("banana", many).find("filter_z"), std::string::npos) << "without a guess all are named";
+  for (std::string& name : many) name.insert(0, name == "voxel" ? "" : "chain.");
+  EXPECT_EQ(hint("banana", many), " (allowed: voxel, chain.*)") << "by group";
 }
 
 TEST(Options, SchemaOfEveryType) {
