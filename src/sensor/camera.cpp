@@ -148,6 +148,17 @@ std::string pinhole_yaml(const Pinhole& p, const std::string& indent) {
                      indent, p.width, p.height, p.fx, p.fy, p.cx, p.cy);
 }
 
+/// `numbers`: k1, k2, p1, p2, k3, or the first of them.
+void take_distortion(const ConfigNode& root, const std::vector<double>& numbers, Camera& camera,
+                     ConfigProblems& problems) {
+  if (numbers.empty() || numbers.size() > camera.distortion.size()) {
+    problems.push_back({root.find("distortion")->mark, "distortion",
+                        fmt::format("has {} numbers (allowed: [k1, k2, p1, p2, k3])", numbers.size())});
+    return;
+  }
+  std::copy(numbers.begin(), numbers.end(), camera.distortion.begin());
+}
+
 }  // namespace
 
 core::Result<Camera> read_camera(const std::filesystem::path& file) {
@@ -182,12 +193,7 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
 
   check_pinhole(*root, camera.color, "", problems);
-  if (distortion.empty() || distortion.size() > camera.distortion.size()) {
-    problems.push_back({root->find("distortion")->mark, "distortion",
-                        fmt::format("has {} numbers (allowed: [k1, k2, p1, p2, k3])", distortion.size())});
-  } else {
-    std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
-  }
+  take_distortion(*root, distortion, camera, problems);
   if (root->find("readout") != nullptr) camera.readout_s = readout_s;
   if (slope.size() == camera.depth_slope.size()) std::copy_n(slope.begin(), 2, camera.depth_slope.begin());
   read_depth_camera(*root, camera, problems);

@@ -99,14 +99,20 @@ bool Visibility::seen(std::size_t face, double u, double v) const {
   return flags_[g.at(i, j)] != 0;
 }
 
+/// By face.
+static std::vector<char> faces_in(const View& view, std::size_t count) {
+  std::vector<char> present(count, 0);
+  for (const int id : view.ids) {
+    if (id >= 0) present[static_cast<std::size_t>(id)] = 1;
+  }
+  return present;
+}
+
 void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::Pinhole& camera) {
   const View view = look(*world_, camera, world_from_camera);
   const DepthRange range = depth_range(world_->options.sensor);
   const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
-  std::vector<char> present(world_->scene.faces.size(), 0);
-  for (const int id : view.ids) {
-    if (id >= 0) present[static_cast<std::size_t>(id)] = 1;
-  }
+  const std::vector<char> present = faces_in(view, world_->scene.faces.size());
   const auto sees = [&](std::size_t index, const Vector3d& p) {
     const Vector3d c = camera_from_world * p;
     if (c.z() < range.min || c.z() > std::min(range.max, world_->options.visible_range)) return false;
