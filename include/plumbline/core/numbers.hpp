@@ -31,8 +31,8 @@ T median(std::vector<T> values) {
   return *middle;
 }
 
-/// The q-quantile of the finite values, its rank rounded to the nearest; `none` when there are none. q in 0
-/// .. 1.
+/// The q-quantile of the finite values, its rank rounded to the nearest; `none` when there are none.
+/// 0 <= q <= 1.
 template <typename T>
 T quantile(std::vector<T> values, double q, T none = std::numeric_limits<T>::quiet_NaN()) {
   values.erase(std::remove_if(values.begin(), values.end(), [](T v) { return !std::isfinite(v); }),

@@ -5,7 +5,6 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
