@@ -1,33 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/features/rolling_shutter.hpp"
 
-#include "plumbline/geometry/rigid3.hpp"
-
 namespace plumbline::features {
 
 void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera,
-                          const Eigen::Vector3d& turn_rate, double readout_s) {
-  if (readout_s == 0.0 || turn_rate.isZero(0.0) || camera.height <= 0) return;
-  // A ray of row v was seen at (v / height - 1/2) readout_s; the turn back to 0 is small, but exact is as
-  // easy.
+                          const geometry::Vector6d& velocity, double readout_s) {
+  if (readout_s == 0.0 || velocity.isZero(0.0) || camera.height <= 0) return;
   const auto middle_from_row = [&](float v) {
     const double seconds = (static_cast<double>(v) / camera.height - 0.5) * readout_s;
-    return geometry::exp_so3(-seconds * turn_rate);
+    return geometry::exp_se3(-seconds * velocity);
   };
-  const auto moved = [&](const Eigen::Vector2f& pixel) -> Eigen::Vector2f {
-    const Eigen::Vector3d ray =
-        camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), 1.0);
-    return camera.project(middle_from_row(pixel.y()) * ray).cast<float>();
+  const auto moved = [&](const Eigen::Vector2f& pixel, double z) -> Eigen::Vector3d {
+    const Eigen::Vector2d p = pixel.cast<double>();
+    const geometry::Rigid3 motion = middle_from_row(pixel.y());
+    // Without a depth: as if it were far away, which only turns it.
+    return z > 0.0 ? motion * camera.unproject(p.x(), p.y(), z)
+                   : motion.rotation * camera.unproject(p.x(), p.y(), 1.0);
   };
-  for (PointFeature& point : features.points) point.pixel = moved(point.pixel);
+  for (PointFeature& point : features.points) {
+    const Eigen::Vector3d p = moved(point.pixel, static_cast<double>(point.depth));
+    point.pixel = camera.project(p).cast<float>();
+    if (point.depth > 0.0F) point.depth = static_cast<float>(p.z());
+  }
   for (LineFeature& line : features.lines) {
     LineSegment& s = line.segment;
-    if (line.line3) {
-      line.line3->start = middle_from_row(s.start.y()) * line.line3->start;
-      line.line3->end = middle_from_row(s.end.y()) * line.line3->end;
-    }
-    s.start = moved(s.start);
-    s.end = moved(s.end);
+    const auto move_end = [&](Eigen::Vector2f& pixel, Eigen::Vector3d* end) {
+      const geometry::Rigid3 motion = middle_from_row(pixel.y());
+      pixel = camera.project(moved(pixel, end != nullptr ? end->z() : 0.0)).cast<float>();
+      if (end != nullptr) *end = motion * *end;
+    };
+    move_end(s.start, line.line3 ? &line.line3->start : nullptr);
+    move_end(s.end, line.line3 ? &line.line3->end : nullptr);
   }
   features.grid = PointGrid(features.points, camera.width, camera.height);
 }

@@ -188,7 +188,7 @@ class Calibrator {
       FreeUnknowns free = believed;
       for (const CameraUnknown u : group) free[u] = true;
       const Trial trial = try_out(evidence, free);
-      const bool used = is_believed(best, trial, group);
+      const bool used = is_believed(best, trial, group, options_.least_gain);
       const CameraChange found = most_likely(evidence, free, prior_);
       const double gain = (best.cost() - trial.cost()) / before.cost();
       note(group, found, trial.sigma(), gain, used, result.findings);
@@ -219,7 +219,7 @@ class Calibrator {
     }
     if (all.empty()) return before;
     Trial trial = try_out(evidence, free);
-    if (!is_believed(before, trial, all)) return before;
+    if (!is_believed(before, trial, all, options_.earlier_least_gain)) return before;
     believed = free;
     return trial;
   }
@@ -234,10 +234,11 @@ class Calibrator {
     return trial;
   }
 
-  [[nodiscard]] bool is_believed(const Trial& before, const Trial& with, const Group& group) const {
+  [[nodiscard]] bool is_believed(const Trial& before, const Trial& with, const Group& group,
+                                 double least_gain) const {
     int better = 0;
     for (std::size_t i = 0; i < kParts; ++i) better += with.held_out[i] < before.held_out[i] ? 1 : 0;
-    if (better < kParts - 1 || !(with.cost() < (1.0 - options_.least_gain) * before.cost())) return false;
+    if (better < kParts - 1 || !(with.cost() < (1.0 - least_gain) * before.cost())) return false;
     if (group.front() == optimize::kReadout && with.mean()[optimize::kReadout] < 0.0)
       return false;  // no camera reads a picture before it is taken
     return std::any_of(group.begin(), group.end(), [&](CameraUnknown u) {

@@ -36,12 +36,11 @@ class RowPoint {
     T still[3];
     ceres::AngleAxisRotatePoint(step, turned, still);
     for (int i = 0; i < 3; ++i) still[i] += pose_.camera_from_world.translation(i) + step[3 + i];
-    const T moved_s = change[kReadout] * share_;
-    const T turned_s = (change[kReadout] - pose_.undone_s) * share_;
+    const T s = (change[kReadout] - pose_.undone_s) * share_;
     const geometry::Vector6d& v = pose_.velocity;
-    p[0] = still[0] + moved_s * v(0) + turned_s * (v(4) * still[2] - v(5) * still[1]);
-    p[1] = still[1] + moved_s * v(1) + turned_s * (v(5) * still[0] - v(3) * still[2]);
-    p[2] = still[2] + moved_s * v(2) + turned_s * (v(3) * still[1] - v(4) * still[0]);
+    p[0] = still[0] + s * (v(0) + v(4) * still[2] - v(5) * still[1]);
+    p[1] = still[1] + s * (v(1) + v(5) * still[0] - v(3) * still[2]);
+    p[2] = still[2] + s * (v(2) + v(3) * still[1] - v(4) * still[0]);
   }
 
  private:

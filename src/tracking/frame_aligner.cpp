@@ -117,19 +117,19 @@ void FrameAligner::align(const AlignmentRound& round) {
   if (round.reject_outliers) reject_outliers();  // chi-square gates
 }
 
-/// The motion model, by which the features were freed of the rolling shutter, lags behind a turn that
-/// changes. Now that the pose is roughly known, so is the turn.
+/// The motion model, by which the features were freed of the rolling shutter, lags behind a motion that
+/// changes. Now that the pose is roughly known, so is the motion.
 void FrameAligner::correct_rolling_shutter() {
-  constexpr double kVisible_px = 1.0;  // at the first and the last row
+  constexpr double kVisible_px = 1.0;  // of the turn, at the first and the last row
   const double readout_s = in_.options.readout_s;
   const double dt = in_.frame.stamp - in_.motion.last_stamp();
   if (readout_s == 0.0 || !in_.motion.continuous() || dt < 1e-4 || dt > 0.5) return;
   const Rigid3 step = result_.camera_from_world * in_.motion.camera_from_world().inverse();
-  const Eigen::Vector3d mean = geometry::log_so3(step.rotation) / dt;
+  const geometry::Vector6d mean = geometry::log_se3(step) / dt;
   // Both are means of their steps: half a step on.
-  const Eigen::Vector3d before = in_.motion.angular_velocity();
-  const Eigen::Vector3d change = before.isZero(0.0) ? mean : Eigen::Vector3d(1.5 * (mean - before));
-  if (change.norm() * 0.5 * readout_s * in_.camera.fx < kVisible_px) return;
+  const geometry::Vector6d before = in_.motion.velocity();
+  const geometry::Vector6d change = before.isZero(0.0) ? mean : geometry::Vector6d(1.5 * (mean - before));
+  if (change.tail<3>().norm() * 0.5 * readout_s * in_.camera.fx < kVisible_px) return;
   auto corrected = std::make_shared<features::FrameFeatures>(in_.features);
   features::undo_rolling_shutter(*corrected, in_.camera, change, readout_s);
   result_.features = std::move(corrected);

@@ -22,14 +22,14 @@ Rigid3 Tracker::depth_from_camera(const sensor::RgbdFrame& frame) const {
 
 /// Features as if all rows of the image, and the depth image, had been taken at the colour image's stamp.
 Tracker::Features Tracker::synchronised(const sensor::RgbdFrame& frame, const Features& features,
-                                        const Eigen::Vector3d& angular_velocity) const {
+                                        const geometry::Vector6d& velocity) const {
   const Rigid3 to_depth = depth_from_camera(frame);
-  const bool distorted = options_.readout_s != 0.0 && !angular_velocity.isZero(0.0);
+  const bool distorted = options_.readout_s != 0.0 && !velocity.isZero(0.0);
   const bool delayed = !to_depth.translation.isZero(0.0) || !to_depth.rotation.isIdentity(0.0);
   if (!distorted && !delayed) return features;
   auto result = std::make_shared<features::FrameFeatures>(*features);
   if (delayed) features::undo_point_depth_delay(*result, frame.depth, camera_, to_depth);
-  if (distorted) features::undo_rolling_shutter(*result, camera_, angular_velocity, options_.readout_s);
+  if (distorted) features::undo_rolling_shutter(*result, camera_, velocity, options_.readout_s);
   return result;
 }
 

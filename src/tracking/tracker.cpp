@@ -57,7 +57,7 @@ Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
 
 TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
   if (map.keyframe_count() == 0) return initialise(frame, features);
-  const Features synced = synchronised(frame, features, motion_.angular_velocity());
+  const Features synced = synchronised(frame, features, motion_.velocity());
   const bool outdated = motion_.outdated();
   std::optional<TrackResult> result =
       outdated ? relocalise(map, frame, *synced) : track_with_motion_model(map, frame, *synced);

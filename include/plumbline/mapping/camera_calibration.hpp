@@ -45,6 +45,7 @@ struct CalibrationOptions {
   double distortion_prior = 0.1;  ///< of k1 and of k2
   double delay_prior_s = 0.02;
   std::vector<CameraFinding> earlier;  ///< of a map made with another camera: looked for together at first
+  double earlier_least_gain = 0.002;   ///< as least_gain, of those together
 };
 
 struct CameraCalibration {

@@ -35,7 +35,7 @@ struct CalibrationPose {
   geometry::Rigid3 camera_from_world;  ///< when the middle row was read
   /// (m/s, rad/s): camera_from_world(t + dt) = Exp(velocity dt) camera_from_world(t).
   geometry::Vector6d velocity = geometry::Vector6d::Zero();
-  double undone_s = 0.0;  ///< the readout whose turns are no longer in the pixels
+  double undone_s = 0.0;  ///< the readout whose motion is no longer in pixels and depths
   bool fixed = false;
 };
 

@@ -45,10 +45,10 @@ class MotionModel {
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
   [[nodiscard]] double last_stamp() const { return stamp_; }
-  /// How the camera turns, rad/s in its frame: camera_from_world(t + dt) = Exp(w dt) camera_from_world(t).
-  /// Zero when that is not known.
-  [[nodiscard]] Eigen::Vector3d angular_velocity() const {
-    return continuous() ? Eigen::Vector3d(velocity_.tail<3>()) : Eigen::Vector3d::Zero();
+  /// Of the camera, (m/s, rad/s) in its frame: camera_from_world(t + dt) = Exp(velocity dt)
+  /// camera_from_world(t). Zero when that is not known.
+  [[nodiscard]] geometry::Vector6d velocity() const {
+    return continuous() ? velocity_ : geometry::Vector6d(geometry::Vector6d::Zero());
   }
   [[nodiscard]] double turn_rate() const { return velocity_.tail<3>().norm(); }
 

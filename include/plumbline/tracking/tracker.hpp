@@ -41,8 +41,8 @@ struct TrackerOptions {
   bool motion_prior = true;  ///< the motion model holds what measurements leave open
   bool pnp_start = false;  ///< every frame begins with PnP, where there are matches enough (METHOD section 2)
   /// Time from the first to the last row of an image, s; 0: all at once. What it shears is put right before
-  /// a frame is tracked (features::undo_rolling_shutter), with the motion model's turn, and again with the
-  /// turn that was found where that differs.
+  /// a frame is tracked (features::undo_rolling_shutter), by the motion model, and again by the motion that
+  /// was found.
   double readout_s = 0.0;
   int min_inliers = 15;
   int min_surface = 300;
@@ -175,7 +175,7 @@ class Tracker {
 
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const sensor::RgbdFrame& frame) const;
   [[nodiscard]] Features synchronised(const sensor::RgbdFrame& frame, const Features& features,
-                                      const Eigen::Vector3d& angular_velocity) const;
+                                      const geometry::Vector6d& velocity) const;
 
   TrackerOptions options_;
   sensor::Pinhole camera_;

@@ -15,7 +15,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-constexpr double kLeastGain = 0.01;  // of a camera that may well be right; afterwards as calibrate asks
+constexpr double kLeastGain = 0.01;  // of a number that may well be right
 constexpr int kMostAsked = 2;        // what a wrong camera has bent shows in a map made with a better one
 constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
 
@@ -72,7 +72,7 @@ void CameraDecision::ask(const RobotInfo& robot, const mapping::CalibrationRun& 
   news.resize(used.size());
   mapping::CalibrationOptions options;
   options.earlier = said[number].findings;
-  if (found_text(options.earlier).empty()) options.least_gain = kLeastGain;
+  options.least_gain = kLeastGain;
   if (guess) {
     options.focal_prior = 0.1;
     options.centre_prior_px = 20.0;

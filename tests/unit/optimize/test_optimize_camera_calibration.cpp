@@ -156,7 +156,7 @@ TEST(CameraCalibration, EvidenceForetellsTheCost) {
   }
 }
 
-// Turns that were undone in the pixels are not looked for there; what the camera's shift did still is.
+// Motion that was undone in pixels and depths is not looked for there.
 TEST(CameraCalibration, KnowsWhatOfTheReadoutWasUndone) {
   sensor::Camera truth = kinect();
   truth.readout_s = 0.02;
@@ -164,9 +164,10 @@ TEST(CameraCalibration, KnowsWhatOfTheReadoutWasUndone) {
   for (CalibrationObservation& o : problem.observations) {
     const CalibrationPose& pose = problem.poses[static_cast<std::size_t>(o.pose)];
     const double back_s = -0.02 * (o.pixel.y() / truth.color.height - 0.5);
-    const Eigen::Vector3d ray(o.ray.x(), o.ray.y(), 1.0);
-    const Eigen::Vector3d turned = geometry::exp_so3(back_s * pose.velocity.tail<3>()) * ray;
-    o.pixel = distorted_pixel(truth, truth.color.project(turned));
+    const Eigen::Vector3d seen = o.depth * Eigen::Vector3d(o.ray.x(), o.ray.y(), 1.0);
+    const Eigen::Vector3d moved = geometry::exp_se3(back_s * pose.velocity) * seen;
+    o.pixel = distorted_pixel(truth, truth.color.project(moved));
+    o.depth = moved.z();
   }
   for (CalibrationPose& pose : problem.poses) pose.undone_s = 0.02;
   FreeUnknowns free{};
