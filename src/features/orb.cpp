@@ -7,7 +7,6 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "fast.hpp"
 #include "orb_orientation.hpp"
 
 namespace plumbline::features {
@@ -16,6 +15,12 @@ namespace {
 constexpr int kFastRadius = 3;
 constexpr int kEdge = 16;        // the patch of a corner 3 px further in must lie inside the image
 constexpr int kCellPixels = 32;  // cell of the spreading grid, pixels of the level
+
+struct Corner {
+  int x = 0;  ///< pixels of the level
+  int y = 0;
+  int score = 0;  ///< the largest threshold at which FAST still finds it, grey values
+};
 
 /// Which cell of a grid over a width x height area a corner lies in.
 class Cells {
@@ -110,15 +115,18 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
   return least * least < squared;
 }
 
-/// FAST over the region, without what lies on edges; cells where the high threshold finds nothing get the low
-/// one.
+/// FAST (Rosten, Porter, Drummond, PAMI 32, 2010) over the region, without what lies on edges; cells where
+/// the high threshold finds nothing get the low one.
 std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int high, int low,
                            double min_corner) {
-  std::vector<Corner> corners = fast_corners(level(region), low);
-  const auto edge = [&](const Corner& c) {
-    return on_edge(level, c.x + region.x, c.y + region.y, min_corner);
-  };
-  if (min_corner > 0.0) corners.erase(std::remove_if(corners.begin(), corners.end(), edge), corners.end());
+  std::vector<cv::KeyPoint> found;
+  cv::FAST(level(region), found, low);
+  std::vector<Corner> corners;
+  for (const cv::KeyPoint& k : found) {
+    const Corner c{cvRound(k.pt.x), cvRound(k.pt.y), cvRound(k.response)};
+    if (min_corner > 0.0 && on_edge(level, c.x + region.x, c.y + region.y, min_corner)) continue;
+    corners.push_back(c);
+  }
   const Cells cells(region.width, region.height);
   std::vector<char> has_strong(cells.count(), 0);
   for (const Corner& c : corners) {
