@@ -304,4 +304,25 @@ Result<ConfigNode> read_yaml(const std::filesystem::path& file) {
   return whole(std::move(node), problems);
 }
 
+std::vector<std::string> yaml_names(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Result<std::filesystem::path> find_yaml(const char* what, const std::string& name_or_file,
+                                        const std::filesystem::path& folder) {
+  std::error_code ignored;
+  for (const auto& file :
+       {std::filesystem::path(name_or_file), folder / name_or_file, folder / (name_or_file + ".yaml")}) {
+    if (std::filesystem::is_regular_file(file, ignored)) return file;
+  }
+  return usage_error(fmt::format("{} '{}': neither a file nor one of {}{}", what, name_or_file,
+                                 folder.string(), hint(name_or_file, yaml_names(folder))));
+}
+
 }  // namespace plumbline::core

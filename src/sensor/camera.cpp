@@ -125,16 +125,6 @@ void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& p
   camera.depth = pinhole;
 }
 
-std::vector<std::string> shipped_names(const std::filesystem::path& folder) {
-  std::vector<std::string> names;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
 /// Quoted where YAML needs it.
 std::string text_yaml(std::string text) {
   core::OptionTable table;
@@ -242,16 +232,9 @@ core::Result<Camera> read_open3d_camera(const std::filesystem::path& file) {
 
 core::Result<Camera> find_camera(const std::string& name_or_file,
                                  const std::filesystem::path& cameras_folder) {
-  const std::filesystem::path shipped = cameras_folder / (name_or_file + ".yaml");
-  std::error_code ignored;
-  if (name_or_file.find('/') == std::string::npos && std::filesystem::is_regular_file(shipped, ignored)) {
-    return read_camera(shipped);
-  }
-  if (std::filesystem::is_regular_file(name_or_file, ignored)) return read_camera(name_or_file);
-
-  const std::vector<std::string> names = shipped_names(cameras_folder);
-  return core::usage_error(fmt::format("camera '{}': neither a file nor a calibration of {}{}", name_or_file,
-                                       cameras_folder.string(), core::hint(name_or_file, names)));
+  const auto file = core::find_yaml("camera", name_or_file, cameras_folder);
+  if (!file) return tl::unexpected<core::Error>(file.error());
+  return read_camera(*file);
 }
 
 std::string to_yaml(const Camera& camera) {

@@ -120,7 +120,6 @@ void FrameAligner::align(const AlignmentRound& round) {
 /// The motion model, by which the features were freed of the rolling shutter, lags behind a motion that
 /// changes. Now that the pose is roughly known, so is the motion.
 void FrameAligner::correct_rolling_shutter() {
-  constexpr double kVisible_px = 1.0;  // of the turn, at the first and the last row
   const double readout_s = in_.options.readout_s;
   const double dt = in_.frame.stamp - in_.motion.last_stamp();
   if (readout_s == 0.0 || !in_.motion.continuous() || dt < 1e-4 || dt > 0.5) return;
@@ -129,7 +128,6 @@ void FrameAligner::correct_rolling_shutter() {
   // Both are means of their steps: half a step on.
   const geometry::Vector6d before = in_.motion.velocity();
   const geometry::Vector6d change = before.isZero(0.0) ? mean : geometry::Vector6d(1.5 * (mean - before));
-  if (change.tail<3>().norm() * 0.5 * readout_s * in_.camera.fx < kVisible_px) return;
   auto corrected = std::make_shared<features::FrameFeatures>(in_.features);
   features::undo_rolling_shutter(*corrected, in_.camera, change, readout_s);
   result_.features = std::move(corrected);

@@ -197,7 +197,8 @@ TEST_F(BadInput, ConfigurationIsRefusedBeforeAnythingIsStarted) {
        "p.yaml:4:64: stages.fuse.voxel: '5 s': the unit 's' does not fit", "there is no view 'tpo'",
        "--set fuse.voxel: 0 is out of range", "--set fsue.voxel: there is no stage 'fsue'",
        "--set fuse: write it as stage.key=value"});
-  expect_refused(run("map wall -o out -p nothing.yaml"), 2, {"nothing.yaml: no such pipeline"});
+  expect_refused(run("map wall -o out -p nothing.yaml"), 2,
+                 {"pipeline 'nothing.yaml': neither a file nor one of"});
   write("twice.yaml", "stages:\n  read: {type: read}\n  read: {type: read}\n");
   expect_refused(run("map wall -o out -p twice.yaml"), 2,
                  {"twice.yaml:3:3: stages.read: the key is given twice"});

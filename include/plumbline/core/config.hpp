@@ -59,6 +59,12 @@ std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigPro
 std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name,
                                      ConfigProblems& problems);
 
+/// Names of the YAML files of a folder, without their ending, sorted.
+std::vector<std::string> yaml_names(const std::filesystem::path& folder);
+/// A file, or one of `folder` by its name. Error (kUsage): neither; `what` it is, "camera", is told.
+Result<std::filesystem::path> find_yaml(const char* what, const std::string& name_or_file,
+                                        const std::filesystem::path& folder);
+
 /// One line of YAML that reads back as the same tree.
 std::string to_flow_yaml(const ConfigNode& node);
 

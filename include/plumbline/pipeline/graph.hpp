@@ -72,11 +72,4 @@ std::string to_yaml(const Graph& graph);
 /// flow once after the last frame.
 std::string to_dot(const Graph& graph);
 
-/// Shipped pipelines by name or any file by path. Errors (kUsage) suggest the nearest name.
-core::Result<std::filesystem::path> find_pipeline(const std::string& name_or_file,
-                                                  const std::filesystem::path& pipelines_folder);
-
-/// Names of the pipelines in a folder, sorted.
-std::vector<std::string> pipeline_names(const std::filesystem::path& pipelines_folder);
-
 }  // namespace plumbline::pipeline

@@ -101,9 +101,6 @@ core::Result<Scene> load_scene(const std::string& name_or_file, const std::files
 /// The same from YAML text; `file_name` is for messages.
 core::Result<Scene> parse_scene(const std::string& yaml, const std::string& file_name);
 
-/// Names of the scenes in a folder, sorted.
-std::vector<std::string> scene_names(const std::filesystem::path& scenes_folder);
-
 /// Materials a scene file may name, sorted.
 const std::vector<std::string>& material_names();
 

@@ -23,21 +23,10 @@ struct FilterRequest {
   std::vector<fs::path> files;  ///< inputs, then the output
 };
 
-/// A file, or a shipped chain by name.
-core::Result<fs::path> find_chain(const std::string& name, const Session& session) {
-  std::error_code ec;
-  if (fs::is_regular_file(name, ec)) return fs::path(name);
-  const auto pipelines = session.pipelines_folder();
-  if (!pipelines) return pipelines;
-  for (const char* ending : {"", ".yaml"}) {
-    const fs::path shipped = *pipelines / "filters" / (name + ending);
-    if (fs::is_regular_file(shipped, ec)) return shipped;
-  }
-  return core::usage_error(fmt::format("{}: no such filter chain, and no shipped one has that name", name));
-}
-
 core::Result<cloud::FilterChain> load_chain(const std::string& name, const Session& session) {
-  const auto file = find_chain(name, session);
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+  const auto file = core::find_yaml("filter chain", name, *pipelines / "filters");
   if (!file) return tl::unexpected<core::Error>(file.error());
   const auto registry = session.filters();
   if (!registry) return tl::unexpected<core::Error>(registry.error());

@@ -40,7 +40,7 @@ core::Result<pipeline::Graph> load(const PipelinesRequest& request, const pipeli
                                    const Session& session) {
   const auto folder = session.pipelines_folder();
   if (!folder) return tl::unexpected<core::Error>(folder.error());
-  const auto file = pipeline::find_pipeline(request.name, *folder);
+  const auto file = core::find_yaml("pipeline", request.name, *folder);
   if (!file) return tl::unexpected<core::Error>(file.error());
   return pipeline::load_graph(*file, registry, *folder, request.overrides);
 }
@@ -56,7 +56,7 @@ int list(Session& session, const PipelinesRequest& /*request*/, const pipeline::
   const auto folder = session.pipelines_folder();
   if (!folder) return session.fail(folder.error());
   fmt::print("pipelines:\n");
-  for (const std::string& name : pipeline::pipeline_names(*folder)) {
+  for (const std::string& name : core::yaml_names(*folder)) {
     const auto graph = load({name, {}, {}, false, false}, registry, session);
     fmt::print("  {:<14} {}\n", name, graph ? graph->description : "(broken) " + graph.error().message);
   }

@@ -169,27 +169,4 @@ std::string to_yaml(const Graph& graph) {
   return taps.empty() ? text : text + "taps:\n" + taps;
 }
 
-std::vector<std::string> pipeline_names(const std::filesystem::path& pipelines_folder) {
-  std::vector<std::string> names;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(pipelines_folder, ignored)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-core::Result<std::filesystem::path> find_pipeline(const std::string& name_or_file,
-                                                  const std::filesystem::path& pipelines_folder) {
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(name_or_file, ignored)) return std::filesystem::path(name_or_file);
-  for (const char* ending : {"", ".yaml"}) {
-    const std::filesystem::path shipped = pipelines_folder / (name_or_file + ending);
-    if (std::filesystem::is_regular_file(shipped, ignored)) return shipped;
-  }
-  return core::usage_error(fmt::format("{}: no such pipeline file, and no shipped pipeline has that name{}",
-                                       name_or_file,
-                                       core::hint(name_or_file, pipeline_names(pipelines_folder))));
-}
-
 }  // namespace plumbline::pipeline

@@ -200,7 +200,7 @@ class Includer {
     if (file.empty()) {
       return refuse(fmt::format(
           "there is no '{}' beside this file, and no shipped pipeline of that name{}", name.scalar,
-          core::hint(fs::path(name.scalar).stem().string(), pipeline_names(pipelines_folder_))));
+          core::hint(fs::path(name.scalar).stem().string(), core::yaml_names(pipelines_folder_))));
     }
     const fs::path canonical = fs::weakly_canonical(file);
     const auto again = std::find(open_.begin(), open_.end(), canonical);

@@ -4,7 +4,7 @@
 namespace plumbline::pipeline {
 
 core::Result<Graph> load_pipeline(const RunRequest& request) {
-  const auto file = find_pipeline(request.pipeline, request.pipelines_folder);
+  const auto file = core::find_yaml("pipeline", request.pipeline, request.pipelines_folder);
   if (!file) return tl::unexpected(file.error());
   StageRegistry registry;
   register_stages(registry);

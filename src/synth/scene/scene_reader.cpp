@@ -175,31 +175,12 @@ core::Result<Scene> parse_scene(const std::string& yaml, const std::string& file
   return build(*root, file_name);
 }
 
-std::vector<std::string> scene_names(const std::filesystem::path& scenes_folder) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(scenes_folder, error)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
 core::Result<Scene> load_scene(const std::string& name_or_file, const std::filesystem::path& scenes_folder) {
-  if (name_or_file.empty()) return core::usage_error("no scene named");
-  std::filesystem::path file = name_or_file;
-  const bool is_path = file.extension() == ".yaml" || file.extension() == ".yml" || file.has_parent_path();
-  if (!is_path) {
-    file = scenes_folder / (name_or_file + ".yaml");
-    if (!std::filesystem::exists(file)) {
-      const std::vector<std::string> names = scene_names(scenes_folder);
-      return core::usage_error(fmt::format("'{}' is neither a YAML file nor a scene{}", name_or_file,
-                                           core::hint(name_or_file, names)));
-    }
-  }
-  auto root = core::read_yaml(file);
+  const auto file = core::find_yaml("scene", name_or_file, scenes_folder);
+  if (!file) return tl::unexpected<core::Error>(file.error());
+  auto root = core::read_yaml(*file);
   if (!root) return tl::unexpected<core::Error>(root.error());
-  return build(*root, file.string());
+  return build(*root, file->string());
 }
 
 }  // namespace plumbline::synth

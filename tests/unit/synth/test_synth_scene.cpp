@@ -15,7 +15,7 @@ std::string problem(const std::string& yaml) {
 }
 
 TEST(SynthScene, EveryShippedSceneLoads) {
-  const auto names = scene_names(kShippedScenes);
+  const auto names = core::yaml_names(kShippedScenes);
   EXPECT_EQ(names, (std::vector<std::string>{"corridor", "office", "plane", "room", "structure"}));
   for (const std::string& name : names) {
     const auto scene = load_scene(name, kShippedScenes);

@@ -273,7 +273,7 @@ TEST(SynthSource, PathThroughAWallIsRefused) {
 }
 
 TEST(SynthSource, EveryShippedPathIsFree) {
-  for (const std::string& name : scene_names(kScenes)) {
+  for (const std::string& name : core::yaml_names(kScenes)) {
     const auto scene = load_scene(name, kScenes);
     ASSERT_TRUE(scene) << scene.error().message;
     SynthOptions options;
