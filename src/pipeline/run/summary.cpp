@@ -296,9 +296,11 @@ std::string to_text(const RunSummary& s) {
   for (const std::string& without : {left_out_text(s), left_out_of_map_text(s)}) {
     if (!without.empty()) text += fmt::format("left out   {}\n", without);
   }
-  text +=
-      fmt::format("time       {:.1f} s in all, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n",
-                  s.wall_s, s.map_s, s.fps(), s.export_s);
+  const bool again =
+      std::any_of(s.cameras.begin(), s.cameras.end(), [](const auto& camera) { return camera.asked > 1; });
+  text += fmt::format(
+      "time       {:.1f} s in all{}, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n", s.wall_s,
+      again ? " (begun again with a better camera)" : "", s.map_s, s.fps(), s.export_s);
   if (s.pace_hz > 0.0) {
     text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", s.pace_hz, s.behind_s);
   }

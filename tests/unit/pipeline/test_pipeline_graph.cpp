@@ -150,9 +150,9 @@ TEST_F(GraphFile, FilesAreFoundBesideThePipelineAndAmongTheShipped) {
     EXPECT_EQ(graph.has_value(), std::string(file) != "none.txt");
   }
   std::ofstream(folder / "shipped" / "rgbd.yaml") << kGood;
-  EXPECT_TRUE(find_pipeline("rgbd", folder / "shipped"));
-  EXPECT_TRUE(find_pipeline((folder / "p.yaml").string(), folder / "shipped"));
-  const auto missing = find_pipeline("rgdb", folder / "shipped");
+  EXPECT_TRUE(core::find_yaml("pipeline", "rgbd", folder / "shipped"));
+  EXPECT_TRUE(core::find_yaml("pipeline", (folder / "p.yaml").string(), folder / "shipped"));
+  const auto missing = core::find_yaml("pipeline", "rgdb", folder / "shipped");
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("did you mean rgbd?"), std::string::npos);
   std::filesystem::remove_all(folder);

@@ -87,7 +87,7 @@ TEST(Shipped, StagesPageIsUpToDate) {
 
 TEST(Shipped, PipelinesPageKnowsEveryPipeline) {
   const std::string page = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs/guide/pipelines.md");
-  for (const std::string& name : pipeline_names(kShipped)) {
+  for (const std::string& name : core::yaml_names(kShipped)) {
     EXPECT_NE(page.find("| `" + name + "` |"), std::string::npos)
         << "docs/guide/pipelines.md does not tell of " << name;
   }
@@ -97,7 +97,7 @@ TEST(Shipped, EveryStageIsUsedByAPipelineOrAnExampleOfThePage) {
   StageRegistry registry;
   register_stages(registry);
   std::string texts = text_of(fs::path(PLUMBLINE_SOURCE_DIR) / "docs/guide/pipelines.md");
-  for (const std::string& name : pipeline_names(kShipped)) {
+  for (const std::string& name : core::yaml_names(kShipped)) {
     const auto graph = load_graph(kShipped / (name + ".yaml"), registry, kShipped);
     ASSERT_TRUE(graph) << graph.error().message;
     texts += to_yaml(*graph);
@@ -121,7 +121,7 @@ TEST(Shipped, EveryPortCanBeTapped) {
 TEST(Shipped, WhatIsWrittenOutReadsBackTheSame) {
   StageRegistry registry;
   register_stages(registry);
-  for (const std::string& name : pipeline_names(kShipped)) {
+  for (const std::string& name : core::yaml_names(kShipped)) {
     const auto graph = load_graph(kShipped / (name + ".yaml"), registry, kShipped);
     ASSERT_TRUE(graph) << graph.error().message;
     const std::string text = to_yaml(*graph);
