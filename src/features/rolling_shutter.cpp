@@ -5,32 +5,35 @@ namespace plumbline::features {
 
 void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera,
                           const geometry::Vector6d& velocity, double readout_s) {
+  constexpr double kNearest = 0.05;  // metres: what would come nearer, or behind the camera, stays
   if (readout_s == 0.0 || velocity.isZero(0.0) || camera.height <= 0) return;
-  const auto middle_from_row = [&](float v) {
+  // Where what was at `from` in row `v` lies when the middle row is read; what has no depth is turned only.
+  const auto moved = [&](float v, const Eigen::Vector3d& from, bool has_depth) -> Eigen::Vector3d {
     const double seconds = (static_cast<double>(v) / camera.height - 0.5) * readout_s;
-    return geometry::exp_se3(-seconds * velocity);
+    geometry::Rigid3 motion = geometry::exp_se3(-seconds * velocity);
+    if (!has_depth) motion.translation.setZero();
+    const Eigen::Vector3d to = motion * from;
+    return to.z() > kNearest ? to : from;
   };
-  const auto moved = [&](const Eigen::Vector2f& pixel, double z) -> Eigen::Vector3d {
-    const Eigen::Vector2d p = pixel.cast<double>();
-    const geometry::Rigid3 motion = middle_from_row(pixel.y());
-    // Without a depth: as if it were far away, which only turns it.
-    return z > 0.0 ? motion * camera.unproject(p.x(), p.y(), z)
-                   : motion.rotation * camera.unproject(p.x(), p.y(), 1.0);
+  const auto ray = [&](const Eigen::Vector2f& pixel, double z) -> Eigen::Vector3d {
+    return camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), z);
   };
   for (PointFeature& point : features.points) {
-    const Eigen::Vector3d p = moved(point.pixel, static_cast<double>(point.depth));
+    const bool has_depth = point.depth > 0.0F;
+    const double z = has_depth ? static_cast<double>(point.depth) : 1.0;
+    const Eigen::Vector3d p = moved(point.pixel.y(), ray(point.pixel, z), has_depth);
     point.pixel = camera.project(p).cast<float>();
-    if (point.depth > 0.0F) point.depth = static_cast<float>(p.z());
+    if (has_depth) point.depth = static_cast<float>(p.z());
   }
   for (LineFeature& line : features.lines) {
-    LineSegment& s = line.segment;
     const auto move_end = [&](Eigen::Vector2f& pixel, Eigen::Vector3d* end) {
-      const geometry::Rigid3 motion = middle_from_row(pixel.y());
-      pixel = camera.project(moved(pixel, end != nullptr ? end->z() : 0.0)).cast<float>();
-      if (end != nullptr) *end = motion * *end;
+      const float v = pixel.y();
+      pixel =
+          camera.project(moved(v, ray(pixel, end != nullptr ? end->z() : 1.0), end != nullptr)).cast<float>();
+      if (end != nullptr) *end = moved(v, *end, true);
     };
-    move_end(s.start, line.line3 ? &line.line3->start : nullptr);
-    move_end(s.end, line.line3 ? &line.line3->end : nullptr);
+    move_end(line.segment.start, line.line3 ? &line.line3->start : nullptr);
+    move_end(line.segment.end, line.line3 ? &line.line3->end : nullptr);
   }
   features.grid = PointGrid(features.points, camera.width, camera.height);
 }

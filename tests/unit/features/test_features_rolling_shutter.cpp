@@ -86,6 +86,17 @@ TEST(RollingShutter, WhatHasNoDepthIsTurnedOnly) {
   EXPECT_EQ(features.points[0].depth, 0.0F);
 }
 
+TEST(RollingShutter, NothingIsMovedBehindTheCamera) {
+  FrameFeatures features;
+  PointFeature point;
+  point.pixel = {100.25F, 470.5F};
+  point.depth = 0.2F;
+  features.points.push_back(point);
+  undo_rolling_shutter(features, kRollingCamera, velocity({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0}), kReadout);
+  EXPECT_LT((features.points[0].pixel - point.pixel).norm(), 1e-3F);
+  EXPECT_NEAR(features.points[0].depth, 0.2F, 1e-6F);
+}
+
 TEST(RollingShutter, NothingMovesWithoutMotionOrReadout) {
   FrameFeatures features;
   PointFeature point;
