@@ -12,14 +12,12 @@ __attribute__((target_clones("popcnt", "default"))) int hamming_distance(const D
 }
 
 __attribute__((target_clones("popcnt", "default"))) void hamming_distances(const Descriptor256& query,
-                                                                           const Descriptor256* candidates,
-                                                                           const int* indices,
+                                                                           const Descriptor256* others,
                                                                            std::size_t count,
                                                                            int* distances) {
   for (std::size_t i = 0; i < count; ++i) {
-    const Descriptor256& c = candidates[indices[i]];
     int sum = 0;
-    for (std::size_t k = 0; k < 4; ++k) sum += __builtin_popcountll(query[k] ^ c[k]);
+    for (std::size_t k = 0; k < 4; ++k) sum += __builtin_popcountll(query[k] ^ others[i][k]);
     distances[i] = sum;
   }
 }

@@ -104,21 +104,12 @@ std::vector<LineMatch> match_lines(const std::vector<DescribedLine>& a, const st
   const std::vector<Shape> shapes_b = shapes(b);
   std::vector<Best> best_a(a.size());
   std::vector<Best> best_b(b.size());
-  std::vector<LineDescriptor> descriptors_b;
-  descriptors_b.reserve(b.size());
-  for (const DescribedLine& l : b) descriptors_b.push_back(l.descriptor);
-  std::vector<int> candidates;
-  std::vector<int> distances(b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
-    candidates.clear();
     for (std::size_t j = 0; j < b.size(); ++j) {
-      if (gate.passes(shapes_a[i], shapes_b[j])) candidates.push_back(static_cast<int>(j));
-    }
-    hamming_distances(a[i].descriptor, descriptors_b.data(), candidates.data(), candidates.size(),
-                      distances.data());
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      best_a[i].offer(candidates[c], distances[c]);
-      best_b[static_cast<std::size_t>(candidates[c])].offer(static_cast<int>(i), distances[c]);
+      if (!gate.passes(shapes_a[i], shapes_b[j])) continue;
+      const int distance = hamming(a[i].descriptor, b[j].descriptor);
+      best_a[i].offer(static_cast<int>(j), distance);
+      best_b[j].offer(static_cast<int>(i), distance);
     }
   }
   std::vector<LineMatch> matches;

@@ -2,7 +2,6 @@
 #include "plumbline/places/majority.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include "plumbline/core/random.hpp"
 
@@ -14,17 +13,14 @@ using features::Descriptor256;
 class Distances {
  public:
   explicit Distances(const std::vector<Descriptor256>& descriptors)
-      : descriptors_(descriptors), all_(descriptors.size()), result_(descriptors.size()) {
-    std::iota(all_.begin(), all_.end(), 0);
-  }
+      : descriptors_(descriptors), result_(descriptors.size()) {}
   const std::vector<int>& from(const Descriptor256& centre) {
-    features::hamming_distances(centre, descriptors_.data(), all_.data(), all_.size(), result_.data());
+    features::hamming_distances(centre, descriptors_.data(), descriptors_.size(), result_.data());
     return result_;
   }
 
  private:
   const std::vector<Descriptor256>& descriptors_;
-  std::vector<int> all_;
   std::vector<int> result_;
 };
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include "plumbline/places/majority.hpp"
@@ -17,15 +16,6 @@ namespace {
 constexpr int kMaxBranching = 64;
 
 std::size_t index_of(Word word) { return static_cast<std::size_t>(word); }
-
-const std::array<int, kMaxBranching>& first_indices() {
-  static const std::array<int, kMaxBranching> kIndices = [] {
-    std::array<int, kMaxBranching> indices{};
-    std::iota(indices.begin(), indices.end(), 0);
-    return indices;
-  }();
-  return kIndices;
-}
 
 }  // namespace
 
@@ -59,8 +49,7 @@ Word Vocabulary::word(Kind kind, const Descriptor256& descriptor) const {
   while (nodes_[index_of(node)].children > 0) {
     const Node& n = nodes_[index_of(node)];
     const auto count = static_cast<std::size_t>(n.children);
-    features::hamming_distances(descriptor, &centres_[index_of(n.first_child)], first_indices().data(), count,
-                                distances.data());
+    features::hamming_distances(descriptor, &centres_[index_of(n.first_child)], count, distances.data());
     const auto nearest = std::min_element(distances.begin(), distances.begin() + n.children);
     node = n.first_child + static_cast<Word>(nearest - distances.begin());
   }

@@ -133,9 +133,11 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
     };
     near.erase(std::remove_if(near.begin(), near.end(), unlike), near.end());
     if (near.empty()) continue;
-    distances.resize(near.size());
-    features::hamming_distances(point->descriptor, frame.descriptors.data(), near.data(), near.size(),
-                                distances.data());
+    distances.clear();
+    for (const int i : near) {
+      const features::Descriptor256& other = frame.descriptors[static_cast<std::size_t>(i)];
+      distances.push_back(features::hamming_distance(point->descriptor, other));
+    }
     const BestTwo best = best_two(frame.points, near, distances);
     if (best.distance > options.max_hamming || best.distance > options.ratio * best.second) continue;
     PointMatch& slot = by_feature[static_cast<std::size_t>(best.feature)];

@@ -2,7 +2,6 @@
 #include "plumbline/tracking/relocalise.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -22,17 +21,15 @@ std::vector<Pair> match_all(const maps::Map& map, core::KeyframeId keyframe,
                             const features::FrameFeatures& frame) {
   constexpr int kMaxHamming = 60;
   constexpr double kRatio = 0.8;
-  std::vector<int> all(frame.descriptors.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<int> distances(all.size());
+  std::vector<int> distances(frame.descriptors.size());
   struct Best {
     int distance = 257;
     core::PointId point;
   };
-  std::vector<Best> by_feature(all.size());
+  std::vector<Best> by_feature(distances.size());
   for (core::PointId id : map.points_of(keyframe)) {
-    if (!id.valid() || all.empty()) continue;
-    features::hamming_distances(map.point(id).descriptor, frame.descriptors.data(), all.data(), all.size(),
+    if (!id.valid() || distances.empty()) continue;
+    features::hamming_distances(map.point(id).descriptor, frame.descriptors.data(), distances.size(),
                                 distances.data());
     const auto best = std::min_element(distances.begin(), distances.end());
     const auto feature = static_cast<std::size_t>(best - distances.begin());

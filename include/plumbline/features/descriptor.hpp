@@ -13,8 +13,8 @@ using Descriptor256 = std::array<std::uint64_t, 4>;
 /// Number of differing bits, 0..256.
 int hamming_distance(const Descriptor256& a, const Descriptor256& b);
 
-/// Distances from `query` to candidates[indices[i]], i < count.
-void hamming_distances(const Descriptor256& query, const Descriptor256* candidates, const int* indices,
-                       std::size_t count, int* distances);
+/// Distances from `query` to each of `count` descriptors.
+void hamming_distances(const Descriptor256& query, const Descriptor256* others, std::size_t count,
+                       int* distances);
 
 }  // namespace plumbline::features

@@ -12,7 +12,6 @@
 namespace plumbline::mapping {
 namespace {
 
-using features::Descriptor256;
 using features::FrameFeatures;
 
 constexpr std::uint32_t kMaxHamming = 72;
@@ -20,26 +19,12 @@ constexpr double kRatio = 0.95;
 constexpr unsigned kIndexBits =
     20;  // distance and index in one number: the least is the nearest, the first of them
 
-/// Distances of one descriptor to all others.
-#if defined(__x86_64__)
-__attribute__((target_clones("popcnt", "default")))
-#endif
-void distances_to(const Descriptor256& one, const Descriptor256* others, std::size_t count, std::uint32_t* to) {
-  for (std::size_t j = 0; j < count; ++j) {
-    std::uint32_t sum = 0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      sum += static_cast<std::uint32_t>(__builtin_popcountll(one[k] ^ others[j][k]));
-    }
-    to[j] = sum;
-  }
-}
-
 /// The nearest of a row, and of each column what is nearest so far.
-PLUMBLINE_CLONES std::uint32_t take_nearest(const std::uint32_t* distances, std::uint32_t count,
-                                            std::uint32_t row, std::uint32_t* nearest) {
+PLUMBLINE_CLONES std::uint32_t take_nearest(const int* distances, std::uint32_t count, std::uint32_t row,
+                                            std::uint32_t* nearest) {
   std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
   for (std::uint32_t j = 0; j < count; ++j) {
-    const std::uint32_t shifted = distances[j] << kIndexBits;
+    const std::uint32_t shifted = static_cast<std::uint32_t>(distances[j]) << kIndexBits;
     least = std::min(least, shifted | j);
     nearest[j] = std::min(nearest[j], shifted | row);
   }
@@ -49,8 +34,7 @@ PLUMBLINE_CLONES std::uint32_t take_nearest(const std::uint32_t* distances, std:
 std::size_t index_of(std::uint32_t key) { return key & ((1U << kIndexBits) - 1U); }
 
 /// Whether nothing at another place of the image is nearly as near as `best`.
-bool clearly_nearest(const FrameFeatures& image, const std::uint32_t* distances, std::size_t step,
-                     std::size_t best) {
+bool clearly_nearest(const FrameFeatures& image, const int* distances, std::size_t step, std::size_t best) {
   const double limit = distances[best * step] / kRatio;
   for (std::size_t j = 0; j < image.descriptors.size(); ++j) {
     if (distances[j * step] < limit && (image.points[j].pixel - image.points[best].pixel).norm() > 5.0F) {
@@ -69,12 +53,12 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   if (rows == 0 || columns == 0) return pairs;
   if (std::max(rows, columns) >> kIndexBits != 0) throw std::length_error("alike_both_ways: too many points");
-  std::vector<std::uint32_t> table(rows * columns);
+  std::vector<int> table(rows * columns);
   std::vector<std::uint32_t> nearest_in_b(rows);
   std::vector<std::uint32_t> nearest_in_a(columns, std::numeric_limits<std::uint32_t>::max());
   for (std::size_t i = 0; i < rows; ++i) {
-    std::uint32_t* row = table.data() + i * columns;
-    distances_to(a.descriptors[i], b.descriptors.data(), columns, row);
+    int* row = table.data() + i * columns;
+    features::hamming_distances(a.descriptors[i], b.descriptors.data(), columns, row);
     nearest_in_b[i] = take_nearest(row, static_cast<std::uint32_t>(columns), static_cast<std::uint32_t>(i),
                                    nearest_in_a.data());
   }

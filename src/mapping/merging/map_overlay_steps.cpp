@@ -2,7 +2,6 @@
 // Where do things repeat? Steps between landmarks that look alike.
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 
 #include "merging/landmark_cells.hpp"
@@ -128,14 +127,11 @@ void MapOverlay::vote(const Side& moved, const Side& fixed, const Rigid3& fixed_
   const std::vector<core::PointId> voters(ids.begin(), ids.end());
   std::vector<features::Descriptor256> descriptors;
   for (const Landmark& l : fixed.landmarks) descriptors.push_back(l.descriptor);
-  std::vector<int> all(descriptors.size());
-  std::iota(all.begin(), all.end(), 0);
   std::vector<int> distances(descriptors.size());
   for (std::size_t v = 0; v < voters.size(); v += stride(voters.size(), kMostVoters)) {
     const Landmark voter = landmark(map, voters[v]);
     const Eigen::Vector3d at = fixed_from_moved * voter.position;
-    features::hamming_distances(voter.descriptor, descriptors.data(), all.data(), all.size(),
-                                distances.data());
+    features::hamming_distances(voter.descriptor, descriptors.data(), descriptors.size(), distances.data());
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (distances[i] <= kAlike) steps.push_back(fixed.landmarks[i].position - at);
     }
