@@ -87,7 +87,7 @@ core::Result<void> write_error_cloud(const std::filesystem::path& file, const st
   if (auto done = cloud::write_ply(file.string() + ".ply", as_ply(cloud, error_m, end_m)); !done) return done;
   viz::Scene scene = as_scene(cloud, error_m);
   scene.title = title;
-  for (const geometry::Trajectory& camera : cameras) scene.paths.push_back({"", camera, {90, 94, 102}, {}});
+  for (const geometry::Trajectory& camera : cameras) scene.paths.push_back({"", camera, {90, 94, 102}});
   viz::SnapshotOptions options;
   options.color = viz::ColorMode::kError;
   options.scalar_range = {0.0, 1000.0 * end_m};

@@ -7,6 +7,7 @@
 
 #include "image_decoders.hpp"
 #include "image_formats.hpp"
+#include "plumbline/core/output_file.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -55,6 +56,12 @@ core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int lev
   Bytes bytes = (*formats)->encode_png(image, level);
   if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the image cannot be encoded as PNG");
   return bytes;
+}
+
+core::Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) {
+  const auto bytes = encode_png(image, 1);
+  if (!bytes) return core::failure(bytes.error().kind, file.string() + ": " + bytes.error().message);
+  return core::write_file(file, *bytes);
 }
 
 }  // namespace plumbline::dataset

@@ -4,26 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "depth_statistics.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {
-namespace {
-
-void describe_time(const FrameSource& source, RecordingSummary& summary) {
-  if (source.size() < 2) return;
-  summary.duration_s = source.info(source.size() - 1).stamp - source.info(0).stamp;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < source.size(); ++i)
-    steps.push_back(source.info(i).stamp - source.info(i - 1).stamp);
-  summary.longest_gap_s = *std::max_element(steps.begin(), steps.end());
-  const double usual = core::median(std::move(steps));
-  if (usual > 0.0) summary.fps = 1.0 / usual;
-}
-
-}  // namespace
-
 std::vector<std::size_t> spread(std::size_t count, std::size_t samples) {
   std::vector<std::size_t> positions;
   samples = std::min(count, samples);
@@ -33,53 +19,44 @@ std::vector<std::size_t> spread(std::size_t count, std::size_t samples) {
   return positions;
 }
 
-RecordingSummary describe(const FrameSource& source, std::size_t samples) {
+std::string to_text(const FrameSource& source) {
+  constexpr std::size_t kSamples = 5;
   const sensor::Camera& camera = source.camera();
-  RecordingSummary summary;
-  summary.name = source.name();
-  summary.format = source.format();
-  summary.camera = camera.name;
-  summary.width = camera.color.width;
-  summary.height = camera.color.height;
-  summary.distorted = camera.distorted();
-  summary.registers_depth = camera.color_from_depth.has_value();
-  summary.depth_scale = camera.depth_scale;
-  summary.pairs = source.size();
-  describe_time(source, summary);
+  std::string text =
+      fmt::format("recording: {} ({})\npairs: {}\n", source.name(), source.format(), source.size());
+
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < source.size(); ++i)
+    steps.push_back(source.info(i).stamp - source.info(i - 1).stamp);
+  const double duration_s = std::accumulate(steps.begin(), steps.end(), 0.0);
+  const double longest_s = steps.empty() ? 0.0 : *std::max_element(steps.begin(), steps.end());
+  const double usual_s = steps.empty() ? 0.0 : core::median(std::move(steps));
+  text += fmt::format("duration: {:.2f} s, {:.1f} pairs a second, longest gap {:.3f} s\n", duration_s,
+                      usual_s > 0.0 ? 1.0 / usual_s : 0.0, longest_s);
+  text += fmt::format("camera: {}, {}x{}, {}, depth {}, depth_scale {}\n", camera.name, camera.color.width,
+                      camera.color.height, camera.distorted() ? "undistorted while reading" : "no distortion",
+                      camera.color_from_depth ? "registered while reading" : "registered to colour",
+                      camera.depth_scale);
 
   DepthStatistics statistics;
-  for (const std::size_t i : spread(source.size(), samples)) {
-    ++summary.sampled;
-    if (const auto frame = source.read(i)) {
-      statistics.add(frame->depth);
-    } else {
-      ++summary.unreadable;
-    }
+  std::size_t read = 0;
+  const std::vector<std::size_t> sampled = spread(source.size(), kSamples);
+  for (const std::size_t i : sampled) {
+    const auto frame = source.read(i);
+    if (!frame) continue;
+    statistics.add(frame->depth);
+    ++read;
   }
-  summary.median_depth_m = statistics.median().value_or(0.0);
-  summary.missing_depth_share = statistics.missing_share();
-  summary.has_truth = source.truth().has_value();
-  return summary;
-}
-
-std::string to_text(const RecordingSummary& s) {
-  std::string text = fmt::format("recording: {} ({})\n", s.name, s.format);
-  text += fmt::format("pairs: {}\n", s.pairs);
-  text += fmt::format("duration: {:.2f} s, {:.1f} pairs a second, longest gap {:.3f} s\n", s.duration_s,
-                      s.fps, s.longest_gap_s);
-  text += fmt::format("camera: {}, {}x{}, {}, depth {}, depth_scale {}\n", s.camera, s.width, s.height,
-                      s.distorted ? "undistorted while reading" : "no distortion",
-                      s.registers_depth ? "registered while reading" : "registered to colour", s.depth_scale);
-  if (s.median_depth_m > 0.0) {
+  if (const double median_m = statistics.median().value_or(0.0); median_m > 0.0) {
     text += fmt::format(
-        "depth: median {:.2f} m, {:.0f} % of the pixels without measurement ({} frames sampled)\n",
-        s.median_depth_m, 100.0 * s.missing_depth_share, s.sampled - s.unreadable);
+        "depth: median {:.2f} m, {:.0f} % of the pixels without measurement ({} frames sampled)\n", median_m,
+        100.0 * statistics.missing_share(), read);
   } else {
-    text += fmt::format("depth: none in {} sampled frames\n", s.sampled - s.unreadable);
+    text += fmt::format("depth: none in {} sampled frames\n", read);
   }
-  if (s.unreadable > 0) text += fmt::format("unreadable: {} of {} sampled frames\n", s.unreadable, s.sampled);
-  text += fmt::format("truth: {}\n", s.has_truth ? "yes" : "no");
-  return text;
+  if (read < sampled.size())
+    text += fmt::format("unreadable: {} of {} sampled frames\n", sampled.size() - read, sampled.size());
+  return text + fmt::format("truth: {}\n", source.truth() ? "yes" : "no");
 }
 
 }  // namespace plumbline::dataset

@@ -287,9 +287,6 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
   report.truth = std::move(*sorted_truth);
   report.truth_from_estimate = alignment(matches, options.align);
   for (const Match& m : matches) report.poses.push_back(pose_error(m, report.truth_from_estimate));
-  for (const StampedPose& pose : *sorted_estimate) {
-    report.aligned.push_back({pose.stamp, report.truth_from_estimate * pose.world_from_camera});
-  }
   for (std::size_t i = 0; i + 1 < matches.size(); ++i) {
     report.path_m += (matches[i + 1].truth.translation - matches[i].truth.translation).norm();
   }

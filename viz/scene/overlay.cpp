@@ -32,28 +32,6 @@ void cased_line(Painter& painter, const std::vector<Eigen::Vector2d>& line, cons
   painter.polyline(line, color, width);
 }
 
-void draw_frustum(Painter& painter, const Projection& projection, const geometry::Rigid3& pose,
-                  const Rgb& color) {
-  constexpr double kHalfWidth = 0.064, kHalfHeight = 0.048, kDepth = 0.09;  // metres
-  const Eigen::Vector3d apex = pose.translation;
-  const std::array<Eigen::Vector3d, 4> corners{pose * Eigen::Vector3d(-kHalfWidth, -kHalfHeight, kDepth),
-                                               pose * Eigen::Vector3d(kHalfWidth, -kHalfHeight, kDepth),
-                                               pose * Eigen::Vector3d(kHalfWidth, kHalfHeight, kDepth),
-                                               pose * Eigen::Vector3d(-kHalfWidth, kHalfHeight, kDepth)};
-  if (!in_front(projection, apex)) return;
-  // A camera right before the viewer's eye would fill the picture.
-  if (!projection.orthographic && projection.project(apex).z() < 0.4) return;
-  for (const auto& corner : corners) {
-    if (!in_front(projection, corner)) return;
-  }
-  std::vector<Eigen::Vector2d> image;
-  for (std::size_t i = 0; i <= 4; ++i) image.push_back(on_picture(projection, corners[i % 4]));
-  painter.polyline(image, color, 1.3, 0.85);
-  for (const auto& corner : corners) {
-    painter.polyline({on_picture(projection, apex), on_picture(projection, corner)}, color, 1.3, 0.85);
-  }
-}
-
 void draw_path(Painter& painter, const Projection& projection, const CameraPath& path) {
   std::vector<std::vector<Eigen::Vector2d>> pieces(1);
   for (const auto& pose : path.trajectory) {
@@ -67,11 +45,6 @@ void draw_path(Painter& painter, const Projection& projection, const CameraPath&
     }
   }
   for (const auto& piece : pieces) cased_line(painter, piece, path.color, 3.0);
-  for (const std::size_t keyframe : path.keyframes) {
-    if (keyframe < path.trajectory.size()) {
-      draw_frustum(painter, projection, path.trajectory[keyframe].world_from_camera, path.color);
-    }
-  }
   pieces.erase(std::remove_if(pieces.begin(), pieces.end(), [](const auto& piece) { return piece.empty(); }),
                pieces.end());
   if (pieces.empty()) return;

@@ -31,6 +31,14 @@ inline Eigen::Vector3i unpack_cell(std::uint64_t key) {
 /// The cell that a place lies in; both in the unit of cells.
 inline Eigen::Vector3i cell_of(const Eigen::Vector3d& at) { return at.array().floor().cast<int>(); }
 
+/// Which axis a normal is nearest to, and which way along it: 0-5.
+template <typename Normal>
+int facing(const Normal& normal) {
+  Eigen::Index axis = 0;
+  normal.cwiseAbs().maxCoeff(&axis);
+  return static_cast<int>(2 * axis + (normal[axis] < 0 ? 1 : 0));
+}
+
 /// Spreads cells over a table (finaliser of MurmurHash3, public domain), eight that follow one another
 /// together: who asks for a cell asks for its neighbours too.
 struct CellHash {

@@ -11,18 +11,13 @@
 
 namespace plumbline::cloud {
 
-struct CompactCloudOptions {
-  double step_m = 0.00025;  ///< coordinates are rounded to multiples of this, > 0; far below sensor noise
-  int level = 1;            ///< of zstd, 1 (fast) to 19 (small)
-};
-
-/// Versioned bytes that decode_cloud() reads on any machine of the same byte order. Kept: positions (to half
-/// a step a coordinate, up to 2^30 steps from the origin), colours exactly, normals to about half a degree
-/// (octahedral map, 2 bytes; Meyer et al. 2010), unknown normals as unknown. The sensor pose is kept,
-/// curvature is not. An organised cloud whose columns and rows lie on rays (any depth camera without
-/// distortion) stays organised, and only its depth is rounded: points stay on their rays. Any other cloud
-/// becomes a list of its finite points, in order. Same cloud and options, same bytes.
-std::vector<std::uint8_t> encode_cloud(const Cloud& cloud, const CompactCloudOptions& options = {});
+/// Versioned bytes that decode_cloud() reads on any machine of the same byte order. Kept: positions (to an
+/// eighth of a millimetre a coordinate, far below sensor noise; up to 268 km from the origin), colours
+/// exactly, normals to about half a degree (octahedral map, 2 bytes; Meyer et al. 2010), unknown normals as
+/// unknown. The sensor pose is kept, curvature is not. An organised cloud whose columns and rows lie on rays
+/// (any depth camera without distortion) stays organised, and only its depth is rounded: points stay on their
+/// rays. Any other cloud becomes a list of its finite points, in order. Same cloud, same bytes.
+std::vector<std::uint8_t> encode_cloud(const Cloud& cloud);
 
 /// Errors (kInput): not such bytes, a version this program does not know, truncated, damaged (checksum).
 /// Memory is taken only for what the bytes can hold.

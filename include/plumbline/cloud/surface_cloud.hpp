@@ -16,6 +16,16 @@ namespace plumbline::cloud {
 using SurfacePoint = pcl::PointNormal;
 using SurfaceCloud = pcl::PointCloud<SurfacePoint>;
 
+/// `sigma_m`: how exactly it is known along its normal.
+inline SurfacePoint surface_point(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
+                                  float sigma_m) {
+  SurfacePoint p;
+  p.getVector3fMap() = position;
+  p.getNormalVector3fMap() = normal;
+  p.curvature = sigma_m;
+  return p;
+}
+
 /// Means of what lies in one voxel and faces one way (pcl::VoxelGrid, one for each of six ways, so that both
 /// sides of a thin wall stay apart). Points and normals that are not finite are left out. Filtered block by
 /// block: however far the cloud reaches, no grid has as many cells as pcl::VoxelGrid cannot count.

@@ -9,8 +9,8 @@
 
 namespace plumbline::core {
 
-/// One zstd frame with checksum. Same bytes, same frame. `level`: 1 (fast) to 19 (small).
-Bytes pack(const Bytes& bytes, int level = 1);
+/// One zstd frame with checksum. Same bytes, same frame.
+Bytes pack(const Bytes& bytes);
 /// Throws BadBytes: truncated, damaged, or more than `most` bytes.
 Bytes unpack(const std::uint8_t* bytes, std::size_t size, std::size_t most = std::size_t{1} << 30U);
 

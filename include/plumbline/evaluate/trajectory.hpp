@@ -68,7 +68,6 @@ struct TrajectoryReport {
   /// when a list was given and none of its frames has a pose.
   std::optional<double> first_pose_s;
   std::vector<PoseError> poses;       ///< matched poses, by time
-  geometry::Trajectory aligned;       ///< the whole estimate in the truth's frame, for drawing
   geometry::Trajectory truth;         ///< the whole truth, for drawing
   std::vector<std::string> warnings;  ///< one sentence each
 };

@@ -21,7 +21,6 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
 
 /// What one frame was made from; for tests and instruments.
 struct ExactFrame {
-  geometry::Rigid3 world_from_color;  ///< pose at the colour stamp
   geometry::Rigid3 world_from_depth;  ///< pose at the depth stamp
   cv::Mat depth;  ///< CV_32FC1 metres, of the true surfaces at the depth stamp, 0 = nothing hit
   cv::Mat face;   ///< CV_32SC1, index into Scene::faces, beyond them: a walker's, -1 = nothing hit
@@ -72,10 +71,6 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string
 
 /// Whether an input is such a URL ("synth:...").
 bool is_synth_url(const std::string& input);
-
-/// One URL per robot: "synth:room?robots=2" -> "synth:room?robots=2&robot=0", "...&robot=1"; unchanged when
-/// it already names its robot.
-core::Result<std::vector<std::string>> split_robots(const std::string& url);
 
 /// The camera of a sensor at an image size. kinect: TUM fr3's intrinsics; depth_scale 5000; no distortion.
 sensor::Camera make_camera(Sensor sensor, int width, int height, double fps);

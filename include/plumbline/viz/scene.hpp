@@ -23,7 +23,6 @@ struct CameraPath {
   std::string name;                 ///< shown in the legend; empty = not listed
   geometry::Trajectory trajectory;  ///< world_from_camera; camera axes x right, y down, z forward
   Rgb color = category_color(0);
-  std::vector<std::size_t> keyframes;  ///< indices into `trajectory` that are drawn as view frusta
 };
 
 struct Segment {

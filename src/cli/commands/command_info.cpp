@@ -133,7 +133,7 @@ core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   const auto source = pipeline::open_input(request.input, request.open, *pipelines / "scenes",
                                            session.executor(), session.console());
   if (!source) return tl::unexpected<core::Error>(source.error());
-  fmt::print("{}", dataset::to_text(dataset::describe(**source)));
+  fmt::print("{}", dataset::to_text(**source));
   return {};
 }
 

@@ -232,23 +232,22 @@ CloudPtr decoded(const Bytes& content) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_cloud(const Cloud& cloud, const CompactCloudOptions& options) {
-  const double step_m = options.step_m;
-  if (!(step_m > 0.0)) throw std::invalid_argument("encode_cloud: step_m must be positive");
+std::vector<std::uint8_t> encode_cloud(const Cloud& cloud) {
+  constexpr double kStep_m = 0.00025;
   auto& whole = const_cast<Cloud&>(cloud);  // a writer changes nothing
   ByteWriter writer;
-  if (auto rays = rays_of(cloud, step_m)) {
-    CompactHead head{cloud.width, cloud.height, step_m};
+  if (auto rays = rays_of(cloud, kStep_m)) {
+    CompactHead head{cloud.width, cloud.height, kStep_m};
     head_fields(writer, head);
-    grid(writer, *rays, step_m, whole);
+    grid(writer, *rays, kStep_m, whole);
   } else {
-    Cloud codable = codable_list(cloud, step_m);
-    CompactHead head{static_cast<std::uint32_t>(codable.points.size()), 0, step_m};
+    Cloud codable = codable_list(cloud, kStep_m);
+    CompactHead head{static_cast<std::uint32_t>(codable.points.size()), 0, kStep_m};
     head_fields(writer, head);
-    list(writer, step_m, codable);
+    list(writer, kStep_m, codable);
   }
   if (has_sensor_pose(cloud)) sensor_pose_fields(writer, whole);
-  Bytes bytes = core::pack(writer.bytes(), options.level);
+  Bytes bytes = core::pack(writer.bytes());
   bytes.insert(bytes.begin(), kCompactMagic.begin(), kCompactMagic.end());
   return bytes;
 }

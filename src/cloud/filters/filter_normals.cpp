@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <pcl/features/normal_3d.h>
+#include <pcl/features/normal_3d_omp.h>
 
 #include "filters/filter_tools.hpp"
-#include "filters/parallel_search.hpp"
+#include "plumbline/core/executor.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -24,8 +24,8 @@ class NormalsFilter : public Filter {
     const CloudPtr points = finite_list(*input);
     if (points->empty()) return points;
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
-    pcl::NormalEstimation<Point, pcl::Normal> estimation;
-    estimation.setSearchMethod(std::make_shared<ParallelSearch>(context.executor, true));
+    const int threads = context.executor != nullptr ? context.executor->threads() : 1;
+    pcl::NormalEstimationOMP<Point, pcl::Normal> estimation(static_cast<unsigned int>(threads));
     estimation.setKSearch(neighbours_);
     estimation.setRadiusSearch(neighbours_ > 0 ? 0.0 : radius_m_);
     estimation.setViewPoint(viewpoint.x(), viewpoint.y(), viewpoint.z());

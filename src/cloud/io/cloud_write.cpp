@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 #include <vector>
 
@@ -26,45 +25,13 @@ void check_columns(const Cloud& cloud, const CloudColumns& columns) {
   }
 }
 
-/// Records of points on their way into a file, many at a time.
-class Records {
- public:
-  Records(core::OutputFile& out, const CloudColumns& columns)
-      : out_(out),
-        columns_(columns),
-        most_(kPoint + 9 + sizeof(float) * columns.others.size()),
-        buffer_(kBuffer + most_) {}
-  /// Of the next point.
-  void begin() {
-    if (at_ >= kBuffer) finish();
-  }
-  template <typename T>
-  void put(const T& value) {
-    std::memcpy(buffer_.data() + at_, &value, sizeof(value));
-    at_ += sizeof(value);
-  }
-  /// What is known of point `i` besides.
-  void put_columns(std::size_t i) {
-    if (!columns_.confidence.empty()) put(columns_.confidence[i]);
-    if (!columns_.observations.empty()) put(columns_.observations[i]);
-    if (!columns_.robot.empty()) put(columns_.robot[i]);
-    for (const auto& other : columns_.others) put(other.values[i]);
-  }
-  void finish() {
-    out_.write(buffer_.data(), at_);
-    at_ = 0;
-  }
-
- private:
-  static constexpr std::size_t kPoint = 32;  // bytes of a point alone, at most
-  static constexpr std::size_t kBuffer = std::size_t{1} << 16U;
-
-  core::OutputFile& out_;
-  const CloudColumns& columns_;
-  std::size_t most_;  ///< bytes of a record
-  std::vector<char> buffer_;
-  std::size_t at_ = 0;
-};
+/// What is known of point `i` besides.
+void put_columns(const CloudColumns& columns, std::size_t i, core::OutputFile& out) {
+  if (!columns.confidence.empty()) out.put(columns.confidence[i]);
+  if (!columns.observations.empty()) out.put(columns.observations[i]);
+  if (!columns.robot.empty()) out.put(columns.robot[i]);
+  for (const auto& other : columns.others) out.put(other.values[i]);
+}
 
 }  // namespace
 
@@ -84,18 +51,15 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
   if (!columns.robot.empty()) out.write("property uchar robot\n");
   for (const auto& other : columns.others) out.write("property float " + other.name + "\n");
   out.write("end_header\n");
-  Records records(out, columns);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!finite(p)) continue;
     const bool normal = std::isfinite(p.normal_x + p.normal_y + p.normal_z);
-    records.begin();
-    records.put(std::array<float, 3>{p.x, p.y, p.z});
-    records.put(normal ? std::array<float, 3>{p.normal_x, p.normal_y, p.normal_z} : std::array<float, 3>{});
-    records.put(std::array<std::uint8_t, 3>{p.r, p.g, p.b});
-    records.put_columns(i);
+    out.put(std::array<float, 3>{p.x, p.y, p.z});
+    out.put(normal ? std::array<float, 3>{p.normal_x, p.normal_y, p.normal_z} : std::array<float, 3>{});
+    out.put(std::array<std::uint8_t, 3>{p.r, p.g, p.b});
+    put_columns(columns, i, out);
   }
-  records.finish();
   return out.commit();
 }
 
@@ -128,18 +92,15 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
                   "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
                   fields, sizes, types, counts, organised ? cloud.width : points,
                   organised ? cloud.height : 1, t[0], t[1], t[2], q.w(), q.x(), q.y(), q.z(), points));
-  Records records(out, columns);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!organised && !finite(p)) continue;
-    records.begin();
-    records.put(std::array<float, 3>{p.x, p.y, p.z});
-    records.put(static_cast<std::uint32_t>(p.r) << 16 | static_cast<std::uint32_t>(p.g) << 8 |
-                static_cast<std::uint32_t>(p.b));
-    records.put(std::array<float, 4>{p.normal_x, p.normal_y, p.normal_z, p.curvature});
-    records.put_columns(i);
+    out.put(std::array<float, 3>{p.x, p.y, p.z});
+    out.put(static_cast<std::uint32_t>(p.r) << 16 | static_cast<std::uint32_t>(p.g) << 8 |
+            static_cast<std::uint32_t>(p.b));
+    out.put(std::array<float, 4>{p.normal_x, p.normal_y, p.normal_z, p.curvature});
+    put_columns(columns, i, out);
   }
-  records.finish();
   return out.commit();
 }
 

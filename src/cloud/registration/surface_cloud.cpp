@@ -9,6 +9,8 @@
 #include <map>
 #include <vector>
 
+#include "plumbline/cloud/cell_map.hpp"
+
 namespace plumbline::cloud {
 namespace {
 
@@ -16,11 +18,8 @@ namespace {
 using Part = std::array<int, 4>;
 
 Part part_of(const SurfacePoint& p, float block_m) {
-  const Eigen::Vector3f normal = p.getNormalVector3fMap();
-  Eigen::Index axis = 0;
-  normal.cwiseAbs().maxCoeff(&axis);
   const auto block = [block_m](float x) { return static_cast<int>(std::floor(x / block_m)); };
-  return {static_cast<int>(2 * axis + (normal[axis] < 0.0F ? 1 : 0)), block(p.x), block(p.y), block(p.z)};
+  return {facing(p.getNormalVector3fMap()), block(p.x), block(p.y), block(p.z)};
 }
 
 /// Of a block whose points face one way.

@@ -82,10 +82,7 @@ core::Result<void> write_debug_picture(const fs::path& folder, std::size_t numbe
   // A keyframe has moved with the landmarks when the map was adjusted to it.
   if (report.keyframe.valid()) track.camera_from_world = slam.map().camera_from_world(report.keyframe);
   const cv::Mat picture = tracking::draw_overlay(shown, features, track, slam.map(), camera);
-  constexpr int kQuick = 1;
-  const auto png = dataset::encode_png(picture, kQuick);
-  if (!png) return tl::unexpected(png.error());
-  return core::write_file(folder / picture_name(number), *png);
+  return dataset::write_png(folder / picture_name(number), picture);
 }
 
 }  // namespace plumbline::pipeline

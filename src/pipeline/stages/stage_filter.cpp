@@ -31,16 +31,13 @@ class FilterStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     const auto input = io.input<DenseCloud>("cloud");
-    cloud::FilterContext context;
-    context.executor = context_->executor;
-    context.spacing_m = input->voxel_m;
-    auto dense = std::make_shared<DenseCloud>();
-    context.columns = &input->columns;
-    context.made_columns = &dense->columns;
-    auto filtered = filters_.chain().apply(input->cloud, context, &reports_);
+    auto filtered = filters_.chain().apply({input->cloud, input->columns}, input->voxel_m,
+                                           *context_->executor, &reports_);
     if (!filtered) return tl::unexpected(filtered.error());
     if (!reports_.empty()) context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(reports_));
-    dense->cloud = std::move(*filtered);
+    auto dense = std::make_shared<DenseCloud>();
+    dense->cloud = std::move(filtered->cloud);
+    dense->columns = std::move(filtered->columns);
     dense->voxel_m = input->voxel_m;
     dense->output_from_map = input->output_from_map;
     dense->upright = input->upright;

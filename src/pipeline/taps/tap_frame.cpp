@@ -13,13 +13,6 @@
 namespace plumbline::pipeline {
 namespace {
 
-core::Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) {
-  constexpr int kQuick = 1;
-  const auto bytes = dataset::encode_png(image, kQuick);
-  if (!bytes) return core::failure(bytes.error().kind, file.string() + ": " + bytes.error().message);
-  return core::write_file(file, *bytes);
-}
-
 class FrameTap : public Tap {
  public:
   FrameTap() : Tap(Count::kFrames, {".png"}) {}
@@ -41,7 +34,7 @@ class FrameTap : public Tap {
   core::Result<void> process(StageIo& io) override {
     if (skips(io.frame())) return {};
     const auto frame = io.input<sensor::RgbdFrame>("in");
-    if (auto written = write_png(path(io.frame(), ".color"), frame->color); !written) return written;
+    if (auto written = dataset::write_png(path(io.frame(), ".color"), frame->color); !written) return written;
     constexpr double kLargest = 65534.0;  // 65535 means no measurement
     cv::Mat raw(frame->depth.size(), CV_16UC1);
     for (int row = 0; row < raw.rows; ++row) {
@@ -52,7 +45,7 @@ class FrameTap : public Tap {
             units > 0.0 && units <= kLargest ? static_cast<std::uint16_t>(units) : std::uint16_t{0};
       }
     }
-    return write_png(path(io.frame(), ".depth"), raw);
+    return dataset::write_png(path(io.frame(), ".depth"), raw);
   }
 
  private:

@@ -19,14 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using core::Result;
 
-std::string write_png(const fs::path& file, const cv::Mat& image) {
-  constexpr int kQuick = 1;
-  const auto bytes = dataset::encode_png(image, kQuick);
-  if (!bytes) return bytes.error().message;
-  const auto done = core::write_file(file, {reinterpret_cast<const char*>(bytes->data()), bytes->size()});
-  return done ? "" : done.error().message;
-}
-
 std::string color_name(const dataset::PairInfo& info) { return fmt::format("rgb/{:.6f}.png", info.stamp); }
 std::string depth_name(const dataset::PairInfo& info) {
   return fmt::format("depth/{:.6f}.png", info.depth_stamp);
@@ -46,8 +38,9 @@ std::string write_pair(const SynthSource& source, std::size_t index, const fs::p
   const dataset::PairInfo info = labelled(source, index);
   cv::Mat raw;
   frame->depth.convertTo(raw, CV_16U, source.camera().depth_scale);
-  const std::string problem = write_png(folder / color_name(info), frame->color);
-  return problem.empty() ? write_png(folder / depth_name(info), raw) : problem;
+  auto written = dataset::write_png(folder / color_name(info), frame->color);
+  if (written) written = dataset::write_png(folder / depth_name(info), raw);
+  return written ? "" : written.error().message;
 }
 
 /// Lists, truth and camera of the first `frames` pairs.

@@ -333,7 +333,6 @@ Rigid3 SynthSource::world_from_camera(double stamp) const {
 ExactFrame SynthSource::exact(std::size_t index) const {
   const Stamps& at = impl_->frames.at(index);
   ExactFrame out;
-  out.world_from_color = impl_->pose(at.color);
   out.world_from_depth = impl_->pose(at.depth);
   const View view = look(*impl_->world, impl_->camera.color, out.world_from_depth, at.depth - kFirstStamp);
   out.depth = exact_depth(view);

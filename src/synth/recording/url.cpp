@@ -55,15 +55,6 @@ core::Result<Parsed> parse_url(const std::string& url) {
 
 bool is_synth_url(const std::string& input) { return input.rfind(kPrefix, 0) == 0; }
 
-core::Result<std::vector<std::string>> split_robots(const std::string& url) {
-  auto parsed = parse_url(url);
-  if (!parsed) return tl::unexpected<core::Error>(parsed.error());
-  if (parsed->robot >= 0 || parsed->options.robots == 1) return std::vector<std::string>{url};
-  std::vector<std::string> urls;
-  for (int i = 0; i < parsed->options.robots; ++i) urls.push_back(fmt::format("{}&robot={}", url, i));
-  return urls;
-}
-
 core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string& url,
                                                                const std::filesystem::path& scenes_folder,
                                                                const core::Executor& executor,

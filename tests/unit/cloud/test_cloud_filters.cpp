@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-#include <pcl/filters/radius_outlier_removal.h>
-#include <pcl/filters/statistical_outlier_removal.h>
 #include <pcl/filters/voxel_grid.h>
 
 #include <cstring>
@@ -186,41 +184,8 @@ TEST(Filters, OutliersGoWithNanPointsAndOrganisedClouds) {
   }
 }
 
-TEST(Filters, StatisticalOutlierIsPclsPointForPoint) {
-  const auto cloud = worlds::gauss_ball(2000);
-  const auto output = must("{type: statistical_outlier, neighbours: 10, deviations: 1}", cloud);
-  pcl::StatisticalOutlierRemoval<Point> removal;
-  removal.setMeanK(10);
-  removal.setStddevMulThresh(1.0);
-  removal.setInputCloud(cloud);
-  Cloud expected;
-  removal.filter(expected);
-  ASSERT_EQ(output->size(), expected.size());
-  ASSERT_LT(expected.size(), 1990U);
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_EQ((*output)[i].getVector3fMap(), expected[i].getVector3fMap());
-  }
-}
-
-TEST(Filters, RadiusOutlierIsPclsPointForPoint) {
-  const auto cloud = worlds::gauss_ball(2000);
-  const auto output = must("{type: radius_outlier, radius: 30 cm, min_neighbours: 6}", cloud);
-  pcl::RadiusOutlierRemoval<Point> removal;
-  removal.setRadiusSearch(0.3);
-  removal.setMinNeighborsInRadius(6);
-  removal.setInputCloud(cloud);
-  Cloud expected;
-  removal.filter(expected);
-  ASSERT_EQ(output->size(), expected.size());
-  ASSERT_LT(expected.size(), 1900U);
-  ASSERT_GT(expected.size(), 100U);
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_EQ((*output)[i].getVector3fMap(), expected[i].getVector3fMap());
-  }
-}
-
 TEST(Filters, AnyNumberOfThreadsGivesTheSameBytes) {
-  const auto cloud = worlds::gauss_ball(40000);  // several blocks of the search
+  const auto cloud = worlds::gauss_ball(40000);
   const core::Executor three(3);
   FilterContext threads;
   threads.executor = &three;

@@ -325,9 +325,6 @@ TEST(SynthUrl, OpensAndRefuses) {
   EXPECT_NE(why("synth:structure?sensor=lidar").find("kinect"), std::string::npos);
   EXPECT_NE(why("synth:"), "");
   EXPECT_NE(why("tum:room"), "");
-  EXPECT_EQ(*split_robots("synth:room?robots=2"),
-            (std::vector<std::string>{"synth:room?robots=2&robot=0", "synth:room?robots=2&robot=1"}));
-  EXPECT_EQ(split_robots("synth:room")->size(), 1U);
 }
 
 }  // namespace

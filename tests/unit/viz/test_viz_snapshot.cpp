@@ -63,7 +63,6 @@ Scene make_room(double tilt_rad = 0.0) {
     path.trajectory.push_back({0.1 * i, {tilt, tilt * Eigen::Vector3d(-0.5 + 0.05 * i, 0.0, 0.0)}});
   }
   path.color = {0, 0, 0};
-  path.keyframes = {0, 10, 19, 99};  // the last one does not exist
   scene.paths.push_back(path);
   return scene;
 }
@@ -262,7 +261,6 @@ TEST_F(Snapshot, SurfacesCloseWithoutHolesAtAnySize) {
     options.shading = false;
     Scene room = make_room();
     room.paths.front().trajectory.resize(1);
-    room.paths.front().keyframes.clear();
     const cv::Mat picture = render(room, options);
     const cv::Mat floor = picture(cv::Rect(width / 5, width / 8, width / 6, width / 6));
     EXPECT_GT(find(floor, Hue::kGrey).count, 0.99 * floor.rows * floor.cols) << width;
