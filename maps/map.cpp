@@ -3,14 +3,10 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <type_traits>
 
 namespace plumbline::maps {
 namespace {
-
-bool seen_by(const std::vector<Observation>& observations, KeyframeId keyframe) {
-  return std::any_of(observations.begin(), observations.end(),
-                     [&](const Observation& o) { return o.keyframe == keyframe; });
-}
 
 int take(std::vector<Observation>& observations, KeyframeId keyframe) {
   const auto found = std::find_if(observations.begin(), observations.end(),
@@ -21,7 +17,26 @@ int take(std::vector<Observation>& observations, KeyframeId keyframe) {
   return feature;
 }
 
+/// What `of` has of any of the keyframes, valid ids only; sorted, each once.
+template <typename Id, typename Of>
+std::vector<Id> of_any(const std::vector<KeyframeId>& keyframes, const Of& of) {
+  std::vector<Id> ids;
+  for (const KeyframeId keyframe : keyframes) {
+    for (const Id id : of(keyframe)) {
+      if (id.valid()) ids.push_back(id);
+    }
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return ids;
+}
+
 }  // namespace
+
+bool seen_by(const std::vector<Observation>& observations, KeyframeId keyframe) {
+  return std::any_of(observations.begin(), observations.end(),
+                     [&](const Observation& o) { return o.keyframe == keyframe; });
+}
 
 KeyframeId Map::next_keyframe_id(std::int32_t robot) const { return keyframes_.next_id(robot); }
 
@@ -72,41 +87,32 @@ LineId Map::add_line(std::int32_t robot, MapLine line) {
   return id;
 }
 
-void Map::remove_point(PointId id) {
-  if (!points_.contains(id)) return;
-  const std::vector<Observation> observations = points_.at(id).observations;
+template <typename Id>
+void Map::remove(Id id) {
+  if (!landmarks(id).contains(id)) return;
+  const std::vector<Observation> observations = landmarks(id).at(id).observations;
   for (const Observation& o : observations) unobserve(id, o.keyframe);
-  points_.erase(id);
+  landmarks(id).erase(id);
 }
+template void Map::remove(PointId id);
+template void Map::remove(LineId id);
 
-void Map::remove_line(LineId id) {
-  if (!lines_.contains(id)) return;
-  const std::vector<Observation> observations = lines_.at(id).observations;
-  for (const Observation& o : observations) unobserve(id, o.keyframe);
-  lines_.erase(id);
+template <typename Id>
+void Map::merge(Id kept, Id gone) {
+  if (kept == gone) throw std::invalid_argument("merge: both are one landmark");
+  auto& k = landmarks(kept).at(kept);
+  const auto g = landmarks(gone).at(gone);
+  k.visible += g.visible;
+  k.found += g.found;
+  remove(gone);
+  for (const Observation& o : g.observations) observe(kept, o.keyframe, o.feature);
+  if constexpr (std::is_same_v<Id, PointId>) {
+    if (k.normal.isZero()) k.normal = g.normal;
+    refresh_point(kept);
+  }
 }
-
-void Map::merge_points(PointId kept, PointId gone) {
-  if (kept == gone) throw std::invalid_argument("merge_points: both are one point");
-  MapPoint& k = points_.at(kept);
-  const std::vector<Observation> observations = points_.at(gone).observations;
-  k.visible += points_.at(gone).visible;
-  k.found += points_.at(gone).found;
-  if (k.normal.isZero()) k.normal = points_.at(gone).normal;
-  remove_point(gone);
-  for (const Observation& o : observations) observe(kept, o.keyframe, o.feature);
-  refresh_point(kept);
-}
-
-void Map::merge_lines(LineId kept, LineId gone) {
-  if (kept == gone) throw std::invalid_argument("merge_lines: both are one line");
-  MapLine& k = lines_.at(kept);
-  const std::vector<Observation> observations = lines_.at(gone).observations;
-  k.visible += lines_.at(gone).visible;
-  k.found += lines_.at(gone).found;
-  remove_line(gone);
-  for (const Observation& o : observations) observe(kept, o.keyframe, o.feature);
-}
+template void Map::merge(PointId kept, PointId gone);
+template void Map::merge(LineId kept, LineId gone);
 
 void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int change) {
   KeyframeEntry& entry = keyframes_.at(keyframe);
@@ -122,41 +128,29 @@ void Map::share(const std::vector<Observation>& others, KeyframeId keyframe, int
   }
 }
 
-bool Map::observe(PointId id, KeyframeId keyframe, int feature, bool aligned) {
-  MapPoint& p = points_.at(id);
-  PointId& slot = keyframes_.at(keyframe).points.at(static_cast<std::size_t>(feature));
-  if (slot.valid() || seen_by(p.observations, keyframe)) return false;
-  share(p.observations, keyframe, +1);
-  p.observations.push_back({keyframe, feature, aligned});
+template <typename Id>
+bool Map::observe(Id id, KeyframeId keyframe, int feature, bool aligned) {
+  std::vector<Observation>& observations = landmarks(id).at(id).observations;
+  Id& slot = keyframes_.at(keyframe).seen(id).at(static_cast<std::size_t>(feature));
+  if (slot.valid() || seen_by(observations, keyframe)) return false;
+  share(observations, keyframe, +1);
+  observations.push_back({keyframe, feature, aligned});
   slot = id;
   return true;
 }
+template bool Map::observe(PointId id, KeyframeId keyframe, int feature, bool aligned);
+template bool Map::observe(LineId id, KeyframeId keyframe, int feature, bool aligned);
 
-bool Map::observe(LineId id, KeyframeId keyframe, int feature) {
-  MapLine& l = lines_.at(id);
-  LineId& slot = keyframes_.at(keyframe).lines.at(static_cast<std::size_t>(feature));
-  if (slot.valid() || seen_by(l.observations, keyframe)) return false;
-  share(l.observations, keyframe, +1);
-  l.observations.push_back({keyframe, feature});
-  slot = id;
-  return true;
-}
-
-void Map::unobserve(PointId id, KeyframeId keyframe) {
-  MapPoint& p = points_.at(id);
-  const int feature = take(p.observations, keyframe);
+template <typename Id>
+void Map::unobserve(Id id, KeyframeId keyframe) {
+  std::vector<Observation>& observations = landmarks(id).at(id).observations;
+  const int feature = take(observations, keyframe);
   if (feature < 0) return;
-  keyframes_.at(keyframe).points[static_cast<std::size_t>(feature)] = PointId{};
-  share(p.observations, keyframe, -1);
+  keyframes_.at(keyframe).seen(id)[static_cast<std::size_t>(feature)] = Id{};
+  share(observations, keyframe, -1);
 }
-
-void Map::unobserve(LineId id, KeyframeId keyframe) {
-  MapLine& l = lines_.at(id);
-  const int feature = take(l.observations, keyframe);
-  if (feature < 0) return;
-  keyframes_.at(keyframe).lines[static_cast<std::size_t>(feature)] = LineId{};
-  share(l.observations, keyframe, -1);
-}
+template void Map::unobserve(PointId id, KeyframeId keyframe);
+template void Map::unobserve(LineId id, KeyframeId keyframe);
 
 PointId Map::point_of(KeyframeId keyframe, int feature) const {
   return keyframes_.at(keyframe).points.at(static_cast<std::size_t>(feature));
@@ -168,6 +162,15 @@ const std::vector<PointId>& Map::points_of(KeyframeId keyframe) const {
   return keyframes_.at(keyframe).points;
 }
 const std::vector<LineId>& Map::lines_of(KeyframeId keyframe) const { return keyframes_.at(keyframe).lines; }
+
+std::vector<PointId> Map::points_seen_by(const std::vector<KeyframeId>& keyframes) const {
+  return of_any<PointId>(
+      keyframes, [&](KeyframeId id) -> const auto& { return points_of(id); });
+}
+std::vector<LineId> Map::lines_seen_by(const std::vector<KeyframeId>& keyframes) const {
+  return of_any<LineId>(
+      keyframes, [&](KeyframeId id) -> const auto& { return lines_of(id); });
+}
 
 std::vector<std::pair<KeyframeId, int>> Map::covisible(KeyframeId keyframe, int min_shared) const {
   const auto& shared = keyframes_.at(keyframe).shared;

@@ -17,11 +17,6 @@ void require(bool holds, const char* otherwise) {
 }
 
 /// Inserts without observations, which are then made one by one so that covisibility follows.
-bool restore(Map& map, PointId id, const Observation& o) {
-  return map.observe(id, o.keyframe, o.feature, o.aligned);
-}
-bool restore(Map& map, LineId id, const Observation& o) { return map.observe(id, o.keyframe, o.feature); }
-
 template <typename IdType, typename Landmark>
 void restore_landmarks(Map& map, IdMap<IdType, Landmark>& landmarks, std::vector<Landmark>& parts) {
   for (Landmark& part : parts) {
@@ -33,7 +28,7 @@ void restore_landmarks(Map& map, IdMap<IdType, Landmark>& landmarks, std::vector
     landmarks.at(id).observations.reserve(observations.size());
     for (const Observation& o : observations) {
       require(o.feature >= 0 && map.has_keyframe(o.keyframe), "a landmark is seen by no keyframe");
-      require(restore(map, id, o), "two landmarks are one feature");
+      require(map.observe(id, o.keyframe, o.feature, o.aligned), "two landmarks are one feature");
     }
   }
 }

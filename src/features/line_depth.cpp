@@ -231,19 +231,7 @@ double endpoint_sigma(const Eigen::Vector3d& end, const EndpointNoise& noise) {
 
 void LineDepthOptions::declare(core::OptionTable& table) {
   table.integer("line.depth_samples", samples, {8, 400}, "", "Depth samples along a line, at most");
-  table.integer("line.depth_side", side_px, {1, 10}, "px", "Depth is looked for this far beside a line");
   table.number("line.max_depth", max_depth_m, {0.5, 100.0}, "m", "Depth beyond this does not make 3D lines");
-  table.number("line.depth_inlier_sigmas", inlier_sigmas, {1.0, 10.0}, "",
-               "Inlier gate in standard deviations of depth");
-  table.number("line.depth_min_inlier_share", min_inlier_share, {0.1, 1.0}, "",
-               "Smallest share of agreeing samples");
-  table.number("line.depth_min_coverage", min_coverage, {0.1, 1.0}, "",
-               "Smallest share of the length with support");
-  table.integer("line.depth_min_inliers", min_inliers, {3, 400}, "", "Fewest agreeing samples");
-  table.integer("line.depth_ransac_rounds", ransac_rounds, {1, kMostRounds}, "",
-                "RANSAC rounds of the 3D line fit");
-  table.number("line.depth_pixel_sigma", pixel_sigma, {0.05, 10.0}, "px",
-               "Standard deviation of an endpoint's position");
 }
 
 std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& depth_m,

@@ -97,12 +97,6 @@ void LineDetectorOptions::declare(core::OptionTable& table) {
   table.boolean("line.exact_nfa", exact_nfa, "LSD: number of false alarms by its sum, not by a bound");
   table.integer("line.max_count", max_count, {0, 10000}, "", "Keep the longest so many lines; 0 keeps all");
   table.boolean("line.join", join, "Join collinear pieces and drop near-duplicates");
-  table.number("line.join_gap", join_gap_px, {0.0, 200.0}, "px",
-               "Largest gap between collinear pieces that are joined");
-  table.number("line.join_angle", join_angle_rad, {0.0, 0.5}, "rad",
-               "Largest angle between pieces that are joined");
-  table.number("line.join_offset", join_offset_px, {0.0, 20.0}, "px",
-               "Largest sideways offset of pieces that are joined");
 }
 
 std::vector<LineSegment> LineDetector::detect(const cv::Mat& gray) const {

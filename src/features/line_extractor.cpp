@@ -21,11 +21,4 @@ std::vector<LineFeature> LineExtractor::extract(const cv::Mat& gray, const cv::M
   return features;
 }
 
-std::vector<DescribedLine> described(const std::vector<LineFeature>& features) {
-  std::vector<DescribedLine> lines;
-  lines.reserve(features.size());
-  for (const LineFeature& f : features) lines.push_back({f.segment, f.descriptor});
-  return lines;
-}
-
 }  // namespace plumbline::features

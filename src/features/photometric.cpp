@@ -164,17 +164,7 @@ PhotometricImage make_photometric_image(const cv::Mat& gray) {
 
 sensor::Pinhole photometric_camera(const sensor::Pinhole& camera, std::size_t level) {
   sensor::Pinhole result = camera;
-  for (std::size_t i = 0; i <= level; ++i) {
-    const int width = result.width / 2, height = result.height / 2;
-    const double sx = static_cast<double>(width) / result.width,
-                 sy = static_cast<double>(height) / result.height;
-    result = {width,
-              height,
-              result.fx * sx,
-              result.fy * sy,
-              (result.cx + 0.5) * sx - 0.5,
-              (result.cy + 0.5) * sy - 0.5};
-  }
+  for (std::size_t i = 0; i <= level; ++i) result = result.resized(result.width / 2, result.height / 2);
   return result;
 }
 

@@ -229,26 +229,6 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
 
 }  // namespace
 
-const char* to_string(Status status) {
-  switch (status) {
-    case Status::kOk:
-      return "ok";
-    case Status::kTooFewViews:
-      return "too few views";
-    case Status::kDegenerate:
-      return "degenerate";
-    case Status::kTooLittleParallax:
-      return "too little parallax";
-    case Status::kUncertain:
-      return "uncertain";
-    case Status::kOutOfRange:
-      return "out of range";
-    case Status::kInconsistent:
-      return "inconsistent";
-  }
-  return "";
-}
-
 TriangulatedLine triangulate_line(const std::vector<LineView>& views,
                                   const LineTriangulationOptions& options) {
   if (views.size() < 2) return {};

@@ -103,7 +103,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
     report.decision.wanted = !track.reference.valid();  // where nothing of this map is seen
     if (!report.decision.wanted)
       report.decision = keyframe_rule_.decide(map_, track, bundle_.idle());  // section 4.1
-    if (report.decision.reuse.valid()) switch_reference(report);
+    if (report.decision.reuse.valid())  // else the map would grow as long as the camera moves
+      set_reference(report.reference = report.decision.reuse);
     if (report.decision.wanted) insert_keyframe(frame, features, report);
   }
   frames_.record(map_, pose, tracker_.reference(),
@@ -137,12 +138,6 @@ void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& featu
   bundle_.request(map_, id,
                   frame_count_);  // section 3.3: local bundle adjustment, put back `lag` frames later
   if (bundle_.due(frame_count_)) put_back_bundle(report.bundle);
-}
-
-/// The map would grow as long as the camera moves, however often it has been there.
-void Slam::switch_reference(FrameReport& report) {
-  report.reference = report.decision.reuse;
-  set_reference(report.reference);
 }
 
 void Slam::set_reference(core::KeyframeId keyframe) {
@@ -199,9 +194,5 @@ void Slam::close_loops(core::KeyframeId keyframe) {
 void Slam::finish() { commit_bundles(); }
 
 geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frame_poses(), map_); }
-
-geometry::Trajectory Slam::keyframe_trajectory() const { return maps::keyframe_trajectory(map_); }
-
-std::vector<maps::LineSegment3> Slam::line_segments() const { return maps::line_segments(map_); }
 
 }  // namespace plumbline::mapping

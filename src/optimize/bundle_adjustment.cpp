@@ -174,14 +174,6 @@ BundleState state_of(const BundleProblem& problem) {
 void BundleOptions::declare(core::OptionTable& table) {
   table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "", "Iterations of each round at most");
   table.integer("bundle.rounds", rounds, {1, 10}, "", "Solves; between them outliers are put aside");
-  table.number("bundle.tolerance", tolerance, {0.0, 0.1}, "",
-               "A round ends with an iteration that lowers the cost by a smaller share");
-  table.number("bundle.point_loss", point_loss, {0.1, 100.0}, "",
-               "Huber threshold of points, standard deviations");
-  table.number("bundle.line_loss", line_loss, {0.1, 100.0}, "",
-               "Huber threshold of lines, standard deviations");
-  table.number("bundle.edge_loss", edge_loss, {0.1, 1000.0}, "",
-               "Huber threshold of relative poses, standard deviations");
 }
 
 BundleSummary adjust_bundle(BundleProblem& problem, const BundleOptions& options) {

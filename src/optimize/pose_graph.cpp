@@ -19,6 +19,9 @@ namespace {
 constexpr double kTolerance = 1e-7;       // of a solve whose weights are decided
 constexpr double kRoughTolerance = 1e-2;  // of one on the way there
 constexpr int kRoughIterations = 3;
+constexpr int kMostIterations = 30;   // of each least-squares solve
+constexpr int kMostRounds = 60;       // solves with changed weights
+constexpr double kRoundFactor = 1.6;  // how fast the loss turns from convex to truncated
 
 /// Every pose that is not fixed is held to where it is by 30 m and 30 rad: nothing beside a measurement, but
 /// enough for directions that no edge holds.
@@ -100,11 +103,10 @@ double graduated_weight(double ratio, double mu) {
 /// Least squares again and again, with weights that turn into 0 and 1.
 class Graduated {
  public:
-  Graduated(const PoseGraph& graph, const PoseGraphOptions& options, Solver& solver,
-            PoseGraphSummary& summary)
-      : graph_(graph), options_(options), solver_(solver), summary_(summary) {
+  Graduated(const PoseGraph& graph, Solver& solver, PoseGraphSummary& summary)
+      : graph_(graph), solver_(solver), summary_(summary) {
     for (std::size_t i = 0; i < graph.edges.size(); ++i) {
-      gates_.push_back(chi_square_gate(std::max(1, summary.edges[i].dimensions), options.false_alarm));
+      gates_.push_back(chi_square_gate(std::max(1, summary.edges[i].dimensions)));
     }
   }
 
@@ -116,16 +118,16 @@ class Graduated {
       if (!graph_.edges[i].trusted) worst = std::max(worst, ratio(i));
     }
     double mu = worst > 1.0 ? 1.0 / (2.0 * worst - 1.0) : 1e6;
-    for (int round = 0; round < options_.max_rounds; ++round) {
+    for (int round = 0; round < kMostRounds; ++round) {
       const bool decided = set_weights(mu);
-      const ceres::Solver::Summary solved = decided ? solver_.solve(options_.max_iterations, kTolerance)
+      const ceres::Solver::Summary solved = decided ? solver_.solve(kMostIterations, kTolerance)
                                                     : solver_.solve(kRoughIterations, kRoughTolerance);
       ++summary_.rounds;
       summary_.iterations += static_cast<int>(solved.iterations.size());
       summary_.message = solved.message;
       if (!solved.IsSolutionUsable()) return false;
       if (decided && !set_weights(mu, true)) break;
-      mu *= options_.round_factor;
+      mu *= kRoundFactor;
     }
     return true;
   }
@@ -151,7 +153,6 @@ class Graduated {
   }
 
   const PoseGraph& graph_;
-  const PoseGraphOptions& options_;
   Solver& solver_;
   PoseGraphSummary& summary_;
   std::vector<double> gates_;
@@ -168,37 +169,22 @@ void check(const PoseGraph& graph) {
 
 }  // namespace
 
-void PoseGraphOptions::declare(core::OptionTable& table) {
-  table.choice<EdgeRobustness>("robust", robust,
-                               {{"none", EdgeRobustness::kNone}, {"graduated", EdgeRobustness::kGraduated}},
-                               "What to do about wrong edges: nothing, or graduated non-convexity");
-  table.integer("iterations", max_iterations, {1, 1000}, "", "Iterations of each solve of the pose graph");
-}
-
 int rank_of(const geometry::Matrix6d& information) {
-  if (information.isDiagonal(0.0)) {
-    const double most = information.diagonal().maxCoeff();
-    return most > 0.0 ? static_cast<int>((information.diagonal().array() > 1e-9 * most).count()) : 0;
-  }
   const Eigen::SelfAdjointEigenSolver<geometry::Matrix6d> eigen(information, Eigen::EigenvaluesOnly);
   const double largest = eigen.eigenvalues()(5);
   return largest > 0.0 ? static_cast<int>((eigen.eigenvalues().array() > 1e-9 * largest).count()) : 0;
 }
 
-double chi_square_gate(int dimensions, double false_alarm) {
+double chi_square_gate(int dimensions) {
   if (dimensions < 1 || dimensions > 6) throw std::invalid_argument("chi_square_gate: 1 to 6 dimensions");
-  static constexpr std::array<double, 6> k05{3.841, 5.991, 7.815, 9.488, 11.070, 12.592};
-  static constexpr std::array<double, 6> k01{6.635, 9.210, 11.345, 13.277, 15.086, 16.812};
-  static constexpr std::array<double, 6> k001{10.828, 13.816, 16.266, 18.467, 20.515, 22.458};
-  const auto i = static_cast<std::size_t>(dimensions - 1);
-  if (false_alarm >= 0.05) return k05[i];
-  return false_alarm >= 0.01 ? k01[i] : k001[i];
+  static constexpr std::array<double, 6> kGates{10.828, 13.816, 16.266, 18.467, 20.515, 22.458};
+  return kGates[static_cast<std::size_t>(dimensions - 1)];
 }
 
-PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options) {
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
   check(graph);
   PoseGraphSummary summary;
-  if (std::none_of(graph.poses.begin(), graph.poses.end(), [](const GraphPose& p) { return p.fixed; })) {
+  if (std::none_of(graph.poses.begin(), graph.poses.end(), [](const BundlePose& p) { return p.fixed; })) {
     summary.message = "no pose is fixed: the solution would float";
     return summary;
   }
@@ -208,10 +194,10 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& opti
     summary.edges[i].dimensions = rank_of(graph.edges[i].information);
     summary.initial_cost += 0.5 * solver.chi2(i);
   }
-  if (options.robust == EdgeRobustness::kGraduated) {
-    if (!Graduated(graph, options, solver, summary).run()) return summary;
+  if (robust) {
+    if (!Graduated(graph, solver, summary).run()) return summary;
   } else {
-    const ceres::Solver::Summary solved = solver.solve(options.max_iterations, kTolerance);
+    const ceres::Solver::Summary solved = solver.solve(kMostIterations, kTolerance);
     summary.rounds = 1;
     summary.iterations = static_cast<int>(solved.iterations.size());
     summary.message = solved.message;

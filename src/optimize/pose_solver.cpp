@@ -184,14 +184,6 @@ FamilySummary summarise(const std::vector<double>& squared) {
 }  // namespace
 
 void PoseSolverOptions::declare(core::OptionTable& table) {
-  table.number("solver.point_loss", point_loss, {0.1, 100.0}, "",
-               "Huber threshold of points, standard deviations");
-  table.number("solver.line_loss", line_loss, {0.1, 100.0}, "",
-               "Huber threshold of lines, standard deviations");
-  table.number("solver.plane_loss", plane_loss, {0.1, 100.0}, "",
-               "Huber threshold of depth, standard deviations");
-  table.number("solver.photometric_loss", photometric_loss, {0.1, 100.0}, "",
-               "Huber threshold of grey values, standard deviations");
   table.number("solver.point_weight", point_weight, {0.0, 100.0}, "", "Weight of all points together");
   table.number("solver.line_weight", line_weight, {0.0, 100.0}, "", "Weight of all lines together");
   table.boolean("solver.depth_rows", depth_rows, "Points are held by their depth, too");

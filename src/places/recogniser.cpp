@@ -23,16 +23,7 @@ void RecogniserOptions::declare(core::OptionTable& table) {
   table.number("places.min_absolute", min_absolute, {0.0, 1.0}, "", "Score of a candidate, at least");
   table.integer("places.consistent", consistent, {1, 100}, "",
                 "Keyframes in a row that must see the same surroundings");
-  table.integer("places.candidates", hits, {1, 1000}, "", "Most similar keyframes that are grouped");
   table.boolean("places.votes", votes, "The most similar are those that share most words");
-  table.integer("places.islands", groups, {1, 100}, "", "Places that are verified per keyframe, at most");
-}
-
-std::vector<Candidate> Recogniser::recognise(const Database& database, KeyframeId query,
-                                             const features::FrameFeatures& image, KeyframeId neighbour,
-                                             const std::function<bool(KeyframeId)>& allowed,
-                                             const Neighbours& neighbours) {
-  return recognise(database.query(image), query, neighbour, allowed, neighbours);
 }
 
 std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, KeyframeId query,
@@ -43,11 +34,11 @@ std::vector<Candidate> Recogniser::recognise(const Database::Scores& scores, Key
   const double threshold = std::max(options_.min_absolute, options_.min_score * usual);
   std::vector<Hit> hits = scores.best(static_cast<std::size_t>(options_.hits), allowed, options_.votes);
   while (!hits.empty() && hits.back().score < threshold) hits.pop_back();
-  return seen_in_a_row(query.robot, islands(hits, usual, neighbours));
+  return seen_in_a_row(query.robot, islands(hits, neighbours));
 }
 
 /// Hits come best first: what lies in the surroundings of a better one belongs to that.
-std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits, double usual,
+std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits,
                                                     const Neighbours& neighbours) const {
   std::vector<Island> result;
   for (const Hit& hit : hits) {
@@ -61,7 +52,6 @@ std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits
     Island& island = result.emplace_back();
     island.candidate.keyframe = hit.keyframe;
     island.candidate.score = island.candidate.group_score = hit.score;
-    island.candidate.relative = usual > 0.0 ? hit.score / usual : 1.0;
     island.members = neighbours(hit.keyframe);
     island.members.push_back(hit.keyframe);
     std::sort(island.members.begin(), island.members.end());

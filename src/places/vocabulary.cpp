@@ -24,7 +24,6 @@ void VocabularyOptions::declare(core::OptionTable& table) {
   table.integer("vocabulary.levels", levels, {1, 12}, "", "Levels of the tree at most");
   table.integer("vocabulary.split", split, {10, 100000}, "",
                 "A word with more features than this is divided");
-  table.integer("vocabulary.iterations", iterations, {1, 100}, "", "Rounds of clustering");
 }
 
 Vocabulary::Vocabulary(const VocabularyOptions& options) : options_(options) {

@@ -5,8 +5,8 @@
 
 #include "observable_directions.hpp"
 #include "plumbline/features/rolling_shutter.hpp"
-#include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/align_points.hpp"
+#include "plumbline/tracking/pose_terms.hpp"
 
 namespace plumbline::tracking {
 namespace {
@@ -24,63 +24,7 @@ constexpr AlignmentRound kFine[] = {{kFineRadius_px, 0.05, 1200, 0, true, true},
 constexpr int kIterations = 4;      // of a round; the next one associates anew
 constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
 constexpr double kLineGate = 9.2;   // 99 %: line ends are less exact than corners
-
-/// Reprojection, and depth where it was measured.
-std::vector<optimize::PointTerm> point_terms(const maps::Map& map, const std::vector<PointMatch>& matches,
-                                             const features::FrameFeatures& features,
-                                             const AssociationOptions& options) {
-  std::vector<optimize::PointTerm> terms;
-  terms.reserve(matches.size());
-  for (const PointMatch& match : matches) {
-    const features::PointFeature& f = features.points[static_cast<std::size_t>(match.feature)];
-    optimize::PointTerm term;
-    term.world = map.point(match.point).position;
-    term.pixel = (f.pixel + match.shift).cast<double>();
-    term.pixel_sigma =
-        std::pow(options.scale_factor, f.octave) * (match.aligned ? options.aligned_sigma : 1.0);
-    const float depth = features.depth_beside(static_cast<std::size_t>(match.feature), match.shift);
-    if (depth > 0.0F) {
-      term.depth = static_cast<double>(depth);
-      // The landmark's own depth is no better than the measurement.
-      term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
-    }
-    terms.push_back(term);
-  }
-  return terms;
-}
-
-/// Distances of the measured ends from the projected Pluecker line.
-std::vector<optimize::LineTerm> line_terms(const maps::Map& map, const std::vector<LineMatch>& matches,
-                                           const features::FrameFeatures& features) {
-  std::vector<optimize::LineTerm> terms;
-  terms.reserve(matches.size());
-  for (const LineMatch& match : matches) {
-    const maps::MapLine& line = map.line(match.line);
-    const features::LineSegment& s = features.lines[static_cast<std::size_t>(match.feature)].segment;
-    optimize::LineTerm term;
-    term.world = geometry::line_through(line.start, line.end);
-    term.start = s.start.cast<double>();
-    term.end = s.end.cast<double>();
-    term.pixel_sigma = 0.6;
-    terms.push_back(term);
-  }
-  return terms;
-}
-
-/// Keeps what fits at the estimated pose.
-template <typename Match, typename Term>
-void keep_inliers(const std::vector<double>& errors, double gate, std::vector<Match>& matches,
-                  std::vector<Term>& terms) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (!(errors[i] <= gate)) continue;
-    matches[kept] = matches[i];
-    terms[kept] = terms[i];
-    ++kept;
-  }
-  matches.resize(kept);
-  terms.resize(kept);
-}
+constexpr double kLineSigma_px = 0.6;
 
 }  // namespace
 
@@ -149,7 +93,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   if (in_.options.lines) {
     result_.lines = match_lines(in_.map, in_.local_map.lines, features(), in_.camera, pose, radius, how,
                                 &result_.visible_lines);
-    problem_.lines = line_terms(in_.map, result_.lines, features());
+    problem_.lines = line_terms(in_.map, result_.lines, features(), kLineSigma_px);
   }
 }
 

@@ -2,10 +2,10 @@
 #include "plumbline/tracking/local_map.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
+
+#include "plumbline/cloud/cell_map.hpp"
 
 namespace plumbline::tracking {
 namespace {
@@ -23,30 +23,15 @@ void append_unique(std::vector<KeyframeId>& list, KeyframeId id) {
 }
 
 /// Which voxel and which way a sample faces: what is fused must lie close together and face the same way.
-struct VoxelKey {
-  std::array<std::int32_t, 4> v{};
-  bool operator==(const VoxelKey& o) const { return v == o.v; }
-};
-struct VoxelHash {
-  std::size_t operator()(const VoxelKey& k) const {
-    std::size_t h = 0;
-    for (std::int32_t i : k.v) h = (h ^ static_cast<std::uint32_t>(i)) * 0x9e3779b97f4a7c15ULL;
-    return h ^ (h >> 29);
-  }
-};
-
-VoxelKey voxel_of(const WorldSurface& s, double voxel_m) {
-  const auto cell = [voxel_m](double x) { return static_cast<std::int32_t>(std::floor(x / voxel_m)); };
-  Eigen::Index axis = 0;
-  s.normal.cwiseAbs().maxCoeff(&axis);
-  const auto facing = static_cast<std::int32_t>(2 * axis + (s.normal(axis) > 0.0 ? 1 : 0));
-  return {{cell(s.point.x()), cell(s.point.y()), cell(s.point.z()), facing}};
+std::uint64_t voxel_of(const WorldSurface& s, double voxel_m) {
+  return cloud::pack_cell(cloud::cell_of(s.point / voxel_m)) << 3 |
+         static_cast<std::uint64_t>(cloud::facing(s.normal));
 }
 
 /// Weighted means of position and normal per voxel; sigma falls with the weight, down to what noise common to
 /// neighbouring pixels leaves. In order of first appearance.
 std::vector<WorldSurface> fuse_voxels(const std::vector<WorldSurface>& samples, double voxel_m) {
-  std::unordered_map<VoxelKey, std::size_t, VoxelHash> index;
+  cloud::CellMap<std::size_t> index;
   index.reserve(samples.size());
   std::vector<WorldSurface> fused;
   std::vector<double> weights;
@@ -121,21 +106,8 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
       append_unique(local.keyframes, id);
     }
   }
-  for (KeyframeId id : local.keyframes) {
-    for (core::PointId p : map.points_of(id)) {
-      if (p.valid()) local.points.push_back(p);
-    }
-    for (core::LineId l : map.lines_of(id)) {
-      if (l.valid()) local.lines.push_back(l);
-    }
-  }
-  const auto sort_unique = [](auto& ids) {
-    std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  };
-  sort_unique(local.points);
-  sort_unique(local.lines);
-
+  local.points = map.points_seen_by(local.keyframes);
+  local.lines = map.lines_seen_by(local.keyframes);
   std::vector<KeyframeId> dense;
   for (KeyframeId id : local.keyframes) {
     if (static_cast<int>(dense.size()) >= options.surface_keyframes) break;

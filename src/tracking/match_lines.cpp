@@ -51,7 +51,7 @@ std::vector<LineMatch> match_lines(const maps::Map& map, const std::vector<core:
   const std::vector<LineCandidate> candidates = candidates_of(frame);
   std::vector<LineMatch> by_feature(frame.lines.size());
   for (core::LineId id : lines) {
-    const maps::MapLine* line = map.find_line(id);
+    const maps::MapLine* line = map.find(id);
     features::LineSegment predicted;
     if (line == nullptr || !project_segment(*line, camera_from_world, camera, predicted)) continue;
     if (visible != nullptr) visible->push_back(id);

@@ -92,16 +92,12 @@ void AssociationOptions::declare(core::OptionTable& table) {
   table.integer("match.max_hamming", max_hamming, {1, 256}, "bit",
                 "Point descriptors may differ by so many bits");
   table.number("match.ratio", ratio, {0.1, 1.0}, "", "Best distance over second best, at most");
-  table.number("match.max_point_angle", max_point_angle_rad, {0.05, 3.2}, "rad",
-               "Angle between a predicted and a measured corner's orientation, at most");
   table.boolean("match.align", align,
                 "Matched corners are aligned with what their landmark looked like, to a tenth of a pixel");
   table.number("match.aligned_sigma", aligned_sigma, {0.01, 1.0}, "",
                "Standard deviation of corners that were aligned, over that of others");
   table.integer("match.max_line_hamming", max_line_hamming, {1, 256}, "bit",
                 "Line descriptors may differ by so many bits");
-  table.number("match.max_line_angle", max_line_angle_rad, {0.01, 1.6}, "rad",
-               "Angle between a predicted and a measured line, at most");
   table.number("match.min_line_ratio", min_line_ratio, {0.0, 1.0}, "",
                "Shorter over longer of a predicted and a measured line, at least");
 }
@@ -118,7 +114,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
   std::vector<int> near;
   std::vector<int> distances;
   for (core::PointId id : points) {
-    const maps::MapPoint* point = map.find_point(id);
+    const maps::MapPoint* point = map.find(id);
     Prediction prediction;
     if (point == nullptr || !predict(*point, camera_from_world, centre, camera, log_scale, prediction))
       continue;

@@ -105,7 +105,7 @@ void draw_lines(cv::Mat& image, const features::FrameFeatures& features, const T
     const features::LineFeature& feature = features.lines[static_cast<std::size_t>(match.feature)];
     const Pixel ends[] = {feature.segment.start.cast<double>(), feature.segment.end.cast<double>()};
     stroke(image, ends[0], ends[1], feature.line3 ? kMeasured : kFlatLine, 2);
-    const maps::MapLine* landmark = map.find_line(match.line);
+    const maps::MapLine* landmark = map.find(match.line);
     if (landmark == nullptr) continue;
     const Eigen::Vector3d a = track.camera_from_world * landmark->start;
     const Eigen::Vector3d b = track.camera_from_world * landmark->end;
@@ -125,7 +125,7 @@ void draw_points(cv::Mat& image, const features::FrameFeatures& features, const 
                  const maps::Map& map, const sensor::Pinhole& camera) {
   for (const PointMatch& match : track.points) {
     const Pixel measured = features.points[static_cast<std::size_t>(match.feature)].pixel.cast<double>();
-    const maps::MapPoint* landmark = map.find_point(match.point);
+    const maps::MapPoint* landmark = map.find(match.point);
     disc(image, measured, 2.5, kMeasured, 1);
     if (landmark == nullptr) continue;
     const Eigen::Vector3d p = track.camera_from_world * landmark->position;

@@ -81,17 +81,6 @@ Step linearise(const std::vector<ThumbnailPixel>& pixels, const cv::Mat& current
   return step;
 }
 
-sensor::Pinhole scaled(const sensor::Pinhole& camera, const cv::Mat& image) {
-  const double sx = static_cast<double>(image.cols) / camera.width;
-  const double sy = static_cast<double>(image.rows) / camera.height;
-  return {image.cols,
-          image.rows,
-          camera.fx * sx,
-          camera.fy * sy,
-          (camera.cx + 0.5) * sx - 0.5,
-          (camera.cy + 0.5) * sy - 0.5};
-}
-
 std::vector<ThumbnailPixel> gather_pixels(const cv::Mat& image, const cv::Mat& depth,
                                           const sensor::Pinhole& camera) {
   std::vector<ThumbnailPixel> pixels;
@@ -115,7 +104,7 @@ ThumbnailAlignment align_thumbnails(const cv::Mat& previous, const cv::Mat& prev
   if (previous.empty() || current.empty() || previous_depth.empty() || previous.size() != current.size()) {
     return result;
   }
-  const sensor::Pinhole small = scaled(camera, previous);
+  const sensor::Pinhole small = camera.resized(previous.cols, previous.rows);
   const std::vector<ThumbnailPixel> pixels = gather_pixels(previous, previous_depth, small);
   if (pixels.size() < 200) return result;
 

@@ -6,7 +6,7 @@
 #include "../unit/line_world.hpp"
 #include "opencv_lbd.hpp"
 #include "plumbline/features/line_border.hpp"
-#include "plumbline/features/line_extractor.hpp"
+#include "plumbline/features/line_match.hpp"
 
 namespace {
 
@@ -84,10 +84,10 @@ void lbd_opencv(benchmark::State& state) {
 BENCHMARK(lbd_opencv)->Arg(150)->Arg(200)->Arg(650)->Unit(benchmark::kMillisecond);
 
 void match(benchmark::State& state) {
-  std::vector<f::DescribedLine> lines;
+  std::vector<f::LineFeature> lines;
   const std::vector<f::LineSegment> found = segments(state.range(0));
   const std::vector<f::LineDescriptor> descriptors = f::describe_lines(picture(), found);
-  for (std::size_t i = 0; i < found.size(); ++i) lines.push_back({found[i], descriptors[i]});
+  for (std::size_t i = 0; i < found.size(); ++i) lines.push_back({found[i], descriptors[i], {}});
   for (auto _ : state) benchmark::DoNotOptimize(f::match_lines(lines, lines));
 }
 BENCHMARK(match)->Arg(150)->Arg(300)->Unit(benchmark::kMillisecond);

@@ -189,9 +189,9 @@ struct StoreWorld {
 
   void thin_out() {
     const std::vector<core::PointId> points = map.point_ids();
-    map.remove_point(points.back());  // the next id must not be given twice
-    map.merge_points(points[0], points[1]);
-    map.remove_line(map.line_ids()[map.line_count() / 2]);
+    map.remove(points.back());  // the next id must not be given twice
+    map.merge(points[0], points[1]);
+    map.remove(map.line_ids()[map.line_count() / 2]);
   }
 
   float number(double low, double high) { return static_cast<float>(random_.uniform(low, high)); }

@@ -46,8 +46,6 @@ class LineDetector {
   /// (valid_region) are masked.
   [[nodiscard]] std::vector<LineSegment> detect(const cv::Mat& gray) const;
 
-  [[nodiscard]] const LineDetectorOptions& options() const { return options_; }
-
  private:
   LineDetectorOptions options_;
 };

@@ -10,7 +10,6 @@
 #include "plumbline/features/lbd.hpp"
 #include "plumbline/features/line_depth.hpp"
 #include "plumbline/features/line_detector.hpp"
-#include "plumbline/features/line_match.hpp"
 
 namespace plumbline::features {
 
@@ -38,14 +37,9 @@ class LineExtractor {
   [[nodiscard]] std::vector<LineFeature> extract(const cv::Mat& gray, const cv::Mat& depth_m,
                                                  const sensor::Pinhole& camera) const;
 
-  [[nodiscard]] const LineOptions& options() const { return options_; }
-
  private:
   LineOptions options_;
   LineDetector detector_;
 };
-
-/// Segment and descriptor of each feature, for match_lines.
-std::vector<DescribedLine> described(const std::vector<LineFeature>& features);
 
 }  // namespace plumbline::features

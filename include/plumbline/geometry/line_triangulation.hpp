@@ -37,7 +37,6 @@ enum class LineTriangulationStatus {
   kOutOfRange,         ///< behind a camera, or too near or too far
   kInconsistent        ///< the segments cannot be images of one 3D segment
 };
-const char* to_string(LineTriangulationStatus status);
 
 /// `line`, `start`, `end` and the sigmas are set when ok() only.
 struct TriangulatedLine {

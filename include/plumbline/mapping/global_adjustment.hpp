@@ -56,8 +56,8 @@ struct MapGraphResult {
 
 /// Pose graph of map_edges(map) and `extra`. `anchor` is held (an invalid id: the map's first keyframe). The
 /// map is not changed. Edges of `extra` between keyframes that the map does not hold throw std::out_of_range.
-MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
-                               const optimize::PoseGraphOptions& options, core::KeyframeId anchor = {});
+MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra, bool robust,
+                               core::KeyframeId anchor = {});
 
 /// Gives keyframes new poses; points and lines follow the keyframes that see them (mean over these).
 void move_keyframes(maps::Map& map, const KeyframePoses& poses);
@@ -82,7 +82,7 @@ struct GlobalAdjustmentOptions {
   /// than this, and 0.8 px, at the poses of the graph waits for the second round (optimize::BundleOptions);
   /// 0: none waits.
   double first_gate = 3.0;
-  optimize::PoseGraphOptions graph;
+  bool robust = true;  ///< the pose graph puts wrong edges aside (optimize::solve_pose_graph)
   optimize::BundleOptions bundle_options;
   SigmaFactors sigma_factors;
   GlobalAdjustmentOptions();
@@ -104,6 +104,10 @@ struct GlobalAdjustmentSummary {
   std::string refusal;   ///< what the last of these would have torn
   std::string message;   ///< why not, or what the solver said
 };
+
+/// Those that their verdicts do not reject; all where there are none.
+std::vector<PoseEdge> believed_edges(const std::vector<PoseEdge>& edges,
+                                     const std::vector<optimize::EdgeVerdict>& verdicts);
 
 /// Moves all keyframes and landmarks of the map to where everything fits best, and takes observations that do
 /// not fit out of it. `anchor` stays where it is (an invalid id: the map's first keyframe). The same input

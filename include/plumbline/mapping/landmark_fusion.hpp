@@ -31,22 +31,13 @@ struct FusionSummary {
 /// `keyframe`. Where one meets a feature that looks like it and lies where it lies, in the image and in
 /// depth: a feature that sees nothing yet becomes an observation; one that sees another landmark shows that
 /// both are one, and the less seen is merged into the other. Two landmarks that one keyframe sees at
-/// different places never merge.
-FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
-                          const std::vector<core::KeyframeId>& neighbours, const sensor::Pinhole& camera,
-                          const FusionOptions& options);
-
-/// The same for lines. A merged line spans what both spanned.
-FusionSummary fuse_lines(maps::Map& map, core::KeyframeId keyframe,
-                         const std::vector<core::KeyframeId>& neighbours, const sensor::Pinhole& camera,
-                         const FusionOptions& options);
-
-/// Both for keyframes of several robots, each with its camera; every robot must have one (throws
-/// std::out_of_range).
+/// different places never merge. Every robot of the keyframes must have a camera (throws std::out_of_range).
 FusionSummary fuse_points(maps::Map& map, core::KeyframeId keyframe,
                           const std::vector<core::KeyframeId>& neighbours,
                           const std::map<std::int32_t, sensor::Pinhole>& cameras,
                           const FusionOptions& options);
+
+/// The same for lines. A merged line spans what both spanned.
 FusionSummary fuse_lines(maps::Map& map, core::KeyframeId keyframe,
                          const std::vector<core::KeyframeId>& neighbours,
                          const std::map<std::int32_t, sensor::Pinhole>& cameras,

@@ -3,32 +3,22 @@
 
 // Local bundle adjustment (docs/method/mapping.md): a keyframe, what it shares landmarks or surfaces with,
 // and what they see. Three steps, so that the middle one can run beside the tracker: take from the map,
-// adjust, put back. The map may grow and lose keyframes and landmarks between the first step and the last.
+// adjust, put back. The map may grow and lose landmarks between the first step and the last.
 #include <map>
 #include <optional>
 #include <vector>
 
+#include "plumbline/mapping/map_bundle.hpp"
 #include "plumbline/mapping/observation_noise.hpp"
 #include "plumbline/mapping/tracked_path.hpp"
-#include "plumbline/maps/map.hpp"
-#include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/camera.hpp"
 
 namespace plumbline::mapping {
 
-struct LocalBundle {
-  optimize::BundleProblem problem;
-  std::vector<core::KeyframeId> keyframes;  ///< of problem.poses
-  std::vector<geometry::Rigid3> taken;      ///< camera_from_world of these when they were taken
-  std::vector<core::PointId> points;        ///< of problem.points, sorted
-  std::vector<core::LineId> lines;          ///< of problem.lines, sorted
-  core::KeyframeId next;                    ///< this robot's keyframes from here on were made after the take
-  struct Seen {
-    int landmark = -1;  ///< index into points or lines
-    maps::Observation by;
-  };
-  std::vector<Seen> point_seen;  ///< of problem.point_observations
-  std::vector<Seen> line_seen;
+/// Points and lines are sorted.
+struct LocalBundle : MapBundle {
+  std::vector<geometry::Rigid3> taken;  ///< camera_from_world of the keyframes when they were taken
+  core::KeyframeId next;                ///< this robot's keyframes from here on were made after the take
 };
 
 struct LocalBundleOptions {

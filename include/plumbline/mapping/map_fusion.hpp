@@ -167,7 +167,6 @@ class OverlapFinder {
   /// The same for all keyframes of all parts, one after the other; the keyframe before each is that of the
   /// lower id.
   std::vector<Candidate> look_at_all(const std::vector<MapPart>& parts, const core::Executor& executor);
-  [[nodiscard]] const MapFusionOptions& options() const { return options_; }
 
  private:
   std::vector<Candidate> recognise(const places::Database::Scores& scores, const std::vector<MapPart>& parts,

@@ -29,16 +29,9 @@ struct ObservationNoise {
   /// As a bundle's camera of the same intrinsics saw it; which pose and which landmark is left to the caller.
   /// `motion_factor`: all standard deviations are so many times as large.
   [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
-                                                    double motion_factor = 1.0) const {
-    return of(corner, is_aligned, motion_factor, octave_px(corner.octave));
-  }
-  /// The same for many: `corner_px` is octave_px() of its octave.
-  [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
-                                                    double motion_factor, double corner_px) const;
+                                                    double motion_factor = 1.0) const;
   /// `motion_factor` of a keyframe that was taken while the camera turned at this rate, rad/s.
   [[nodiscard]] double motion_factor_of(double rate) const;
-  /// Standard deviation of a corner of this octave.
-  [[nodiscard]] double octave_px(int octave) const;
   [[nodiscard]] optimize::BundleLineObservation of(const features::LineFeature& line,
                                                    double motion_factor = 1.0) const;
 };

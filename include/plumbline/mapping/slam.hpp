@@ -21,7 +21,6 @@
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
-#include "plumbline/maps/line_export.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
@@ -98,13 +97,9 @@ class Slam {
   [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_.poses(); }
   /// Poses after optimisation: tracked frames only, in order of time.
   [[nodiscard]] geometry::Trajectory trajectory() const;
-  [[nodiscard]] geometry::Trajectory keyframe_trajectory() const;
-  /// Line landmarks that enough keyframes have seen, as 3D segments in the world frame, metres.
-  [[nodiscard]] std::vector<maps::LineSegment3> line_segments() const;
 
  private:
   void start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
-  void switch_reference(FrameReport& report);
   void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
   void set_reference(core::KeyframeId keyframe);
   void put_back_bundle(BundleReport& report);

@@ -63,6 +63,9 @@ struct Observation {
 };
 static_assert(sizeof(Observation) == 12, "a map has thousands of them for each keyframe");
 
+/// Whether one of the observations is this keyframe's.
+bool seen_by(const std::vector<Observation>& observations, KeyframeId keyframe);
+
 /// So many keyframes of each robot, those made last, keep the patches of their corners.
 constexpr int kPatchedKeyframes = 200;
 
@@ -192,18 +195,18 @@ class Map {
     return keyframes_.at(id).children;
   }
 
-  // Landmarks.
+  // Landmarks: an Id is a PointId or a LineId.
   PointId add_point(std::int32_t robot, MapPoint point);
   LineId add_line(std::int32_t robot, MapLine line);
-  void remove_point(PointId id);
-  void remove_line(LineId id);
+  template <typename Id>
+  void remove(Id id);
   /// Two landmarks that are one: `kept` takes the observations and counts of `gone`, which is removed. Where
   /// one keyframe sees both, the feature of `kept` stays. Positions are the caller's business. Throws
   /// std::invalid_argument when both are the same.
-  void merge_points(PointId kept, PointId gone);
-  void merge_lines(LineId kept, LineId gone);
-  [[nodiscard]] const MapPoint* find_point(PointId id) const { return points_.find(id); }
-  [[nodiscard]] const MapLine* find_line(LineId id) const { return lines_.find(id); }
+  template <typename Id>
+  void merge(Id kept, Id gone);
+  [[nodiscard]] const MapPoint* find(PointId id) const { return points_.find(id); }
+  [[nodiscard]] const MapLine* find(LineId id) const { return lines_.find(id); }
   [[nodiscard]] MapPoint& point(PointId id) { return points_.at(id); }
   [[nodiscard]] MapLine& line(LineId id) { return lines_.at(id); }
   [[nodiscard]] const MapPoint& point(PointId id) const { return points_.at(id); }
@@ -215,15 +218,18 @@ class Map {
 
   // Observations. A feature sees at most one landmark; a keyframe sees a landmark with at most one feature:
   // observe returns false and changes nothing otherwise.
-  bool observe(PointId point, KeyframeId keyframe, int feature, bool aligned = false);
-  bool observe(LineId line, KeyframeId keyframe, int feature);
-  void unobserve(PointId point, KeyframeId keyframe);
-  void unobserve(LineId line, KeyframeId keyframe);
+  template <typename Id>
+  bool observe(Id id, KeyframeId keyframe, int feature, bool aligned = false);
+  template <typename Id>
+  void unobserve(Id id, KeyframeId keyframe);
   /// Landmark that a keyframe's feature sees; an invalid id: none.
   [[nodiscard]] PointId point_of(KeyframeId keyframe, int feature) const;
   [[nodiscard]] LineId line_of(KeyframeId keyframe, int feature) const;
   [[nodiscard]] const std::vector<PointId>& points_of(KeyframeId keyframe) const;
   [[nodiscard]] const std::vector<LineId>& lines_of(KeyframeId keyframe) const;
+  /// Landmarks that any of these keyframes sees, by id.
+  [[nodiscard]] std::vector<PointId> points_seen_by(const std::vector<KeyframeId>& keyframes) const;
+  [[nodiscard]] std::vector<LineId> lines_seen_by(const std::vector<KeyframeId>& keyframes) const;
 
   /// Keyframes that share at least `min_shared` landmarks with `keyframe`, most first, ties by id. If there
   /// are none, the ones that share most.
@@ -255,11 +261,15 @@ class Map {
     geometry::Rigid3 pose;
     std::vector<PointId> points;  ///< by feature
     std::vector<LineId> lines;    ///< by feature
+    std::vector<PointId>& seen(PointId /*kind*/) { return points; }
+    std::vector<LineId>& seen(LineId /*kind*/) { return lines; }
     std::map<KeyframeId, int> shared;
     std::vector<std::uint64_t> edges;
     KeyframeId parent;
     std::vector<KeyframeId> children;  ///< by id
   };
+  IdMap<PointId, MapPoint>& landmarks(PointId /*kind*/) { return points_; }
+  IdMap<LineId, MapLine>& landmarks(LineId /*kind*/) { return lines_; }
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
   void erase_patches(KeyframeId id);
   void detach(KeyframeId child);

@@ -8,15 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "plumbline/core/options.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/optimize/bundle_adjustment.hpp"
 
 namespace plumbline::optimize {
-
-struct GraphPose {
-  geometry::Rigid3 camera_from_world;
-  bool fixed = false;
-};
 
 /// b_from_a was measured: xi = log(b_from_a_estimate * measured^-1), xi = (rho, phi) in metres and radians,
 /// has this information. It may be singular: what the measurement does not hold stays free.
@@ -29,24 +24,8 @@ struct GraphEdge {
 };
 
 struct PoseGraph {
-  std::vector<GraphPose> poses;
+  std::vector<BundlePose> poses;
   std::vector<GraphEdge> edges;
-};
-
-enum class EdgeRobustness {
-  kNone,       ///< plain least squares: every edge counts
-  kGraduated,  ///< graduated non-convexity: wrong edges are put aside
-};
-
-struct PoseGraphOptions {
-  EdgeRobustness robust = EdgeRobustness::kGraduated;
-  /// Share of right edges that may be taken for wrong, 0.001 or 0.01 or 0.05: gives the squared error beyond
-  /// which an edge is wrong, by the chi-square distribution of as many degrees of freedom as the edge holds.
-  double false_alarm = 0.001;
-  int max_iterations = 30;    ///< of each least-squares solve
-  int max_rounds = 60;        ///< solves with changed weights
-  double round_factor = 1.6;  ///< how fast the loss turns from convex to truncated
-  void declare(core::OptionTable& table);
 };
 
 /// What became of one edge.
@@ -70,13 +49,14 @@ struct PoseGraphSummary {
 
 /// Updates the poses that are not fixed. Parts of the graph that no edges tie to a fixed pose stay near where
 /// they are. Edges that name no pose, or the same twice, throw std::invalid_argument; without a fixed pose
-/// nothing is changed (usable = false, message says why).
-PoseGraphSummary solve_pose_graph(PoseGraph& graph, const PoseGraphOptions& options = {});
+/// nothing is changed (usable = false, message says why). `robust`: wrong edges are put aside, by graduated
+/// non-convexity; else every edge counts.
+PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust = true);
 
 /// Number of eigenvalues that are not next to nothing beside the largest one (less than 1e-9 of it).
 int rank_of(const geometry::Matrix6d& information);
 
-/// Squared error that a measurement of `dimensions` (1-6) directions exceeds with probability `false_alarm`.
-double chi_square_gate(int dimensions, double false_alarm);
+/// Squared error that a measurement of `dimensions` (1-6) directions exceeds once in a thousand times.
+double chi_square_gate(int dimensions);
 
 }  // namespace plumbline::optimize

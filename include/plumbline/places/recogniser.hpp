@@ -26,7 +26,6 @@ struct RecogniserOptions {
 struct Candidate {
   core::KeyframeId keyframe;  ///< the best of its group
   double score = 0.0;
-  double relative = 0.0;     ///< score over that of the query's neighbour
   double group_score = 0.0;  ///< sum over its covisible keyframes among the hits
   int in_a_row = 1;          ///< queries in a row that found these surroundings
 };
@@ -40,21 +39,15 @@ class Recogniser {
  public:
   explicit Recogniser(const RecogniserOptions& options) : options_(options) {}
 
-  /// Candidates for keyframe `query` that looks like `image`: best group first. `neighbour` is a keyframe
-  /// that saw nearly the same as the query (usually the one before): its score is what a good score is here;
-  /// invalid: scores are not compared. Keyframes that `allowed` refuses (the query's own surroundings) are
-  /// left out. Those seen fewer than options.consistent times in a row come too, with their in_a_row.
-  std::vector<Candidate> recognise(const Database& database, core::KeyframeId query,
-                                   const features::FrameFeatures& image, core::KeyframeId neighbour,
-                                   const std::function<bool(core::KeyframeId)>& allowed,
-                                   const Neighbours& neighbours);
-  /// The same with what `database.query` said of the image.
+  /// Candidates for keyframe `query` from what `Database::query` said of its image: best group first.
+  /// `neighbour` is a keyframe that saw nearly the same as the query (usually the one before): its score is
+  /// what a good score is here; invalid: scores are not compared. Keyframes that `allowed` refuses (the
+  /// query's own surroundings) are left out. Those seen fewer than options.consistent times in a row come
+  /// too, with their in_a_row.
   std::vector<Candidate> recognise(const Database::Scores& scores, core::KeyframeId query,
                                    core::KeyframeId neighbour,
                                    const std::function<bool(core::KeyframeId)>& allowed,
                                    const Neighbours& neighbours);
-
-  [[nodiscard]] const RecogniserOptions& options() const { return options_; }
 
  private:
   /// Keyframes that see much the same.
@@ -62,8 +55,7 @@ class Recogniser {
     Candidate candidate;
     std::vector<core::KeyframeId> members;  ///< sorted
   };
-  [[nodiscard]] std::vector<Island> islands(const std::vector<Hit>& hits, double usual,
-                                            const Neighbours& neighbours) const;
+  [[nodiscard]] std::vector<Island> islands(const std::vector<Hit>& hits, const Neighbours& neighbours) const;
   std::vector<Candidate> seen_in_a_row(std::int32_t robot, std::vector<Island> islands);
 
   RecogniserOptions options_;

@@ -53,7 +53,6 @@ class Vocabulary {
   [[nodiscard]] std::size_t word_count(Kind kind) const;
   [[nodiscard]] std::int64_t feature_count(Kind kind) const;
   [[nodiscard]] int depth(Kind kind) const;  ///< of the deepest word; 0: the root is the only word
-  [[nodiscard]] const VocabularyOptions& options() const { return options_; }
 
  private:
   struct Node {

@@ -33,6 +33,12 @@ struct Pinhole {
     return pixel.x() >= border && pixel.y() >= border && pixel.x() <= width - 1 - border &&
            pixel.y() <= height - 1 - border;
   }
+  /// Of the image resized to that many pixels; the middle of pixel (0, 0) is at (0, 0).
+  [[nodiscard]] Pinhole resized(int to_width, int to_height) const {
+    const double sx = static_cast<double>(to_width) / width;
+    const double sy = static_cast<double>(to_height) / height;
+    return {to_width, to_height, fx * sx, fy * sy, (cx + 0.5) * sx - 0.5, (cy + 0.5) * sy - 0.5};
+  }
 };
 
 /// OpenCV's radial-tangential model: k1 k2 p1 p2 k3.

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plumbline/geometry/adjoint.hpp"
 #include "plumbline/geometry/plucker.hpp"
+#include "plumbline/mapping/map_bundle.hpp"
 #include "plumbline/optimize/pose_covariances.hpp"
 
 namespace plumbline::mapping {
@@ -17,35 +19,7 @@ using geometry::Rigid3;
 /// One keyframe after another, by what the tracker has seen in between. Weaker than landmarks and surfaces:
 /// it holds keyframes that have neither, those taken while turning, and the length of a corridor that nothing
 /// else measures.
-Matrix6d chain_information() {
-  constexpr double kSigma_m = 0.01;
-  constexpr double kSigma_rad = 0.007;
-  geometry::Vector6d diagonal;
-  diagonal << Eigen::Vector3d::Constant(1.0 / (kSigma_m * kSigma_m)),
-      Eigen::Vector3d::Constant(1.0 / (kSigma_rad * kSigma_rad));
-  return diagonal.asDiagonal();
-}
-
-/// Landmarks in the order in which they are worth having: those seen most often first.
-template <typename IdType>
-std::vector<std::pair<int, IdType>> by_observations(const std::vector<IdType>& ids,
-                                                    const std::vector<int>& observations) {
-  std::vector<std::pair<int, IdType>> order;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (observations[i] >= 2) order.emplace_back(-observations[i], ids[i]);
-  }
-  std::sort(order.begin(), order.end());
-  return order;
-}
-
-struct GlobalBundle {
-  optimize::BundleProblem problem;
-  std::vector<KeyframeId> keyframes;   ///< of problem.poses
-  std::vector<core::PointId> points;   ///< of problem.points
-  std::vector<core::LineId> lines;     ///< of problem.lines
-  std::vector<KeyframeId> point_seen;  ///< of problem.point_observations
-  std::vector<KeyframeId> line_seen;   ///< of problem.line_observations
-};
+Matrix6d chain_information() { return geometry::information_of(0.01, 0.007); }
 
 /// Builds the bundle of a whole map. Several cameras become one: pixels are carried to the first robot's
 /// camera, their standard deviations with them.
@@ -61,31 +35,10 @@ class GlobalBuilder {
       bundle_.keyframes.push_back(id);
       bundle_.problem.poses.push_back({map.camera_from_world(id), id == anchor});
     }
-    tied_.assign(bundle_.keyframes.size(), 0);
   }
 
-  /// As many landmarks as every keyframe needs: one is left out when all keyframes that see it have enough.
-  void add_points() {
-    const std::vector<core::PointId> ids = map_.point_ids();
-    std::vector<int> observations;
-    for (const core::PointId id : ids) {
-      observations.push_back(static_cast<int>(map_.point(id).observations.size()));
-    }
-    for (const auto& [order, id] : by_observations(ids, observations)) {
-      if (wanted(map_.point(id).observations, options_.observations)) add(map_.point(id));
-    }
-  }
-  void add_lines() {
-    std::fill(tied_.begin(), tied_.end(), 0);
-    const std::vector<core::LineId> ids = map_.line_ids();
-    std::vector<int> observations;
-    for (const core::LineId id : ids) {
-      observations.push_back(static_cast<int>(map_.line(id).observations.size()));
-    }
-    for (const auto& [order, id] : by_observations(ids, observations)) {
-      if (wanted(map_.line(id).observations, options_.observations)) add(map_.line(id));
-    }
-  }
+  void add_points() { add_seen_most(map_.point_ids()); }
+  void add_lines() { add_seen_most(map_.line_ids()); }
   int add_surface_edges() {
     int count = 0;
     for (const KeyframeId id : bundle_.keyframes) {
@@ -111,9 +64,31 @@ class GlobalBuilder {
   void add_edge(KeyframeId a, KeyframeId b, const Rigid3& b_from_a, const Matrix6d& information) {
     bundle_.problem.edges.push_back({index_of(a), index_of(b), b_from_a, information});
   }
-  GlobalBundle take() { return std::move(bundle_); }
+  MapBundle take() { return std::move(bundle_); }
 
  private:
+  /// As many landmarks as every keyframe needs, those seen most often first: one is left out when all
+  /// keyframes that see it have enough.
+  template <typename Id>
+  void add_seen_most(const std::vector<Id>& ids) {
+    std::vector<std::pair<int, Id>> order;
+    for (const Id id : ids) order.emplace_back(-static_cast<int>(map_.find(id)->observations.size()), id);
+    std::sort(order.begin(), order.end());
+    std::vector<int> tied(bundle_.keyframes.size(), 0);  // landmarks taken that a keyframe sees
+    const auto tied_at = [&](const maps::Observation& o) -> int& {
+      return tied[static_cast<std::size_t>(index_of(o.keyframe))];
+    };
+    for (const auto& [minus_seen, id] : order) {
+      const std::vector<maps::Observation>& seen = map_.find(id)->observations;
+      if (seen.size() < 2 || std::all_of(seen.begin(), seen.end(), [&](const maps::Observation& o) {
+            return tied_at(o) >= options_.observations;
+          })) {
+        continue;
+      }
+      for (const maps::Observation& o : seen) ++tied_at(o);
+      add(*map_.find(id));
+    }
+  }
   /// Among the problem's poses.
   [[nodiscard]] int index_of(KeyframeId id) const {
     const int* found = index_.find(id);
@@ -123,21 +98,6 @@ class GlobalBuilder {
   /// What standard deviations of a keyframe's measurements are multiplied by.
   [[nodiscard]] double motion_factor(KeyframeId id) const {
     return motion_factor_[static_cast<std::size_t>(index_of(id))];
-  }
-  [[nodiscard]] double octave_px(int octave) {
-    if (octave < 0 || octave > 64) return options_.noise.octave_px(octave);
-    while (static_cast<int>(octave_px_.size()) <= octave)
-      octave_px_.push_back(options_.noise.octave_px(static_cast<int>(octave_px_.size())));
-    return octave_px_[static_cast<std::size_t>(octave)];
-  }
-  bool wanted(const std::vector<maps::Observation>& seen, int enough) {
-    bool any = false;
-    for (const maps::Observation& o : seen) {
-      any = any || tied_[static_cast<std::size_t>(index_of(o.keyframe))] < enough;
-    }
-    if (!any) return false;
-    for (const maps::Observation& o : seen) ++tied_[static_cast<std::size_t>(index_of(o.keyframe))];
-    return true;
   }
   /// A pixel as the problem's camera would have it.
   [[nodiscard]] Eigen::Vector2d pixel(KeyframeId id, const Eigen::Vector2d& seen) const {
@@ -160,14 +120,13 @@ class GlobalBuilder {
     for (const maps::Observation& o : point.observations) {
       const features::PointFeature& f =
           map_.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
-      optimize::BundlePointObservation seen =
-          options_.noise.of(f, o.aligned, motion_factor(o.keyframe), octave_px(f.octave));
+      optimize::BundlePointObservation seen = options_.noise.of(f, o.aligned, motion_factor(o.keyframe));
       seen.pose = index_of(o.keyframe);
       seen.point = index;
       seen.pixel = pixel(o.keyframe, seen.pixel);
       seen.pixel_sigma *= pixel_size(o.keyframe);
       bundle_.problem.point_observations.push_back(seen);
-      bundle_.point_seen.push_back(o.keyframe);
+      bundle_.point_seen.push_back(o);
     }
   }
   void add(const maps::MapLine& line) {
@@ -184,37 +143,17 @@ class GlobalBuilder {
       seen.end = pixel(o.keyframe, seen.end);
       seen.pixel_sigma *= pixel_size(o.keyframe);
       bundle_.problem.line_observations.push_back(seen);
-      bundle_.line_seen.push_back(o.keyframe);
+      bundle_.line_seen.push_back(o);
     }
   }
 
   const maps::Map& map_;
   const Cameras& cameras_;
   const GlobalAdjustmentOptions& options_;
-  GlobalBundle bundle_;
+  MapBundle bundle_;
   maps::IdMap<KeyframeId, int> index_;
   std::vector<double> motion_factor_;  ///< of the problem's poses
-  std::vector<double> octave_px_;      ///< as far as it was asked for
-  std::vector<int> tied_;              ///< landmarks taken that a keyframe sees
 };
-
-/// Landmarks that no keyframe sees any more are gone.
-void drop_outliers(const GlobalBundle& bundle, maps::Map& map) {
-  for (std::size_t i = 0; i < bundle.point_seen.size(); ++i) {
-    const optimize::BundlePointObservation& o = bundle.problem.point_observations[i];
-    if (!o.outlier) continue;
-    const core::PointId id = bundle.points[static_cast<std::size_t>(o.point)];
-    map.unobserve(id, bundle.point_seen[i]);
-    if (map.point(id).observations.empty()) map.remove_point(id);
-  }
-  for (std::size_t i = 0; i < bundle.line_seen.size(); ++i) {
-    const optimize::BundleLineObservation& o = bundle.problem.line_observations[i];
-    if (!o.outlier) continue;
-    const core::LineId id = bundle.lines[static_cast<std::size_t>(o.line)];
-    map.unobserve(id, bundle.line_seen[i]);
-    if (map.line(id).observations.empty()) map.remove_line(id);
-  }
-}
 
 /// Whether the poses may be put into the map; reported if not.
 bool may_move(const maps::Map& map, const KeyframePoses& poses, GlobalAdjustmentSummary& summary) {
@@ -225,7 +164,7 @@ bool may_move(const maps::Map& map, const KeyframePoses& poses, GlobalAdjustment
   return false;
 }
 
-KeyframePoses poses_of(const GlobalBundle& bundle) {
+KeyframePoses poses_of(const MapBundle& bundle) {
   KeyframePoses poses;
   for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
     poses.emplace_back(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
@@ -233,23 +172,16 @@ KeyframePoses poses_of(const GlobalBundle& bundle) {
   return poses;
 }
 
-void put_back(const GlobalBundle& bundle, maps::Map& map) {
+void put_back(const MapBundle& bundle, maps::Map& map) {
   move_keyframes(map, poses_of(bundle));  // and with them what the bundle left out
-  for (std::size_t i = 0; i < bundle.points.size(); ++i) {
-    map.point(bundle.points[i]).position = bundle.problem.points[i];
-  }
-  for (std::size_t i = 0; i < bundle.lines.size(); ++i) {
-    maps::MapLine& line = map.line(bundle.lines[i]);
-    line.start = geometry::nearest_point(bundle.problem.lines[i], line.start);
-    line.end = geometry::nearest_point(bundle.problem.lines[i], line.end);
-  }
+  put_back_landmarks(bundle, map);
   drop_outliers(bundle, map);
 }
 
 void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
                     const GlobalAdjustmentOptions& options, KeyframeId anchor,
                     GlobalAdjustmentSummary& summary) {
-  const MapGraphResult graph = solve_map_graph(map, extra, options.graph, anchor);
+  const MapGraphResult graph = solve_map_graph(map, extra, options.robust, anchor);
   summary.message = graph.summary.message;
   if (!graph.summary.usable) return;
   summary.extra = graph.summary.edges;
@@ -260,8 +192,8 @@ void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
 }
 
 /// Of the whole map, with the edges of `extra`. `surface_edges`: how many others there are.
-GlobalBundle bundle_of(const maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
-                       const GlobalAdjustmentOptions& options, KeyframeId anchor, int& surface_edges) {
+MapBundle bundle_of(const maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
+                    const GlobalAdjustmentOptions& options, KeyframeId anchor, int& surface_edges) {
   GlobalBuilder builder(map, cameras, options, anchor);
   builder.add_points();
   builder.add_lines();
@@ -273,11 +205,8 @@ GlobalBundle bundle_of(const maps::Map& map, const Cameras& cameras, const std::
 
 void run_bundle(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
                 const GlobalAdjustmentOptions& options, KeyframeId anchor, GlobalAdjustmentSummary& summary) {
-  std::vector<PoseEdge> believed;
-  for (std::size_t i = 0; i < extra.size(); ++i) {
-    if (summary.extra.empty() || !summary.extra[i].rejected) believed.push_back(extra[i]);
-  }
-  GlobalBundle bundle = bundle_of(map, cameras, believed, options, anchor, summary.surface_edges);
+  const std::vector<PoseEdge> believed = believed_edges(extra, summary.extra);
+  MapBundle bundle = bundle_of(map, cameras, believed, options, anchor, summary.surface_edges);
   summary.points = static_cast<int>(bundle.points.size());
   summary.lines = static_cast<int>(bundle.lines.size());
   optimize::BundleOptions bundle_options = options.bundle_options;
@@ -321,17 +250,10 @@ GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
 }
 
 void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
-  table.boolean("adjust.pose_graph", pose_graph,
-                "Solve a pose graph first, which tells wrong alignments and loops");
-  table.boolean("adjust.bundle", bundle, "Adjust all keyframes, points, lines and surfaces together");
   table.integer("adjust.observations", observations, {10, 100000}, "",
                 "Points, and lines, that a keyframe is tied with at most");
   table.integer("adjust.iterations", bundle_options.max_iterations, {1, 1000}, "",
                 "Iterations of each round of the adjustment at most");
-  table.integer("adjust.rounds", bundle_options.rounds, {1, 10}, "",
-                "Rounds of the adjustment; between them outliers are put aside");
-  table.number("adjust.tolerance", bundle_options.tolerance, {0.0, 0.1}, "",
-               "A round ends with an iteration that lowers the cost by a smaller share");
   table.number("adjust.gate", first_gate, {0.0, 1000.0}, "",
                "Observations further off than so many standard deviations, and 0.8 px, where the pose graph "
                "has put the keyframes wait for the second round: those that caused a drift would restore it; "
@@ -341,10 +263,17 @@ void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
   noise.declare(table, "adjust.");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");
-  table.choice<optimize::EdgeRobustness>(
-      "adjust.robust", graph.robust,
-      {{"none", optimize::EdgeRobustness::kNone}, {"graduated", optimize::EdgeRobustness::kGraduated}},
-      "What the pose graph does about wrong edges: nothing, or graduated non-convexity");
+  table.choice<bool>("adjust.robust", robust, {{"none", false}, {"graduated", true}},
+                     "What the pose graph does about wrong edges: nothing, or graduated non-convexity");
+}
+
+std::vector<PoseEdge> believed_edges(const std::vector<PoseEdge>& edges,
+                                     const std::vector<optimize::EdgeVerdict>& verdicts) {
+  std::vector<PoseEdge> believed;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (verdicts.empty() || !verdicts[i].rejected) believed.push_back(edges[i]);
+  }
+  return believed;
 }
 
 GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
@@ -377,8 +306,7 @@ std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Came
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   if (ids.empty() || ids.size() > kMost) return {};
   int unused = 0;
-  GlobalBundle bundle =
-      bundle_of(map, cameras, extra, options, anchor.valid() ? anchor : ids.front(), unused);
+  MapBundle bundle = bundle_of(map, cameras, extra, options, anchor.valid() ? anchor : ids.front(), unused);
   widen(options.sigma_factors, bundle.problem);
   const std::vector<Matrix6d> covariances =
       optimize::pose_covariances(bundle.problem, options.bundle_options);

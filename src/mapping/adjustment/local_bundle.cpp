@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "plumbline/geometry/adjoint.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -21,11 +23,7 @@ Matrix6d tracked_information(const maps::Keyframe& keyframe) {
   constexpr double kLeast_m = 0.01;
   constexpr double kRadPerMetre = 0.7;
   const double sigma_m = std::max(kLeast_m, keyframe.reference_sigma_m);
-  const double sigma_rad = kRadPerMetre * sigma_m;
-  geometry::Vector6d diagonal;
-  diagonal << Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m)),
-      Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad));
-  return diagonal.asDiagonal();
+  return geometry::information_of(sigma_m, kRadPerMetre * sigma_m);
 }
 
 /// The keyframe, those not adjusted yet, those its surface is aligned with, and those that share most with
@@ -39,9 +37,7 @@ std::vector<KeyframeId> window_of(const maps::Map& map, KeyframeId keyframe,
       window.push_back(id);
     }
   };
-  for (KeyframeId id : also) {
-    if (map.has_keyframe(id)) append(id);
-  }
+  for (KeyframeId id : also) append(id);
   for (const maps::SurfaceEdge& edge : map.edges_of(keyframe)) append(edge.a == keyframe ? edge.b : edge.a);
   for (const KeyframeId id : map.neighbours(keyframe, map.keyframe_count())) append(id);
   return window;
@@ -84,18 +80,11 @@ class Builder {
 
   /// The landmarks of the window; keyframes outside that see them are held.
   void add_landmarks(const std::vector<KeyframeId>& window) {
-    std::vector<core::PointId> points;
-    std::vector<core::LineId> lines;
-    for (KeyframeId id : window) {
-      for (core::PointId p : map_.points_of(id)) {
-        if (p.valid() && map_.point(p).observations.size() >= 2) points.push_back(p);
-      }
-      for (core::LineId l : map_.lines_of(id)) {
-        if (l.valid() && map_.line(l).observations.size() >= 2) lines.push_back(l);
-      }
-    }
-    sort_unique(points);
-    sort_unique(lines);
+    std::vector<core::PointId> points = map_.points_seen_by(window);
+    std::vector<core::LineId> lines = map_.lines_seen_by(window);
+    const auto once = [&](auto id) { return map_.find(id)->observations.size() < 2; };
+    points.erase(std::remove_if(points.begin(), points.end(), once), points.end());
+    lines.erase(std::remove_if(lines.begin(), lines.end(), once), lines.end());
     hold_others(points, lines);
     for (core::PointId id : points) add_point(id);
     for (core::LineId id : lines) add_line(id);
@@ -128,11 +117,6 @@ class Builder {
   }
 
  private:
-  template <typename Ids>
-  static void sort_unique(Ids& ids) {
-    std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  }
   [[nodiscard]] bool pose_fixed(int i) const {
     return bundle_.problem.poses[static_cast<std::size_t>(i)].fixed;
   }
@@ -182,7 +166,7 @@ class Builder {
       seen.pose = index_.at(o.keyframe);
       seen.point = index;
       bundle_.problem.point_observations.push_back(seen);
-      bundle_.point_seen.push_back({index, o});
+      bundle_.point_seen.push_back(o);
     }
   }
 
@@ -199,7 +183,7 @@ class Builder {
       seen.pose = index_.at(o.keyframe);
       seen.line = index;
       bundle_.problem.line_observations.push_back(seen);
-      bundle_.line_seen.push_back({index, o});
+      bundle_.line_seen.push_back(o);
     }
   }
 
@@ -257,50 +241,13 @@ void carry_landmarks(const LocalBundle& bundle, KeyframeId id, const Rigid3& new
   }
 }
 
-bool same(const Rigid3& a, const Rigid3& b) {
-  return a.rotation == b.rotation && a.translation == b.translation;
-}
-
 bool moved_otherwise(const LocalBundle& bundle, const maps::Map& map) {
   for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
-    const KeyframeId id = bundle.keyframes[i];
-    if (map.has_keyframe(id) && !same(map.camera_from_world(id), bundle.taken[i])) return true;
+    const Rigid3& now = map.camera_from_world(bundle.keyframes[i]);
+    if (now.rotation != bundle.taken[i].rotation || now.translation != bundle.taken[i].translation)
+      return true;
   }
   return false;
-}
-
-void put_back_landmarks(const LocalBundle& bundle, maps::Map& map) {
-  for (std::size_t i = 0; i < bundle.points.size(); ++i) {
-    if (map.find_point(bundle.points[i]) != nullptr)
-      map.point(bundle.points[i]).position = bundle.problem.points[i];
-  }
-  for (std::size_t i = 0; i < bundle.lines.size(); ++i) {
-    if (map.find_line(bundle.lines[i]) == nullptr) continue;
-    maps::MapLine& line = map.line(bundle.lines[i]);
-    line.start = geometry::nearest_point(bundle.problem.lines[i], line.start);
-    line.end = geometry::nearest_point(bundle.problem.lines[i], line.end);
-  }
-}
-
-/// Observations that did not fit go, unless the landmark is seen otherwise by now.
-void drop_outliers(const LocalBundle& bundle, maps::Map& map) {
-  for (std::size_t i = 0; i < bundle.point_seen.size(); ++i) {
-    if (!bundle.problem.point_observations[i].outlier) continue;
-    const LocalBundle::Seen& seen = bundle.point_seen[i];
-    const core::PointId id = bundle.points[static_cast<std::size_t>(seen.landmark)];
-    if (!map.has_keyframe(seen.by.keyframe) || map.point_of(seen.by.keyframe, seen.by.feature) != id)
-      continue;
-    map.unobserve(id, seen.by.keyframe);
-    if (map.point(id).observations.empty()) map.remove_point(id);
-  }
-  for (std::size_t i = 0; i < bundle.line_seen.size(); ++i) {
-    if (!bundle.problem.line_observations[i].outlier) continue;
-    const LocalBundle::Seen& seen = bundle.line_seen[i];
-    const core::LineId id = bundle.lines[static_cast<std::size_t>(seen.landmark)];
-    if (!map.has_keyframe(seen.by.keyframe) || map.line_of(seen.by.keyframe, seen.by.feature) != id) continue;
-    map.unobserve(id, seen.by.keyframe);
-    if (map.line(id).observations.empty()) map.remove_line(id);
-  }
 }
 
 }  // namespace
@@ -323,11 +270,11 @@ static KeyframePoses poses_after(const LocalBundle& bundle, const MapCorrection&
                                  const maps::Map& map) {
   KeyframePoses poses;
   for (std::size_t i = 0; i < bundle.keyframes.size(); ++i) {
-    if (!bundle.problem.poses[i].fixed && map.has_keyframe(bundle.keyframes[i]))
+    if (!bundle.problem.poses[i].fixed)
       poses.emplace_back(bundle.keyframes[i], bundle.problem.poses[i].camera_from_world);
   }
   for (const auto& [id, new_from_old_world] : correction) {
-    if (id.robot == bundle.next.robot && id.index >= bundle.next.index && map.has_keyframe(id))
+    if (id.robot == bundle.next.robot && id.index >= bundle.next.index)
       poses.emplace_back(id, map.camera_from_world(id) * new_from_old_world.inverse());
   }
   return poses;
@@ -343,7 +290,7 @@ std::optional<MapCorrection> put_back(const LocalBundle& bundle, maps::Map& map,
     return std::nullopt;
   }
   for (const auto& [id, new_from_old_world] : correction) {
-    if (map.has_keyframe(id)) carry_landmarks(bundle, id, new_from_old_world, map);
+    carry_landmarks(bundle, id, new_from_old_world, map);
   }
   put_back_landmarks(bundle, map);
   for (const auto& [id, pose] : poses) map.set_pose(id, pose);

@@ -23,16 +23,9 @@ constexpr double kMany = 100.0;  // landmarks
 constexpr double kNextSigma_m = 0.02;
 constexpr double kNextSigma_rad = 0.015;
 
-Matrix6d information(double metres, double radians) {
-  geometry::Vector6d diagonal;
-  diagonal << Eigen::Vector3d::Constant(1.0 / (metres * metres)),
-      Eigen::Vector3d::Constant(1.0 / (radians * radians));
-  return diagonal.asDiagonal();
-}
-
 Matrix6d information_of_shared(int shared) {
   const double grown = std::sqrt(std::max(1.0, kMany / std::max(1, shared)));
-  return information(grown * kSigma_m, grown * kSigma_rad);
+  return geometry::information_of(grown * kSigma_m, grown * kSigma_rad);
 }
 
 /// Collects edges between pairs of keyframes, each pair once, as the map has them now.
@@ -63,7 +56,8 @@ class EdgeCollector {
 /// b_from_a. `steps` counts them.
 Matrix6d covariance_of_path(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
                             KeyframeId b, int& steps) {
-  const Matrix6d step = information(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();  // several edges hold each
+  const Matrix6d step =
+      geometry::information_of(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();  // several edges hold each
   Matrix6d sum = Matrix6d::Zero();
   steps = 0;
   const Rigid3& b_from_world = map.camera_from_world(b);
@@ -129,7 +123,7 @@ struct Gating {
 };
 
 Gating gate_edges(const maps::Map& map, const std::vector<KeyframeId>& ids,
-                  const std::vector<PoseEdge>& extra, const optimize::PoseGraphOptions& options) {
+                  const std::vector<PoseEdge>& extra, bool robust) {
   std::vector<Discrepancy> discrepancies;
   for (const PoseEdge& e : extra) {
     if (!map.has_keyframe(e.a) || !map.has_keyframe(e.b))
@@ -138,8 +132,7 @@ Gating gate_edges(const maps::Map& map, const std::vector<KeyframeId>& ids,
   }
   Gating result;
   result.drift_factor = drift_factor(discrepancies);
-  const double gate = optimize::chi_square_gate(6, options.false_alarm);
-  const bool robust = options.robust != optimize::EdgeRobustness::kNone;
+  const double gate = optimize::chi_square_gate(6);
   for (const Discrepancy& d : discrepancies) {
     result.chi2.push_back(d.known ? d.chi2(result.drift_factor) : 0.0);
     result.refused.push_back(robust && result.chi2.back() > gate);
@@ -181,7 +174,7 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
   KeyframeId last;
   for (const KeyframeId id : map.keyframe_ids()) {
     if (last.valid() && last.robot == id.robot) {
-      edges.add(last, id, information(kNextSigma_m, kNextSigma_rad));
+      edges.add(last, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
     last = id;
     int neighbours = 0;
@@ -190,7 +183,7 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
       edges.add(id, other, information_of_shared(shared));
     }
     for (const maps::SurfaceEdge& edge : map.edges_of(id)) {
-      if (edge.b == id) edges.add(edge.a, id, information(kNextSigma_m, kNextSigma_rad));
+      if (edge.b == id) edges.add(edge.a, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
   }
   return edges.take();
@@ -219,8 +212,8 @@ void set_loops(maps::Map& map, const std::vector<PoseEdge>& edges) {
   map.set_loops(std::move(loops));
 }
 
-MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra,
-                               const optimize::PoseGraphOptions& options, KeyframeId anchor) {
+MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra, bool robust,
+                               KeyframeId anchor) {
   MapGraphResult result;
   const std::vector<KeyframeId> ids = map.keyframe_ids();
   if (ids.empty()) {
@@ -237,12 +230,12 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
   const auto add = [&](const PoseEdge& e, const Matrix6d& information) {
     graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, information, e.trusted});
   };
-  const Gating gating = gate_edges(map, ids, extra, options);
+  const Gating gating = gate_edges(map, ids, extra, robust);
   for (std::size_t i = 0; i < extra.size(); ++i) {
     if (!gating.refused[i]) add(extra[i], extra[i].information);
   }
   for (const PoseEdge& e : map_edges(map)) add(e, e.information / gating.drift_factor);
-  result.summary = optimize::solve_pose_graph(graph, options);
+  result.summary = optimize::solve_pose_graph(graph, robust);
   add_verdicts(gating, result.summary);
   for (std::size_t i = 0; i < ids.size(); ++i)
     result.poses.emplace_back(ids[i], graph.poses[i].camera_from_world);

@@ -26,13 +26,11 @@ double ObservationNoise::motion_factor_of(double rate) const {
   return std::hypot(1.0, ratio * ratio);
 }
 
-double ObservationNoise::octave_px(int octave) const { return std::pow(orb_scale_factor, octave); }
-
 optimize::BundlePointObservation ObservationNoise::of(const features::PointFeature& corner, bool is_aligned,
-                                                      double motion_factor, double corner_px) const {
+                                                      double motion_factor) const {
   optimize::BundlePointObservation seen;
   seen.pixel = corner.pixel.cast<double>();
-  seen.pixel_sigma = motion_factor * corner_px * (is_aligned ? aligned : 1.0);
+  seen.pixel_sigma = motion_factor * std::pow(orb_scale_factor, corner.octave) * (is_aligned ? aligned : 1.0);
   if (!depth_rows) return seen;
   seen.depth = static_cast<double>(corner.depth);
   seen.depth_sigma =

@@ -36,16 +36,12 @@ ViewOverlap overlap_of(const maps::Keyframe& keyframe, const geometry::Rigid3& c
           static_cast<double>(core::median(std::move(depths)))};
 }
 
-bool sees(const std::vector<maps::Observation>& observations, core::KeyframeId keyframe) {
-  return std::any_of(observations.begin(), observations.end(),
-                     [&](const maps::Observation& o) { return o.keyframe == keyframe; });
-}
-
 /// How many of the keyframe's own landmarks the frame has matched.
 int landmarks_in_common(const maps::Map& map, core::KeyframeId keyframe, const tracking::TrackResult& track) {
   int common = 0;
-  for (const auto& m : track.points) common += sees(map.point(m.point).observations, keyframe) ? 1 : 0;
-  for (const auto& m : track.lines) common += sees(map.line(m.line).observations, keyframe) ? 1 : 0;
+  for (const auto& m : track.points)
+    common += maps::seen_by(map.point(m.point).observations, keyframe) ? 1 : 0;
+  for (const auto& m : track.lines) common += maps::seen_by(map.line(m.line).observations, keyframe) ? 1 : 0;
   return common;
 }
 
@@ -95,8 +91,6 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.boolean(
       "keyframe.cone_scaled", cone_scaled,
       "Cone rule: thresholds follow what a scene has, and balance is waited for six frames at most");
-  table.number("keyframe.cone_epsilon", cone_epsilon, {0.0, 100.0}, "",
-               "Cone rule: weight of lost matches in the threshold");
   table.choice(
       "keyframe.urgent", urgent,
       {{"thin", Urgent::kThin}, {"nearly_lost", Urgent::kNearlyLost}, {"off", Urgent::kOff}},

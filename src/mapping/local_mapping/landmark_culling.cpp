@@ -42,25 +42,21 @@ void LandmarkCuller::restore(const maps::Map& map, core::KeyframeId newest) {
 
 int LandmarkCuller::judge(maps::Map& map, core::KeyframeId newest) {
   int removed = 0;
-  const auto judge_all = [&](auto& watched, const auto& find, const auto& remove) {
+  const auto judge_all = [&](auto& watched) {
     std::size_t kept = 0;
     for (const auto& w : watched) {
-      const auto* landmark = find(w.id);
+      const auto* landmark = map.find(w.id);
       if (landmark == nullptr) continue;  // merged, or gone with its keyframes
       const Verdict v = verdict(*landmark, newest.index - w.born);
       if (v == Verdict::kWait) watched[kept++] = w;
       if (v != Verdict::kGo) continue;
-      remove(w.id);
+      map.remove(w.id);
       ++removed;
     }
     watched.resize(kept);
   };
-  judge_all(
-      points_, [&](core::PointId id) { return map.find_point(id); },
-      [&](core::PointId id) { map.remove_point(id); });
-  judge_all(
-      lines_, [&](core::LineId id) { return map.find_line(id); },
-      [&](core::LineId id) { map.remove_line(id); });
+  judge_all(points_);
+  judge_all(lines_);
   return removed;
 }
 

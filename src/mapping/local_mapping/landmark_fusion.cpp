@@ -22,23 +22,11 @@ const features::PointFeature& feature_of(const maps::Map& map, const maps::Obser
   return map.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
 }
 
-bool seen_by(const maps::MapPoint& point, KeyframeId keyframe) {
-  return std::any_of(point.observations.begin(), point.observations.end(),
-                     [&](const maps::Observation& o) { return o.keyframe == keyframe; });
-}
-
 /// Landmarks that `from` see and `keyframe` does not; sorted, unique.
 std::vector<PointId> unseen_points(const maps::Map& map, const std::vector<KeyframeId>& from,
                                    KeyframeId keyframe) {
-  std::vector<PointId> result;
-  for (KeyframeId id : from) {
-    for (PointId p : map.points_of(id)) {
-      if (p.valid()) result.push_back(p);
-    }
-  }
-  std::sort(result.begin(), result.end());
-  result.erase(std::unique(result.begin(), result.end()), result.end());
-  const auto seen = [&](PointId p) { return seen_by(map.point(p), keyframe); };
+  std::vector<PointId> result = map.points_seen_by(from);
+  const auto seen = [&](PointId p) { return maps::seen_by(map.point(p).observations, keyframe); };
   result.erase(std::remove_if(result.begin(), result.end(), seen), result.end());
   return result;
 }
@@ -84,7 +72,7 @@ void merge(maps::Map& map, PointId a, PointId b) {
   const auto wg = static_cast<double>(std::min(na, nb));
   map.point(kept).position =
       (wk * map.point(kept).position + wg * map.point(gone).position) / std::max(1.0, wk + wg);
-  map.merge_points(kept, gone);
+  map.merge(kept, gone);
 }
 
 void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId keyframe,
@@ -94,9 +82,9 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
   const auto matches = tracking::match_points(map, points, features, camera, pose, options.radius_px,
                                               options.association, nullptr);
   for (const tracking::PointMatch& m : matches) {
-    const maps::MapPoint* point = map.find_point(m.point);  // an earlier match may have merged it away
+    const maps::MapPoint* point = map.find(m.point);  // an earlier match may have merged it away
     const features::PointFeature& f = features.points[static_cast<std::size_t>(m.feature)];
-    if (point == nullptr || seen_by(*point, keyframe) ||
+    if (point == nullptr || maps::seen_by(point->observations, keyframe) ||
         !fits(*point, f, pose, camera, options.association.scale_factor)) {
       continue;
     }
@@ -130,13 +118,6 @@ FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector
   fuse_into(map, unseen_points(map, neighbours, keyframe), keyframe, cameras.at(keyframe.robot), options,
             summary);
   return summary;
-}
-
-FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,
-                          const sensor::Pinhole& camera, const FusionOptions& options) {
-  std::map<std::int32_t, sensor::Pinhole> cameras{{keyframe.robot, camera}};
-  for (const KeyframeId other : neighbours) cameras[other.robot] = camera;
-  return fuse_points(map, keyframe, neighbours, cameras, options);
 }
 
 }  // namespace plumbline::mapping

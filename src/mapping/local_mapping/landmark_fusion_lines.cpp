@@ -17,22 +17,10 @@ constexpr double kEndSigmas = 3.0;    // of a measured end from the landmark in 
 constexpr double kMaxAngle = 0.07;    // rad, between two landmarks that are one
 constexpr double kMinSigma_m = 0.01;  // ends of lines are less exact than corners
 
-bool seen_by(const maps::MapLine& line, KeyframeId keyframe) {
-  return std::any_of(line.observations.begin(), line.observations.end(),
-                     [&](const maps::Observation& o) { return o.keyframe == keyframe; });
-}
-
 std::vector<LineId> unseen_lines(const maps::Map& map, const std::vector<KeyframeId>& from,
                                  KeyframeId keyframe) {
-  std::vector<LineId> result;
-  for (KeyframeId id : from) {
-    for (LineId l : map.lines_of(id)) {
-      if (l.valid()) result.push_back(l);
-    }
-  }
-  std::sort(result.begin(), result.end());
-  result.erase(std::unique(result.begin(), result.end()), result.end());
-  const auto seen = [&](LineId l) { return seen_by(map.line(l), keyframe); };
+  std::vector<LineId> result = map.lines_seen_by(from);
+  const auto seen = [&](LineId l) { return maps::seen_by(map.line(l).observations, keyframe); };
   result.erase(std::remove_if(result.begin(), result.end(), seen), result.end());
   return result;
 }
@@ -87,7 +75,7 @@ bool may_be_one(const maps::MapLine& a, const maps::MapLine& b, const geometry::
     if (distance(end, longer) > kEndSigmas * sigma) return false;
   }
   return std::none_of(a.observations.begin(), a.observations.end(),
-                      [&](const maps::Observation& o) { return seen_by(b, o.keyframe); });
+                      [&](const maps::Observation& o) { return maps::seen_by(b.observations, o.keyframe); });
 }
 
 /// `line` spans what `other` spans, too.
@@ -112,7 +100,7 @@ void merge(maps::Map& map, LineId a, LineId b) {
   const LineId kept = keep_a ? a : b;
   const LineId gone = keep_a ? b : a;
   extend(map.line(kept), map.line(gone));
-  map.merge_lines(kept, gone);
+  map.merge(kept, gone);
 }
 
 void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyframe,
@@ -124,8 +112,8 @@ void fuse_into(maps::Map& map, const std::vector<LineId>& lines, KeyframeId keyf
   const auto matches = tracking::match_lines(map, lines, features, camera, pose, options.radius_px,
                                              options.association, nullptr);
   for (const tracking::LineMatch& m : matches) {
-    const maps::MapLine* line = map.find_line(m.line);  // an earlier match may have merged it away
-    if (line == nullptr || seen_by(*line, keyframe) ||
+    const maps::MapLine* line = map.find(m.line);  // an earlier match may have merged it away
+    if (line == nullptr || maps::seen_by(line->observations, keyframe) ||
         !fits(*line, features.lines[static_cast<std::size_t>(m.feature)], pose, camera)) {
       continue;
     }
@@ -151,13 +139,6 @@ FusionSummary fuse_lines(maps::Map& map, KeyframeId keyframe, const std::vector<
     fuse_into(map, unseen_lines(map, {keyframe}, other), other, cameras, options, summary);
   fuse_into(map, unseen_lines(map, neighbours, keyframe), keyframe, cameras, options, summary);
   return summary;
-}
-
-FusionSummary fuse_lines(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,
-                         const sensor::Pinhole& camera, const FusionOptions& options) {
-  std::map<std::int32_t, sensor::Pinhole> cameras{{keyframe.robot, camera}};
-  for (const KeyframeId other : neighbours) cameras[other.robot] = camera;
-  return fuse_lines(map, keyframe, neighbours, cameras, options);
 }
 
 }  // namespace plumbline::mapping

@@ -199,8 +199,6 @@ core::PointId add_landmark(maps::Map& map, KeyframeId keyframe, int feature,
 
 void TriangulationOptions::declare(core::OptionTable& table) {
   table.integer("triangulate.keyframes", keyframes, {1, 50}, "", "Neighbours that are searched");
-  table.integer("triangulate.max_hamming", max_hamming, {1, 256}, "bit",
-                "Point descriptors may differ by so many bits");
   table.number("triangulate.max_sigma", max_relative_sigma, {0.001, 1.0}, "",
                "Standard deviation of a triangulated depth over that depth, at most");
   table.integer("triangulate.line_views", min_line_views, {2, 10}, "",

@@ -192,8 +192,8 @@ void LocalMapper::triangulate(maps::Map& map, core::KeyframeId id, const NewestI
 void LocalMapper::refine(maps::Map& map, core::KeyframeId id) {
   if (options_.fuse && !distorted(map, id)) {
     const std::vector<core::KeyframeId> neighbours = nearest_undistorted(map, id, options_.fusion.keyframes);
-    fuse_points(map, id, neighbours, camera_, options_.fusion);
-    fuse_lines(map, id, neighbours, camera_, options_.fusion);
+    fuse_points(map, id, neighbours, {{id.robot, camera_}}, options_.fusion);
+    fuse_lines(map, id, neighbours, {{id.robot, camera_}}, options_.fusion);
   }
   culler_.judge(map, id);
 }

@@ -98,7 +98,7 @@ std::vector<Loop> InterRobotLoops::detect(places::Database& database, const maps
   std::vector<Loop> loops;
   for (const Loop& late : sure) {
     std::optional<Loop> worst;
-    double most = optimize::chi_square_gate(6, optimize::PoseGraphOptions().false_alarm);
+    double most = optimize::chi_square_gate(6);
     for (const Loop& early : sightings_) {
       double chi2 = 0.0;
       auto loop = by_way_of(map, early, late, chi2);

@@ -34,9 +34,6 @@ void LoopOptions::declare(core::OptionTable& table) {
                 "Verified keyframes that must agree before a loop is closed");
   table.number("loops.max_alternative", max_alternative, {0.0, 1.0}, "",
                "Share of these that may agree on another place at most");
-  table.number("loops.max_translation", consistency.max_apart_m, {0.0, 10.0}, "m",
-               "How far apart loops that agree may put the camera; 2 cm more for every metre between them");
-  table.number("loops.max_rotation", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
   table.number("loops.max_drift", max_drift, {0.0, 10.0}, "",
                "Share of the way since a place was seen that a loop may correct; 10 cm are always allowed");
   table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
@@ -143,7 +140,8 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
     return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
   };
   const auto neighbours = [&](KeyframeId id) { return map.neighbours(id, kAroundLoop); };
-  const auto candidates = recogniser_.recognise(database_, keyframe, *features, last_, allowed, neighbours);
+  const auto candidates =
+      recogniser_.recognise(database_.query(*features), keyframe, last_, allowed, neighbours);
   const std::vector<Loop> verified = verify(map, keyframe, candidates);
   database_.add(keyframe, features);
   last_ = keyframe;
@@ -192,8 +190,8 @@ void LoopCloser::merge_duplicates(maps::Map& map, const PoseEdge& edge) const {
     for (const KeyframeId other : old_side) {
       if (other != id) others.push_back(other);
     }
-    fuse_points(map, id, others, camera_, options_.fusion);
-    fuse_lines(map, id, others, camera_, options_.fusion);
+    fuse_points(map, id, others, {{id.robot, camera_}}, options_.fusion);
+    fuse_lines(map, id, others, {{id.robot, camera_}}, options_.fusion);
   }
 }
 
@@ -215,9 +213,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
                [&](const PoseEdge& e) { return map.has_keyframe(e.a) && map.has_keyframe(e.b); });
   if (all.size() == known) return false;
 
-  optimize::PoseGraphOptions graph;
-  graph.robust = options_.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
-  const MapGraphResult solved = solve_map_graph(map, all, graph);
+  const MapGraphResult solved = solve_map_graph(map, all, options_.robust);
   if (!solved.summary.usable) return false;
   if (const auto wrong = contradiction(map, solved.poses)) {
     ++counts_.refused;

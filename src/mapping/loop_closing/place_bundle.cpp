@@ -83,11 +83,12 @@ class PairBundle {
 }  // namespace
 
 Rigid3 adjust_pair(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& around,
-                   const CommonLandmarks& common, const ObservationNoise& noise,
+                   const std::vector<tracking::PointMatch>& points,
+                   const std::vector<tracking::LineMatch>& lines, const ObservationNoise& noise,
                    const Rigid3& camera_from_world) {
   PairBundle bundle(query, match, around, noise, camera_from_world);
-  for (const auto& [id, feature] : common.points) bundle.add(id, feature);
-  for (const auto& [id, feature] : common.lines) bundle.add(id, feature);
+  for (const tracking::PointMatch& m : points) bundle.add(m.point, m.feature);
+  for (const tracking::LineMatch& m : lines) bundle.add(m.line, m.feature);
   const bool usable = optimize::adjust_bundle(bundle.problem, {}).usable;
   return usable ? bundle.problem.poses.front().camera_from_world : camera_from_world;
 }

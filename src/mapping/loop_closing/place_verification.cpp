@@ -18,6 +18,7 @@
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 #include "plumbline/tracking/association.hpp"
+#include "plumbline/tracking/pose_terms.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -29,6 +30,7 @@ using geometry::Rigid3;
 
 constexpr double kPointGate = 7.8;
 constexpr double kLineGate = 9.2;
+constexpr double kLineSigma_px = 1.0;
 constexpr std::size_t kSurfaceKeyframes = 5;
 
 const FrameFeatures& features_of(const PlaceView& view) {
@@ -68,8 +70,7 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
   features::LineMatchOptions options;
   options.max_angle_rad = 1.0;
   options.min_length_ratio = 0.3;
-  for (const features::LineMatch& l :
-       features::match_lines(features::described(m.lines), features::described(q.lines), options)) {
+  for (const features::LineMatch& l : features::match_lines(m.lines, q.lines, options)) {
     const features::LineFeature& from = m.lines[static_cast<std::size_t>(l.a)];
     const features::LineFeature& to = q.lines[static_cast<std::size_t>(l.b)];
     if (!from.line3) continue;
@@ -108,19 +109,9 @@ class Growth {
  public:
   Growth(const PlaceView& query, const PlaceView& match, const VerificationOptions& options,
          const std::vector<KeyframeId>& around)
-      : query_(query), match_(match), options_(options) {
-    for (const KeyframeId id : around) {
-      for (const core::PointId p : match.map->points_of(id)) {
-        if (p.valid()) points_.push_back(p);
-      }
-      for (const core::LineId l : match.map->lines_of(id)) {
-        if (l.valid()) lines_.push_back(l);
-      }
-    }
-    std::sort(points_.begin(), points_.end());
-    points_.erase(std::unique(points_.begin(), points_.end()), points_.end());
-    std::sort(lines_.begin(), lines_.end());
-    lines_.erase(std::unique(lines_.begin(), lines_.end()), lines_.end());
+      : query_(query), match_(match) {
+    points_ = match.map->points_seen_by(around);
+    lines_ = match.map->lines_seen_by(around);
     problem.camera = query.camera;
     association_.scale_factor = options.orb_scale_factor;
     solver_.depth_rows = options.depth_rows;
@@ -131,20 +122,19 @@ class Growth {
     const FrameFeatures& features = features_of(query_);
     visible_points.clear();
     visible_lines.clear();
-    const auto points = tracking::match_points(*match_.map, points_, features, query_.camera,
-                                               camera_from_world, radius, association_, &visible_points);
-    const auto lines = tracking::match_lines(*match_.map, lines_, features, query_.camera, camera_from_world,
-                                             radius, association_, &visible_lines);
-    problem.points.clear();
-    problem.lines.clear();
-    common = {};
-    for (const tracking::PointMatch& m : points) add(m);
-    for (const tracking::LineMatch& m : lines) add(m);
+    points = tracking::match_points(*match_.map, points_, features, query_.camera, camera_from_world, radius,
+                                    association_, &visible_points);
+    lines = tracking::match_lines(*match_.map, lines_, features, query_.camera, camera_from_world, radius,
+                                  association_, &visible_lines);
+    problem.points = tracking::point_terms(*match_.map, points, features, association_);
+    problem.lines = tracking::line_terms(*match_.map, lines, features, kLineSigma_px);
     for (int round = 0; round < 2; ++round) {
       summary = optimize::solve_pose(problem, camera_from_world, solver_);
       camera_from_world = summary.camera_from_world;
-      keep(optimize::point_errors(problem, camera_from_world), kPointGate, problem.points, common.points);
-      keep(optimize::line_errors(problem, camera_from_world), kLineGate, problem.lines, common.lines);
+      tracking::keep_inliers(optimize::point_errors(problem, camera_from_world), kPointGate, points,
+                             problem.points);
+      tracking::keep_inliers(optimize::line_errors(problem, camera_from_world), kLineGate, lines,
+                             problem.lines);
     }
     summary = optimize::solve_pose(problem, camera_from_world, solver_);
     camera_from_world = summary.camera_from_world;
@@ -168,50 +158,14 @@ class Growth {
 
   optimize::PoseProblem problem;
   optimize::PoseSummary summary;
-  CommonLandmarks common;  ///< of problem
+  std::vector<tracking::PointMatch> points;  ///< of problem
+  std::vector<tracking::LineMatch> lines;    ///< of problem
   std::vector<core::PointId> visible_points;
   std::vector<core::LineId> visible_lines;
 
  private:
-  void add(const tracking::PointMatch& m) {
-    const features::PointFeature& f = features_of(query_).points[static_cast<std::size_t>(m.feature)];
-    optimize::PointTerm term;
-    term.world = match_.map->point(m.point).position;
-    term.pixel = f.pixel.cast<double>();
-    term.pixel_sigma = std::pow(options_.orb_scale_factor, f.octave);
-    if (f.depth > 0.0F) {
-      term.depth = static_cast<double>(f.depth);
-      term.depth_sigma = std::sqrt(2.0) * sensor::depth_sigma(term.depth);
-    }
-    problem.points.push_back(term);
-    common.points.emplace_back(m.point, m.feature);
-  }
-  void add(const tracking::LineMatch& m) {
-    const maps::MapLine& line = match_.map->line(m.line);
-    const features::LineSegment& s = features_of(query_).lines[static_cast<std::size_t>(m.feature)].segment;
-    optimize::LineTerm term;
-    term.world = geometry::line_through(line.start, line.end);
-    term.start = s.start.cast<double>();
-    term.end = s.end.cast<double>();
-    problem.lines.push_back(term);
-    common.lines.emplace_back(m.line, m.feature);
-  }
-  template <typename Term, typename Landmarks>
-  static void keep(const std::vector<double>& errors, double gate, std::vector<Term>& terms,
-                   Landmarks& landmarks) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      if (!(errors[i] <= gate)) continue;
-      landmarks[kept] = landmarks[i];
-      terms[kept++] = terms[i];
-    }
-    terms.resize(kept);
-    landmarks.resize(kept);
-  }
-
   const PlaceView& query_;
   const PlaceView& match_;
-  const VerificationOptions& options_;
   tracking::AssociationOptions association_;
   optimize::PoseSolverOptions solver_;
   std::vector<core::PointId> points_;
@@ -303,8 +257,6 @@ void VerificationOptions::declare(core::OptionTable& table) {
   table.number("verify.max_contradiction", max_contradiction, {0.0, 1.0}, "",
                "Share of it that may lie where free space was seen");
   table.integer("verify.rounds", rounds, {10, 100000}, "", "RANSAC samples at most");
-  table.integer("verify.neighbours", neighbours, {0, 100}, "",
-                "Keyframes around a place whose landmarks are looked for");
   table.boolean("verify.depth_rows", depth_rows, "Points are held by their depth, too");
   table.boolean("verify.joint", joint, "Landmarks are adjusted together with the pose between two keyframes");
   table.boolean("verify.align", align, "Surfaces have a say in that pose");
@@ -333,7 +285,8 @@ PlaceVerification verify_place(const PlaceView& query, const PlaceView& match,
     ObservationNoise noise;
     noise.orb_scale_factor = options.orb_scale_factor;
     noise.depth_rows = options.depth_rows;
-    camera_from_world = adjust_pair(query, match, around, growth.common, noise, camera_from_world);
+    camera_from_world =
+        adjust_pair(query, match, around, growth.points, growth.lines, noise, camera_from_world);
   }
   result.query_from_match = camera_from_world * match_from_world.inverse();
   result.points = static_cast<int>(growth.problem.points.size());

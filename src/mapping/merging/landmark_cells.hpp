@@ -3,25 +3,17 @@
 
 // What laying maps over each other and looking for steps between their landmarks share.
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstddef>
 
+#include "plumbline/cloud/cell_map.hpp"
 #include "plumbline/features/descriptor.hpp"
 #include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::mapping {
 
-using Cell = std::array<int, 3>;
-
-inline Cell cell_of(const Eigen::Vector3d& p, double size) {
-  const Eigen::Vector3d scaled = p / size;
-  return {static_cast<int>(std::floor(scaled.x())), static_cast<int>(std::floor(scaled.y())),
-          static_cast<int>(std::floor(scaled.z()))};
-}
-
-inline Cell corner_of(const Cell& low, int corner, int sign = 1) {
-  return {low[0] + sign * (corner & 1), low[1] + sign * (corner >> 1 & 1), low[2] + sign * (corner >> 2)};
+/// One of the eight cells of a block: `low`, and its neighbours on the side of `sign`.
+inline Eigen::Vector3i corner_of(const Eigen::Vector3i& low, int corner, int sign = 1) {
+  return low + sign * Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2);
 }
 
 /// Every how manieth, so that no more than `most` are taken.

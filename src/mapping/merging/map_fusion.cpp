@@ -123,8 +123,6 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
                "Metres more for every metre between the pairs: maps drift");
   table.number(prefix + "max_alternative", alternative, {0.0, 1.0}, "",
                "A second answer with this share of the best one's keyframes makes both doubtful");
-  table.number(prefix + "alternative_share", alternative_share, {0.0, 1.0}, "",
-               "Another answer that fits this share of the landmarks the best one fits is a doubt too");
   table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",
                "Share of the landmarks seen through that rules such an answer out");
   table.number(prefix + "min_confirmed", min_confirmed, {0.0, 1.0}, "",
@@ -178,8 +176,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   edges.insert(edges.end(), loops.begin(), loops.end());
   const std::vector<KeyframeId> ids = parts[anchor].map->keyframe_ids();
   GlobalAdjustmentOptions adjustment = options.adjustment;
-  adjustment.graph.robust =
-      options.robust ? optimize::EdgeRobustness::kGraduated : optimize::EdgeRobustness::kNone;
+  adjustment.robust = options.robust;
   adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
   adjustment.bundle = false;  // before surfaces are aligned it bends a map that hangs on a narrow overlap
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
@@ -187,10 +184,7 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   fused.refusal = graph.refusal;
   if (take_back(graph.extra, used, fused)) return fuse_maps(parts, merges, anchor, options);
   if (!options.merge_duplicates) return fused;
-  std::vector<PoseEdge> believed;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    if (i >= graph.extra.size() || !graph.extra[i].rejected) believed.push_back(edges[i]);
-  }
+  const std::vector<PoseEdge> believed = believed_edges(edges, graph.extra);
   std::set<std::pair<KeyframeId, KeyframeId>> done;
   for (const PoseEdge& edge : believed) merge_duplicates(edge, options, done, fused);
   set_loops(fused.map, believed);

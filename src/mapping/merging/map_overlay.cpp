@@ -19,12 +19,6 @@ constexpr std::size_t kMostTried = 6000;
 constexpr double kNear_m = 0.4;  // what depth is believed
 constexpr double kFar_m = 5.0;
 
-std::uint64_t key_of(const Cell& c) {
-  std::uint64_t key = 0;
-  for (const int v : c) key = key << 21U | (static_cast<std::uint64_t>(v + (1 << 20)) & 0x1fffffU);
-  return key;
-}
-
 enum class Seen { kNot, kThere, kThrough };
 
 /// What a keyframe's depth says of a surface at `point` in its camera frame.
@@ -77,7 +71,8 @@ MapOverlay::Side MapOverlay::side(const MapPart& part) {
   std::vector<std::pair<std::uint64_t, core::PointId>> order;
   for (const core::PointId id : part.map->point_ids()) {
     const maps::MapPoint& point = part.map->point(id);
-    if (point.observations.size() >= 2) order.emplace_back(key_of(cell_of(point.position, kCell_m)), id);
+    if (point.observations.size() >= 2)
+      order.emplace_back(cloud::pack_cell(cloud::cell_of(point.position / kCell_m)), id);
   }
   std::sort(order.begin(), order.end());
   for (const auto& [key, id] : order) {
@@ -103,11 +98,11 @@ MapOverlay::MapOverlay(const MapPart& a, const MapPart& b) : a_(side(a)), b_(sid
 bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
                        OverlayFit& sum) const {
   // Cells are twice the reach wide: eight of them hold all that is near.
-  const Cell low = cell_of(at - Eigen::Vector3d::Constant(kReach_m), kCell_m);
+  const Eigen::Vector3i low = cloud::cell_of((at - Eigen::Vector3d::Constant(kReach_m)) / kCell_m);
   bool found = false;
   int near = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const std::uint64_t key = key_of(corner_of(low, corner));
+    const std::uint64_t key = cloud::pack_cell(corner_of(low, corner));
     auto cell = std::lower_bound(side.cells.begin(), side.cells.end(), key);
     for (; cell != side.cells.end() && *cell == key; ++cell) {
       const Landmark& other = side.landmarks[static_cast<std::size_t>(cell - side.cells.begin())];

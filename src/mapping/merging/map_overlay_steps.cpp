@@ -21,18 +21,18 @@ class Peaks {
  public:
   Peaks(const std::vector<Eigen::Vector3d>& steps, double least_m) : steps_(steps), least_m_(least_m) {
     for (std::size_t i = 0; i < steps.size(); ++i) {
-      if (steps[i].norm() >= least_m) bins_[cell_of(steps[i], kBin_m)].push_back(i);
+      if (steps[i].norm() >= least_m) bins_[cloud::pack_cell(cloud::cell_of(steps[i] / kBin_m))].push_back(i);
     }
   }
   /// Means of the fullest blocks of eight bins, no two of one peak.
   [[nodiscard]] std::vector<Eigen::Vector3d> highest(std::size_t most) const {
-    std::map<Cell, std::size_t> counts;
+    std::map<std::uint64_t, std::size_t> counts;
     for (const auto& bin : bins_) {
       for (int corner = 0; corner < 8; ++corner) {
-        counts[corner_of(bin.first, corner, -1)] += bin.second.size();
+        counts[cloud::pack_cell(corner_of(cloud::unpack_cell(bin.first), corner, -1))] += bin.second.size();
       }
     }
-    std::vector<std::pair<std::size_t, Cell>> blocks;
+    std::vector<std::pair<std::size_t, std::uint64_t>> blocks;
     for (const auto& [low, count] : counts) blocks.emplace_back(count, low);
     std::sort(blocks.begin(), blocks.end(), [](const auto& x, const auto& y) {
       return x.first != y.first ? x.first > y.first : x.second < y.second;
@@ -40,7 +40,7 @@ class Peaks {
     std::vector<Eigen::Vector3d> result;
     for (const auto& block : blocks) {
       if (result.size() >= most) break;
-      const Eigen::Vector3d mean = settled(mean_of(block.second));
+      const Eigen::Vector3d mean = settled(mean_of(cloud::unpack_cell(block.second)));
       const auto same = [&](const Eigen::Vector3d& other) { return (other - mean).norm() < 2.0 * kBin_m; };
       if (mean.norm() >= least_m_ && std::none_of(result.begin(), result.end(), same)) result.push_back(mean);
     }
@@ -48,11 +48,11 @@ class Peaks {
   }
 
  private:
-  [[nodiscard]] Eigen::Vector3d mean_of(const Cell& low) const {
+  [[nodiscard]] Eigen::Vector3d mean_of(const Eigen::Vector3i& low) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     double count = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
-      const auto bin = bins_.find(corner_of(low, corner));
+      const auto bin = bins_.find(cloud::pack_cell(corner_of(low, corner)));
       if (bin == bins_.end()) continue;
       for (const std::size_t i : bin->second) sum += steps_[i];
       count += static_cast<double>(bin->second.size());
@@ -79,7 +79,7 @@ class Peaks {
 
   const std::vector<Eigen::Vector3d>& steps_;
   double least_m_;
-  std::map<Cell, std::vector<std::size_t>> bins_;
+  std::map<std::uint64_t, std::vector<std::size_t>> bins_;  ///< by cell, in order of x, then y, then z
 };
 
 }  // namespace

@@ -12,7 +12,6 @@
 
 #include "plumbline/cloud/constrained_point_to_plane.hpp"
 #include "plumbline/cloud/two_way_correspondences.hpp"
-#include "registration/surface_voxels.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -36,8 +35,10 @@ Rigid3 rigid_of(const Eigen::Matrix4d& matrix) {
 /// the rest.
 pcl::Indices spread(const SurfaceCloud& cloud, const pcl::Indices& some, int wanted) {
   std::array<pcl::Indices, 6> ways;
-  for (const int i : some)
-    ways[facing(cloud[static_cast<std::size_t>(i)].getNormalVector3fMap())].push_back(i);
+  for (const int i : some) {
+    const SurfacePoint& p = cloud[static_cast<std::size_t>(i)];
+    ways[static_cast<std::size_t>(cloud::facing(p.getNormalVector3fMap()))].push_back(i);
+  }
   std::array<pcl::Indices*, 6> order{};
   for (std::size_t i = 0; i < 6; ++i) order[i] = &ways[i];
   std::stable_sort(order.begin(), order.end(), [](auto* x, auto* y) { return x->size() < y->size(); });
@@ -213,13 +214,8 @@ class Aligner {
 
 cloud::SurfaceSearch search_of(const CoarseSurface& surface) {
   auto cloud = std::make_shared<SurfaceCloud>();
-  for (const maps::SurfaceSample& s : surface) {
-    SurfacePoint p;
-    p.getVector3fMap() = s.point;
-    p.getNormalVector3fMap() = s.normal;
-    p.curvature = s.sigma;
-    cloud->push_back(p);
-  }
+  for (const maps::SurfaceSample& s : surface)
+    cloud->push_back(cloud::surface_point(s.point, s.normal, s.sigma));
   return cloud::SurfaceSearch(cloud);
 }
 
@@ -238,9 +234,6 @@ void AlignmentOptions::declare(core::OptionTable& table) {
       "icp.min_information", min_information, {0.0, 0.3}, "",
       "A direction is held when its share of the normals, squared, is larger: a corridor's length, with "
       "little along it, is not");
-  table.number("icp.correlation", correlation, {1e-4, 1.0}, "",
-               "By how much samples count: the noise of neighbours is alike");
-  table.number("icp.min_sigma", floor_m, {0.0, 0.1}, "m", "What no alignment of this sensor knows better");
 }
 
 SurfaceAlignment align_surfaces(const cloud::SurfaceSearch& a, const cloud::SurfaceSearch& b,

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <utility>
 
+#include "plumbline/cloud/cell_map.hpp"
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/cloud/surface_cloud.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
-#include "registration/surface_voxels.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -55,14 +55,6 @@ class LocalMapCutter {
   std::vector<LocalMap> result_;
 };
 
-cloud::SurfacePoint point_of(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, float sigma) {
-  cloud::SurfacePoint p;
-  p.getVector3fMap() = point;
-  p.getNormalVector3fMap() = normal;
-  p.curvature = sigma;
-  return p;
-}
-
 CoarseSurface samples_of(const cloud::SurfaceCloud& cloud) {
   CoarseSurface samples;
   samples.reserve(cloud.size());
@@ -82,7 +74,7 @@ CoarseSurface fused_surface(const maps::Map& map, const std::map<KeyframeId, Coa
     const Eigen::Matrix3f rotation = anchor_from_member.rotation.cast<float>();
     const Eigen::Vector3f translation = anchor_from_member.translation.cast<float>();
     for (const maps::SurfaceSample& s : surfaces.at(id))
-      all.push_back(point_of(rotation * s.point + translation, rotation * s.normal, s.sigma));
+      all.push_back(cloud::surface_point(rotation * s.point + translation, rotation * s.normal, s.sigma));
   }
   return samples_of(cloud::voxel_filtered(all, static_cast<float>(voxel_m), true));
 }
@@ -94,8 +86,9 @@ std::vector<std::uint64_t> filled_voxels(const maps::Map& map, const LocalMap& l
   const Eigen::Vector3f translation = world_from_anchor.translation.cast<float>();
   std::vector<std::uint64_t> keys;
   for (const maps::SurfaceSample& s : local.surface) {
-    const std::uint64_t key = voxel_key(rotation * s.point + translation, static_cast<float>(voxel_m)) << 3 |
-                              facing(rotation * s.normal);
+    const Eigen::Vector3f at = (rotation * s.point + translation) / static_cast<float>(voxel_m);
+    const std::uint64_t key = cloud::pack_cell(at.array().floor().cast<int>()) << 3 |
+                              static_cast<std::uint64_t>(cloud::facing(Eigen::Vector3f(rotation * s.normal)));
     if (keys.empty() || keys.back() != key) keys.push_back(key);  // neighbours follow one another
   }
   std::sort(keys.begin(), keys.end());
@@ -163,8 +156,8 @@ CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m) {
     if (!p.getVector3fMap().allFinite() || !normal.allFinite() || !(p.z > 0.0F)) continue;
     // Half of the noise stays in the mean of a voxel; it acts along the ray.
     const double sigma = 0.5 * sensor::depth_sigma(static_cast<double>(p.z));
-    points.push_back(point_of(rotation * p.getVector3fMap() + translation, rotation * normal,
-                              static_cast<float>(sigma) * std::max(0.3F, -normal.z())));
+    points.push_back(cloud::surface_point(rotation * p.getVector3fMap() + translation, rotation * normal,
+                                          static_cast<float>(sigma) * std::max(0.3F, -normal.z())));
   }
   return samples_of(cloud::voxel_filtered(points, static_cast<float>(voxel_m), false));
 }

@@ -42,31 +42,22 @@ const Keys kAdvanced{
 
 /// What nobody has been seen to set: accepted, and listed nowhere.
 const Keys kInternal{
-    {"features",
-     keys_in("line.border_either line.exact_nfa orb.spread line.join_gap line.join_angle line.join_offset "
-             "line.depth_side line.depth_inlier_sigmas line.depth_min_inlier_share line.depth_min_coverage "
-             "line.depth_min_inliers line.depth_ransac_rounds line.depth_pixel_sigma")},
+    {"features", keys_in("line.border_either line.exact_nfa orb.spread")},
     {"track",
      keys_in(
-         "match.max_point_angle match.max_line_angle local.overlap_angle solver.point_loss solver.line_loss "
-         "solver.plane_loss solver.photometric_loss keyframe.cone_min_change landmark.min_visible "
-         "landmark.min_age triangulate.max_hamming triangulate.max_sigma triangulate.line_views "
-         "bundle.rounds bundle.tolerance bundle.point_loss bundle.line_loss bundle.edge_loss "
-         "surface.max_incidence loops.max_translation loops.max_rotation vocabulary.split "
-         "vocabulary.iterations places.min_absolute places.votes places.consistent places.candidates "
-         "places.islands verify.min_found verify.min_evidence verify.min_cells verify.neighbours "
-         "keyframe.cone_balance keyframe.cone_scaled keyframe.cone_epsilon keyframe.urgent thumbnails "
+         "local.overlap_angle keyframe.cone_min_change landmark.min_visible landmark.min_age "
+         "triangulate.max_sigma triangulate.line_views bundle.rounds surface.max_incidence vocabulary.split "
+         "places.min_absolute places.votes places.consistent verify.min_found verify.min_evidence "
+         "verify.min_cells keyframe.cone_balance keyframe.cone_scaled keyframe.urgent thumbnails "
          "motion_prior pnp_start landmark.by_keyframes bundle.depth_rows "
          "solver.depth_rows verify.depth_rows verify.align verify.joint match.min_line_ratio")},
     {"merge",
-     keys_in("min_span min_turn max_translation max_rotation drift max_alternative alternative_share "
+     keys_in("min_span min_turn max_translation max_rotation drift max_alternative "
              "max_seen_through min_confirmed robust vocabulary.branching vocabulary.levels vocabulary.split "
-             "vocabulary.iterations places.min_score places.min_absolute places.votes places.consistent "
-             "places.candidates places.islands verify.min_inliers verify.min_overlap "
-             "verify.max_contradiction verify.min_found verify.min_evidence verify.min_cells "
-             "verify.neighbours verify.depth_rows verify.align verify.joint")},
-    {"refine", keys_in("adjust.depth_rows local_map.angle icp.min_information icp.correlation icp.min_sigma "
-                       "adjust.pose_graph adjust.bundle adjust.rounds adjust.tolerance")},
+             "places.min_score places.min_absolute places.votes places.consistent verify.min_inliers "
+             "verify.min_overlap verify.max_contradiction verify.min_found verify.min_evidence "
+             "verify.min_cells verify.depth_rows verify.align verify.joint")},
+    {"refine", keys_in("adjust.depth_rows local_map.angle icp.min_information")},
 };
 
 bool lists(const Keys& keys, const std::string& stage, const std::string& key) {

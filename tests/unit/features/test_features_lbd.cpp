@@ -8,10 +8,10 @@
 namespace plumbline::features {
 namespace {
 
-std::vector<DescribedLine> describe(const world::View& view) {
+std::vector<LineFeature> describe(const world::View& view) {
   const std::vector<LineDescriptor> descriptors = describe_lines(view.image, view.lines);
-  std::vector<DescribedLine> result;
-  for (std::size_t i = 0; i < descriptors.size(); ++i) result.push_back({view.lines[i], descriptors[i]});
+  std::vector<LineFeature> result;
+  for (std::size_t i = 0; i < descriptors.size(); ++i) result.push_back({view.lines[i], descriptors[i], {}});
   return result;
 }
 
@@ -113,40 +113,36 @@ TEST(LineMatch, PairsTheSameEdgesWithFewErrors) {
 }
 
 TEST(LineMatch, HonoursItsGates) {
-  const DescribedLine base{world::segment(0, 0, 100, 0), {}};
-  LineMatchOptions o;
-  const auto matched = [&](const LineSegment& other) { return match_lines({base}, {{other, {}}}, o).size(); };
-  EXPECT_EQ(matched(world::segment(0, 0, 100, 0)), 1U);
+  const LineSegment base = world::segment(0, 0, 100, 0);
+  const auto matched = [&](const LineSegment& other) {
+    return match_lines({{base, {}, {}}}, {{other, {}, {}}}).size();
+  };
+  EXPECT_EQ(matched(world::segment(0, 40, 100, 40)), 1U);
   EXPECT_EQ(matched(world::segment(100, 0, 0, 0)), 0U);   // opposite step
   EXPECT_EQ(matched(world::segment(0, 0, 100, 50)), 0U);  // turned by 0.46 rad
   EXPECT_EQ(matched(world::segment(0, 0, 30, 0)), 0U);    // too short
-  EXPECT_EQ(matched(world::segment(0, 40, 100, 40)), 1U);
-  o.max_distance_px = 20.0;
-  EXPECT_EQ(matched(world::segment(0, 40, 100, 40)), 0U);
-  EXPECT_EQ(matched(world::segment(0, 10, 100, 10)), 1U);
-  EXPECT_EQ(matched(world::segment(60, 10, 160, 10)), 1U);
-  o.min_overlap = 0.5;
-  EXPECT_EQ(matched(world::segment(60, 10, 160, 10)), 0U);
-  EXPECT_NEAR(overlap(base.segment, world::segment(60, 10, 160, 10)), 0.4, 1e-5);
-  EXPECT_EQ(overlap(base.segment, world::segment(200, 0, 300, 0)), 0.0);
+  EXPECT_NEAR(overlap(base, world::segment(60, 10, 160, 10)), 0.4, 1e-5);
+  EXPECT_EQ(overlap(base, world::segment(200, 0, 300, 0)), 0.0);
 }
 
 TEST(LineMatch, RefusesTheAmbiguousAndTheFar) {
-  const LineSegment s = world::segment(0, 0, 100, 0);
-  const LineDescriptor zero{};
-  const LineDescriptor near{0xFFULL, 0, 0, 0};
-  const LineDescriptor far{~0ULL, ~0ULL, 0, 0};
-  EXPECT_EQ(hamming(zero, near), 8);
-  EXPECT_EQ(hamming(zero, far), 128);
-  EXPECT_EQ(match_lines({{s, zero}}, {{s, far}}).size(), 0U);
-  EXPECT_EQ(match_lines({{s, zero}}, {{s, near}, {s, near}}).size(), 0U);
-  EXPECT_EQ(match_lines({{s, zero}}, {{s, near}, {s, far}}).size(), 1U);
+  const auto line = [](const LineDescriptor& descriptor) {
+    return LineFeature{world::segment(0, 0, 100, 0), descriptor, {}};
+  };
+  const LineFeature zero = line({});
+  const LineFeature near = line({0xFFULL, 0, 0, 0});
+  const LineFeature far = line({~0ULL, ~0ULL, 0, 0});
+  EXPECT_EQ(hamming(zero.descriptor, near.descriptor), 8);
+  EXPECT_EQ(hamming(zero.descriptor, far.descriptor), 128);
+  EXPECT_EQ(match_lines({zero}, {far}).size(), 0U);
+  EXPECT_EQ(match_lines({zero}, {near, near}).size(), 0U);
+  EXPECT_EQ(match_lines({zero}, {near, far}).size(), 1U);
   // Two want the same: only its own best gets it.
-  const std::vector<LineMatch> mutual = match_lines({{s, near}, {s, zero}}, {{s, zero}});
+  const std::vector<LineMatch> mutual = match_lines({near, zero}, {zero});
   ASSERT_EQ(mutual.size(), 1U);
   EXPECT_EQ(mutual[0].a, 1);
-  EXPECT_TRUE(match_lines({}, {{s, zero}}).empty());
-  EXPECT_TRUE(match_lines({{s, zero}}, {}).empty());
+  EXPECT_TRUE(match_lines({}, {zero}).empty());
+  EXPECT_TRUE(match_lines({zero}, {}).empty());
 }
 
 }  // namespace

@@ -69,7 +69,7 @@ TEST(LineTriangulation, EndsNeedNotBeTheSamePoints) {
   const Eigen::Vector3d along = kUpright.end - kUpright.start;
   const Segment part{kUpright.start + 0.3 * along, kUpright.end + 0.4 * along};
   const TriangulatedLine result = triangulate_line({view_of(kUpright, a), view_of(part, b)});
-  ASSERT_TRUE(result.ok()) << to_string(result.status);
+  ASSERT_TRUE(result.ok());
   EXPECT_LT((result.start - kUpright.start).norm(), 1e-8) << "ends are those of the first view";
   EXPECT_LT((result.end - kUpright.end).norm(), 1e-8);
 }
@@ -80,7 +80,7 @@ TEST(LineTriangulation, SigmaTellsTheSpread) {
   for (int i = 0; i < 4; ++i)
     exact.push_back(view_of(kUpright, camera_at({0.08 * i, 0.02 * i, 0.03 * i}, -0.02 * i)));
   const TriangulatedLine truth = triangulate_line(exact);
-  ASSERT_TRUE(truth.ok()) << to_string(truth.status);
+  ASSERT_TRUE(truth.ok());
   double squared = 0.0;
   double rms = 0.0;
   int solved = 0;
@@ -124,7 +124,7 @@ TEST(LineTriangulation, MovingAlongTheLineTellsNothing) {
   EXPECT_EQ(turned.status, Status::kTooLittleParallax);
   const TriangulatedLine across =
       triangulate_line({view_of(level, camera_at({0, 0, 0})), view_of(level, camera_at({0, 0.5, 0}))});
-  EXPECT_TRUE(across.ok()) << to_string(across.status);
+  EXPECT_TRUE(across.ok());
 }
 
 TEST(LineTriangulation, WhatIsFarForItsBaselineIsRefused) {
@@ -176,7 +176,6 @@ TEST(LineTriangulation, DegenerateInputIsRefused) {
   EXPECT_EQ(triangulate_line({a, point}).status, Status::kDegenerate);
   b.end.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(triangulate_line({a, b}).status, Status::kDegenerate);
-  EXPECT_STREQ(to_string(Status::kTooLittleParallax), "too little parallax");
 }
 
 }  // namespace

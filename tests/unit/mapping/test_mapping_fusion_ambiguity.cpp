@@ -27,7 +27,7 @@ void add_landmarks_seen_twice(maps::Map& map, const cv::Mat& wall, const Rigid3&
   const std::vector<core::PointId> kept = map.points_of(first);
   const std::vector<core::PointId> gone = map.points_of(second);
   for (std::size_t i = 0; i < kept.size() && i < gone.size(); ++i) {
-    if (kept[i].valid() && gone[i].valid()) map.merge_points(kept[i], gone[i]);
+    if (kept[i].valid() && gone[i].valid()) map.merge(kept[i], gone[i]);
   }
 }
 

@@ -271,7 +271,7 @@ TEST(AdjustMap, SmallAndEmptyMapsStay) {
   EXPECT_FALSE(adjust_map(empty, kOneCamera, {}, {}).changed);
   RingMap single(0.0, 1);
   EXPECT_FALSE(adjust_map(single.map, kOneCamera, {}, {}).changed);
-  EXPECT_FALSE(solve_map_graph(empty, {}, {}).summary.usable);
+  EXPECT_FALSE(solve_map_graph(empty, {}, true).summary.usable);
 }
 
 TEST(AdjustMap, SameInputSameBytes) {

@@ -192,11 +192,11 @@ TEST(Fusion, AddsObservationsThatWereMissingBothWays) {
   const KeyframeId b = world.add_keyframe(looking_from(0.1));
   for (std::size_t i = 0; i < 60; ++i) world.add_point(i, {i < 30 ? a : b});
   for (std::size_t i = 0; i < 15; ++i) world.add_line(i, {i < 7 ? a : b});
-  const FusionSummary points = fuse_points(world.map, b, {a}, world.camera, {});
+  const FusionSummary points = fuse_points(world.map, b, {a}, {{0, world.camera}}, {});
   EXPECT_GT(points.observed, 50);
   EXPECT_EQ(points.merged, 0);
   EXPECT_EQ(world.map.shared(a, b), points.observed);
-  const FusionSummary lines = fuse_lines(world.map, b, {a}, world.camera, {});
+  const FusionSummary lines = fuse_lines(world.map, b, {a}, {{0, world.camera}}, {});
   EXPECT_GT(lines.observed, 10);
   for (core::PointId id : world.map.point_ids()) {
     for (const maps::Observation& o : world.map.point(id).observations) EXPECT_EQ(o.feature, id.index);
@@ -213,10 +213,10 @@ TEST(Fusion, MergesDoublesIntoTheBetterSeen) {
   for (std::size_t i = 0; i < 60; ++i) world.add_point(i, {c}, error);
   for (std::size_t i = 0; i < 15; ++i) world.add_line(i, {a, b});
   for (std::size_t i = 0; i < 15; ++i) world.add_line(i, {c}, error);
-  const FusionSummary points = fuse_points(world.map, c, {a, b}, world.camera, {});
+  const FusionSummary points = fuse_points(world.map, c, {a, b}, {{0, world.camera}}, {});
   EXPECT_GT(points.merged, 50);
   EXPECT_EQ(world.map.point_count(), static_cast<std::size_t>(120 - points.merged));
-  const FusionSummary lines = fuse_lines(world.map, c, {a, b}, world.camera, {});
+  const FusionSummary lines = fuse_lines(world.map, c, {a, b}, {{0, world.camera}}, {});
   EXPECT_GT(lines.merged, 10);
   for (core::PointId id : world.map.point_ids()) {
     if (world.map.point(id).observations.size() < 3) continue;
@@ -234,9 +234,9 @@ TEST(Fusion, NeighboursInSpaceOrInOnePictureStayTwo) {
   const KeyframeId b = world.add_keyframe(looking_from(0.05));
   const core::PointId near = world.add_point(0, {a});
   const core::PointId far = world.add_point(1, {b}, {0.0, 0.0, 0.6});  // on the same ray of no camera but a's
-  EXPECT_EQ(fuse_points(world.map, b, {a}, world.camera, {}).merged, 0) << "60 cm behind it";
-  EXPECT_NE(world.map.find_point(near), nullptr);
-  EXPECT_NE(world.map.find_point(far), nullptr);
+  EXPECT_EQ(fuse_points(world.map, b, {a}, {{0, world.camera}}, {}).merged, 0) << "60 cm behind it";
+  EXPECT_NE(world.map.find(near), nullptr);
+  EXPECT_NE(world.map.find(far), nullptr);
 
   LandmarkWorld pair(9, 2, 0);  // two corners 1.5 cm (4 px) apart that look the same, both in one picture
   pair.points = {{0.0, 0.0, 2.0}, {0.015, 0.0, 2.0}};
@@ -245,7 +245,7 @@ TEST(Fusion, NeighboursInSpaceOrInOnePictureStayTwo) {
   const KeyframeId d = pair.add_keyframe(looking_from(0.05));
   pair.add_point(0, {c, d});
   pair.add_point(1, {c});
-  EXPECT_EQ(fuse_points(pair.map, d, {c}, pair.camera, {}).merged, 0);
+  EXPECT_EQ(fuse_points(pair.map, d, {c}, {{0, pair.camera}}, {}).merged, 0);
   EXPECT_EQ(pair.map.point_count(), 2U);
 }
 
@@ -256,7 +256,7 @@ TEST(Fusion, ACornerTwoPixelsOffIsAnother) {
     const KeyframeId a = world.add_keyframe(looking_from(0.0));
     const KeyframeId b = world.add_keyframe(looking_from(0.05));
     world.add_point(0, {a}, {error_m, 0.0, 0.0});
-    EXPECT_EQ(fuse_points(world.map, b, {a}, world.camera, {}).observed, error_m < 0.005 ? 1 : 0);
+    EXPECT_EQ(fuse_points(world.map, b, {a}, {{0, world.camera}}, {}).observed, error_m < 0.005 ? 1 : 0);
   }
 }
 
@@ -281,7 +281,7 @@ TEST(Fusion, EdgesThatMeetInOnePictureStayTwo) {
     const KeyframeId before = world.add_keyframe(looking_from(0.0));
     world.add_line(0, {aside});
     world.add_line(0, {before}, {0.0, 0.0, behind_m});
-    EXPECT_EQ(fuse_lines(world.map, before, {aside}, world.camera, {}).merged, behind_m > 0.0 ? 0 : 1);
+    EXPECT_EQ(fuse_lines(world.map, before, {aside}, {{0, world.camera}}, {}).merged, behind_m > 0.0 ? 0 : 1);
     EXPECT_EQ(world.map.line_count(), behind_m > 0.0 ? 2U : 1U);
   }
 }
@@ -308,15 +308,15 @@ TEST(LandmarkCuller, KeepsWhatIsSeenAndFound) {
     world.map.point(id).found = id == seldom ? 5 : 6;
   }
   EXPECT_EQ(culler.judge(world.map, k[4]), 1) << "found in less than 30 %: at once";
-  EXPECT_EQ(world.map.find_point(seldom), nullptr);
-  EXPECT_NE(world.map.find_point(few), nullptr) << "within the grace time";
+  EXPECT_EQ(world.map.find(seldom), nullptr);
+  EXPECT_NE(world.map.find(few), nullptr) << "within the grace time";
   EXPECT_EQ(culler.judge(world.map, k[5]), 2);
-  EXPECT_EQ(world.map.find_point(few), nullptr);
-  EXPECT_EQ(world.map.find_line(few_line), nullptr);
-  EXPECT_NE(world.map.find_point(good), nullptr);
-  EXPECT_NE(world.map.find_line(good_line), nullptr);
-  EXPECT_NE(world.map.find_point(young), nullptr);
-  world.map.remove_point(young);  // gone by other means
+  EXPECT_EQ(world.map.find(few), nullptr);
+  EXPECT_EQ(world.map.find(few_line), nullptr);
+  EXPECT_NE(world.map.find(good), nullptr);
+  EXPECT_NE(world.map.find(good_line), nullptr);
+  EXPECT_NE(world.map.find(young), nullptr);
+  world.map.remove(young);  // gone by other means
   EXPECT_EQ(culler.judge(world.map, {0, 140}), 0) << "who passed stays";
   world.map.point(good).found = 0;
   EXPECT_EQ(culler.judge(world.map, {0, 141}), 0) << "and is not judged again";

@@ -139,7 +139,7 @@ TEST(LocalBundle, AKeyframeTakenWhileTurningFastSaysLess) {
     std::vector<double> found;
     const LocalBundle bundle = take_local_bundle(world.map, {0, 1}, kCamera, {});
     for (std::size_t i = 0; i < bundle.point_seen.size(); ++i) {
-      if (bundle.point_seen[i].by.keyframe == KeyframeId{0, 2})
+      if (bundle.point_seen[i].keyframe == KeyframeId{0, 2})
         found.push_back(bundle.problem.point_observations[i].pixel_sigma);
     }
     return found;
@@ -220,12 +220,12 @@ TEST(LocalBundle, WhatIsGoneMeanwhileIsLeftOut) {
   world.map.set_parent({0, 1}, {0, 0});
   world.map.set_parent({0, 2}, {0, 0});
   LocalBundle bundle = take_local_bundle(world.map, {0, 2}, kCamera, {});
-  world.map.remove_point(core::PointId{0, 4});
-  world.map.merge_points(core::PointId{0, 5}, core::PointId{0, 6});
+  world.map.remove(core::PointId{0, 4});
+  world.map.merge(core::PointId{0, 5}, core::PointId{0, 6});
   ASSERT_TRUE(optimize::adjust_bundle(bundle.problem, {}).usable);
   ASSERT_TRUE(put_back(bundle, world.map).has_value());
-  EXPECT_EQ(world.map.find_point(core::PointId{0, 4}), nullptr);
-  EXPECT_EQ(world.map.find_point(core::PointId{0, 6}), nullptr);
+  EXPECT_EQ(world.map.find(core::PointId{0, 4}), nullptr);
+  EXPECT_EQ(world.map.find(core::PointId{0, 6}), nullptr);
   EXPECT_LT(tests::distance(world.map.camera_from_world({0, 2}), world.truth[2]), 1e-3);
   EXPECT_LT((world.map.point(core::PointId{0, 8}).position - world.points[8]).norm(), 2e-3);
 }

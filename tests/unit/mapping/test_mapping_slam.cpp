@@ -11,6 +11,8 @@
 
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/mapping/slam.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/line_export.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::mapping {
@@ -99,8 +101,8 @@ SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& 
   slam.finish();
   result.landmarks = landmarks_of(slam.map());
   result.trajectory = slam.trajectory();
-  result.keyframes = slam.keyframe_trajectory();
-  result.lines = slam.line_segments();
+  result.keyframes = maps::keyframe_trajectory(slam.map());
+  result.lines = maps::line_segments(slam.map());
   result.points = slam.map().point_count();
   return result;
 }

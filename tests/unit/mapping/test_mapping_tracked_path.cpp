@@ -127,7 +127,7 @@ TEST(TrackedPath, ALoopOfTwentyCentimetresPasses) {
                 way.truth[23] * Rigid3(Eigen::Matrix3d::Identity(), {0.0, 0.2, 0.0}),
                 1e6 * geometry::Matrix6d::Identity(),
                 true};
-  const MapGraphResult solved = solve_map_graph(way.map, {loop}, {});
+  const MapGraphResult solved = solve_map_graph(way.map, {loop}, true);
   ASSERT_TRUE(solved.summary.usable) << solved.summary.message;
   const Rigid3 end = solved.poses.back().second;
   EXPECT_GT(tests::distance(end, way.truth[23]), 0.15) << "the loop is closed";

@@ -54,7 +54,7 @@ void expect_consistent(const Map& map) {
     const auto& points = map.points_of(a);
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!points[i].valid()) continue;
-      const MapPoint* point = map.find_point(points[i]);
+      const MapPoint* point = map.find(points[i]);
       ASSERT_NE(point, nullptr) << "a feature names a point that is gone";
       int seen = 0;
       for (const Observation& o : point->observations) {
@@ -106,7 +106,7 @@ TEST(Map, WhatWasAlignedWithAnotherLandmarkIsNotAlignedAfterAMerger) {
   map.observe(kept, a, 0, true);
   map.observe(kept, b, 0);
   map.observe(gone, c, 1, true);
-  map.merge_points(kept, gone);
+  map.merge(kept, gone);
   const std::vector<Observation>& seen = map.point(kept).observations;
   ASSERT_EQ(seen.size(), 3U);
   EXPECT_TRUE(seen[0].aligned);
@@ -168,7 +168,7 @@ TEST(Map, UnknownThingsThrowAndChangeNothing) {
   EXPECT_TRUE(map.point(p).observations.empty());
   EXPECT_THROW(map.add_keyframe(nullptr, {}), std::invalid_argument);
   EXPECT_THROW(map.add_keyframe(std::make_shared<Keyframe>(), {}), std::invalid_argument);  // no id
-  map.remove_point({0, 9});
+  map.remove(PointId{0, 9});
   EXPECT_EQ(map.point_count(), 1U);
 }
 
@@ -190,23 +190,23 @@ TEST(Map, CovisibilityStaysRightUnderRandomChanges) {
     const LineId l = pick(lines);
     switch (random.integer(0, 9)) {
       case 0:
-        if (map.find_point(p) != nullptr) map.unobserve(p, k);
+        if (map.find(p) != nullptr) map.unobserve(p, k);
         break;
       case 1:
-        if (map.find_line(l) != nullptr) map.unobserve(l, k);
+        if (map.find(l) != nullptr) map.unobserve(l, k);
         break;
       case 2:
-        if (round % 10 == 0) map.remove_point(p);
+        if (round % 10 == 0) map.remove(p);
         break;
       case 3:
-        if (round % 20 == 0) map.remove_line(l);
+        if (round % 20 == 0) map.remove(l);
         break;
       case 4:
       case 5:
-        if (map.find_line(l) != nullptr) map.observe(l, k, random.integer(0, 9));
+        if (map.find(l) != nullptr) map.observe(l, k, random.integer(0, 9));
         break;
       default:
-        if (map.find_point(p) != nullptr) map.observe(p, k, random.integer(0, 29));
+        if (map.find(p) != nullptr) map.observe(p, k, random.integer(0, 29));
         break;
     }
     if (round % 250 == 0) expect_consistent(map);
@@ -315,7 +315,7 @@ TEST(Map, LandmarkIdsAreNotReusedAndRobotsCountAlone) {
   EXPECT_EQ(map.add_point(0, {}), (PointId{0, 0}));
   EXPECT_EQ(map.add_point(1, {}), (PointId{1, 0}));
   const PointId p = map.add_point(0, {});
-  map.remove_point(p);
+  map.remove(p);
   EXPECT_EQ(map.add_point(0, {}), (PointId{0, 2}));
   MapPoint with_history;
   with_history.observations.push_back({{0, 5}, 1});

@@ -149,7 +149,7 @@ TEST(MapStore, HoldsWhatIsHardlyThere) {
   empty->features = std::make_shared<features::FrameFeatures>();
   empty->stamp = -0.0;
   map.add_keyframe(empty, {});
-  map.remove_point(map.add_point(5, {}));  // a robot whose only point went
+  map.remove(map.add_point(5, {}));  // a robot whose only point went
   auto writer = StoreWriter::create(folder.file(), {});
   ASSERT_TRUE(writer);
   ASSERT_TRUE(writer->save_final(map, {}));

@@ -75,7 +75,7 @@ TEST(StoreReplica, HoldsTheSameRowsWheneverItCaughtUp) {
   for (int i = 0; i < 24; ++i) {
     const KeyframeId id = world.step();  // landmarks come and go
     for (const PointId p : world.map.point_ids()) {
-      if (i == 15 && p.robot == 0 && p.index < 64) world.map.remove_point(p);  // a row goes
+      if (i == 15 && p.robot == 0 && p.index < 64) world.map.remove(p);  // a row goes
     }
     ASSERT_TRUE(writer->add_keyframe(world.map, id, small_cloud(i), world.frames));
     if (i % 5 != 0) continue;

@@ -120,8 +120,8 @@ TEST(MapMerge, ObservationsAndCountsMove) {
   map.observe(p, b, 0);
   map.observe(q, b, 1);
   map.observe(q, c, 1);
-  map.merge_points(p, q);
-  EXPECT_EQ(map.find_point(q), nullptr);
+  map.merge(p, q);
+  EXPECT_EQ(map.find(q), nullptr);
   EXPECT_EQ(map.point(p).observations.size(), 3U);
   EXPECT_EQ(map.point(p).visible, 8);
   EXPECT_EQ(map.point(p).found, 6);
@@ -130,8 +130,8 @@ TEST(MapMerge, ObservationsAndCountsMove) {
   EXPECT_EQ(map.point_of(b, 0), p) << "its own feature stays";
   EXPECT_FALSE(map.point_of(b, 1).valid()) << "the other is free again";
   EXPECT_EQ(map.shared(a, c), 1);
-  EXPECT_THROW(map.merge_points(p, p), std::invalid_argument);
-  EXPECT_THROW(map.merge_points(p, q), std::out_of_range);
+  EXPECT_THROW(map.merge(p, p), std::invalid_argument);
+  EXPECT_THROW(map.merge(p, q), std::out_of_range);
   EXPECT_EQ(map.point(p).observations.size(), 3U);
 
   const LineId l = map.add_line(0, {});
@@ -139,11 +139,11 @@ TEST(MapMerge, ObservationsAndCountsMove) {
   map.observe(l, a, 0);
   map.observe(m, a, 1);
   map.observe(m, c, 1);
-  map.merge_lines(l, m);
-  EXPECT_EQ(map.find_line(m), nullptr);
+  map.merge(l, m);
+  EXPECT_EQ(map.find(m), nullptr);
   EXPECT_EQ(map.line_of(c, 1), l);
   EXPECT_FALSE(map.line_of(a, 1).valid());
-  EXPECT_THROW(map.merge_lines(l, l), std::invalid_argument);
+  EXPECT_THROW(map.merge(l, l), std::invalid_argument);
 }
 
 constexpr int kLines = 190;
