@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pcl/features/normal_3d_omp.h>
+#include <pcl/search/kdtree.h>
 
 #include "filters/filter_tools.hpp"
 #include "plumbline/core/executor.hpp"
@@ -26,6 +27,7 @@ class NormalsFilter : public Filter {
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
     const int threads = context.executor != nullptr ? context.executor->threads() : 1;
     pcl::NormalEstimationOMP<Point, pcl::Normal> estimation(static_cast<unsigned int>(threads));
+    estimation.setSearchMethod(std::make_shared<pcl::search::KdTree<Point>>());
     estimation.setKSearch(neighbours_);
     estimation.setRadiusSearch(neighbours_ > 0 ? 0.0 : radius_m_);
     estimation.setViewPoint(viewpoint.x(), viewpoint.y(), viewpoint.z());
