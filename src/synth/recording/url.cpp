@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::synth {
@@ -65,7 +67,9 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string
   if (!scene) return tl::unexpected<core::Error>(scene.error());
   auto world = build_world(*scene, parsed->options, executor);
   if (!world) return tl::unexpected<core::Error>(world.error());
-  auto source = SynthSource::create(*world, parsed->robot < 0 ? 0 : parsed->robot);
+  if (parsed->robot < 0 && parsed->options.robots > 1)
+    log.warning(fmt::format("{}: robot 0 of {}; add &robot=1 for another", url, parsed->options.robots));
+  auto source = SynthSource::create(*world, std::max(0, parsed->robot));
   if (!source) return tl::unexpected<core::Error>(source.error());
   log.debug(fmt::format("{}: {} frames, {} faces, {} lamps, {:.1f} m of path", (*source)->name(),
                         (*source)->size(), scene->faces.size(), scene->lamps.size(),

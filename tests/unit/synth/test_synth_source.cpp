@@ -301,6 +301,20 @@ TEST(SynthSource, WithoutTextureNothingButShadingIsLeft) {
   EXPECT_LT(none, 0.3 * full);
 }
 
+TEST(SynthUrl, SaysWhichOfSeveralRobotsItIs) {
+  struct Warnings : core::Log {
+    std::string text;
+    void write(core::LogLevel level, const std::string& message) override {
+      if (level >= core::LogLevel::kWarning) text += message;
+    }
+  } log;
+  const std::string url = "synth:structure?frames=4&robots=2&width=160&height=120";
+  ASSERT_TRUE(open_synth(url + "&robot=0", kScenes, core::Executor(1), log));
+  EXPECT_EQ(log.text, "");
+  ASSERT_TRUE(open_synth(url, kScenes, core::Executor(1), log));
+  EXPECT_NE(log.text.find("robot 0 of 2; add &robot=1 for another"), std::string::npos);
+}
+
 TEST(SynthUrl, OpensAndRefuses) {
   const core::Executor executor(2);
   const auto log = core::null_log();
