@@ -74,11 +74,8 @@ Refinement refine_map(maps::Map& map, const std::map<core::KeyframeId, CoarseSur
   count(adjusted, result.summary);
   tell(adjusted, edges.size(), log);
   if (!options.accuracy) return result;
-  std::vector<PoseEdge> believed;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    if (adjusted.extra.empty() || !adjusted.extra[i].rejected) believed.push_back(edges[i]);
-  }
-  result.accuracy = keyframe_accuracy(map, cameras, believed, options.adjustment);
+  result.accuracy =
+      keyframe_accuracy(map, cameras, believed_edges(edges, adjusted.extra), options.adjustment);
   return result;
 }
 
