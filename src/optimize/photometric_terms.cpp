@@ -2,9 +2,14 @@
 #include "plumbline/optimize/photometric_terms.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 
+#include "plumbline/core/clones.hpp"
 #include "plumbline/geometry/adjoint.hpp"
 
 namespace plumbline::optimize {
@@ -12,105 +17,177 @@ namespace {
 
 using geometry::Rigid3;
 
-/// Where a family's image shows a point of the reference camera.
-class Lookup {
- public:
-  Lookup(const PhotometricFamily& family, const Rigid3& camera_from_world)
-      : image_(family.image),
-        last_x_(static_cast<float>(image_.cols) - 2.0F),
-        last_y_(static_cast<float>(image_.rows) - 2.0F) {
+constexpr std::size_t kBlock = 512;  // terms that are looked up together, and summed in single precision
+using Seen = std::array<float, kBlock>;
+
+/// Where a family's image shows points of the reference camera.
+struct View {
+  View(const PhotometricFamily& family, const Rigid3& camera_from_world)
+      : pixels(family.image.ptr<float>()),
+        row(static_cast<std::int32_t>(family.image.step1())),
+        last_x(static_cast<float>(family.image.cols) - 2.0F),
+        last_y(static_cast<float>(family.image.rows) - 2.0F),
+        fx(static_cast<float>(family.camera.fx)),
+        fy(static_cast<float>(family.camera.fy)),
+        cx(static_cast<float>(family.camera.cx)),
+        cy(static_cast<float>(family.camera.cy)) {
     const Rigid3 camera_from_reference = camera_from_world * family.reference_from_world.inverse();
-    rotation_ = camera_from_reference.rotation.cast<float>();
-    translation_ = camera_from_reference.translation.cast<float>();
-    fx_ = static_cast<float>(family.camera.fx);
-    fy_ = static_cast<float>(family.camera.fy);
-    cx_ = static_cast<float>(family.camera.cx);
-    cy_ = static_cast<float>(family.camera.cy);
-  }
-  /// Grey value there, bilinear; false: not in the image.
-  bool at(const Eigen::Vector3f& point, float& value) const {
-    const Eigen::Vector3f p = rotation_ * point + translation_;
-    if (!(p.z() > 0.1F)) return false;
-    const float per_z = 1.0F / p.z();
-    const float x = fx_ * p.x() * per_z + cx_, y = fy_ * p.y() * per_z + cy_;
-    if (!(x >= 1.0F && y >= 1.0F && x < last_x_ && y < last_y_)) return false;
-    const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-    const float sx = x - static_cast<float>(ix), sy = y - static_cast<float>(iy);
-    const float* top = image_.ptr<float>(iy) + ix;
-    const float* low = image_.ptr<float>(iy + 1) + ix;
-    const float t = top[0] + sx * (top[1] - top[0]), l = low[0] + sx * (low[1] - low[0]);
-    value = t + sy * (l - t);
-    return true;
-  }
-
- private:
-  const cv::Mat& image_;
-  float last_x_, last_y_;
-  Eigen::Matrix3f rotation_;
-  Eigen::Vector3f translation_;
-  float fx_ = 1.0F, fy_ = 1.0F, cx_ = 0.0F, cy_ = 0.0F;
-};
-
-/// Sums of w r^T r for rows r = (j, e), padded to whole vectors.
-struct Sums {
-  alignas(32) float s[7][8] = {};
-  void add(const float (&row)[8], float w) {
-    for (int a = 0; a < 7; ++a) {
-      const float wa = w * row[a];
-      for (int b = 0; b < 8; ++b) s[a][b] += wa * row[b];
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) r[a][b] = static_cast<float>(camera_from_reference.rotation(a, b));
+      t[a] = static_cast<float>(camera_from_reference.translation(a));
     }
   }
+
+  const float* pixels;
+  std::int32_t row;  ///< from one row of the image to the next
+  float last_x, last_y, fx, fy, cx, cy;
+  float r[3][3];
+  float t[3];
 };
+
+/// Eight at a time. The default clone takes two registers for each.
+using Floats = float __attribute__((vector_size(32)));
+using Integers = std::int32_t __attribute__((vector_size(32)));
+constexpr std::size_t kLanes = sizeof(Floats) / sizeof(float);
+static_assert(kBlock % kLanes == 0);
+
+/// What is looked up for a block of terms, in columns.
+struct Places {
+  alignas(32) float x[kBlock], y[kBlock], z[kBlock];  // of the points
+  alignas(32) std::int32_t pixel[kBlock];
+  alignas(32) float right[kBlock], down[kBlock];  // from that pixel, fractions
+};
+
+/// Bilinear grey values where the image shows `count` terms, at most a block; NaN: not in the image.
+PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, const View& v, float* seen) {
+  constexpr float kNearest_m = 0.1F;
+  constexpr std::int32_t kNan = 0x7FC00000;
+  Places at;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* point = terms[i].point.data();
+    at.x[i] = point[0];
+    at.y[i] = point[1];
+    at.z[i] = point[2];
+  }
+  for (std::size_t i = count; i % kLanes != 0; ++i) at.x[i] = at.y[i] = at.z[i] = 0.0F;
+
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    Floats x, y, z;
+    std::memcpy(&x, at.x + i, sizeof x);
+    std::memcpy(&y, at.y + i, sizeof y);
+    std::memcpy(&z, at.z + i, sizeof z);
+    const Floats in_x = v.r[0][0] * x + (v.r[0][1] * y + v.r[0][2] * z) + v.t[0];
+    const Floats in_y = v.r[1][0] * x + (v.r[1][1] * y + v.r[1][2] * z) + v.t[1];
+    const Floats in_z = v.r[2][0] * x + (v.r[2][1] * y + v.r[2][2] * z) + v.t[2];
+    const Floats per_z = 1.0F / in_z;
+    Floats u = v.fx * in_x * per_z + v.cx, w = v.fy * in_y * per_z + v.cy;
+    const Integers inside = (in_z > kNearest_m) & (u >= 1.0F) & (w >= 1.0F) & (u < v.last_x) & (w < v.last_y);
+    u = reinterpret_cast<Floats>(reinterpret_cast<Integers>(u) & inside);
+    w = reinterpret_cast<Floats>(reinterpret_cast<Integers>(w) & inside);
+    const Integers column = __builtin_convertvector(u, Integers), line = __builtin_convertvector(w, Integers);
+    const Integers pixel = line * v.row + column, unseen = ~inside & kNan;
+    u -= __builtin_convertvector(column, Floats);
+    w -= __builtin_convertvector(line, Floats);
+    std::memcpy(at.pixel + i, &pixel, sizeof pixel);
+    std::memcpy(at.right + i, &u, sizeof u);
+    std::memcpy(at.down + i, &w, sizeof w);
+    std::memcpy(seen + i, &unseen, sizeof unseen);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* top = v.pixels + at.pixel[i];
+    const float* low = top + v.row;
+    const float above = top[0] + at.right[i] * (top[1] - top[0]);
+    const float below = low[0] + at.right[i] * (low[1] - low[0]);
+    seen[i] += above + at.down[i] * (below - above);
+  }
+}
+
+/// Calls what(first, count, seen) for block after block of a family's terms.
+template <typename What>
+void for_blocks(const PhotometricFamily& family, const Rigid3& camera_from_world, const What& what) {
+  const View view(family, camera_from_world);
+  Seen seen;
+  for (std::size_t first = 0; first < family.terms.size(); first += kBlock) {
+    const std::size_t count = std::min(kBlock, family.terms.size() - first);
+    look(family.terms.data() + first, count, view, seen.data());
+    what(first, count, seen.data());
+  }
+}
+
+/// Factors of a family's residuals, and Huber's threshold.
+struct Scale {
+  float gain, per_sigma, threshold;
+};
+
+/// Sums of w r^T r for rows r = (j, e), padded to whole vectors, and the cost.
+struct Sums {
+  float s[7][8];
+  float cost;
+};
+
+PLUMBLINE_CLONES void sum_block(const PhotometricTerm* terms, const float* seen, std::size_t count,
+                                const Scale& scale, Sums& sums) {
+  static_assert(offsetof(PhotometricTerm, value) == 6 * sizeof(float));
+  const Floats in_jacobian{1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 0.0F, 0.0F};
+  const Floats is_residual{0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F};
+  Floats s0{}, s1{}, s2{}, s3{}, s4{}, s5{}, s6{};  // an array would not stay in registers
+  float cost = 0.0F;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (std::isnan(seen[i])) {
+      cost += 0.5F;
+      continue;
+    }
+    const PhotometricTerm& term = terms[i];
+    const float e = (seen[i] - scale.gain * term.value) * term.weight * scale.per_sigma;
+    const float size = std::abs(e);
+    const bool near = size <= scale.threshold;
+    const float w = near ? 1.0F : scale.threshold / size;
+    cost += near ? 0.5F * e * e : scale.threshold * (size - 0.5F * scale.threshold);
+    Floats row;
+    std::memcpy(&row, reinterpret_cast<const char*>(&term), sizeof row);
+    row = row * (in_jacobian * (scale.gain * term.weight * scale.per_sigma)) + is_residual * e;
+    const Floats weighted = row * w;
+    s0 += weighted[0] * row;
+    s1 += weighted[1] * row;
+    s2 += weighted[2] * row;
+    s3 += weighted[3] * row;
+    s4 += weighted[4] * row;
+    s5 += weighted[5] * row;
+    s6 += weighted[6] * row;
+  }
+  const Floats s[7] = {s0, s1, s2, s3, s4, s5, s6};
+  std::memcpy(sums.s, s, sizeof s);
+  sums.cost = cost;
+}
 
 }  // namespace
 
 std::vector<float> photometric_residuals(const PhotometricFamily& family, const Rigid3& camera_from_world) {
-  const Lookup image(family, camera_from_world);
   const auto gain = static_cast<float>(family.gain), per_sigma = static_cast<float>(1.0 / family.sigma);
-  std::vector<float> result(family.terms.size(), std::numeric_limits<float>::quiet_NaN());
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    float value = 0.0F;
-    if (image.at(family.terms[i].point, value)) {
-      result[i] = (value - gain * family.terms[i].value) * family.terms[i].weight * per_sigma;
+  std::vector<float> result(family.terms.size());
+  for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t count, const float* seen) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const PhotometricTerm& term = family.terms[first + i];
+      result[first + i] = (seen[i] - gain * term.value) * term.weight * per_sigma;
     }
-  }
+  });
   return result;
 }
 
 PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& camera_from_world,
                                 double loss) {
-  constexpr std::size_t kBlock = 512;  // summed in single precision
-  const Lookup image(family, camera_from_world);
-  const auto gain = static_cast<float>(family.gain), per_sigma = static_cast<float>(1.0 / family.sigma);
-  const auto threshold = static_cast<float>(loss);
+  const Scale scale{static_cast<float>(family.gain), static_cast<float>(1.0 / family.sigma),
+                    static_cast<float>(loss)};
   PhotometricSums sums;
-  for (std::size_t from = 0; from < family.terms.size(); from += kBlock) {
-    const std::size_t to = std::min(family.terms.size(), from + kBlock);
+  for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t count, const float* seen) {
     Sums block;
-    float cost = 0.0F;
-    for (std::size_t i = from; i < to; ++i) {
-      const PhotometricTerm& term = family.terms[i];
-      float value = 0.0F;
-      if (!image.at(term.point, value)) {
-        cost += 0.5F;
-        continue;
-      }
-      const float e = (value - gain * term.value) * term.weight * per_sigma;
-      const float size = std::abs(e);
-      const float w = size <= threshold ? 1.0F : threshold / size;
-      cost += size <= threshold ? 0.5F * e * e : threshold * (size - 0.5F * threshold);
-      const auto& d = term.derivative;
-      const float scale = gain * term.weight * per_sigma;
-      alignas(32) const float row[8] = {
-          scale * d(0), scale * d(1), scale * d(2), scale * d(3), scale * d(4), scale * d(5), e, 0.0F};
-      block.add(row, w);
-    }
+    sum_block(family.terms.data() + first, seen, count, scale, block);
     for (int a = 0; a < 6; ++a) {
       for (int b = 0; b <= a; ++b) sums.h(a, b) += static_cast<double>(block.s[a][b]);
       sums.g(a) += static_cast<double>(block.s[a][6]);
     }
-    sums.cost += static_cast<double>(cost);
-  }
+    sums.cost += static_cast<double>(block.cost);
+  });
   // T Exp(xi) = Exp(adjoint(T) xi) T: from the right of camera_from_reference to the left.
   const Rigid3 reference_from_camera = family.reference_from_world * camera_from_world.inverse();
   const geometry::Matrix6d carry = geometry::adjoint(reference_from_camera);
@@ -122,18 +199,18 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
 
 double photometric_correlation(const PhotometricFamily& family, const Rigid3& camera_from_world,
                                int min_terms) {
-  const Lookup image(family, camera_from_world);
   double vv = 0.0, ss = 0.0, vs = 0.0;
   int count = 0;
-  for (const PhotometricTerm& term : family.terms) {
-    float seen = 0.0F;
-    if (!image.at(term.point, seen)) continue;
-    const auto s = static_cast<double>(seen), v = static_cast<double>(term.value);
-    vv += v * v;
-    ss += s * s;
-    vs += v * s;
-    ++count;
-  }
+  for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t block, const float* seen) {
+    for (std::size_t i = 0; i < block; ++i) {
+      if (std::isnan(seen[i])) continue;
+      const auto s = static_cast<double>(seen[i]), v = static_cast<double>(family.terms[first + i].value);
+      vv += v * v;
+      ss += s * s;
+      vs += v * s;
+      ++count;
+    }
+  });
   return count < min_terms || !(vv > 0.0) || !(ss > 0.0) ? 0.0 : vs / std::sqrt(vv * ss);
 }
 

@@ -13,13 +13,14 @@
 
 namespace plumbline::optimize {
 
-/// A surface sample and its grey value in the reference camera's image.
+/// A surface sample and its grey value in the reference camera's image. The derivative and the value lie side
+/// by side: sum_photometric() takes them as one row.
 struct PhotometricTerm {
-  Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< reference camera, metres
-  float value = 0.0F;                               ///< grey value that is expected, of the reference image
-  float weight = 1.0F;  ///< standard deviation of the family over that of the term
   /// Of the expected grey value by xi = (rho, phi), camera_from_reference <- camera_from_reference Exp(xi).
   Eigen::Matrix<float, 6, 1> derivative = Eigen::Matrix<float, 6, 1>::Zero();
+  float value = 0.0F;   ///< grey value that is expected, of the reference image
+  float weight = 1.0F;  ///< standard deviation of the family over that of the term
+  Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< reference camera, metres
 };
 
 struct PhotometricFamily {
