@@ -1,13 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where the tracker looks for the camera, and which of the poses found from there it takes.
 #include <algorithm>
+#include <cmath>
 
 #include "frame_aligner.hpp"
+#include "photometric_view.hpp"
 #include "plumbline/tracking/thumbnail_alignment.hpp"
 
 namespace plumbline::tracking {
 
 using geometry::Rigid3;
+
+namespace {
+
+/// What the view shows from a pose of the first keyframe that has enough in view.
+std::optional<optimize::PhotometricFamily> comparable(const PhotometricKeyframes& known, const maps::Map& map,
+                                                      const std::vector<core::KeyframeId>& keyframes,
+                                                      std::size_t level, const PhotometricView& view,
+                                                      const Rigid3& camera_from_world) {
+  for (const core::KeyframeId id : keyframes) {
+    const auto samples = known.find(id);
+    if (samples == nullptr) continue;
+    auto family = photometric_in_view(*samples, level, view, map.camera_from_world(id), camera_from_world);
+    if (!family) continue;
+    const std::vector<float> seen = optimize::photometric_residuals(*family, camera_from_world);
+    const auto hidden = std::count_if(seen.begin(), seen.end(), [](float r) { return std::isnan(r); });
+    if (static_cast<std::ptrdiff_t>(seen.size()) - hidden >= kMinPhotometric) return family;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 TrackResult Tracker::align(const maps::Map& map, const sensor::RgbdFrame& frame,
                            const features::FrameFeatures& features, const Rigid3& hypothesis,
@@ -51,7 +74,7 @@ void Tracker::rank_by_intensity(const maps::Map& map, const PhotometricView& vie
   std::vector<std::optional<optimize::PhotometricFamily>> families;
   for (const Rigid3& pose : poses) {
     const auto& family =
-        families.emplace_back(photometric_.associate(map, local_map_.keyframes, kCoarse, view, pose));
+        families.emplace_back(comparable(photometric_, map, local_map_.keyframes, kCoarse, view, pose));
     agreement.push_back(family
                             ? std::optional(optimize::photometric_correlation(*family, pose, kMinPhotometric))
                             : std::nullopt);

@@ -2,9 +2,12 @@
 #include "plumbline/tracking/photometric_alignment.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
-#include "plumbline/core/numbers.hpp"
+#include "photometric_view.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::tracking {
@@ -15,6 +18,30 @@ using geometry::Rigid3;
 constexpr double kMinCorrelation = 0.3;  // noise alone has 0.02 of 2000 samples
 constexpr double kMinSigma = 0.3;        // grey values: what rounding leaves
 constexpr double kLargestGain = 4.0;
+
+/// core::median() of numbers that are not negative. Their bits are in the same order as they are: most are
+/// left out by a histogram of the leading ones.
+float median_size(const std::vector<float>& sizes) {
+  constexpr unsigned kMantissaShift = 20;
+  const auto bin_of = [](float size) {
+    std::uint32_t bits = 0;
+    std::memcpy(&bits, &size, sizeof bits);
+    return bits >> kMantissaShift;
+  };
+  std::array<std::uint32_t, 1U << (32 - kMantissaShift)> counts{};
+  for (const float size : sizes) ++counts[bin_of(size)];
+  std::size_t rank = sizes.size() / 2;
+  std::uint32_t bin = 0;
+  for (; rank >= counts[bin]; ++bin) rank -= counts[bin];
+  std::vector<float> alike;
+  alike.reserve(counts[bin]);
+  for (const float size : sizes) {
+    if (bin_of(size) == bin) alike.push_back(size);
+  }
+  const auto place = alike.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(alike.begin(), place, alike.end());
+  return *place;
+}
 
 /// Whether the depth image measured something before the point.
 bool hidden(const PhotometricView& view, const Eigen::Vector3f& in_depth) {
@@ -83,6 +110,14 @@ std::optional<optimize::PhotometricFamily> associate_photometric(const features:
                                                                  const PhotometricView& view,
                                                                  const Rigid3& reference_from_world,
                                                                  const Rigid3& camera_from_world) {
+  auto family = photometric_in_view(samples, level, view, reference_from_world, camera_from_world);
+  return family && update_photometric(*family, camera_from_world) ? std::move(family) : std::nullopt;
+}
+
+std::optional<optimize::PhotometricFamily> photometric_in_view(const features::PhotometricSamples& samples,
+                                                               std::size_t level, const PhotometricView& view,
+                                                               const Rigid3& reference_from_world,
+                                                               const Rigid3& camera_from_world) {
   const cv::Mat& image = (*view.image)[level];
   if (image.empty() || static_cast<int>(samples[level].size()) < kMinPhotometric) return std::nullopt;
   optimize::PhotometricFamily family;
@@ -114,7 +149,7 @@ std::optional<optimize::PhotometricFamily> associate_photometric(const features:
     family.terms.push_back(term);
   }
   if (static_cast<int>(family.terms.size()) < kMinPhotometric) return std::nullopt;
-  return update_photometric(family, camera_from_world) ? std::optional(std::move(family)) : std::nullopt;
+  return family;
 }
 
 bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camera_from_world) {
@@ -132,14 +167,14 @@ bool update_photometric(optimize::PhotometricFamily& family, const Rigid3& camer
   }
   if (static_cast<int>(sizes.size()) < kMinPhotometric) return false;
   family.gain = std::clamp(
-      static_cast<double>(core::median(sizes)) / std::max(static_cast<double>(core::median(expected)), 1e-3),
+      static_cast<double>(median_size(sizes)) / std::max(static_cast<double>(median_size(expected)), 1e-3),
       1.0 / kLargestGain, kLargestGain);
   sizes.clear();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!std::isnan(seen[i]))
       sizes.push_back(std::abs(seen[i] - static_cast<float>(family.gain) * family.terms[i].value));
   }
-  family.sigma = std::max(kMinSigma, 1.4826 * static_cast<double>(core::median(sizes)));
+  family.sigma = std::max(kMinSigma, 1.4826 * static_cast<double>(median_size(sizes)));
   weigh_by_depth(camera_from_world * family.reference_from_world.inverse(), family);
   return true;
 }
