@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -108,28 +109,35 @@ bool supports(const InverseDepth& line, const Sample& sample, double gate) {
   return predicted > 0.0 && std::abs(sample.inverse - predicted) <= gate * inverse_sigma(predicted);
 }
 
-/// Samples in columns, so that all are tried at once.
+/// Samples in columns, so that many are tried at once; the last ones, up to a whole number of vectors,
+/// support nothing.
 struct Columns {
+  static constexpr std::size_t kAtATime = 8;
   std::vector<double> s;
   std::vector<double> inverse;
   explicit Columns(const std::vector<Sample>& samples) {
-    s.reserve(samples.size());
-    inverse.reserve(samples.size());
-    for (const Sample& q : samples) {
-      s.push_back(q.s);
-      inverse.push_back(q.inverse);
+    const std::size_t size = (samples.size() + kAtATime - 1) / kAtATime * kAtATime;
+    s.resize(size, 0.0);
+    inverse.resize(size, std::numeric_limits<double>::infinity());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      s[i] = samples[i].s;
+      inverse[i] = samples[i].inverse;
     }
   }
 };
 
-// How many samples support a line, as `supports` says.
+// How many samples support a line, as `supports` says; 0 as soon as they cannot become more than `to_beat`.
 PLUMBLINE_CLONES std::int64_t count_support(const double* s, const double* inverse, std::size_t count,
-                                            double start, double end, double gate) {
+                                            const InverseDepth& line, double gate, std::int64_t to_beat) {
+  const double start = line.start, end = line.end;
   std::int64_t support = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double predicted = (1.0 - s[i]) * start + s[i] * end;
-    const double limit = gate * (sensor::depth_sigma(1.0 / predicted) * predicted * predicted);
-    support += static_cast<std::int64_t>((predicted > 0.0) & (std::abs(inverse[i] - predicted) <= limit));
+  for (std::size_t first = 0; first < count; first += Columns::kAtATime) {
+    if (support + static_cast<std::int64_t>(count - first) <= to_beat) return 0;
+    for (std::size_t i = first; i < first + Columns::kAtATime; ++i) {
+      const double predicted = (1.0 - s[i]) * start + s[i] * end;
+      const double limit = gate * (sensor::depth_sigma(1.0 / predicted) * predicted * predicted);
+      support += static_cast<std::int64_t>((predicted > 0.0) & (std::abs(inverse[i] - predicted) <= limit));
+    }
   }
   return support;
 }
@@ -157,8 +165,8 @@ std::optional<InverseDepth> ransac(const std::vector<Sample>& samples, const Lin
     const double slope = (b.inverse - a.inverse) / (b.s - a.s);
     const InverseDepth line{a.inverse - slope * a.s, a.inverse + slope * (1.0 - a.s)};
     if (!plausible(line, options)) continue;
-    const std::int64_t support = count_support(columns.s.data(), columns.inverse.data(), samples.size(),
-                                               line.start, line.end, options.inlier_sigmas);
+    const std::int64_t support = count_support(columns.s.data(), columns.inverse.data(), samples.size(), line,
+                                               options.inlier_sigmas, most);
     if (support > most) {
       most = support;
       best = line;

@@ -2,12 +2,14 @@
 #include <cmath>
 
 #include "line_geometry.hpp"
+#include "plumbline/core/clones.hpp"
 #include "plumbline/features/line_detector.hpp"
 
 namespace plumbline::features {
 namespace {
 
 constexpr float kDuplicateOffset = 1.0F;  // px: overlapping parallels nearer than this are one edge
+constexpr float kSameDirection = 0.8F;    // cosine; opposite steps are the two edges of a thin line
 
 // A segment with what the pairwise tests need again and again.
 struct Piece {
@@ -25,7 +27,7 @@ struct Piece {
 };
 
 bool belong_together(const Piece& a, const Piece& b, const LineDetectorOptions& options) {
-  if (a.direction.dot(b.direction) <= 0.8F) return false;  // opposite steps: the two edges of a thin line
+  if (a.direction.dot(b.direction) <= kSameDirection) return false;
   const Piece& longer = a.length >= b.length ? a : b;
   const Piece& shorter = a.length >= b.length ? b : a;
   const Eigen::Vector2f between = shorter.middle - longer.middle;
@@ -40,6 +42,46 @@ bool belong_together(const Piece& a, const Piece& b, const LineDetectorOptions& 
   const float offset = offset_at_middle + 0.5F * shorter.length * angle;  // of the farther end
   const bool overlapping = gap < -0.25F * shorter.length;
   return offset <= (overlapping ? std::min(kDuplicateOffset, offset_limit) : offset_limit);
+}
+
+/// What a first look at pairs needs, in columns.
+struct Glance {
+  std::vector<float> dx, dy, mx, my, length;
+
+  explicit Glance(const std::vector<Piece>& pieces) {
+    for (std::vector<float>* column : {&dx, &dy, &mx, &my, &length}) column->resize(pieces.size());
+    for (std::size_t i = 0; i < pieces.size(); ++i) set(i, pieces[i]);
+  }
+  void set(std::size_t i, const Piece& piece) {
+    dx[i] = piece.direction.x();
+    dy[i] = piece.direction.y();
+    mx[i] = piece.middle.x();
+    my[i] = piece.middle.y();
+    length[i] = piece.length;
+  }
+  /// It has no direction, so that it belongs to nothing.
+  void take_out(std::size_t i) { dx[i] = dy[i] = 0.0F; }
+};
+
+/// Whether any of the pieces [first, last) passes what belong_together() asks first, with `own` as the other
+/// one: about the same direction, and not far to the side.
+PLUMBLINE_CLONES bool any_near(const Glance& all, std::size_t first, std::size_t last, std::size_t own,
+                               float offset_limit) {
+  const float *dx = all.dx.data(), *dy = all.dy.data(), *mx = all.mx.data(), *my = all.my.data();
+  const float* length = all.length.data();
+  const float own_dx = dx[own], own_dy = dy[own], own_mx = mx[own], own_my = my[own];
+  const float own_length = length[own];
+  int found = 0;
+  for (std::size_t j = first; j < last; ++j) {
+    const float along = own_dx * dx[j] + own_dy * dy[j];
+    const float x = mx[j] - own_mx, y = my[j] - own_my;
+    // Of the longer one.
+    const bool longer = own_length >= length[j];
+    const float direction_x = longer ? own_dx : dx[j], direction_y = longer ? own_dy : dy[j];
+    const float offset = std::abs(direction_x * y - direction_y * x);
+    found |= static_cast<int>((along > kSameDirection) & (offset <= offset_limit));
+  }
+  return found != 0;
 }
 
 // Least-squares line through both (weight = length), spanning both.
@@ -81,13 +123,27 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
   pieces.reserve(segments.size());
   for (const LineSegment& s : segments) pieces.emplace_back(s);
   // Longest lines grow first, each by its first fitting partner, until nothing fits any more.
+  constexpr std::size_t kAtATime = 32;
+  Glance glance(pieces);
   std::vector<char> gone(pieces.size(), 0);
+  const auto partner_of = [&](std::size_t i) {
+    for (std::size_t first = 0; first < pieces.size(); first += kAtATime) {
+      const std::size_t last = std::min(pieces.size(), first + kAtATime);
+      if (!any_near(glance, first, last, i, static_cast<float>(options.join_offset_px))) continue;
+      for (std::size_t j = first; j < last; ++j) {
+        if (j != i && gone[j] == 0 && belong_together(pieces[i], pieces[j], options)) return j;
+      }
+    }
+    return pieces.size();
+  };
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    for (std::size_t j = 0; gone[i] == 0 && j < pieces.size(); ++j) {
-      if (j == i || gone[j] != 0 || !belong_together(pieces[i], pieces[j], options)) continue;
+    if (gone[i] != 0) continue;
+    // What did not fit the shorter line may fit now: each time from the start.
+    for (std::size_t j = partner_of(i); j < pieces.size(); j = partner_of(i)) {
       pieces[i] = Piece(merged(pieces[i].segment, pieces[j].segment));
+      glance.set(i, pieces[i]);
+      glance.take_out(j);
       gone[j] = 1;
-      j = static_cast<std::size_t>(-1);  // what did not fit the shorter line may fit now: from the start
     }
   }
   segments.clear();

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <opencv2/core.hpp>
 
 namespace plumbline::features {
@@ -117,20 +118,15 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
   }
 }
 
+bool three_used(const std::uint8_t* used) {
+  constexpr std::array<std::uint8_t, 4> kAll{1, 1, 1, 0};
+  std::array<std::uint8_t, 4> three{};
+  std::memcpy(three.data(), used, 3);
+  return std::memcmp(three.data(), kAll.data(), sizeof kAll) == 0;
+}
+
 // Neighbours join while their level-line angle is within the tolerance of the region's.
 void Lsd::grow(int seed, float cosine) {
-  struct Step {
-    int index;
-    float x, y;
-  };
-  const std::array<Step, 8> around = {{{-width_ - 1, -1.0F, -1.0F},
-                                       {-width_, 0.0F, -1.0F},
-                                       {-width_ + 1, 1.0F, -1.0F},
-                                       {-1, -1.0F, 0.0F},
-                                       {1, 1.0F, 0.0F},
-                                       {width_ - 1, -1.0F, 1.0F},
-                                       {width_, 0.0F, 1.0F},
-                                       {width_ + 1, 1.0F, 1.0F}}};
   region_.assign(1, pixel(seed));
   used_[static_cast<std::size_t>(seed)] = 1;
   float sx = gradients_[static_cast<std::size_t>(seed)].x;
@@ -140,16 +136,20 @@ void Lsd::grow(int seed, float cosine) {
   const Gradient* const gradients = gradients_.data();
   for (std::size_t i = 0; i < region_.size(); ++i) {
     const Pixel from = region_[i];
-    for (const Step& step : around) {
-      const int index = from.index + step.index;
-      if (used[index] != 0) continue;
-      const Gradient& g = gradients[index];
-      if (g.x * sx + g.y * sy < limit) continue;
-      used[index] = 1;
-      region_.push_back({index, from.x + step.x, from.y + step.y});
-      sx += g.x;
-      sy += g.y;
-      limit = cosine * std::sqrt(sx * sx + sy * sy);
+    for (int dy = -1; dy <= 1; ++dy) {
+      const int left = from.index + dy * width_ - 1;
+      if (three_used(used + left)) continue;  // mostly: the inner pixels of a region
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int index = left + 1 + dx;
+        if (used[index] != 0) continue;
+        const Gradient& g = gradients[index];
+        if (g.x * sx + g.y * sy < limit) continue;
+        used[index] = 1;
+        region_.push_back({index, from.x + static_cast<float>(dx), from.y + static_cast<float>(dy)});
+        sx += g.x;
+        sy += g.y;
+        limit = cosine * std::sqrt(sx * sx + sy * sy);
+      }
     }
   }
   sum_ = {sx, sy};

@@ -36,8 +36,24 @@ class Cells {
     const int r = std::min(rows_ - 1, corner.y * rows_ / height_);
     return static_cast<std::size_t>(r * columns_ + c);
   }
+  /// Calls what(area) for the areas of the cells that are not `done`, those beside one another as one.
+  template <typename What>
+  void for_others(const std::vector<char>& done, const What& what) const {
+    const auto is_done = [&](int r, int c) { return done[static_cast<std::size_t>(r * columns_ + c)] != 0; };
+    for (int r = 0; r < rows_; ++r) {
+      const int top = first(r, rows_, height_), bottom = first(r + 1, rows_, height_);
+      for (int c = 0, end = 0; c < columns_; c = end + 1) {
+        for (end = c; end < columns_ && !is_done(r, end);) ++end;
+        const int left = first(c, columns_, width_), right = first(end, columns_, width_);
+        if (left < right) what(cv::Rect(left, top, right - left, bottom - top));
+      }
+    }
+  }
 
  private:
+  /// The first of `size` pixels that lies in the cell `i` of `cells`.
+  static int first(int i, int cells, int size) { return (i * size + cells - 1) / cells; }
+
   int width_;
   int height_;
   int columns_;
@@ -115,25 +131,38 @@ bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
   return least * least < squared;
 }
 
-/// FAST (Rosten, Porter, Drummond, PAMI 32, 2010) over the region, without what lies on edges; cells where
-/// the high threshold finds nothing get the low one.
+/// FAST (Rosten, Porter, Drummond, PAMI 32, 2010) in an area of the region, without what lies on edges.
+/// Whether a pixel is the best of its neighbours does not depend on where the area ends.
+void find_corners(const cv::Mat& level, const cv::Rect& region, const cv::Rect& area, int threshold,
+                  double min_corner, std::vector<Corner>& corners) {
+  constexpr int kAround = kFastRadius + 1;  // the circle of a neighbour
+  const cv::Rect around =
+      cv::Rect(area.x - kAround, area.y - kAround, area.width + 2 * kAround, area.height + 2 * kAround) &
+      cv::Rect(0, 0, region.width, region.height);
+  std::vector<cv::KeyPoint> found;
+  cv::FAST(level(around + region.tl()), found, threshold);
+  for (const cv::KeyPoint& k : found) {
+    const cv::Point at(cvRound(k.pt.x) + around.x, cvRound(k.pt.y) + around.y);
+    if (!area.contains(at)) continue;
+    if (min_corner > 0.0 && on_edge(level, at.x + region.x, at.y + region.y, min_corner)) continue;
+    corners.push_back({at.x, at.y, cvRound(k.response)});
+  }
+}
+
+/// Corners of the high threshold, and in cells without any those of the low one. FAST with the low one alone
+/// would find the same, but the many weak corners of a busy image cost most of its time.
 std::vector<Corner> detect(const cv::Mat& level, const cv::Rect& region, int high, int low,
                            double min_corner) {
-  std::vector<cv::KeyPoint> found;
-  cv::FAST(level(region), found, low);
   std::vector<Corner> corners;
-  for (const cv::KeyPoint& k : found) {
-    const Corner c{cvRound(k.pt.x), cvRound(k.pt.y), cvRound(k.response)};
-    if (min_corner > 0.0 && on_edge(level, c.x + region.x, c.y + region.y, min_corner)) continue;
-    corners.push_back(c);
+  find_corners(level, region, {0, 0, region.width, region.height}, high, min_corner, corners);
+  if (low < high) {
+    const Cells cells(region.width, region.height);
+    std::vector<char> has_strong(cells.count(), 0);
+    for (const Corner& c : corners) has_strong[cells.of(c)] = 1;
+    cells.for_others(has_strong, [&](const cv::Rect& area) {
+      find_corners(level, region, area, low, min_corner, corners);
+    });
   }
-  const Cells cells(region.width, region.height);
-  std::vector<char> has_strong(cells.count(), 0);
-  for (const Corner& c : corners) {
-    if (c.score >= high) has_strong[cells.of(c)] = 1;
-  }
-  const auto not_needed = [&](const Corner& c) { return c.score < high && has_strong[cells.of(c)] != 0; };
-  corners.erase(std::remove_if(corners.begin(), corners.end(), not_needed), corners.end());
   for (Corner& c : corners) {
     c.x += region.x;
     c.y += region.y;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "depth_roughness.hpp"
+#include "plumbline/core/clones.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::features {
@@ -143,15 +144,42 @@ std::vector<PhotometricSample> sample_level(const cv::Mat& image, std::size_t le
   return samples;
 }
 
+/// Means of 2 x 2 pixels, not rounded.
+PLUMBLINE_CLONES void halve_rows(const std::uint8_t* top, const std::uint8_t* low, int count, float* to) {
+  for (int x = 0; x < count; ++x) {
+    const int sum = top[2 * x] + top[2 * x + 1] + low[2 * x] + low[2 * x + 1];
+    to[x] = 0.25F * static_cast<float>(sum);
+  }
+}
+
+/// Half of the image's size. An odd size has no pairs of pixels: each of half the size gets its share of
+/// three.
+cv::Mat half_size(const cv::Mat& gray) {
+  const cv::Size size(gray.cols / 2, gray.rows / 2);
+  cv::Mat half(size, CV_32FC1);
+  if (gray.cols % 2 == 0 && gray.rows % 2 == 0) {
+    for (int y = 0; y < size.height; ++y)
+      halve_rows(gray.ptr(2 * y), gray.ptr(2 * y + 1), size.width, half.ptr<float>(y));
+  } else {
+    cv::Mat exact;
+    gray.convertTo(exact, CV_32F);
+    cv::resize(exact, half, size, 0, 0, cv::INTER_AREA);
+  }
+  return half;
+}
+
 }  // namespace
 
 PhotometricImage make_photometric_image(const cv::Mat& gray) {
   PhotometricImage result;
   if (gray.cols < 64 || gray.rows < 64) return result;
   cv::Mat half;
-  gray.convertTo(half, CV_32F);
   for (cv::Mat& level : result) {
-    cv::resize(half, half, {half.cols / 2, half.rows / 2}, 0, 0, cv::INTER_AREA);
+    if (half.empty()) {
+      half = half_size(gray);
+    } else {
+      cv::resize(half, half, {half.cols / 2, half.rows / 2}, 0, 0, cv::INTER_AREA);
+    }
     cv::Mat smooth, mean;
     cv::GaussianBlur(half, smooth, {3, 3}, 0.6);
     // Two boxes have the spread of a Gaussian of 2.8 pixels.
