@@ -2,6 +2,7 @@
 // PNG (ISO/IEC 15948) for what cameras write: 8-bit grey, RGB, RGBA and 16-bit grey, not interlaced.
 // The whole image is inflated in one call of libdeflate, which is quicker than libpng's streaming through
 // zlib.
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <libdeflate.h>
 
@@ -75,25 +76,38 @@ std::uint8_t paeth(int left, int up, int corner) {
   return static_cast<std::uint8_t>(to_up <= to_corner ? up : corner);
 }
 
-/// Undoes one row's filter in place; `above` is the row above, already undone. B: bytes per pixel.
+/// Undoes one row's filter in place; `above` is the row above, already undone. B: bytes per pixel. Where a
+/// pixel depends on the one before, that one is kept in registers: the row is one long chain of dependences.
 template <std::size_t B>
 bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std::size_t size) {
   const auto add = [](std::uint8_t& to, int value) { to = static_cast<std::uint8_t>(to + value); };
   switch (filter) {
     case 0:
       return true;
-    case 1:
-      for (std::size_t i = B; i < size; ++i) add(row[i], row[i - B]);
+    case 1: {
+      std::uint8_t left[B] = {};
+      for (std::size_t i = 0; i < size; i += B) {
+        for (std::size_t c = 0; c < B; ++c) {
+          left[c] = static_cast<std::uint8_t>(left[c] + row[i + c]);
+          row[i + c] = left[c];
+        }
+      }
       return true;
+    }
     case 2:
       for (std::size_t i = 0; i < size; ++i) add(row[i], above[i]);
       return true;
-    case 3:
-      for (std::size_t i = 0; i < B; ++i) add(row[i], above[i] / 2);
-      for (std::size_t i = B; i < size; ++i) add(row[i], (row[i - B] + above[i]) / 2);
+    case 3: {
+      std::uint8_t left[B] = {};
+      for (std::size_t i = 0; i < size; i += B) {
+        for (std::size_t c = 0; c < B; ++c) {
+          left[c] = static_cast<std::uint8_t>(row[i + c] + (left[c] + above[i + c]) / 2);
+          row[i + c] = left[c];
+        }
+      }
       return true;
+    }
     case 4: {
-      // pixel by pixel with the neighbours in registers: the row is one long chain of dependences
       int left[B] = {};
       int corner[B] = {};
       for (std::size_t i = 0; i < size; i += B) {
@@ -112,19 +126,19 @@ bool unfilter_row(int filter, std::uint8_t* row, const std::uint8_t* above, std:
 }
 
 template <std::size_t B>
-bool unfilter(const Header& header, Bytes& pixels) {
+bool unfilter(const Header& header, std::uint8_t* pixels) {
   const std::size_t size = header.row_bytes();
   const Bytes zeros(size, 0);
   const std::uint8_t* above = zeros.data();
   for (std::size_t v = 0; v < static_cast<std::size_t>(header.height); ++v) {
-    std::uint8_t* row = &pixels[v * (size + 1)];
+    std::uint8_t* row = pixels + v * (size + 1);
     if (!unfilter_row<B>(row[0], row + 1, above, size)) return false;
     above = row + 1;
   }
   return true;
 }
 
-bool unfilter_any(const Header& header, Bytes& pixels) {
+bool unfilter_any(const Header& header, std::uint8_t* pixels) {
   const std::size_t bytes = header.pixel_bytes();
   return bytes == 1   ? unfilter<1>(header, pixels)
          : bytes == 2 ? unfilter<2>(header, pixels)
@@ -133,19 +147,18 @@ bool unfilter_any(const Header& header, Bytes& pixels) {
 }
 
 /// Rows without their filter bytes, in OpenCV's order of channels and this machine's order of bytes.
-cv::Mat to_image(const Header& header, Bytes& pixels) {
+cv::Mat to_image(const Header& header, std::uint8_t* pixels) {
   const std::size_t stride = header.row_bytes() + 1;
   if (header.bits == 16) {
     cv::Mat image(header.height, header.width, CV_16UC1);
     for (int v = 0; v < header.height; ++v) {
-      const std::uint8_t* from = &pixels[static_cast<std::size_t>(v) * stride + 1];
-      auto* to = image.ptr<std::uint16_t>(v);
-      for (int u = 0; u < header.width; ++u, from += 2)
-        to[u] = static_cast<std::uint16_t>(from[0] << 8 | from[1]);
+      auto* row = image.ptr<std::uint16_t>(v);
+      std::memcpy(row, pixels + static_cast<std::size_t>(v) * stride + 1, header.row_bytes());
+      for (int u = 0; u < header.width; ++u) row[u] = ntohs(row[u]);
     }
     return image;
   }
-  const cv::Mat rows(header.height, header.width, CV_8UC(header.channels()), &pixels[1], stride);
+  const cv::Mat rows(header.height, header.width, CV_8UC(header.channels()), pixels + 1, stride);
   cv::Mat image;
   if (header.channels() == 1) return rows.clone();
   cv::cvtColor(rows, image, header.channels() == 3 ? cv::COLOR_RGB2BGR : cv::COLOR_RGBA2BGRA);
@@ -174,17 +187,17 @@ Decoded decode_png(const Bytes& file) {
   // it
   const std::size_t size = (header.row_bytes() + 1) * static_cast<std::size_t>(header.height);
   if (size / 1032 > compressed.size()) return tl::unexpected<std::string>("the image data is too short");
-  Bytes pixels(size);
+  const std::unique_ptr<std::uint8_t[]> pixels(new std::uint8_t[size]);  // all of it is written to
   const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
   std::size_t produced = 0;
   const auto status = libdeflate_zlib_decompress(inflater.get(), compressed.data(), compressed.size(),
-                                                 pixels.data(), pixels.size(), &produced);
-  if (status != LIBDEFLATE_SUCCESS || produced != pixels.size()) {
+                                                 pixels.get(), size, &produced);
+  if (status != LIBDEFLATE_SUCCESS || produced != size) {
     return tl::unexpected<std::string>("the image data cannot be inflated");
   }
-  if (!unfilter_any(header, pixels)) return tl::unexpected<std::string>("unknown row filter");
-  return to_image(header, pixels);
+  if (!unfilter_any(header, pixels.get())) return tl::unexpected<std::string>("unknown row filter");
+  return to_image(header, pixels.get());
 }
 
 }  // namespace plumbline::dataset

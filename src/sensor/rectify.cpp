@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "plumbline/core/clones.hpp"
+
 namespace plumbline::sensor {
 namespace {
 
@@ -17,6 +19,15 @@ constexpr std::uint16_t kSaturated = 65535;  // what 7-Scenes and some drivers w
 
 float metres(std::uint16_t raw, float scale) {
   return raw == kNoReading || raw == kSaturated ? 0.0F : static_cast<float>(raw) / scale;
+}
+
+/// metres() of a row.
+PLUMBLINE_CLONES void row_to_metres(const std::uint16_t* raw, int count, float scale, float* to) {
+  for (int u = 0; u < count; ++u) {
+    const bool nothing = (raw[u] == kNoReading) | (raw[u] == kSaturated);
+    const float z = static_cast<float>(raw[u]) / scale;
+    to[u] = nothing ? 0.0F : z;
+  }
 }
 
 /// 1 / z = 1 / z_measured + slope . (x, y); what would come to lie behind the camera is no reading.
@@ -80,11 +91,8 @@ struct Rectifier::Maps {
 cv::Mat Rectifier::Maps::converted(const cv::Mat& raw) const {
   cv::Mat out(raw.size(), CV_32FC1);
   const auto scale = static_cast<float>(camera.depth_scale);
-  for (int v = 0; v < raw.rows; ++v) {
-    const auto* from = raw.ptr<std::uint16_t>(v);
-    auto* to = out.ptr<float>(v);
-    for (int u = 0; u < raw.cols; ++u) to[u] = metres(from[u], scale);
-  }
+  for (int v = 0; v < raw.rows; ++v)
+    row_to_metres(raw.ptr<std::uint16_t>(v), raw.cols, scale, out.ptr<float>(v));
   return out;
 }
 
