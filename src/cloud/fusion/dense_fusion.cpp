@@ -118,31 +118,44 @@ class Fusion {
   }
 
   /// Lays the views into the voxels of the tiles from `first` on, a few views at a time: each is read once
-  /// for all of these tiles, and every tile takes the views in their order.
+  /// for all of these tiles, and every tile takes the views in their order. Beside that the next views are
+  /// measured.
   core::Result<void> fill(std::size_t first, std::vector<VoxelMap>& voxels) {
-    constexpr std::size_t kViewsAtATime = 4;
+    constexpr std::size_t kViewsAtATime = 2;
     std::vector<std::uint32_t> views;
     for (std::size_t k = 0; k < voxels.size(); ++k) {
       views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
     }
     std::sort(views.begin(), views.end());
     views.erase(std::unique(views.begin(), views.end()), views.end());
-    for (std::size_t at = 0; at < views.size(); at += kViewsAtATime) {
-      const std::size_t count = std::min(kViewsAtATime, views.size() - at);
-      std::vector<std::vector<VoxelSample>> samples(count);
-      std::vector<core::Result<void>> done(count);
-      executor_.parallel_for(count, [&](std::size_t i) { done[i] = measure(views[at + i], samples[i]); });
-      if (auto failed = first_error(done); !failed) return failed;
-      executor_.parallel_for(voxels.size(), [&](std::size_t k) {
-        const FusionTile& tile = tiles_[first + k];
-        const Eigen::AlignedBox3i region = tile.voxels(kCell_m, options_.voxels.voxel_m);
-        for (std::size_t i = 0; i < count; ++i) {
-          const bool reaches = std::binary_search(tile.views.begin(), tile.views.end(), views[at + i]);
-          if (reaches) voxels[k].insert(samples[i], region);
+    std::vector<std::vector<VoxelSample>> measured;  // of the views from `at` on
+    for (std::size_t at = 0; at < views.size() || !measured.empty();) {
+      const std::size_t next = at + measured.size();
+      std::vector<std::vector<VoxelSample>> samples(std::min(kViewsAtATime, views.size() - next));
+      std::vector<core::Result<void>> done(samples.size());
+      executor_.parallel_for(samples.size() + voxels.size(), [&](std::size_t i) {
+        if (i < samples.size()) {
+          done[i] = measure(views[next + i], samples[i]);
+        } else {
+          const std::size_t k = i - samples.size();
+          insert(tiles_[first + k], views.data() + at, measured, voxels[k]);
         }
       });
+      if (auto failed = first_error(done); !failed) return failed;
+      at = next;
+      measured = std::move(samples);
     }
     return {};
+  }
+
+  /// `samples` are those of `views`.
+  void insert(const FusionTile& tile, const std::uint32_t* views,
+              const std::vector<std::vector<VoxelSample>>& samples, VoxelMap& voxels) const {
+    const Eigen::AlignedBox3i region = tile.voxels(kCell_m, options_.voxels.voxel_m);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const bool reaches = std::binary_search(tile.views.begin(), tile.views.end(), views[i]);
+      if (reaches) voxels.insert(samples[i], region);
+    }
   }
 
   core::Result<void> measure(std::size_t v, std::vector<VoxelSample>& samples) const {
