@@ -18,7 +18,12 @@ core::Result<void> hand_on(Function Drawing::*function, const Arguments&... argu
 
 core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& options,
                                    const std::filesystem::path& file) {
-  return hand_on(&Drawing::render_snapshot, scene, options, file);
+  return render_snapshots(scene, {{options, file}}, core::Executor(1));
+}
+
+core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
+                                    const core::Executor& executor) {
+  return hand_on(&Drawing::render_snapshots, scene, snapshots, executor);
 }
 
 core::Result<void> draw_graph(const std::string& dot, const std::filesystem::path& file) {

@@ -12,13 +12,13 @@ namespace plumbline::viz {
 struct Drawing {
   static constexpr const char* kPart = "viz";
   static constexpr std::uint64_t layout() {
-    return core::layout_of<Drawing, Scene, CameraPath, geometry::Trajectory, Segment, SnapshotOptions,
-                           std::filesystem::path>();
+    return core::layout_of<Drawing, Scene, CameraPath, geometry::Trajectory, Segment, Snapshot,
+                           core::Executor, std::filesystem::path>();
   }
   using GlFunction = void (*)();
 
-  core::Result<void> (*render_snapshot)(const Scene& scene, const SnapshotOptions& options,
-                                        const std::filesystem::path& file);
+  core::Result<void> (*render_snapshots)(const Scene& scene, const std::vector<Snapshot>& snapshots,
+                                         const core::Executor& executor);
   core::Result<void> (*draw_graph)(const std::string& dot, const std::filesystem::path& file);
   /// OSMesa's function of that name.
   GlFunction (*gl_function)(const char* name);

@@ -3,5 +3,5 @@
 
 #include "canvas/drawing.hpp"
 
-PLUMBLINE_PART(plumbline::viz::Drawing, &plumbline::viz::render_snapshot, &plumbline::viz::draw_graph,
+PLUMBLINE_PART(plumbline::viz::Drawing, &plumbline::viz::render_snapshots, &plumbline::viz::draw_graph,
                &OSMesaGetProcAddress)

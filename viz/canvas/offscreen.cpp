@@ -7,14 +7,8 @@
 #include <GL/osmesa.h>
 #include <vtkAutoInit.h>
 #include <vtkCallbackCommand.h>
-#include <vtkImageData.h>
 #include <vtkNew.h>
-#include <vtkPNGWriter.h>
 #include <vtkUnsignedCharArray.h>
-
-#include <algorithm>
-
-#include "plumbline/core/output_file.hpp"
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2)
 VTK_MODULE_INIT(vtkRenderingContextOpenGL2)
@@ -85,30 +79,12 @@ OffscreenWindow::~OffscreenWindow() {
   window_ = nullptr;
 }
 
-cv::Mat3b OffscreenWindow::draw() {
+cv::Mat4b OffscreenWindow::draw() {
   window_->Render();
   vtkNew<vtkUnsignedCharArray> pixels;
-  window_->GetPixelData(0, 0, context_->width - 1, context_->height - 1, 0, pixels, 0);
-  return cv::Mat3b(context_->height, context_->width, reinterpret_cast<cv::Vec3b*>(pixels->GetPointer(0)))
+  window_->GetRGBACharPixelData(0, 0, context_->width - 1, context_->height - 1, 0, pixels, 0);
+  return cv::Mat4b(context_->height, context_->width, reinterpret_cast<cv::Vec4b*>(pixels->GetPointer(0)))
       .clone();
-}
-
-core::Result<void> write_png(const cv::Mat3b& picture, const std::filesystem::path& file) {
-  vtkNew<vtkImageData> data;
-  data->SetDimensions(picture.cols, picture.rows, 1);
-  data->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
-  std::copy(picture.begin(), picture.end(), static_cast<cv::Vec3b*>(data->GetScalarPointer()));
-  vtkNew<vtkPNGWriter> writer;
-  writer->SetInputData(data);
-  writer->SetCompressionLevel(6);
-  writer->WriteToMemoryOn();
-  writer->Write();
-  vtkUnsignedCharArray* bytes = writer->GetResult();
-  if (bytes == nullptr || bytes->GetNumberOfValues() == 0) {
-    return core::output_error(file.string() + ": the picture cannot be encoded as PNG");
-  }
-  return core::write_file(file, {reinterpret_cast<const char*>(bytes->GetPointer(0)),
-                                 static_cast<std::size_t>(bytes->GetNumberOfValues())});
 }
 
 }  // namespace plumbline::viz

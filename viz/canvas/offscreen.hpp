@@ -5,7 +5,6 @@
 #include <vtkGenericOpenGLRenderWindow.h>
 #include <vtkSmartPointer.h>
 
-#include <filesystem>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 
@@ -23,8 +22,9 @@ class OffscreenWindow {
   OffscreenWindow& operator=(const OffscreenWindow&) = delete;
 
   [[nodiscard]] vtkGenericOpenGLRenderWindow* window() const { return window_; }
-  /// Renders what the window holds and reads it back: RGB, rows from the bottom to the top.
-  cv::Mat3b draw();
+  /// Renders what the window holds and reads it back: RGBA, rows from the bottom to the top. Where a renderer
+  /// has a transparent background colours are multiplied by their opacity.
+  cv::Mat4b draw();
 
  private:
   OffscreenWindow() = default;
@@ -33,8 +33,5 @@ class OffscreenWindow {
   std::unique_ptr<Context> context_;
   vtkSmartPointer<vtkGenericOpenGLRenderWindow> window_;
 };
-
-/// RGB, rows from the bottom to the top. The file appears whole or not at all; errors name it.
-core::Result<void> write_png(const cv::Mat3b& picture, const std::filesystem::path& file);
 
 }  // namespace plumbline::viz

@@ -4,35 +4,28 @@
 #include <fmt/format.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
-#include <vtkActor.h>
-#include <vtkCamera.h>
-#include <vtkCellArray.h>
 #include <vtkContext2D.h>
 #include <vtkContextActor.h>
 #include <vtkContextItem.h>
 #include <vtkContextScene.h>
-#include <vtkFloatArray.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
-#include <vtkPointData.h>
-#include <vtkPoints.h>
-#include <vtkPolyData.h>
-#include <vtkPolyDataMapper.h>
-#include <vtkProperty.h>
 #include <vtkRenderer.h>
-#include <vtkShaderProperty.h>
 #include <vtkTransform2D.h>
-#include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdint>
+#include <memory>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "canvas/offscreen.hpp"
+#include "canvas/png_writer.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "scene/overlay.hpp"
 #include "scene/point_style.hpp"
+#include "scene/raster.hpp"
 #include "scene/view_frame.hpp"
 
 namespace plumbline::viz {
@@ -44,10 +37,9 @@ constexpr std::size_t kFramingSample = 100000;
 constexpr double kLargest = 30.0 * kSupersampling;  // diameter of a point
 
 // A picture is drawn in bands, since the buffers of a whole one at twice its size take hundreds of megabytes.
-// Points are drawn or not by their centres: bands overlap, so that none is cut at their borders.
+// They overlap, so that no wide line is cut at their borders.
 constexpr int kBand_px = 256;
-constexpr int kMargin = 50;  // large pixels: half the largest point, chosen ones included
-static_assert(kMargin >= kLargest / 2 && kMargin >= 50 * kSupersampling / 2);
+constexpr int kMargin = 50;  // large pixels
 
 /// Rows of the large picture that are drawn at a time, from the bottom.
 struct Band {
@@ -151,172 +143,184 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   return directions;
 }
 
-void place_camera(vtkRenderer& renderer, const Projection& projection, const Band& band) {
-  vtkCamera* camera = renderer.GetActiveCamera();
-  const Eigen::Vector3d target = projection.eye + projection.forward;
-  camera->SetPosition(projection.eye.data());
-  camera->SetFocalPoint(target.data());
-  camera->SetViewUp(projection.up.data());
-  camera->SetParallelProjection(projection.orthographic ? 1 : 0);
-  if (projection.orthographic) {
-    camera->SetParallelScale(0.5 * band.height / projection.focal_px);
-  } else {
-    camera->SetViewAngle(2.0 * std::atan(0.5 * band.height / projection.focal_px) * 180.0 / M_PI);
-  }
-  camera->SetClippingRange(projection.near_m, projection.far_m);
-  // In half heights of the band, from the picture's middle to the band's.
-  camera->SetWindowCenter(
-      0.0, (band.first + 0.5 * band.height - 0.5 * projection.height_px) / (0.5 * band.height));
-}
-
-/// Draws band by band what `renderer` of `window` holds; `band` tells the overlay which one.
-cv::Mat3b draw_bands(OffscreenWindow& window, vtkRenderer& renderer, const Projection& projection,
-                     const SnapshotOptions& options, Band& band) {
-  cv::Mat3b picture(options.height_px, options.width_px);
-  for (int first_px = 0; first_px < picture.rows; first_px += kBand_px) {
-    band.first = kSupersampling * first_px - kMargin;
-    place_camera(renderer, projection, band);
-    cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
-    const cv::Mat3b large = window.draw().rowRange(kMargin, kMargin + kSupersampling * part.rows);
-    cv::resize(large, part, part.size(), 0.0, 0.0, cv::INTER_AREA);
-  }
-  return picture;
-}
-
-/// Points of one size as an actor; `members` index `points` and `colors`.
-vtkSmartPointer<vtkActor> point_actor(const Scene& scene, const std::vector<std::uint32_t>& points,
-                                      const std::vector<Rgb>& colors,
-                                      const std::vector<std::uint32_t>& members, float size_px) {
-  const auto count = static_cast<vtkIdType>(members.size());
-  vtkNew<vtkFloatArray> xyz;
-  xyz->SetNumberOfComponents(3);
-  xyz->SetNumberOfTuples(count);
-  vtkNew<vtkUnsignedCharArray> rgb;
-  rgb->SetNumberOfComponents(3);
-  rgb->SetNumberOfTuples(count);
-  float* to_xyz = xyz->GetPointer(0);
-  unsigned char* to_rgb = rgb->GetPointer(0);
-  for (const auto k : members) {
-    const auto& p = (*scene.cloud)[points[k]];
-    to_xyz = std::copy_n(p.data, 3, to_xyz);
-    *to_rgb++ = colors[k].r;
-    *to_rgb++ = colors[k].g;
-    *to_rgb++ = colors[k].b;
-  }
-  vtkNew<vtkCellArray> vertices;  // one cell of all points
-  vertices->InsertNextCell(static_cast<int>(count));
-  for (vtkIdType i = 0; i < count; ++i) vertices->InsertCellPoint(i);
-  vtkNew<vtkPoints> vtk_points;
-  vtk_points->SetData(xyz);
-  vtkNew<vtkPolyData> data;
-  data->SetPoints(vtk_points);
-  data->SetVerts(vertices);
-  data->GetPointData()->SetScalars(rgb);
-  vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputData(data);
-  auto actor = vtkSmartPointer<vtkActor>::New();
-  actor->SetMapper(mapper);
-  actor->GetProperty()->SetPointSize(size_px);
-  actor->GetProperty()->LightingOff();
-  // Discs instead of squares.
-  actor->GetShaderProperty()->AddFragmentShaderReplacement(
-      "//VTK::Color::Impl", true,
-      "//VTK::Color::Impl\n"
-      "  vec2 from_centre = 2.0 * gl_PointCoord - 1.0;\n"
-      "  if (dot(from_centre, from_centre) > 1.0) discard;\n",
-      false);
-  return actor;
-}
-
-/// In perspective near points are larger than far ones: one actor per whole number of pixels.
-void add_points(vtkRenderer& renderer, const Scene& scene, const std::vector<std::uint32_t>& points,
-                const std::vector<Rgb>& colors, const SnapshotOptions& options, const Projection& projection,
-                double spacing_m) {
+/// How large each point is drawn, whole pixels; 0: it is behind the viewer.
+std::vector<int> point_sizes(const Scene& scene, const std::vector<std::uint32_t>& points,
+                             const SnapshotOptions& options, const Projection& projection, double spacing_m) {
   constexpr double kOverlap = 1.7;  // neighbours at a slant, and voxels that are not quite full
   constexpr double kSmallest = 2.0 * kSupersampling;
   constexpr double kLonely = 6.0 * kSupersampling;  // a single point
-  std::map<int, std::vector<std::uint32_t>> by_size;
-  for (std::uint32_t k = 0; k < points.size(); ++k) {
+  std::vector<int> sizes;
+  sizes.reserve(points.size());
+  for (const std::uint32_t k : points) {
     double size = options.point_size_px * kSupersampling;
     if (size <= 0.0) {
-      const Eigen::Vector3d p = scene.cloud->at(points[k]).getVector3fMap().cast<double>();
+      const Eigen::Vector3d p = scene.cloud->at(k).getVector3fMap().cast<double>();
       const double depth = (p - projection.eye).dot(projection.forward);
-      if (depth < projection.near_m) continue;
       const double wanted = kOverlap * spacing_m * projection.pixels_per_metre(depth);
-      size = spacing_m > 0.0 ? std::clamp(wanted, kSmallest, kLargest) : kLonely;
+      size = depth < projection.near_m ? 0.0
+             : spacing_m > 0.0         ? std::clamp(wanted, kSmallest, kLargest)
+                                       : kLonely;
     }
-    by_size[std::max(1, static_cast<int>(std::lround(size)))].push_back(k);
+    sizes.push_back(size > 0.0 ? std::max(1, static_cast<int>(std::lround(size))) : 0);
   }
-  for (const auto& [size, members] : by_size) {
-    renderer.AddActor(point_actor(scene, points, colors, members, static_cast<float>(size)));
-  }
+  return sizes;
 }
 
-/// Line landmarks lie on surfaces: drawn a little nearer to the viewer, so that the points do not hide them.
-void add_segments(vtkRenderer& renderer, const Scene& scene, const Projection& projection, double spacing_m) {
-  vtkNew<vtkPoints> ends;
-  vtkNew<vtkCellArray> lines;
-  for (const Segment& segment : scene.segments) {
-    if (!segment.a.allFinite() || !segment.b.allFinite()) continue;
-    lines->InsertNextCell(2);
-    for (const Eigen::Vector3d& end : {segment.a, segment.b}) {
-      const Eigen::Vector3d lifted = end + (0.02 + 1.5 * spacing_m) * projection.to_viewer(end);
-      lines->InsertCellPoint(ends->InsertNextPoint(lifted.data()));
-    }
-  }
-  if (lines->GetNumberOfCells() == 0) return;
-  vtkNew<vtkPolyData> data;
-  data->SetPoints(ends);
-  data->SetLines(lines);
-  vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputData(data);
-  vtkNew<vtkActor> actor;
-  actor->SetMapper(mapper);
-  actor->GetProperty()->LightingOff();
-  actor->GetProperty()->SetLineWidth(2.5F * kSupersampling);
-  actor->GetProperty()->SetColor(scene.segment_color.r / 255.0, scene.segment_color.g / 255.0,
-                                 scene.segment_color.b / 255.0);
-  renderer.AddActor(actor);
-}
+/// What one picture is made of.
+struct Drawn {
+  std::vector<std::uint32_t> points;
+  PointColors styled;
+  std::vector<int> sizes;               ///< of the points, large pixels
+  std::vector<Eigen::Vector3d> places;  ///< of the points, as projected
+  double spacing_m = 0.0;
+  OverlayContent content;
+};
 
-}  // namespace
-
-core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& options,
-                                   const std::filesystem::path& file) {
-  if (auto checked = check(scene, options); !checked) return checked;
+Drawn choose_what_to_draw(const Scene& scene, const SnapshotOptions& options) {
   SnapshotOptions large = options;
   large.width_px *= kSupersampling;
   large.height_px *= kSupersampling;
-
   const SceneAxes axes = scene_axes(scene, large);
-  OverlayContent content;
-  content.scene = &scene;
-  content.options = &options;
-  content.projection = choose_projection(scene, large, axes);
-  const Projection& projection = content.projection;
+  Drawn drawn;
+  drawn.content.scene = &scene;
+  drawn.content.options = &options;
+  drawn.content.projection = choose_projection(scene, large, axes);
+  const Projection& projection = drawn.content.projection;
   const auto facing = visible_points(scene, projection, options.cull_back_faces);
-  const double spacing_m = point_spacing(scene, facing);
-  const auto points = nearest_per_cell(scene, facing, projection, kSupersampling);
-  const PointColors styled = color_points(scene, points, options, axes, projection);
-  content.color_scale = styled.scale;
-  content.empty = facing.empty() && scene.segments.empty();
+  drawn.spacing_m = point_spacing(scene, facing);
+  drawn.points = nearest_per_cell(scene, facing, projection, kSupersampling);
+  drawn.styled = color_points(scene, drawn.points, options, axes, projection);
+  drawn.sizes = point_sizes(scene, drawn.points, options, projection, drawn.spacing_m);
+  for (const Eigen::Vector3d& p : positions(scene, drawn.points))
+    drawn.places.push_back(projection.project(p));
+  drawn.content.color_scale = drawn.styled.scale;
+  drawn.content.empty = facing.empty() && scene.segments.empty();
+  return drawn;
+}
 
-  Band band;
-  band.height = kSupersampling * std::min(kBand_px, options.height_px) + 2 * kMargin;
-  auto window = OffscreenWindow::open(large.width_px, band.height);
-  if (!window) return tl::unexpected(window.error());
-  vtkNew<vtkRenderer> renderer;
-  renderer->SetBackground(kBackground.r / 255.0, kBackground.g / 255.0, kBackground.b / 255.0);
-  (*window)->window()->AddRenderer(renderer);
-  add_points(*renderer, scene, points, styled.colors, options, projection, spacing_m);
-  add_segments(*renderer, scene, projection, spacing_m);
-  vtkNew<Overlay> overlay;
-  overlay->content = &content;
-  overlay->band = &band;
-  vtkNew<vtkContextActor> over_points;
-  over_points->GetScene()->AddItem(overlay);
-  renderer->AddActor(over_points);
-  return write_png(draw_bands(**window, *renderer, projection, options, band), file);
+/// Line landmarks lie on surfaces: drawn a little nearer to the viewer, so that the points do not hide them.
+void draw_segments(const Scene& scene, const Drawn& drawn, Raster& raster) {
+  const Projection& projection = drawn.content.projection;
+  const auto depth_of = [&](const Eigen::Vector3d& p) {
+    return (p - projection.eye).dot(projection.forward);
+  };
+  for (const Segment& segment : scene.segments) {
+    if (!segment.a.allFinite() || !segment.b.allFinite()) continue;
+    const auto lifted = [&](const Eigen::Vector3d& end) -> Eigen::Vector3d {
+      return end + (0.02 + 1.5 * drawn.spacing_m) * projection.to_viewer(end);
+    };
+    Eigen::Vector3d near = lifted(segment.a), far = lifted(segment.b);
+    if (depth_of(near) > depth_of(far)) std::swap(near, far);
+    if (depth_of(far) <= projection.near_m) continue;
+    const double before = projection.near_m - depth_of(near);
+    if (before > 0.0) near += before / (depth_of(far) - depth_of(near)) * (far - near);
+    raster.draw_line(projection.project(near), projection.project(far), 2.5 * kSupersampling,
+                     !projection.orthographic, scene.segment_color);
+  }
+}
+
+void draw_band(const Scene& scene, const Drawn& drawn, Raster& raster) {
+  for (std::size_t k = 0; k < drawn.points.size(); ++k) {
+    if (drawn.sizes[k] > 0) raster.draw_point(drawn.places[k], drawn.sizes[k], drawn.styled.colors[k]);
+  }
+  draw_segments(scene, drawn, raster);
+}
+
+/// Pictures of the same size, `over` with colours that are multiplied by their opacity.
+cv::Mat3b laid_over(const cv::Mat4b& below, const cv::Mat4b& over) {
+  cv::Mat3b result(below.size());
+  for (int y = 0; y < result.rows; ++y) {
+    const cv::Vec4b *under = below[y], *top = over[y];
+    cv::Vec3b* to = result[y];
+    for (int x = 0; x < result.cols; ++x) {
+      const int through = 255 - top[x][3];
+      for (int c = 0; c < 3; ++c)
+        to[x][c] = static_cast<std::uint8_t>(std::min(255, top[x][c] + (under[x][c] * through + 127) / 255));
+    }
+  }
+  return result;
+}
+
+/// Draws picture after picture, in the same window as long as they are of the same size: VTK's shaders are
+/// compiled once.
+class Renderer {
+ public:
+  core::Result<cv::Mat3b> draw(const Scene& scene, const SnapshotOptions& options, const Drawn& drawn) {
+    Band band;
+    band.height = kSupersampling * std::min(kBand_px, options.height_px) + 2 * kMargin;
+    if (auto opened = open({kSupersampling * options.width_px, band.height}); !opened)
+      return tl::unexpected(opened.error());
+
+    vtkNew<vtkRenderer> renderer;
+    renderer->SetBackground(0.0, 0.0, 0.0);
+    renderer->SetBackgroundAlpha(0.0);
+    window_->window()->AddRenderer(renderer);
+    vtkNew<Overlay> overlay;
+    overlay->content = &drawn.content;
+    overlay->band = &band;
+    vtkNew<vtkContextActor> actor;
+    actor->GetScene()->AddItem(overlay);
+    renderer->AddActor(actor);
+
+    Raster raster(kSupersampling * options.width_px, band.height);
+    cv::Mat3b picture(options.height_px, options.width_px);
+    for (int first_px = 0; first_px < picture.rows; first_px += kBand_px) {
+      band.first = kSupersampling * first_px - kMargin;
+      raster.clear(band.first, kBackground);
+      draw_band(scene, drawn, raster);
+      cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
+      const cv::Mat3b large = laid_over(raster.picture(), window_->draw())
+                                  .rowRange(kMargin, kMargin + kSupersampling * part.rows);
+      cv::resize(large, part, part.size(), 0.0, 0.0, cv::INTER_AREA);
+    }
+    window_->window()->RemoveRenderer(renderer);
+    return picture;
+  }
+
+ private:
+  core::Result<void> open(const cv::Size& size) {
+    if (window_ != nullptr && size == size_) return {};
+    window_.reset();
+    auto window = OffscreenWindow::open(size.width, size.height);
+    if (!window) return tl::unexpected(window.error());
+    window_ = std::move(*window);
+    size_ = size;
+    return {};
+  }
+
+  std::unique_ptr<OffscreenWindow> window_;
+  cv::Size size_;
+};
+
+}  // namespace
+
+/// Only this thread draws. What is to be drawn is chosen, and what is drawn is written, beside it.
+core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
+                                    const core::Executor& executor) {
+  for (const Snapshot& snapshot : snapshots) {
+    if (auto checked = check(scene, snapshot.options); !checked) return checked;
+  }
+  std::vector<Drawn> drawn(snapshots.size());
+  std::vector<core::Result<void>> written(snapshots.size());
+  std::vector<core::Executor::Job> choosing, writing;
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    choosing.push_back(
+        executor.submit([&, i] { drawn[i] = choose_what_to_draw(scene, snapshots[i].options); }));
+  }
+  Renderer renderer;
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    choosing[i].wait();
+    auto picture = renderer.draw(scene, snapshots[i].options, drawn[i]);
+    if (!picture) return tl::unexpected(picture.error());
+    drawn[i] = {};
+    writing.push_back(
+        executor.submit([&, i, picture = *picture] { written[i] = write_png(picture, snapshots[i].file); }));
+  }
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    writing[i].wait();
+    if (!written[i]) return written[i];
+  }
+  return {};
 }
 
 }  // namespace plumbline::viz

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
 #include "plumbline/core/options.hpp"
 #include "plumbline/viz/scene.hpp"
 
@@ -63,5 +64,14 @@ Eigen::Vector3d estimate_up(const Scene& scene);
 /// OpenGL context).
 core::Result<void> render_snapshot(const Scene& scene, const SnapshotOptions& options,
                                    const std::filesystem::path& file);
+
+/// A picture and where it goes.
+struct Snapshot {
+  SnapshotOptions options;
+  std::filesystem::path file;
+};
+/// Several pictures of one scene, each as by render_snapshot, in less time than one by one.
+core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapshot>& snapshots,
+                                    const core::Executor& executor);
 
 }  // namespace plumbline::viz

@@ -202,8 +202,12 @@ class Runner {
       while (first + count < graph_.nodes.size() && may_export_beside(first, first + count)) ++count;
       const auto began = Clock::now();
       std::vector<core::Result<void>> finished(count);
-      context_.executor->parallel_for(count,
-                                      [&](std::size_t k) { finished[k] = finish_stage(first + k, results); });
+      std::vector<core::Executor::Job> beside;
+      for (std::size_t k = 0; k + 1 < count; ++k)
+        beside.push_back(
+            context_.executor->submit([&, k] { finished[k] = finish_stage(first + k, results); }));
+      finished[count - 1] = finish_stage(first + count - 1, results);
+      for (core::Executor::Job& job : beside) job.wait();
       const double seconds = ms_since(began) / 1000.0;
       (graph_.nodes[first].type->exports ? report_.export_s : report_.map_s) += seconds;
       for (const auto& one : finished) {

@@ -89,11 +89,15 @@ class OutputStage : public Stage {
         [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
     };
     std::vector<core::Result<void>> written(steps.size());
-    context_->executor->parallel_for(steps.size(), [&](std::size_t i) { written[i] = steps[i](); });
+    std::vector<core::Executor::Job> jobs;
+    for (std::size_t i = 0; i < steps.size(); ++i)
+      jobs.push_back(context_->executor->submit([&, i] { written[i] = steps[i](); }));
+    auto drawn = write_snapshots(folder / "snapshots", map, *dense);
+    for (core::Executor::Job& job : jobs) job.wait();
     for (const auto& one : written) {
       if (!one) return one;
     }
-    return write_snapshots(folder / "snapshots", map, *dense);
+    return drawn;
   }
 
   void summarise(RunSummary& summary) const override { summary.path.check = path_; }
@@ -195,18 +199,16 @@ class OutputStage : public Stage {
       scene.paths.push_back(std::move(path));
     }
     add_robots(map, dense, scene);
+    std::vector<viz::Snapshot> snapshots;
+    const auto add = [&](const std::string& name, viz::View view, viz::ColorMode color) {
+      snapshots.push_back({picture_options(view, color, dense), folder / (name + ".png")});
+    };
     for (const viz::View view : chosen_) {
-      if (map.robots.size() > 1 && !dense.columns.robot.empty()) {
-        if (auto drawn = draw(folder / ("robots_" + viz::view_name(view) + ".png"), view,
-                              viz::ColorMode::kRobot, scene, dense);
-            !drawn) {
-          return drawn;
-        }
-      }
-      auto drawn = draw(folder / (viz::view_name(view) + ".png"), view, viz::ColorMode::kRgb, scene, dense);
-      if (!drawn) return drawn;
+      if (map.robots.size() > 1 && !dense.columns.robot.empty())
+        add("robots_" + viz::view_name(view), view, viz::ColorMode::kRobot);
+      add(viz::view_name(view), view, viz::ColorMode::kRgb);
     }
-    return {};
+    return viz::render_snapshots(scene, snapshots, *context_->executor);
   }
 
   /// Paths of several robots, and who saw which point.
@@ -225,15 +227,15 @@ class OutputStage : public Stage {
     scene.scalars.assign(dense.columns.robot.begin(), dense.columns.robot.end());
   }
 
-  core::Result<void> draw(const std::filesystem::path& file, viz::View view, viz::ColorMode color,
-                          const viz::Scene& scene, const DenseCloud& dense) const {
+  [[nodiscard]] viz::SnapshotOptions picture_options(viz::View view, viz::ColorMode color,
+                                                     const DenseCloud& dense) const {
     viz::SnapshotOptions options;
     options.view = view;
     options.color = color;
     if (dense.upright) options.up = Eigen::Vector3d::UnitZ();
     options.width_px = width_px_;
     options.height_px = height_px_;
-    return viz::render_snapshot(scene, options, file);
+    return options;
   }
 
   bool ply_ = true;

@@ -67,7 +67,7 @@ Scene make_room(double tilt_rad = 0.0) {
   return scene;
 }
 
-class Snapshot : public ::testing::Test {
+class Snapshots : public ::testing::Test {
  protected:
   void SetUp() override {
     unsetenv("DISPLAY");
@@ -155,7 +155,7 @@ int drawn_on_border(const cv::Mat& picture, int border) {
   return drawn;
 }
 
-TEST_F(Snapshot, SparseSurfacesFarAwayAreInThePictureToo) {
+TEST_F(Snapshots, SparseSurfacesFarAwayAreInThePictureToo) {
   // Near the camera a thousand times as many points per square metre as on the floor behind.
   Scene scene;
   auto cloud = std::make_shared<Cloud>();
@@ -174,7 +174,7 @@ TEST_F(Snapshot, SparseSurfacesFarAwayAreInThePictureToo) {
   EXPECT_EQ(drawn_on_border(picture, 8), 0);
 }
 
-TEST_F(Snapshot, NoDustStaysOfACeilingThatIsLeftOut) {
+TEST_F(Snapshots, NoDustStaysOfACeilingThatIsLeftOut) {
   Scene scene = make_room();
   auto cloud = std::make_shared<Cloud>(*scene.cloud);
   for (std::size_t i = 0; i < cloud->size();
@@ -189,7 +189,7 @@ TEST_F(Snapshot, NoDustStaysOfACeilingThatIsLeftOut) {
   EXPECT_EQ(find(picture(inside), Hue::kMagenta).count, 0);
 }
 
-TEST_F(Snapshot, IsoViewLooksWhereTheCamerasLooked) {
+TEST_F(Snapshots, IsoViewLooksWhereTheCamerasLooked) {
   // Walls at 45 degrees: their direction next to the heading is a matter of chance, the side shown is not.
   for (const double turn : {-0.6, 0.6}) {
     Scene scene = make_room();
@@ -202,7 +202,7 @@ TEST_F(Snapshot, IsoViewLooksWhereTheCamerasLooked) {
   }
 }
 
-TEST_F(Snapshot, TopViewIsAPlanWithoutCeiling) {
+TEST_F(Snapshots, TopViewIsAPlanWithoutCeiling) {
   for (const double tilt : {0.0, 0.5}) {  // a camera that looked 29 degrees up or down at the start
     const cv::Mat picture = render(make_room(tilt), small(View::kTop));
     ASSERT_EQ(picture.cols, 400);
@@ -221,13 +221,13 @@ TEST_F(Snapshot, TopViewIsAPlanWithoutCeiling) {
   }
 }
 
-TEST_F(Snapshot, CeilingHidesThePlanWhenCullingIsOff) {
+TEST_F(Snapshots, CeilingHidesThePlanWhenCullingIsOff) {
   SnapshotOptions options = small(View::kTop);
   options.cull_back_faces = false;
   EXPECT_GT(find(render(make_room(), options), Hue::kMagenta).count, 400 * 300 / 3);
 }
 
-TEST_F(Snapshot, SideViewsShowTheOppositeWall) {
+TEST_F(Snapshots, SideViewsShowTheOppositeWall) {
   const Scene room = make_room();
   EXPECT_GT(find(render(room, small(View::kFront)), Hue::kBlue).count, 10000);
   EXPECT_GT(find(render(room, small(View::kBack)), Hue::kYellow).count, 10000);
@@ -236,7 +236,7 @@ TEST_F(Snapshot, SideViewsShowTheOppositeWall) {
   EXPECT_GT(find(render(room, small(View::kBottom)), Hue::kMagenta).count, 10000);
 }
 
-TEST_F(Snapshot, IsoOpensTheRoomTowardsTheViewer) {
+TEST_F(Snapshots, IsoOpensTheRoomTowardsTheViewer) {
   const cv::Mat picture = render(make_room(), small(View::kIso));
   EXPECT_GT(find(picture, Hue::kGrey).count, 2000);
   EXPECT_GT(find(picture, Hue::kBlue).count, 2000);
@@ -245,7 +245,7 @@ TEST_F(Snapshot, IsoOpensTheRoomTowardsTheViewer) {
   EXPECT_GT(find(picture, Hue::kBackground).count, 400 * 300 / 5);
 }
 
-TEST_F(Snapshot, ExplicitViewpointLooksWhereItIsTold) {
+TEST_F(Snapshots, ExplicitViewpointLooksWhereItIsTold) {
   SnapshotOptions options = small(View::kExplicit);
   options.viewpoint.eye = {0.0, 0.0, 0.0};
   options.viewpoint.target = {-1.0, 0.0, 0.0};
@@ -253,7 +253,7 @@ TEST_F(Snapshot, ExplicitViewpointLooksWhereItIsTold) {
   EXPECT_GT(find(picture, Hue::kRed).count, 400 * 300 / 2);
 }
 
-TEST_F(Snapshot, SurfacesCloseWithoutHolesAtAnySize) {
+TEST_F(Snapshots, SurfacesCloseWithoutHolesAtAnySize) {
   for (const int width : {200, 1000}) {
     SnapshotOptions options = small(View::kTop);
     options.width_px = width;
@@ -267,7 +267,7 @@ TEST_F(Snapshot, SurfacesCloseWithoutHolesAtAnySize) {
   }
 }
 
-TEST_F(Snapshot, SameSceneSameBytes) {
+TEST_F(Snapshots, SameSceneSameBytes) {
   SnapshotOptions options = small(View::kIso);
   options.annotations = true;
   const Scene room = make_room();
@@ -277,7 +277,7 @@ TEST_F(Snapshot, SameSceneSameBytes) {
   EXPECT_EQ(bytes("a.png"), bytes("b.png"));
 }
 
-TEST_F(Snapshot, EmptySceneSaysSo) {
+TEST_F(Snapshots, EmptySceneSaysSo) {
   SnapshotOptions options = small(View::kIso);
   options.annotations = true;
   Scene nothing;
@@ -290,7 +290,7 @@ TEST_F(Snapshot, EmptySceneSaysSo) {
   EXPECT_LT(background, 400 * 300);  // the words
 }
 
-TEST_F(Snapshot, NonFinitePointsAndPosesAreLeftOut) {
+TEST_F(Snapshots, NonFinitePointsAndPosesAreLeftOut) {
   Scene room = make_room();
   auto cloud = std::make_shared<Cloud>(*room.cloud);
   for (int i = 0; i < 500; ++i) {
@@ -310,7 +310,7 @@ TEST_F(Snapshot, NonFinitePointsAndPosesAreLeftOut) {
   EXPECT_LT(cv::norm(clean, picture, cv::NORM_L1) / (400.0 * 300.0 * 3.0), 1.0);
 }
 
-TEST_F(Snapshot, OnePointAndAllNanAreFine) {
+TEST_F(Snapshots, OnePointAndAllNanAreFine) {
   Scene scene;
   auto one = std::make_shared<Cloud>();
   one->push_back(point({0.3, 0.2, 1.0}, {0, 0, -1}, {220, 30, 30}));
@@ -325,7 +325,7 @@ TEST_F(Snapshot, OnePointAndAllNanAreFine) {
   EXPECT_GT(find(render(scene, small(View::kTop)), Hue::kBackground).count, 400 * 300 * 9 / 10);
 }
 
-TEST_F(Snapshot, FarOutliersDoNotShrinkTheRoom) {
+TEST_F(Snapshots, FarOutliersDoNotShrinkTheRoom) {
   Scene room = make_room();
   auto cloud = std::make_shared<Cloud>(*room.cloud);
   for (int i = 0; i < 40; ++i) cloud->push_back(point({50.0 + i, 3.0, 80.0}, {0, -1, 0}, {0, 0, 0}));
@@ -333,7 +333,7 @@ TEST_F(Snapshot, FarOutliersDoNotShrinkTheRoom) {
   EXPECT_GT(find(render(room, small(View::kTop)), Hue::kGrey).count, 400 * 300 / 3);
 }
 
-TEST_F(Snapshot, ColorModesShowTheirValues) {
+TEST_F(Snapshots, ColorModesShowTheirValues) {
   Scene room = make_room();
   for (const auto& p : *room.cloud) room.scalars.push_back(p.x < 0.0F ? 0.0F : 1.0F);
   room.paths.clear();
@@ -361,7 +361,7 @@ TEST_F(Snapshot, ColorModesShowTheirValues) {
   EXPECT_GT(at(120, 150).b, 200);  // the floor's normal is up
 }
 
-TEST_F(Snapshot, SegmentsLieOverTheirSurface) {
+TEST_F(Snapshots, SegmentsLieOverTheirSurface) {
   Scene room = make_room();
   room.segments.push_back({{-1.5, 1.2, 1.0}, {1.5, 1.2, 1.0}});
   room.segment_color = {255, 0, 255};
@@ -370,7 +370,7 @@ TEST_F(Snapshot, SegmentsLieOverTheirSurface) {
   EXPECT_NEAR(line.x, 0.5, 0.02);
 }
 
-TEST_F(Snapshot, UpIsFoundFromTheFloor) {
+TEST_F(Snapshots, UpIsFoundFromTheFloor) {
   const double tilt = 0.6;
   const Scene room = make_room(tilt);
   const Eigen::Vector3d up = Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitX()) * Eigen::Vector3d(0, -1, 0);
@@ -383,7 +383,7 @@ TEST_F(Snapshot, UpIsFoundFromTheFloor) {
   EXPECT_EQ(estimate_up(Scene{}), Eigen::Vector3d(0, -1, 0));
 }
 
-TEST_F(Snapshot, WrongRequestsAreUsageErrors) {
+TEST_F(Snapshots, WrongRequestsAreUsageErrors) {
   const Scene room = make_room();
   const auto kind = [&](const SnapshotOptions& options) {
     const auto done = render_snapshot(room, options, folder_ / "a.png");
@@ -402,7 +402,24 @@ TEST_F(Snapshot, WrongRequestsAreUsageErrors) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "a.png"));
 }
 
-TEST_F(Snapshot, UnwritablePathIsAnOutputErrorThatNamesTheFile) {
+TEST_F(Snapshots, SeveralAreTheSameAsOneByOne) {
+  const Scene room = make_room();
+  std::vector<Snapshot> wanted;
+  for (const View view : {View::kIso, View::kTop, View::kFront}) {
+    wanted.push_back({small(view), folder_ / (view_name(view) + ".png")});
+    wanted.back().options.annotations = true;
+  }
+  wanted.back().options.width_px = 500;  // another window
+  for (const int threads : {1, 2}) {
+    ASSERT_TRUE(render_snapshots(room, wanted, core::Executor(threads)));
+    for (const Snapshot& one : wanted) {
+      render(room, one.options);
+      EXPECT_EQ(bytes(one.file.filename().string()), bytes("a.png")) << one.file;
+    }
+  }
+}
+
+TEST_F(Snapshots, UnwritablePathIsAnOutputErrorThatNamesTheFile) {
   const auto file = folder_ / "missing" / "a.png";
   const auto done = render_snapshot(make_room(), small(View::kTop), file);
   ASSERT_FALSE(done.has_value());
