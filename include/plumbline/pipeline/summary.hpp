@@ -144,7 +144,7 @@ struct RunSummary {
   int threads = 0;
   int seed = 0;
 
-  [[nodiscard]] double fps() const;  ///< frames read over map_s; 0 when nothing was read
+  [[nodiscard]] double fps() const;  ///< frames read over wall_s less export_s; 0 when nothing was read
 };
 
 /// Sets `reason` when tracking was lost for more than 10 % of the frames, the map has torn or the cloud that

@@ -203,7 +203,8 @@ double RunSummary::Frames::tracked_percent() const {
 }
 
 double RunSummary::fps() const {
-  return map_s > 0.0 ? static_cast<double>(frames.read - frames.resumed) / map_s : 0.0;
+  const double seconds = wall_s - export_s;
+  return seconds > 0.0 ? static_cast<double>(frames.read - frames.resumed) / seconds : 0.0;
 }
 
 void judge(RunSummary& summary) {
@@ -299,8 +300,8 @@ std::string to_text(const RunSummary& s) {
   const bool again =
       std::any_of(s.cameras.begin(), s.cameras.end(), [](const auto& camera) { return camera.asked > 1; });
   text += fmt::format(
-      "time       {:.1f} s in all{}, {:.1f} s mapping ({:.1f} frames a second), {:.1f} s export\n", s.wall_s,
-      again ? " (begun again with a better camera)" : "", s.map_s, s.fps(), s.export_s);
+      "time       {:.1f} s in all{}, {:.1f} s of it export: {:.1f} frames a second without that\n", s.wall_s,
+      again ? " (begun again with a better camera)" : "", s.export_s, s.fps());
   if (s.pace_hz > 0.0) {
     text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", s.pace_hz, s.behind_s);
   }
