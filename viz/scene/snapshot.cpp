@@ -38,8 +38,8 @@ constexpr double kLargest = 30.0 * kSupersampling;  // diameter of a point
 
 // A picture is drawn in bands, since the buffers of a whole one at twice its size take hundreds of megabytes.
 // They overlap, so that no wide line is cut at their borders.
-constexpr int kBand_px = 256;
-constexpr int kMargin = 50;  // large pixels
+constexpr int kBand_px = 128;
+constexpr int kMargin = 32;  // large pixels
 
 /// Rows of the large picture that are drawn at a time, from the bottom.
 struct Band {
@@ -303,13 +303,17 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
   std::vector<Drawn> drawn(snapshots.size());
   std::vector<core::Result<void>> written(snapshots.size());
   std::vector<core::Executor::Job> choosing, writing;
-  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+  const auto choose_next = [&] {
+    const std::size_t i = choosing.size();
+    if (i == snapshots.size()) return;
     choosing.push_back(
         executor.submit([&, i] { drawn[i] = choose_what_to_draw(scene, snapshots[i].options); }));
-  }
+  };
   Renderer renderer;
+  choose_next();
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
     choosing[i].wait();
+    choose_next();
     auto picture = renderer.draw(scene, snapshots[i].options, drawn[i]);
     if (!picture) return tl::unexpected(picture.error());
     drawn[i] = {};
