@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
+#include <limits>
 #include <opencv2/core.hpp>
 
 namespace plumbline::features {
@@ -21,11 +20,18 @@ constexpr double kWeakShare = 0.10;  // of the pixels: up to here weaker gradien
 constexpr float kBinsPerLevel = 2.8F;
 constexpr int kBins = 1024;  // of gradient magnitude, for the order of seeds
 
-// Gradient of one pixel as unit vector and magnitude, (gx, gy) / |g| and |g|; one cache line holds five.
+// Gradient of one pixel as unit vector and magnitude, (gx, gy) / |g| and |g|.
 struct Gradient {
   float x = 0.0F;
   float y = 0.0F;
   float magnitude = 0.0F;
+};
+
+// Direction of a gradient that may still join a region. What is in one, or has no usable gradient, is no
+// number: the only comparison that growing makes fails.
+struct Direction {
+  float x = std::numeric_limits<float>::quiet_NaN();
+  float y = 0.0F;
 };
 
 struct Rectangle {
@@ -50,6 +56,10 @@ class Lsd {
   [[nodiscard]] Pixel pixel(int index) const {
     return {index, static_cast<float>(index % width_), static_cast<float>(index / width_)};
   }
+  void give_back(int index) {
+    const Gradient& g = gradients_[static_cast<std::size_t>(index)];
+    free_[static_cast<std::size_t>(index)] = {g.x, g.y};
+  }
   void grow(int seed, float cosine);
   [[nodiscard]] Rectangle fit() const;
   [[nodiscard]] float density(const Rectangle& r) const {
@@ -63,8 +73,8 @@ class Lsd {
   int height_;
   bool exact_;
   std::vector<Gradient> gradients_;
-  std::vector<std::uint8_t> used_;  // in a region, or no usable gradient
-  std::vector<int> seeds_;          // strongest first
+  std::vector<Direction> free_;
+  std::vector<int> seeds_;  // strongest first
   Region region_;
   Eigen::Vector2f sum_ = Eigen::Vector2f::Zero();  // of the region's unit gradients
 };
@@ -74,14 +84,14 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
       height_(image.rows),
       exact_(exact),
       gradients_(static_cast<std::size_t>(width_ * height_)),
-      used_(static_cast<std::size_t>(width_ * height_), 1) {
+      free_(static_cast<std::size_t>(width_ * height_)) {
   const int least_squared = std::max(1, static_cast<int>(std::ceil(4.0F * min_gradient * min_gradient)));
   std::vector<int> usable;
   std::vector<int> bins;
   usable.reserve(gradients_.size() / 3);
   bins.reserve(gradients_.size() / 3);
   std::array<int, kBins + 1> first{};
-  // The outermost pixels stay used: regions need no bounds checks.
+  // The outermost pixels are never free: regions need no bounds checks.
   for (int y = 1; y + 1 < height_; ++y) {
     const unsigned char* p = image.ptr<unsigned char>(y);
     const unsigned char* q = image.ptr<unsigned char>(y + 1);
@@ -114,42 +124,41 @@ Lsd::Lsd(const cv::Mat& image, float min_gradient, bool exact)
     const auto bin = static_cast<std::size_t>(bins[i]);
     if (bin >= last) continue;
     seeds_[static_cast<std::size_t>(first[bin]++)] = usable[i];
-    used_[static_cast<std::size_t>(usable[i])] = 0;
+    give_back(usable[i]);
   }
-}
-
-bool three_used(const std::uint8_t* used) {
-  constexpr std::array<std::uint8_t, 4> kAll{1, 1, 1, 0};
-  std::array<std::uint8_t, 4> three{};
-  std::memcpy(three.data(), used, 3);
-  return std::memcmp(three.data(), kAll.data(), sizeof kAll) == 0;
 }
 
 // Neighbours join while their level-line angle is within the tolerance of the region's.
 void Lsd::grow(int seed, float cosine) {
+  struct Step {
+    int index;
+    float x, y;
+  };
+  const std::array<Step, 8> around = {{{-width_ - 1, -1.0F, -1.0F},
+                                       {-width_, 0.0F, -1.0F},
+                                       {-width_ + 1, 1.0F, -1.0F},
+                                       {-1, -1.0F, 0.0F},
+                                       {1, 1.0F, 0.0F},
+                                       {width_ - 1, -1.0F, 1.0F},
+                                       {width_, 0.0F, 1.0F},
+                                       {width_ + 1, 1.0F, 1.0F}}};
   region_.assign(1, pixel(seed));
-  used_[static_cast<std::size_t>(seed)] = 1;
+  free_[static_cast<std::size_t>(seed)] = {};
   float sx = gradients_[static_cast<std::size_t>(seed)].x;
   float sy = gradients_[static_cast<std::size_t>(seed)].y;
   float limit = cosine;  // cos(tolerance) |sum|
-  std::uint8_t* const used = used_.data();
-  const Gradient* const gradients = gradients_.data();
+  Direction* const free = free_.data();
   for (std::size_t i = 0; i < region_.size(); ++i) {
     const Pixel from = region_[i];
-    for (int dy = -1; dy <= 1; ++dy) {
-      const int left = from.index + dy * width_ - 1;
-      if (three_used(used + left)) continue;  // mostly: the inner pixels of a region
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int index = left + 1 + dx;
-        if (used[index] != 0) continue;
-        const Gradient& g = gradients[index];
-        if (g.x * sx + g.y * sy < limit) continue;
-        used[index] = 1;
-        region_.push_back({index, from.x + static_cast<float>(dx), from.y + static_cast<float>(dy)});
-        sx += g.x;
-        sy += g.y;
-        limit = cosine * std::sqrt(sx * sx + sy * sy);
-      }
+    for (const Step& step : around) {
+      const int index = from.index + step.index;
+      const Direction g = free[index];
+      if (!(g.x * sx + g.y * sy >= limit)) continue;
+      free[index] = {};
+      region_.push_back({index, from.x + step.x, from.y + step.y});
+      sx += g.x;
+      sy += g.y;
+      limit = cosine * std::sqrt(sx * sx + sy * sy);
     }
   }
   sum_ = {sx, sy};
@@ -223,7 +232,7 @@ bool Lsd::make_dense(Rectangle& rectangle) {
   if (density(rectangle) >= kDensity) return true;
   const Pixel seed = region_.front();
   const float tolerance = tolerance_near_seed(rectangle.width);
-  for (const Pixel& i : region_) used_[static_cast<std::size_t>(i.index)] = 0;
+  for (const Pixel& i : region_) give_back(i.index);
   grow(seed.index, std::cos(tolerance));
   if (region_.size() < 3) return false;
   rectangle = fit();
@@ -235,7 +244,7 @@ bool Lsd::make_dense(Rectangle& rectangle) {
       return !((i.position() - middle).squaredNorm() > radius * radius);
     };
     const auto kept = std::stable_partition(region_.begin(), region_.end(), inside);
-    for (auto i = kept; i != region_.end(); ++i) used_[static_cast<std::size_t>(i->index)] = 0;
+    for (auto i = kept; i != region_.end(); ++i) give_back(i->index);
     region_.erase(kept, region_.end());
     if (region_.size() < 3) return false;
     rectangle = fit();
@@ -276,7 +285,7 @@ std::vector<cv::Vec4f> Lsd::detect(float min_length) {
   const auto cosine = static_cast<float>(std::cos(kTolerance));
   const auto fewest = static_cast<std::size_t>(std::max(3.0F, min_length));
   for (const int seed : seeds_) {
-    if (used_[static_cast<std::size_t>(seed)] != 0) continue;
+    if (std::isnan(free_[static_cast<std::size_t>(seed)].x)) continue;
     grow(seed, cosine);
     if (region_.size() < fewest) continue;
     Rectangle r = fit();
