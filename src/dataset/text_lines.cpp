@@ -8,24 +8,38 @@
 
 namespace plumbline::dataset {
 
-core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file) {
+std::vector<std::string> split_words(std::string_view text, std::string_view separators) {
+  std::vector<std::string> words;
+  for (std::size_t from = 0; (from = text.find_first_not_of(separators, from)) != std::string_view::npos;) {
+    const std::size_t to = std::min(text.find_first_of(separators, from), text.size());
+    words.emplace_back(text.substr(from, to - from));
+    from = to;
+  }
+  return words;
+}
+
+core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::error_code ignored;
   if (!stream || std::filesystem::is_directory(file, ignored)) {
     return core::input_error(fmt::format("{}: cannot be read: missing or no right", file.string()));
   }
-  constexpr std::string_view separators = " \t\r\n,\v\f";
-  std::vector<TextLine> lines;
+  std::vector<RawLine> lines;
   std::string text;
   for (int number = 1; std::getline(stream, text); ++number) {
     if (number == 1 && text.compare(0, 3, "\xEF\xBB\xBF") == 0) text.erase(0, 3);
-    TextLine line{number, {}};
-    for (std::size_t from = 0; (from = text.find_first_not_of(separators, from)) != std::string::npos;) {
-      const std::size_t to = std::min(text.find_first_of(separators, from), text.size());
-      line.words.push_back(text.substr(from, to - from));
-      from = to;
-    }
-    if (!line.words.empty() && line.words.front().front() != '#') lines.push_back(std::move(line));
+    lines.push_back({number, text});
+  }
+  return lines;
+}
+
+core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file) {
+  const auto raw = read_raw_lines(file);
+  if (!raw) return tl::unexpected(raw.error());
+  std::vector<TextLine> lines;
+  for (const RawLine& line : *raw) {
+    TextLine words{line.number, split_words(line.text)};
+    if (!words.words.empty() && words.words.front().front() != '#') lines.push_back(std::move(words));
   }
   return lines;
 }

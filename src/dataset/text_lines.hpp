@@ -16,6 +16,20 @@ struct TextLine {
   std::vector<std::string> words;
 };
 
+/// A line as it stands, without its end.
+struct RawLine {
+  int number = 0;  ///< counts from 1
+  std::string text;
+};
+
+inline constexpr std::string_view kWordSeparators = " \t\r\n,\v\f";
+
+/// What stands between the separators.
+std::vector<std::string> split_words(std::string_view text, std::string_view separators = kWordSeparators);
+
+/// All lines, comments and blank ones too, without a byte order mark. Error (kInput): cannot be read.
+core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file);
+
 /// Words are separated by blanks, tabs or commas. Comments ('#'), blank lines, a byte order mark and
 /// carriage returns are passed over.
 core::Result<std::vector<TextLine>> read_lines(const std::filesystem::path& file);

@@ -154,7 +154,9 @@ core::Result<Layout> read_tum(const fs::path& folder, const LayoutOptions& optio
   if (!pairs) return tl::unexpected(pairs.error());
   Layout layout{"tum", std::move(*pairs), std::nullopt};
   if (is_file(folder / "groundtruth.txt")) {
-    auto truth = read_trajectory(folder / "groundtruth.txt");
+    std::vector<std::string> notes;
+    auto truth = read_trajectory(folder / "groundtruth.txt", &notes);
+    for (const std::string& note : notes) log.warning(note);
     if (truth) {
       layout.truth = std::move(*truth);
     } else {

@@ -58,12 +58,40 @@ struct Match {
   Rigid3 truth;
 };
 
-std::vector<Match> match(const Trajectory& estimate, const Trajectory& truth, double max_dt_s) {
-  std::vector<Match> matches;
-  for (const StampedPose& pose : estimate) {
-    if (const auto at = geometry::pose_at(truth, pose.stamp, max_dt_s)) {
-      matches.push_back({pose.stamp, pose.world_from_camera, *at});
+struct Matches {
+  std::vector<Match> pairs;
+  std::size_t ambiguous = 0;  ///< poses that share a stamp, of which the truth has another number there
+};
+
+/// The poses of the truth at this very stamp: the first of them and how many.
+std::pair<Trajectory::const_iterator, std::size_t> truth_at(const Trajectory& truth, double stamp) {
+  constexpr double kSame = 1e-6;  // seconds since 1970 as a double are good to 2e-7
+  const auto first = std::lower_bound(truth.begin(), truth.end(), stamp - kSame,
+                                      [](const StampedPose& pose, double s) { return pose.stamp < s; });
+  auto last = first;
+  while (last != truth.end() && last->stamp <= stamp + kSame) ++last;
+  return {first, static_cast<std::size_t>(last - first)};
+}
+
+/// Poses with stamps of their own get the truth interpolated; poses that share a stamp are paired with as
+/// many of the truth in the order of both files.
+Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt_s) {
+  Matches matches;
+  for (std::size_t i = 0; i < estimate.size();) {
+    std::size_t end = i + 1;
+    while (end < estimate.size() && estimate[end].stamp == estimate[i].stamp) ++end;
+    const auto [first, there] = truth_at(truth, estimate[i].stamp);
+    if (end - i > 1 || there > 1) {
+      if (there != end - i) matches.ambiguous += end - i;
+      for (std::size_t k = i; k < end && there == end - i; ++k) {
+        const StampedPose& partner = *(first + static_cast<std::ptrdiff_t>(k - i));
+        matches.pairs.push_back(
+            {estimate[k].stamp, estimate[k].world_from_camera, partner.world_from_camera});
+      }
+    } else if (const auto at = geometry::pose_at(truth, estimate[i].stamp, max_dt_s)) {
+      matches.pairs.push_back({estimate[i].stamp, estimate[i].world_from_camera, *at});
     }
+    i = end;
   }
   return matches;
 }
@@ -83,6 +111,15 @@ std::string too_few_message(std::size_t matched, std::size_t needed, const Traje
       "only {} of {} poses have truth within {} s of their stamp, {} are needed ({}): is the truth complete, "
       "or max_dt too small?",
       matched, estimate.size(), max_dt_s, needed, ranges);
+}
+
+/// "" when there are none.
+std::string ambiguous_message(std::size_t ambiguous) {
+  if (ambiguous == 0) return "";
+  return fmt::format(
+      "; {} poses are left out because they share a stamp with others, and the truth has another number "
+      "there",
+      ambiguous);
 }
 
 Rigid3 alignment(const std::vector<Match>& matches, TrajectoryAlignment align) {
@@ -271,11 +308,12 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
     if (!std::isfinite(s)) return core::input_error("the list of frames has a stamp that is not finite");
   }
 
-  const std::vector<Match> matches = match(*sorted_estimate, *sorted_truth, options.max_dt_s);
+  const auto [matches, ambiguous] = match(*sorted_estimate, *sorted_truth, options.max_dt_s);
   const std::size_t needed = options.align == TrajectoryAlignment::kSe3 ? 3 : 1;
   if (matches.size() < needed) {
     return core::input_error(
-        too_few_message(matches.size(), needed, *sorted_estimate, *sorted_truth, options.max_dt_s));
+        too_few_message(matches.size(), needed, *sorted_estimate, *sorted_truth, options.max_dt_s) +
+        ambiguous_message(ambiguous));
   }
 
   TrajectoryReport report;
@@ -299,6 +337,7 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
   report.rpe_second =
       relative_error(report.poses, time_pairs(report.poses, options.rpe_seconds, options.max_dt_s));
   add_warnings(matches, report);
+  if (ambiguous > 0) report.warnings.push_back(ambiguous_message(ambiguous).substr(2));
   return report;
 }
 

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -21,6 +22,19 @@ inline std::optional<double> to_number(std::string_view word) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
   return value;
+}
+
+/// Whether the words of a line, separated by blanks, are numbers with decimal commas, as a locale writes
+/// them: "0,5 1,25". Words that lists separate by commas ("1,2,3" or "1, 2") are not.
+inline bool has_decimal_comma(const std::vector<std::string>& words) {
+  const auto decimal = [](const std::string& word) {
+    const std::size_t comma = word.find(',');
+    if (comma == std::string::npos || comma + 1 == word.size()) return false;
+    const bool digit = word[comma + 1] >= '0' && word[comma + 1] <= '9';
+    return digit && word.find('.') == std::string::npos &&
+           to_number(word.substr(0, comma) + "." + word.substr(comma + 1)).has_value();
+  };
+  return words.size() > 1 && std::any_of(words.begin(), words.end(), decimal);
 }
 
 /// The upper of both where their number is even. There must be one, and none may be NaN.

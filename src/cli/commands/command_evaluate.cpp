@@ -67,10 +67,14 @@ tl::unexpected<core::Error> about(const fs::path& file, core::Error error) {
   return tl::unexpected<core::Error>(std::move(error));
 }
 
-core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryRequest& request) {
+core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryRequest& request,
+                                                               Console& console) {
   const std::vector<fs::path> estimates(request.files.begin(), std::prev(request.files.end()));
-  const auto truth = dataset::read_trajectory(file_in(request.files.back(), "groundtruth.txt"));
+  const fs::path truth_file = file_in(request.files.back(), "groundtruth.txt");
+  const auto truth = dataset::read_trajectory_file(truth_file);
   if (!truth) return tl::unexpected<core::Error>(truth.error());
+  for (const std::string& note : truth->notes)
+    console.warning(fmt::format("{}: {}", truth_file.string(), note));
   std::vector<double> stamps;
   if (!request.frames.empty()) {
     auto read = evaluate::read_frame_stamps(request.frames);
@@ -81,9 +85,15 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
   std::vector<evaluate::NamedReport> reports;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const fs::path file = file_in(estimates[i], "trajectory.txt");
-    const auto estimate = dataset::read_trajectory(file);
+    auto estimate = dataset::read_trajectory_file(file);
     if (!estimate) return tl::unexpected<core::Error>(estimate.error());
-    auto report = evaluate::evaluate_trajectory(*estimate, *truth, request.options, stamps);
+    dataset::TrajectoryReading fitting_truth = *truth;
+    if (auto paired = dataset::pair_by_number(*estimate, fitting_truth); !paired)
+      return about(file, paired.error());
+    for (const std::string& note : estimate->notes)
+      console.warning(fmt::format("{}: {}", file.string(), note));
+    auto report =
+        evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
     if (!report) return about(file, report.error());
     reports.push_back({names[i], std::move(*report)});
   }
@@ -92,7 +102,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
 
 core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) {
   if (auto applied = request.flags.apply(); !applied) return applied;
-  const auto reports = measure_paths(request);
+  const auto reports = measure_paths(request, console);
   if (!reports) return tl::unexpected<core::Error>(reports.error());
   const bool single = reports->size() == 1;
   for (const evaluate::NamedReport& named : *reports) {
@@ -118,9 +128,10 @@ void add_trajectory(CLI::App& group, Session& session) {
       add_command(group, session, "trajectory", "Absolute and relative pose error against truth",
                   [&session, request] { return evaluate_paths(*request, session.console()); });
   command
-      ->add_option("EST... GT", request->files,
-                   "One or several estimates (TUM format, or result folders), and last the true poses (TUM "
-                   "format, or a recording with groundtruth.txt)")
+      ->add_option(
+          "EST... GT", request->files,
+          "One or several estimates (TUM, EuRoC or KITTI format, or result folders), and last the true "
+          "poses (the same formats, or a recording with groundtruth.txt)")
       ->required()
       ->expected(2, 100);
   command->add_option("--frames", request->frames, "The recording's rgb.txt, for the share of frames tracked")

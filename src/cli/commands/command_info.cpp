@@ -105,25 +105,21 @@ core::Result<void> describe_map(const maps::MapPlace& place) {
   return place.store.empty() ? core::Result<void>() : describe_store(place.store);
 }
 
-/// Whether a text's first line of numbers is a pose: eight of them, the last four a unit quaternion.
-bool holds_poses(const std::filesystem::path& file) {
-  if (file.extension() != ".txt") return false;
-  std::ifstream stream(file);
-  std::string line;
-  while (std::getline(stream, line) && (line.empty() || line[0] == '#')) line.clear();
-  std::istringstream words(line);
-  const std::vector<double> n{std::istream_iterator<double>(words), {}};
-  return words.eof() && n.size() == 8 &&
-         std::abs(std::hypot(std::hypot(n[4], n[5], n[6]), n[7]) - 1.0) < 1e-3;
+/// Whether the file is a trajectory; clouds of points are text files too.
+bool is_trajectory(const std::filesystem::path& file) {
+  return (file.extension() == ".txt" || file.extension() == ".csv") && dataset::holds_poses(file);
 }
 
-void describe_path(const geometry::Trajectory& path) {
+void describe_path(const dataset::TrajectoryReading& reading) {
+  const geometry::Trajectory& path = reading.poses;
   double length_m = 0.0;
   for (std::size_t i = 1; i < path.size(); ++i) {
     length_m += (path[i].world_from_camera.translation - path[i - 1].world_from_camera.translation).norm();
   }
-  fmt::print("poses: {}\nfrom: {:.6f} s\nto: {:.6f} s\nlength: {:.3f} m\n", path.size(), path.front().stamp,
-             path.back().stamp, length_m);
+  fmt::print("poses: {}\nformat: {}\n", path.size(), reading.format);
+  if (reading.stamped) fmt::print("from: {:.6f} s\nto: {:.6f} s\n", path.front().stamp, path.back().stamp);
+  fmt::print("length: {:.3f} m\n", length_m);
+  for (const std::string& note : reading.notes) fmt::print("note: {}\n", note);
 }
 
 core::Result<void> describe_recording(Session& session, InfoRequest& request) {
@@ -147,8 +143,8 @@ core::Result<void> info(Session& session, InfoRequest& request) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
   if (!std::filesystem::is_directory(path, ec)) {
-    if (!holds_poses(path)) return describe_cloud(path);
-    const auto poses = dataset::read_trajectory(path);
+    if (!is_trajectory(path)) return describe_cloud(path);
+    const auto poses = dataset::read_trajectory_file(path);
     if (!poses) return tl::unexpected<core::Error>(poses.error());
     describe_path(*poses);
     return {};

@@ -8,6 +8,7 @@ namespace plumbline::dataset {
 namespace {
 
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 class TrajectoryFile : public RecordingTest {
@@ -69,12 +70,138 @@ TEST_F(TrajectoryFile, ErrorsNameTheLine) {
               AllOf(HasSubstr("t.txt:3"), HasSubstr("7 words")));
   EXPECT_THAT(error_of("1 0 0 zero 0 0 0 1\n"),
               AllOf(HasSubstr("t.txt:1"), HasSubstr("'zero' is no number")));
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n"),
-              AllOf(HasSubstr("t.txt:2"), HasSubstr("finite")));
-  EXPECT_THAT(error_of("1 0 inf 0 0 0 0 1\n"), HasSubstr("finite"));
+  EXPECT_THAT(error_of("1 0 inf 0 0 0 0 1\n"), AllOf(HasSubstr("t.txt:1"), HasSubstr("no row is finite")));
   EXPECT_THAT(error_of("\n\n1 0 0 0 0 0 0 0\n"),
               AllOf(HasSubstr("t.txt:3"), HasSubstr("quaternion is zero")));
   EXPECT_THAT(error_of("1 0 0 0x1 0 0 0 1\n"), HasSubstr("no number"));
+}
+
+TEST_F(TrajectoryFile, RowsWithNanAreLeftOutAndCounted) {
+  write_text("t.txt",
+             "1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n3 0 0 0 0 0 -inf 1\nnan 0 0 0 0 0 0 1\n4 0 0 0 0 0 0 1\n");
+  const auto reading = read_trajectory_file(folder_ / "t.txt");
+  ASSERT_TRUE(reading) << reading.error().message;
+  EXPECT_EQ(reading->poses.size(), 2U);
+  EXPECT_EQ(reading->rows.size(), 5U);
+  EXPECT_THAT(reading->notes, ElementsAre(HasSubstr("3 of 5 rows")));
+  std::vector<std::string> notes;
+  EXPECT_EQ(read_trajectory(folder_ / "t.txt", &notes)->size(), 2U);
+  EXPECT_THAT(notes, ElementsAre(AllOf(HasSubstr("t.txt"), HasSubstr("3 of 5 rows"))));
+}
+
+TEST_F(TrajectoryFile, DecimalCommasAreRefused) {
+  EXPECT_THAT(
+      error_of("# x\n1300000000,066667 0,000473 -0,008971 -2,500000 0,001014 0,000506 0,000269 0,999999\n"),
+      AllOf(HasSubstr("t.txt:2"), HasSubstr("decimal comma")));
+  EXPECT_THAT(error_of("1300000000,066667;0,000473;-0,008971;-2,5;0,001014;0,000506;0,000269;0,999999\n"),
+              HasSubstr("decimal comma"));
+  EXPECT_THAT(
+      error_of("1300000000,066667,0,000473,-0,008971,-2,500000,0,001014,0,000506,0,000269,0,999999\n"),
+      HasSubstr("decimal comma"));
+  write_text("t.txt", "1.5, 1, 2, 3, 0, 0, 0, 1\n2.5,1,2,3,0,0,0,1\n");  // commas that separate
+  EXPECT_EQ(read_trajectory(folder_ / "t.txt")->size(), 2U);
+}
+
+TEST_F(TrajectoryFile, EurocHasNanosecondsAndWFirst) {
+  const char* const rows =
+      "1300000000066667008,1,2,3,0.5,0.1,0.2,0.3\r\n1300000000100000000,1,2,3,0.5,0.1,0.2,0.3\r\n";
+  const Eigen::Quaterniond truth = Eigen::Quaterniond(0.5, 0.1, 0.2, 0.3).normalized();
+  for (const char* header :
+       {"#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z "
+        "[]\r\n",
+        "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\r\n",
+        ""}) {
+    write_text("t.csv", std::string(header) + rows);
+    const auto reading = read_trajectory_file(folder_ / "t.csv");
+    ASSERT_TRUE(reading) << reading.error().message;
+    EXPECT_EQ(reading->format, "EuRoC");
+    ASSERT_EQ(reading->poses.size(), 2U);
+    EXPECT_NEAR(reading->poses[0].stamp, 1300000000.066667, 1e-6);
+    EXPECT_LT(reading->poses[0].world_from_camera.quaternion().angularDistance(truth), 1e-9);
+    EXPECT_EQ(reading->poses[0].world_from_camera.translation, Eigen::Vector3d(1, 2, 3));
+  }
+}
+
+TEST_F(TrajectoryFile, HeadersTellTheColumns) {
+  write_text("t.csv",
+             "timestamp, frame, x, y, z, qx, qy, qz, qw\n100.000000, 000000, 1, 2, 3, 0.1, 0.2, 0.3, 0.5\n");
+  const Eigen::Quaterniond truth = Eigen::Quaterniond(0.5, 0.1, 0.2, 0.3).normalized();
+  const auto stray = read_trajectory_file(folder_ / "t.csv");
+  ASSERT_TRUE(stray) << stray.error().message;
+  ASSERT_EQ(stray->poses.size(), 1U);
+  EXPECT_EQ(stray->poses[0].stamp, 100.0);
+  EXPECT_LT(stray->poses[0].world_from_camera.quaternion().angularDistance(truth), 1e-9);
+  write_text("t.txt", "# timestamp tx ty tz qw qx qy qz\n1 1 2 3 0.5 0.1 0.2 0.3\n");
+  const auto tum = read_trajectory_file(folder_ / "t.txt");
+  ASSERT_TRUE(tum) << tum.error().message;
+  EXPECT_EQ(tum->format, "TUM");
+  EXPECT_LT(tum->poses[0].world_from_camera.quaternion().angularDistance(truth), 1e-9);
+  write_text("t.txt", "1403636579763555584.0 1 2 3 0.1 0.2 0.3 0.5\n");  // ORB-SLAM's, for EuRoC
+  EXPECT_NEAR((*read_trajectory(folder_ / "t.txt"))[0].stamp, 1403636579.763556, 1e-6);
+}
+
+TEST_F(TrajectoryFile, KittiHasNoStamps) {
+  write_text("kitti.txt",
+             "1 0 0 5 0 1 0 6 0 0 1 7\nnan nan nan nan nan nan nan nan nan nan nan nan\n"
+             "0 -1 0 5 1 0 0 6 0 0 1 8\n");
+  auto kitti = read_trajectory_file(folder_ / "kitti.txt");
+  ASSERT_TRUE(kitti) << kitti.error().message;
+  EXPECT_FALSE(kitti->stamped);
+  ASSERT_EQ(kitti->poses.size(), 2U);
+  EXPECT_EQ(kitti->poses[1].stamp, 2.0);
+  EXPECT_EQ(kitti->poses[1].world_from_camera.translation, Eigen::Vector3d(5, 6, 8));
+  const auto alone = read_trajectory(folder_ / "kitti.txt");
+  ASSERT_FALSE(alone);
+  EXPECT_THAT(alone.error().message, HasSubstr("without stamps"));
+
+  write_text("t.txt", "10 5 6 7 0 0 0 1\n11 5 6 7 0 0 0 1\n12 5 6 8 0 0 0 1\n");
+  auto stamped = read_trajectory_file(folder_ / "t.txt");
+  ASSERT_TRUE(stamped);
+  ASSERT_TRUE(pair_by_number(*kitti, *stamped));
+  EXPECT_EQ(kitti->poses[1].stamp, 12.0);
+  EXPECT_THAT(kitti->notes.back(), AllOf(HasSubstr("paired by number"), HasSubstr("3 poses")));
+  stamped->rows.pop_back();
+  kitti = read_trajectory_file(folder_ / "kitti.txt");
+  const auto apart = pair_by_number(*stamped, *kitti);
+  ASSERT_FALSE(apart);
+  EXPECT_THAT(apart.error().message, AllOf(HasSubstr("2 poses"), HasSubstr("3 in the truth")));
+
+  auto one = read_trajectory_file(folder_ / "kitti.txt");
+  auto other = read_trajectory_file(folder_ / "kitti.txt");
+  ASSERT_TRUE(pair_by_number(*one, *other));
+  EXPECT_DOUBLE_EQ(one->poses[1].stamp, 0.2);
+  EXPECT_DOUBLE_EQ(other->poses[1].stamp, 0.2);
+}
+
+TEST_F(TrajectoryFile, ReplicaHasWholeMatrices) {
+  write_text("traj.txt", "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1\n1 0 0 5 0 1 0 6 0 0 1 8 0 0 0 1\n");
+  const auto reading = read_trajectory_file(folder_ / "traj.txt");
+  ASSERT_TRUE(reading) << reading.error().message;
+  EXPECT_FALSE(reading->stamped);
+  EXPECT_EQ(reading->poses[1].world_from_camera.translation.z(), 8.0);
+  EXPECT_THAT(error_of("1 0 0 5 0 1 0 6 0 0 1 7\n2 0 0 5 0 1 0 6 0 0 1 7\n"),
+              AllOf(HasSubstr("t.txt:2"), HasSubstr("no rotation")));
+}
+
+TEST_F(TrajectoryFile, SharedStampsAreCounted) {
+  write_text("t.txt", "1 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n");
+  const auto reading = read_trajectory_file(folder_ / "t.txt");
+  ASSERT_TRUE(reading);
+  EXPECT_EQ(reading->poses.size(), 4U);
+  EXPECT_THAT(reading->notes, ElementsAre(HasSubstr("3 poses share one stamp")));
+}
+
+TEST_F(TrajectoryFile, TellsPathsFromClouds) {
+  const auto holds = [&](const char* text) {
+    write_text("x.txt", text);
+    return holds_poses(folder_ / "x.txt");
+  };
+  EXPECT_TRUE(holds("1 0 0 0 0 0 0 1\n"));
+  EXPECT_TRUE(holds("1 0 0 5 0 1 0 6 0 0 1 7\n"));
+  EXPECT_TRUE(holds("#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1,0,0,0,1,0,0,0\n"));
+  EXPECT_FALSE(holds("1 2 3\n"));
+  EXPECT_FALSE(holds("x y z red green blue nx ny\n1 2 3 255 255 0 0 1\n"));
+  EXPECT_FALSE(holds("# nothing\n"));
 }
 
 TEST_F(TrajectoryFile, MissingFilesAndFolders) {

@@ -22,8 +22,10 @@ class MemoryLog : public core::Log {
  public:
   void write(core::LogLevel level, const std::string& message) override {
     if (level >= core::LogLevel::kWarning) warnings += message + "\n";
+    if (level == core::LogLevel::kInfo) infos += message + "\n";
   }
   std::string warnings;
+  std::string infos;
 };
 
 class RecordingTest : public testing::Test {

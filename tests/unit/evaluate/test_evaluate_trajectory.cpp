@@ -275,6 +275,33 @@ TEST(EvaluateTrajectory, OrderOfThePosesDoesNotMatter) {
   EXPECT_EQ(to_json(*evaluate_trajectory(estimate, truth)), to_json(*evaluate_trajectory(reversed, truth)));
 }
 
+TEST(EvaluateTrajectory, PosesThatShareAStampArePairedInTheirOrder) {
+  Trajectory path;
+  for (int i = 0; i < 3; ++i)
+    path.push_back(
+        {1604644894.0, Rigid3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-0.33 * i, 0.03 * i, 0))});
+  path.push_back({1604644895.0, Rigid3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 1, 0))});
+  const auto itself = evaluate_trajectory(path, path);
+  ASSERT_TRUE(itself) << itself.error().message;
+  EXPECT_EQ(itself->matched, 4U);
+  EXPECT_LT(itself->ate_m.max, 1e-12);
+
+  Trajectory fewer = path;
+  fewer.erase(fewer.begin());
+  TrajectoryOptions options;
+  options.align = TrajectoryAlignment::kNone;
+  const auto other = evaluate_trajectory(fewer, path, options);
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(other->matched, 1U);
+  bool said = false;
+  for (const std::string& warning : other->warnings)
+    said = said || warning.find("share a stamp") != std::string::npos;
+  EXPECT_TRUE(said);
+  const auto too_few = evaluate_trajectory(fewer, path);
+  ASSERT_FALSE(too_few);
+  EXPECT_NE(too_few.error().message.find("share a stamp"), std::string::npos);
+}
+
 TEST(EvaluateTrajectory, NoOverlapInTimeIsSaidWithBothRanges) {
   const auto report = evaluate_trajectory(winding_path(50, 1000.0), winding_path(50, 2000.0));
   ASSERT_FALSE(report);
