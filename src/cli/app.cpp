@@ -115,6 +115,12 @@ void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequ
   command.add_flag("--force", request.replace, "Replace an earlier result");
 }
 
+std::string shift_text(const Eigen::Vector3d& shift) {
+  return fmt::format(
+      "{:.0f} {:.0f} {:.0f} m (taken off the coordinates while computing, added again when written)",
+      shift.x(), shift.y(), shift.z());
+}
+
 void add_time_range(CLI::App& command, dataset::OpenOptions& open) {
   command.add_option("--from", open.from_s, "Start this many seconds after the first frame")
       ->type_name("S")

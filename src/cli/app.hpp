@@ -60,6 +60,9 @@ void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequ
 /// What all commands that map a recording take besides.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
 /// --from S and --to S, for commands that read recordings.
+/// "701362 4485513 0 m (...)": what was taken off large coordinates while reading a cloud.
+std::string shift_text(const Eigen::Vector3d& shift);
+
 void add_time_range(CLI::App& command, dataset::OpenOptions& open);
 /// A word that only groups commands, like `evaluate`.
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);

@@ -33,6 +33,9 @@ inline void read_as_cloud(const std::uint8_t* data, std::size_t size, const char
   for (const auto& other : others) {
     require(other.values.size() == points.size(), "columns are as long as the cloud");
   }
+  const auto shifted = cloud::read_cloud(file.path(), cloud::LargeCoordinates::kShifted);
+  require(shifted.has_value() && shifted->cloud->size() == points.size(),
+          "digits that are kept change no count");
 }
 
 }  // namespace plumbline::fuzz

@@ -2,6 +2,7 @@
 #pragma once
 
 // Clouds on disk.
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -33,35 +34,52 @@ struct CloudColumns {
 
 /// Binary PLY: float x y z nx ny nz, uchar red green blue [, float confidence, int observations, uchar
 /// robot, float others...]; opens with colours and normals in PCL, Open3D, MeshLab and CloudCompare. Points
-/// with a NaN coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. Errors
-/// (kOutput) name the file; it appears whole or not at all.
+/// with a NaN coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. A `shift`
+/// (CloudFile::shift) is added to the positions, which are doubles then. Errors (kOutput) name the file; it
+/// appears whole or not at all.
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
-                             const CloudColumns& columns = {});
+                             const CloudColumns& columns = {},
+                             const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
 
 /// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot,
 /// others]. An
 /// organised cloud stays organised and keeps its NaN points; an unorganised one loses them.
 core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
-                             const CloudColumns& columns = {});
+                             const CloudColumns& columns = {},
+                             const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
 
 /// write_ply or write_pcd by the name's ending; another ending is a kUsage error.
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
-                               const CloudColumns& columns = {});
+                               const CloudColumns& columns = {},
+                               const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
 
 struct CloudFile {
   CloudPtr cloud;  ///< without colour: 255 255 255; without normals: NaN normals
   CloudColumns columns;
+  /// Taken off all positions while reading: a point is at `shift` + its coordinates. Not zero only with
+  /// LargeCoordinates::kShifted.
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   bool has_color = false;
   bool has_normals = false;
   std::size_t nan_points = 0;   ///< with a coordinate that is not finite; kept in `cloud`
   std::size_t nan_normals = 0;  ///< points whose normal is unknown (NaN or zero) though the file has normals
 };
 
+/// What becomes of coordinates, such as UTM's, that have more digits than a float.
+enum class LargeCoordinates {
+  kRounded,  ///< to the nearest float
+  kShifted   ///< whole metres near their middle are taken off first: CloudFile::shift
+};
+
+/// Moves a cloud that was read with one shift into the frame of one with another.
+void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 /// Reads PLY (ascii, binary), PCD (ascii, binary, binary_compressed) and text (.xyz .txt .csv .asc .pts: x y
 /// z, then 0-255 red green blue and/or nx ny nz; separated by blanks, commas or semicolons; a CSV header line
 /// names columns). Columns with other names are kept as 32 bit floats (lists, arrays and alpha are not).
 /// Errors (kInput): missing, empty, not this format, without x y z, truncated, header promising more points
 /// than the file holds (found before memory is taken).
-core::Result<CloudFile> read_cloud(const std::filesystem::path& file);
+core::Result<CloudFile> read_cloud(const std::filesystem::path& file,
+                                   LargeCoordinates large = LargeCoordinates::kRounded);
 
 }  // namespace plumbline::cloud

@@ -25,6 +25,9 @@ struct CloudColumns;
 struct FilterContext {
   /// Where the sensor stood, in the cloud's frame; without it the cloud's own sensor_origin_.
   std::optional<Eigen::Vector3f> viewpoint;
+  /// What was taken off the positions while reading (CloudFile::shift): options in metres are about positions
+  /// with it.
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   /// How far neighbouring points are apart, metres, where that is known (the voxel of a fused cloud); 0: not.
   double spacing_m = 0.0;
   std::uint32_t seed = 0;  ///< of random choices

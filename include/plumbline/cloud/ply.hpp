@@ -30,6 +30,8 @@ struct PlyData {
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<std::array<std::uint8_t, 3>> edge_colors;  ///< red, green, blue; empty or one per edge
   std::vector<std::string> comments;
+  /// Added to the columns x, y and z: what read_ply took off them, or what write_ply is to add, as doubles.
+  std::array<double, 3> shift{};
 
   /// The column as floats or bytes; nullptr when there is none of this name and type.
   [[nodiscard]] const std::vector<float>* floats(std::string_view name) const;
@@ -41,12 +43,13 @@ struct PlyData {
 
 /// Reads vertices, faces and edges; other elements and list properties are passed over. Every promise of the
 /// header is checked against the file's size before memory is taken. Errors (kInput): not readable, not PLY,
-/// truncated, text that is not a number, vertex index out of range.
-core::Result<PlyData> read_ply(const std::filesystem::path& file);
+/// truncated, text that is not a number, vertex index out of range. With `take_shift` x, y and z that have
+/// more digits than a float are read less PlyData::shift; else they are rounded.
+core::Result<PlyData> read_ply(const std::filesystem::path& file, bool take_shift = false);
 
-/// Writes binary little endian: the columns in their order (float or uchar), faces as
-/// `list uchar int vertex_indices`, edges as `int vertex1, int vertex2 [, uchar red, green, blue]`.
-/// The file appears whole or not at all. Errors (kOutput).
+/// Writes binary little endian: the columns in their order (float or uchar; x, y and z double where `shift`
+/// is not zero), faces as `list uchar int vertex_indices`, edges as `int vertex1, int vertex2 [, uchar red,
+/// green, blue]`. The file appears whole or not at all. Errors (kOutput).
 core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& data);
 
 }  // namespace plumbline::cloud

@@ -116,26 +116,54 @@ core::Result<void> export_keyframes(const maps::MapPlace& place, const ExportReq
   return {};
 }
 
-core::Result<void> export_mesh(const maps::MapPlace& place, const ExportRequest& request,
-                               const core::Executor& executor) {
-  if (request.output.extension() != ".ply" && request.output.extension() != ".obj") {
-    return core::usage_error(fmt::format("{}: meshes are written as .ply or .obj", request.output.string()));
-  }
-  const auto file = cloud_of(place, request, executor);
-  if (!file) return tl::unexpected<core::Error>(file.error());
-  const auto mesh = [&] {
+/// Whether the input is a cloud by itself: no folder, and no map.db.
+bool is_cloud_file(const std::filesystem::path& input) {
+  std::error_code ec;
+  return std::filesystem::is_regular_file(input, ec) && input.extension() != ".db";
+}
+
+core::Result<void> write_as_mesh(const cloud::CloudFile& file, const ExportRequest& request) {
+  auto mesh = [&] {
     const SilencedStdio silenced;  // PCL's Poisson prints what it thinks of the points
-    return cloud::make_mesh(*file->cloud, request.mesh_options);
+    return cloud::make_mesh(*file.cloud, request.mesh_options);
   }();
   if (!mesh) return tl::unexpected<core::Error>(mesh.error());
+  mesh->shift = {file.shift.x(), file.shift.y(), file.shift.z()};
   return cloud::write_mesh(request.output, *mesh);
 }
 
-core::Result<void> run_export(ExportRequest& request, const core::Executor& executor) {
+core::Result<void> write_as_cloud(const cloud::CloudFile& file, const ExportRequest& request) {
+  return cloud::write_cloud(request.output, *file.cloud, file.columns, file.shift);
+}
+
+core::Result<void> check_cloud_output(const std::filesystem::path& output, bool mesh) {
+  const auto extension = output.extension();
+  if (extension == ".ply" || extension == (mesh ? ".obj" : ".pcd")) return {};
+  return core::usage_error(mesh ? fmt::format("{}: meshes are written as .ply or .obj", output.string())
+                                : fmt::format("{}: clouds are written as .ply or .pcd", output.string()));
+}
+
+/// A cloud file in another format, its large coordinates kept.
+core::Result<void> convert_cloud(const ExportRequest& request, Console& console) {
+  if (request.what != "cloud" || request.trajectory || request.lines || !request.voxel.empty() ||
+      !request.keyframes.empty()) {
+    return core::usage_error(fmt::format("{}: is a cloud, of which only the cloud or a --mesh can be written",
+                                         request.input.string()));
+  }
+  if (auto fits = check_cloud_output(request.output, request.mesh); !fits) return fits;
+  const auto file = cloud::read_cloud(request.input, cloud::LargeCoordinates::kShifted);
+  if (!file) return tl::unexpected<core::Error>(file.error());
+  if (!file->shift.isZero(0.0)) console.info("shift: " + shift_text(file->shift));
+  return request.mesh ? write_as_mesh(*file, request) : write_as_cloud(*file, request);
+}
+
+core::Result<void> run_export(ExportRequest& request, Session& session) {
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (request.output.empty() && request.keyframes.empty()) {
     return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
   }
+  if (is_cloud_file(request.input)) return convert_cloud(request, session.console());
+  const core::Executor& executor = session.executor();
   auto place = maps::find_map(request.input);
   if (!place) return tl::unexpected<core::Error>(place.error());
   place->robot = request.robot;
@@ -143,17 +171,15 @@ core::Result<void> run_export(ExportRequest& request, const core::Executor& exec
     auto done = export_keyframes(*place, request);
     if (!done || request.output.empty()) return done;
   }
-  if (request.mesh) return export_mesh(*place, request, executor);
-  if (request.trajectory || request.what == "trajectory") return export_path(*place, false, request.output);
+  if (!request.mesh && (request.trajectory || request.what == "trajectory"))
+    return export_path(*place, false, request.output);
   if (request.what == "keyframes") return export_path(*place, true, request.output);
-  if (request.lines || request.what == "lines") return export_lines(*place, request.output);
-  const auto extension = request.output.extension();
-  if (extension != ".ply" && extension != ".pcd") {
-    return core::usage_error(fmt::format("{}: clouds are written as .ply or .pcd", request.output.string()));
-  }
+  if (!request.mesh && (request.lines || request.what == "lines"))
+    return export_lines(*place, request.output);
+  if (auto fits = check_cloud_output(request.output, request.mesh); !fits) return fits;
   const auto file = cloud_of(*place, request, executor);
   if (!file) return tl::unexpected<core::Error>(file.error());
-  return cloud::write_cloud(request.output, *file->cloud, file->columns);
+  return request.mesh ? write_as_mesh(*file, request) : write_as_cloud(*file, request);
 }
 
 }  // namespace
@@ -161,8 +187,10 @@ core::Result<void> run_export(ExportRequest& request, const core::Executor& exec
 void add_export(CLI::App& app, Session& session) {
   const auto request = std::make_shared<ExportRequest>();
   CLI::App* command = add_command(app, session, "export", "Write parts of a map in other formats",
-                                  [&session, request] { return run_export(*request, session.executor()); });
-  command->add_option("MAP", request->input, "A result folder, also of a run that was interrupted, or map.db")
+                                  [&session, request] { return run_export(*request, session); });
+  command
+      ->add_option("MAP", request->input,
+                   "A result folder, also of a run that was interrupted, map.db, or a cloud file")
       ->required();
   command->add_option("-o,--output", request->output, "File to write")->type_name("FILE.ply|.pcd|.obj|.txt");
   command

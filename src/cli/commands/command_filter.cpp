@@ -52,21 +52,40 @@ core::Result<void> check_output(const fs::path& output, const cloud::FilterChain
   return {};
 }
 
-/// The inputs one after the other.
-core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::CloudColumns& columns) {
+/// The inputs one after the other, in the frame of the first.
+core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::CloudColumns& columns,
+                                          Eigen::Vector3d& shift) {
   cloud::CloudPtr all;
   for (std::size_t i = 0; i + 1 < request.files.size(); ++i) {
-    auto file = cloud::read_cloud(request.files[i]);
+    auto file = cloud::read_cloud(request.files[i], cloud::LargeCoordinates::kShifted);
     if (!file) return tl::unexpected<core::Error>(file.error());
     if (all == nullptr) {
       all = std::move(file->cloud);
       columns = std::move(file->columns);
+      shift = file->shift;
     } else {
+      cloud::change_shift(*file->cloud, file->shift, shift);
       cloud::append_columns(columns, all->size(), file->columns, file->cloud->size());
       *all += *file->cloud;
     }
   }
   return all;
+}
+
+/// Where a chain leaves no point: which filter took the last.
+core::Result<void> something_left(const cloud::FilterChain& chain,
+                                  const std::vector<cloud::FilterReport>& reports) {
+  if (reports.empty() || reports.back().points_out > 0) return {};
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    if (reports[i].points_out > 0) continue;
+    const std::string what = reports[i].points_in == 0
+                                 ? "got no point to begin with"
+                                 : fmt::format("took the last of {} points", reports[i].points_in);
+    return core::failure(core::ErrorKind::kUntrustworthy,
+                         fmt::format("chain {}: no point is left: filters[{}] ({}) {}", chain.name(), i,
+                                     reports[i].type, what));
+  }
+  return {};
 }
 
 core::Result<void> filter(const FilterRequest& request, Session& session) {
@@ -78,7 +97,7 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   if (auto fit = check_output(output, *chain); !fit) return fit;
   if (auto fit = chain->ready(context); !fit) return fit;
   cloud::CloudColumns columns;
-  auto input = read_inputs(request, columns);
+  auto input = read_inputs(request, columns, context.shift);
   if (!input) return tl::unexpected<core::Error>(input.error());
   context.columns = &columns;
   context.made_columns = &columns;
@@ -92,7 +111,9 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
   console.end_progress();
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (!session.quiet) fmt::print("{}", cloud::to_table(reports));
-  return cloud::write_cloud(output, **filtered, columns);
+  if (!session.quiet && !context.shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(context.shift));
+  if (auto written = cloud::write_cloud(output, **filtered, columns, context.shift); !written) return written;
+  return something_left(*chain, reports);
 }
 
 int list_filters(Session& session) {

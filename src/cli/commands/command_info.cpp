@@ -77,7 +77,7 @@ core::Result<void> describe_result(const std::filesystem::path& folder) {
 }
 
 core::Result<void> describe_cloud(const std::filesystem::path& file) {
-  const auto read = cloud::read_cloud(file);
+  const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected<core::Error>(read.error());
   Eigen::Array3f low = Eigen::Array3f::Constant(INFINITY);
   Eigen::Array3f high = Eigen::Array3f::Constant(-INFINITY);
@@ -91,9 +91,14 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
   if (read->cloud->isOrganized()) fmt::print("organised: {} x {}\n", read->cloud->width, read->cloud->height);
   fmt::print("colour: {}\nnormals: {}\n", read->has_color ? "yes" : "no", read->has_normals ? "yes" : "no");
   if (read->has_normals) fmt::print("without normal: {}\n", read->nan_normals);
+  if (!read->shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(read->shift));
   if ((low <= high).all()) {
-    fmt::print("from: {:.3f} {:.3f} {:.3f} m\nto: {:.3f} {:.3f} {:.3f} m\n", low.x(), low.y(), low.z(),
-               high.x(), high.y(), high.z());
+    const Eigen::Array3d from = low.cast<double>() + read->shift.array();
+    const Eigen::Array3d to = high.cast<double>() + read->shift.array();
+    fmt::print("from: {:.3f} {:.3f} {:.3f} m\nto: {:.3f} {:.3f} {:.3f} m\n", from.x(), from.y(), from.z(),
+               to.x(), to.y(), to.z());
+    const Eigen::Array3f size = high - low;
+    fmt::print("size: {:.3f} x {:.3f} x {:.3f} m\n", size.x(), size.y(), size.z());
   }
   return {};
 }

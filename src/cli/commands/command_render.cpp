@@ -161,9 +161,10 @@ core::Result<void> render(RenderRequest& request, Session& session) {
   const std::optional<maps::MapPlace>& place = *found;
   std::error_code ec;
   const bool cloud_file = fs::is_regular_file(request.input, ec) && request.input.extension() != ".db";
-  const auto file =
-      cloud_file ? cloud::read_cloud(request.input) : maps::read_map_cloud(*place, session.executor());
+  const auto file = cloud_file ? cloud::read_cloud(request.input, cloud::LargeCoordinates::kShifted)
+                               : maps::read_map_cloud(*place, session.executor());
   if (!file) return tl::unexpected<core::Error>(file.error());
+  if (!file->shift.isZero(0.0)) session.console().info("shift: " + shift_text(file->shift));
   viz::Scene scene;
   scene.cloud = file->cloud;
   scene.title = display_name(place && place->result ? place->result->folder : request.input);

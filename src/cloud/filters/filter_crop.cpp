@@ -17,8 +17,8 @@ namespace {
 class CropBoxFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.numbers("min", min_m_, 3, {-1e6, 1e6}, "m", "Corner with the smallest x, y, z");
-    table.numbers("max", max_m_, 3, {-1e6, 1e6}, "m", "Corner with the largest x, y, z");
+    table.numbers("min", min_m_, 3, {-1e8, 1e8}, "m", "Corner with the smallest x, y, z");
+    table.numbers("max", max_m_, 3, {-1e8, 1e8}, "m", "Corner with the largest x, y, z");
     table.boolean("inside", inside_, "Keep what is inside (on) or outside (off)");
   }
   std::string check() const override {
@@ -27,17 +27,17 @@ class CropBoxFilter : public Filter {
     }
     return "";
   }
-  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     pcl::CropBox<Point> crop;
-    crop.setMin(corner(min_m_));
-    crop.setMax(corner(max_m_));
+    crop.setMin(corner(min_m_, context.shift));
+    crop.setMax(corner(max_m_, context.shift));
     crop.setNegative(!inside_);
     return chosen_by(crop, input);
   }
 
  private:
-  static Eigen::Vector4f corner(const std::vector<double>& v) {
-    return Eigen::Vector4d(v[0], v[1], v[2], 1.0).cast<float>();
+  static Eigen::Vector4f corner(const std::vector<double>& v, const Eigen::Vector3d& shift) {
+    return Eigen::Vector4d(v[0] - shift.x(), v[1] - shift.y(), v[2] - shift.z(), 1.0).cast<float>();
   }
   std::vector<double> min_m_{-1.0, -1.0, -1.0};
   std::vector<double> max_m_{1.0, 1.0, 1.0};
@@ -65,7 +65,9 @@ class PassThroughFilter : public Filter {
     if (!column_.empty()) return by_column(*input, context);
     pcl::PassThrough<Point> pass;
     pass.setFilterFieldName(field_);
-    pass.setFilterLimits(static_cast<float>(min_), static_cast<float>(max_));
+    const std::size_t axis = field_.size() == 1 ? std::string("xyz").find(field_) : std::string::npos;
+    const double shift = axis < 3 ? context.shift[static_cast<Eigen::Index>(axis)] : 0.0;
+    pass.setFilterLimits(static_cast<float>(min_ - shift), static_cast<float>(max_ - shift));
     pass.setNegative(!inside_);
     return chosen_by(pass, input);
   }

@@ -25,8 +25,9 @@ class MergeFilter : public Filter {
     return core::input_error(file_ + ": no such file");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
-    const auto other = read_cloud(file_);
+    const auto other = read_cloud(file_, LargeCoordinates::kShifted);
     if (!other) return tl::unexpected<core::Error>(other.error());
+    change_shift(*other->cloud, other->shift, context.shift);
     auto output = like(*input);
     output->points.reserve(input->size() + other->cloud->size());
     std::vector<std::size_t> chosen[2];
@@ -73,7 +74,8 @@ class TeeFilter : public Filter {
       file.replace_filename(file.stem().string() + "_" + context.run + file.extension().string());
     }
     const CloudColumns none;
-    if (auto written = write_cloud(file, *input, context.columns != nullptr ? *context.columns : none);
+    if (auto written =
+            write_cloud(file, *input, context.columns != nullptr ? *context.columns : none, context.shift);
         !written)
       return tl::unexpected<core::Error>(written.error());
     return std::make_shared<Cloud>(*input);

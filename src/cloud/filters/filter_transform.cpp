@@ -9,11 +9,11 @@ namespace {
 class TransformFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.numbers("translation", translation_m_, 3, {-1e6, 1e6}, "m", "x, y, z, added after the rotation");
+    table.numbers("translation", translation_m_, 3, {-1e8, 1e8}, "m", "x, y, z, added after the rotation");
     table.numbers("rotation", rotation_rad_, 3, {-6.2832, 6.2832}, "rad",
                   "Roll, pitch, yaw: about x first, then y, then z of the fixed frame");
   }
-  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext&) const override {
+  core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (input->empty()) return like(*input);
     Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
     transform.linear() = (Eigen::AngleAxisd(rotation_rad_[2], Eigen::Vector3d::UnitZ()) *
@@ -21,6 +21,7 @@ class TransformFilter : public Filter {
                           Eigen::AngleAxisd(rotation_rad_[0], Eigen::Vector3d::UnitX()))
                              .toRotationMatrix();
     transform.translation() << translation_m_[0], translation_m_[1], translation_m_[2];
+    transform.translation() += transform.linear() * context.shift - context.shift;
     auto output = std::make_shared<Cloud>();
     pcl::transformPointCloudWithNormals(*input, *output, transform.matrix().cast<float>().eval());
     const Eigen::Vector3d origin = input->sensor_origin_.head<3>().cast<double>();

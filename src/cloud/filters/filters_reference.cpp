@@ -35,7 +35,12 @@ constexpr const char* kIntroduction =
     "Points that\n"
     "filters choose or move keep theirs; voxel_grid averages; other new points have those of the nearest "
     "point of\n"
-    "the filter's input.\n";
+    "the filter's input.\n\n"
+    "Coordinates with more digits than a 32 bit float has, such as UTM's, are computed with less whole "
+    "metres (the `shift` that\n"
+    "is told) and written as doubles with them again; options in metres are about the coordinates of the "
+    "file. A chain that\n"
+    "leaves no point ends with exit code 4 and names the filter that took the last.\n";
 
 std::string allowed(const core::OptionSpec& option) {
   if (!option.choices.empty()) return fmt::format("{}", fmt::join(option.choices, ", "));

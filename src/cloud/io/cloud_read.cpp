@@ -10,8 +10,8 @@
 
 namespace plumbline::cloud {
 
-core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file) {
-  auto ply = read_ply(file);
+core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeCoordinates large) {
+  auto ply = read_ply(file, large == LargeCoordinates::kShifted);
   if (!ply) return tl::unexpected<core::Error>(ply.error());
   std::vector<Meaning> meanings;
   std::vector<std::string> names;
@@ -39,10 +39,23 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file) {
     }
     values = std::vector<float>();  // the column is in the cloud now
   }
-  return builder.finish();
+  CloudFile result = builder.finish();
+  result.shift = Eigen::Map<const Eigen::Vector3d>(ply->shift.data());
+  return result;
 }
 
-core::Result<CloudFile> read_cloud(const std::filesystem::path& file) {
+void change_shift(Cloud& cloud, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  if (from == to) return;
+  const Eigen::Vector3d step = from - to;
+  for (Point& p : cloud.points) {
+    p.x = static_cast<float>(static_cast<double>(p.x) + step.x());
+    p.y = static_cast<float>(static_cast<double>(p.y) + step.y());
+    p.z = static_cast<float>(static_cast<double>(p.z) + step.z());
+  }
+  cloud.sensor_origin_.head<3>() = (cloud.sensor_origin_.head<3>().cast<double>() + step).cast<float>();
+}
+
+core::Result<CloudFile> read_cloud(const std::filesystem::path& file, LargeCoordinates large) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return core::input_error(file.string() + ": does not exist");
   if (std::filesystem::is_directory(file, error)) {
@@ -51,10 +64,10 @@ core::Result<CloudFile> read_cloud(const std::filesystem::path& file) {
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (ending == ".ply") return read_ply_cloud(file);
-  if (ending == ".pcd") return read_pcd_cloud(file);
+  if (ending == ".ply") return read_ply_cloud(file, large);
+  if (ending == ".pcd") return read_pcd_cloud(file, large);
   if (ending == ".xyz" || ending == ".txt" || ending == ".csv" || ending == ".asc" || ending == ".pts") {
-    return read_text_cloud(file);
+    return read_text_cloud(file, large);
   }
   return core::input_error(fmt::format(
       "{}: ending '{}' is not one that clouds are read from; use .ply, .pcd, .xyz, .txt, .csv, .asc or .pts",

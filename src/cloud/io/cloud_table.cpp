@@ -11,6 +11,7 @@
 
 #include "finite.hpp"
 #include "io/scalar.hpp"
+#include "io/shift.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -113,7 +114,11 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, dou
     case Meaning::kX:
     case Meaning::kY:
     case Meaning::kZ:
-      p.data[axis_of(meaning, Meaning::kX)] = number;
+      if (auto& wide = wide_[static_cast<std::size_t>(axis_of(meaning, Meaning::kX))]; !wide.empty()) {
+        wide[row] = value;
+      } else {
+        p.data[axis_of(meaning, Meaning::kX)] = number;
+      }
       break;
     case Meaning::kNormalX:
     case Meaning::kNormalY:
@@ -147,6 +152,21 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, dou
   }
 }
 
+void CloudBuilder::keep_digits(Meaning axis) {
+  if (const auto k = axis_of_column(axis); k && position_)
+    wide_[static_cast<std::size_t>(*k)].resize(file_.cloud->size(), static_cast<double>(kNan));
+}
+
+void CloudBuilder::take_shift() {
+  for (int k = 0; k < 3; ++k) {
+    const std::vector<double>& wide = wide_[static_cast<std::size_t>(k)];
+    if (wide.empty()) continue;
+    file_.shift[k] = axis_shift(wide);
+    for (std::size_t i = 0; i < wide.size(); ++i)
+      file_.cloud->points[i].data[k] = static_cast<float>(wide[i] - file_.shift[k]);
+  }
+}
+
 void CloudBuilder::set_packed_color(std::size_t row, std::uint32_t bits) {
   Point& p = file_.cloud->points[row];
   p.r = static_cast<std::uint8_t>(bits >> 16 & 255U);
@@ -160,6 +180,7 @@ void CloudBuilder::shape(std::uint32_t width, std::uint32_t height) {
 }
 
 CloudFile CloudBuilder::finish() {
+  take_shift();
   for (Point& p : file_.cloud->points) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) ++file_.nan_points;
     if (!file_.has_normals) continue;

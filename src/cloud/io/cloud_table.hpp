@@ -40,6 +40,8 @@ class CloudBuilder {
   /// Meanings and names of the file's columns; prepares those that the cloud gets.
   CloudBuilder(const std::vector<Meaning>& meanings, const std::vector<std::string>& names,
                std::size_t points);
+  /// Keeps the values of an axis as doubles until all are there; finish() takes a shift off them.
+  void keep_digits(Meaning axis);
   /// False when x, y or z is missing.
   [[nodiscard]] bool has_position() const { return position_; }
   /// `column`: of the file, needed for kOther.
@@ -50,12 +52,15 @@ class CloudBuilder {
 
  private:
   CloudFile file_;
-  std::vector<float*> others_;  ///< of each column of the file that is kOther, else null
+  void take_shift();
+
+  std::array<std::vector<double>, 3> wide_;  ///< of axes whose digits are kept
+  std::vector<float*> others_;               ///< of each column of the file that is kOther, else null
   bool position_ = false;
 };
 
-core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file);
-core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file);
-core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file);
+core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeCoordinates large);
+core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeCoordinates large);
+core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file, LargeCoordinates large);
 
 }  // namespace plumbline::cloud

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "finite.hpp"
+#include "io/shift.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/core/output_file.hpp"
 
@@ -25,6 +26,16 @@ void check_columns(const Cloud& cloud, const CloudColumns& columns) {
   }
 }
 
+/// As floats, or as doubles with the shift added.
+void put_position(const Point& p, const Eigen::Vector3d& shift, core::OutputFile& out) {
+  if (shift.isZero(0.0)) {
+    out.put(std::array<float, 3>{p.x, p.y, p.z});
+  } else {
+    out.put(std::array<double, 3>{with_shift(p.x, shift.x()), with_shift(p.y, shift.y()),
+                                  with_shift(p.z, shift.z())});
+  }
+}
+
 /// What is known of point `i` besides.
 void put_columns(const CloudColumns& columns, std::size_t i, core::OutputFile& out) {
   if (!columns.confidence.empty()) out.put(columns.confidence[i]);
@@ -36,14 +47,15 @@ void put_columns(const CloudColumns& columns, std::size_t i, core::OutputFile& o
 }  // namespace
 
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
-                             const CloudColumns& columns) {
+                             const CloudColumns& columns, const Eigen::Vector3d& shift) {
   check_columns(cloud, columns);
   core::OutputFile out(file);
   out.write(
       fmt::format("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\nelement vertex {}\n",
                   count_finite(cloud)));
+  const char* type = shift.isZero(0.0) ? "float" : "double";
+  out.write(fmt::format("property {0} x\nproperty {0} y\nproperty {0} z\n", type));
   out.write(
-      "property float x\nproperty float y\nproperty float z\n"
       "property float nx\nproperty float ny\nproperty float nz\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n");
   if (!columns.confidence.empty()) out.write("property float confidence\n");
@@ -55,7 +67,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
     const Point& p = cloud[i];
     if (!finite(p)) continue;
     const bool normal = std::isfinite(p.normal_x + p.normal_y + p.normal_z);
-    out.put(std::array<float, 3>{p.x, p.y, p.z});
+    put_position(p, shift, out);
     out.put(normal ? std::array<float, 3>{p.normal_x, p.normal_y, p.normal_z} : std::array<float, 3>{});
     out.put(std::array<std::uint8_t, 3>{p.r, p.g, p.b});
     put_columns(columns, i, out);
@@ -64,12 +76,12 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
 }
 
 core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& cloud,
-                             const CloudColumns& columns) {
+                             const CloudColumns& columns, const Eigen::Vector3d& shift) {
   check_columns(cloud, columns);
   const bool organised = cloud.height > 1;
   const std::size_t points = organised ? cloud.size() : count_finite(cloud);
   std::string fields = "x y z rgb normal_x normal_y normal_z curvature";
-  std::string sizes = "4 4 4 4 4 4 4 4";
+  std::string sizes = shift.isZero(0.0) ? "4 4 4 4 4 4 4 4" : "8 8 8 4 4 4 4 4";
   std::string types = "F F F F F F F F";
   std::string counts = "1 1 1 1 1 1 1 1";
   const auto field = [&](bool present, const std::string& name, const char* size, const char* type) {
@@ -87,15 +99,18 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   core::OutputFile out(file);
   const auto& t = cloud.sensor_origin_;
   const auto& q = cloud.sensor_orientation_;
-  out.write(
-      fmt::format("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\n"
-                  "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
-                  fields, sizes, types, counts, organised ? cloud.width : points,
-                  organised ? cloud.height : 1, t[0], t[1], t[2], q.w(), q.x(), q.y(), q.z(), points));
+  const auto origin = [&](int k) {  // a float is printed with fewer digits
+    return shift[k] == 0.0 ? fmt::format("{}", t[k]) : fmt::format("{}", with_shift(t[k], shift[k]));
+  };
+  out.write(fmt::format(
+      "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\n"
+      "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
+      fields, sizes, types, counts, organised ? cloud.width : points, organised ? cloud.height : 1, origin(0),
+      origin(1), origin(2), q.w(), q.x(), q.y(), q.z(), points));
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!organised && !finite(p)) continue;
-    out.put(std::array<float, 3>{p.x, p.y, p.z});
+    put_position(p, shift, out);
     out.put(static_cast<std::uint32_t>(p.r) << 16 | static_cast<std::uint32_t>(p.g) << 8 |
             static_cast<std::uint32_t>(p.b));
     out.put(std::array<float, 4>{p.normal_x, p.normal_y, p.normal_z, p.curvature});
@@ -105,10 +120,10 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
 }
 
 core::Result<void> write_cloud(const std::filesystem::path& file, const Cloud& cloud,
-                               const CloudColumns& columns) {
+                               const CloudColumns& columns, const Eigen::Vector3d& shift) {
   const std::string ending = file.extension().string();
-  if (ending == ".ply") return write_ply(file, cloud, columns);
-  if (ending == ".pcd") return write_pcd(file, cloud, columns);
+  if (ending == ".ply") return write_ply(file, cloud, columns, shift);
+  if (ending == ".pcd") return write_pcd(file, cloud, columns, shift);
   return core::usage_error(fmt::format(
       "{}: ending '{}' is not one that clouds are written as; use .ply or .pcd", file.string(), ending));
 }

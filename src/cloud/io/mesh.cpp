@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "filters/pcl_functions.hpp"
+#include "io/shift.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
@@ -121,7 +122,11 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
   core::OutputFile out(file);
   out.write("# metres; x y z red green blue\n");
   for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
-    const auto at = [&](std::size_t k) { return (*columns[k])[v]; };
+    const auto at = [&](std::size_t k) {
+      const float value = (*columns[k])[v];
+      const double shift = k < mesh.shift.size() ? mesh.shift[k] : 0.0;
+      return shift == 0.0 ? static_cast<double>(value) : with_shift(value, shift);
+    };
     const auto channel = [v](const std::vector<std::uint8_t>& c) { return c[v] / 255.0; };
     out.write(fmt::format("v {:.5f} {:.5f} {:.5f} {:.4f} {:.4f} {:.4f}\nvn {:.4f} {:.4f} {:.4f}\n", at(0),
                           at(1), at(2), channel(*red), channel(*green), channel(*blue), at(3), at(4), at(5)));

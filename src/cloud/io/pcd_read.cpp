@@ -11,6 +11,7 @@
 #include "io/byte_reader.hpp"
 #include "io/cloud_table.hpp"
 #include "io/scalar.hpp"
+#include "io/shift.hpp"
 
 namespace plumbline::cloud {
 namespace {
@@ -246,7 +247,7 @@ std::string check_size(const PcdHeader& header, std::uint64_t remaining) {
 
 }  // namespace
 
-core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file) {
+core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeCoordinates large) {
   const auto error = [&file](const std::string& what) {
     return core::input_error(file.string() + ": " + what);
   };
@@ -265,6 +266,10 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file) {
   }
   CloudBuilder builder(meanings, names, static_cast<std::size_t>(header->points));
   if (!builder.has_position()) return error("has no x, y and z; it is not a point cloud");
+  for (const PcdField& field : header->fields) {
+    const bool digits = header->data == "ascii" || exceeds_float(field.scalar);
+    if (digits && large == LargeCoordinates::kShifted) builder.keep_digits(field.meaning);
+  }
   if (header->data == "ascii") {
     problem = read_ascii(reader, *header, builder);
   } else if (header->data == "binary") {
@@ -278,7 +283,10 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file) {
                 static_cast<std::uint32_t>(organised ? header->height : 1));
   CloudFile result = builder.finish();
   if (const auto& v = header->viewpoint; v.size() == 7) {
-    result.cloud->sensor_origin_ = Eigen::Vector4d(v[0], v[1], v[2], 0.0).cast<float>();
+    result.cloud->sensor_origin_ =
+        (Eigen::Vector4d(v[0], v[1], v[2], 0.0) -
+         Eigen::Vector4d(result.shift.x(), result.shift.y(), result.shift.z(), 0.0))
+            .cast<float>();
     result.cloud->sensor_orientation_ = Eigen::Quaterniond(v[3], v[4], v[5], v[6]).cast<float>();
   }
   return result;

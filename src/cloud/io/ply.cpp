@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "io/ply_header.hpp"
+#include "io/shift.hpp"
 #include "plumbline/core/output_file.hpp"
 
 namespace plumbline::cloud {
@@ -79,9 +80,17 @@ struct Sink {
   std::size_t offset = 0;
   float* floats = nullptr;
   std::uint8_t* bytes = nullptr;
+  double* doubles = nullptr;  ///< in their place
 };
 
+/// Positions with more digits than a float has, by axis, until the whole column is known; else empty.
+using WidePositions = std::array<std::vector<double>, 3>;
+
 void store(const Sink& sink, std::size_t row, double value) {
+  if (sink.doubles != nullptr) {
+    sink.doubles[row] = value;
+    return;
+  }
   if (sink.floats != nullptr) sink.floats[row] = static_cast<float>(value);
   if (sink.bytes != nullptr) sink.bytes[row] = to_byte(value);
 }
@@ -109,6 +118,31 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
   return sinks;
 }
 
+/// Positions that exceed floats go to `wide` first.
+void divert_positions(const PlyElement& element, bool ascii, const PlyData& data, std::vector<Sink>& sinks,
+                      WidePositions& wide) {
+  for (std::size_t i = 0; i < sinks.size(); ++i) {
+    const auto axis = axis_of_column(meaning_of(data.columns[i].name));
+    if (!axis || sinks[i].floats == nullptr || !(ascii || exceeds_float(sinks[i].type))) continue;
+    auto& column = wide[static_cast<std::size_t>(*axis)];
+    if (!column.empty()) continue;
+    column.resize(static_cast<std::size_t>(element.count));
+    sinks[i].doubles = column.data();
+  }
+}
+
+/// Back into the columns, less a shift.
+void store_positions(const WidePositions& wide, const std::vector<Sink>& sinks, PlyData& data) {
+  for (std::size_t axis = 0; axis < wide.size(); ++axis) {
+    if (wide[axis].empty()) continue;
+    data.shift[axis] = axis_shift(wide[axis]);
+    const auto sink = std::find_if(sinks.begin(), sinks.end(),
+                                   [&](const Sink& s) { return s.doubles == wide[axis].data(); });
+    for (std::size_t i = 0; i < wide[axis].size(); ++i)
+      sink->floats[i] = static_cast<float>(wide[axis][i] - data.shift[axis]);
+  }
+}
+
 bool has_lists(const PlyElement& element) {
   return std::any_of(element.properties.begin(), element.properties.end(),
                      [](const auto& p) { return p.list; });
@@ -129,8 +163,8 @@ std::uint64_t read_records(Body& body, const PlyElement& element, const Visit& v
 }
 
 /// Returns how many vertices were read.
-std::uint64_t read_vertices(Body& body, const PlyElement& element, PlyData& data) {
-  const std::vector<Sink> sinks = make_columns(element, data);
+std::uint64_t fill_columns(Body& body, const PlyElement& element, const std::vector<Sink>& sinks,
+                           const PlyData& data) {
   if (!body.ascii() && !has_lists(element)) {
     const std::size_t size = element.least_size(false);
     for (std::size_t row = 0; row < data.vertex_count; ++row) {
@@ -153,6 +187,15 @@ std::uint64_t read_vertices(Body& body, const PlyElement& element, PlyData& data
     if (!property.list) store(sinks[column++ % sinks.size()], static_cast<std::size_t>(row), value);
     return true;
   });
+}
+
+std::uint64_t read_vertices(Body& body, const PlyElement& element, bool take_shift, PlyData& data) {
+  std::vector<Sink> sinks = make_columns(element, data);
+  WidePositions wide;
+  if (take_shift) divert_positions(element, body.ascii(), data, sinks, wide);
+  const std::uint64_t rows = fill_columns(body, element, sinks, data);
+  if (rows == element.count) store_positions(wide, sinks, data);
+  return rows;
 }
 
 bool to_index(double value, std::size_t vertices, std::uint32_t& index) {
@@ -202,7 +245,7 @@ std::uint64_t read_edges(Body& body, const PlyElement& element, PlyData& data) {
 }
 
 /// "" or what is wrong with the records of one element.
-std::string read_element(Body& body, const PlyElement& element, PlyData& data) {
+std::string read_element(Body& body, const PlyElement& element, bool take_shift, PlyData& data) {
   const std::size_t least = element.least_size(body.ascii());
   // The last word of an ascii file needs no blank after it.
   const std::uint64_t room = body.reader().remaining() + (body.ascii() ? 1 : 0);
@@ -214,7 +257,7 @@ std::string read_element(Body& body, const PlyElement& element, PlyData& data) {
   }
   std::uint64_t rows = 0;
   if (element.name == "vertex") {
-    rows = read_vertices(body, element, data);
+    rows = read_vertices(body, element, take_shift, data);
   } else if (element.name == "face") {
     rows = read_faces(body, element, data);
   } else if (element.name == "edge") {
@@ -253,7 +296,7 @@ void PlyData::add(std::string name, std::vector<std::uint8_t> values) {
   columns.push_back({std::move(name), std::move(values)});
 }
 
-core::Result<PlyData> read_ply(const std::filesystem::path& file) {
+core::Result<PlyData> read_ply(const std::filesystem::path& file, bool take_shift) {
   ByteReader reader(file);
   if (!reader.open()) return core::input_error(file.string() + ": cannot be read");
   auto header = read_ply_header(reader);
@@ -262,7 +305,7 @@ core::Result<PlyData> read_ply(const std::filesystem::path& file) {
   data.comments = header->comments;
   Body body(reader, header->format);
   for (const auto& element : header->elements) {
-    const std::string problem = read_element(body, element, data);
+    const std::string problem = read_element(body, element, take_shift, data);
     if (!problem.empty()) return core::input_error(file.string() + ": " + problem);
   }
   return data;
@@ -282,9 +325,14 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
   out.write("ply\nformat binary_little_endian 1.0\n");
   for (const auto& comment : data.comments) out.write("comment " + comment + "\n");
   out.write(fmt::format("element vertex {}\n", data.vertex_count));
+  const auto shift_of = [&data](const PlyColumn& column) {
+    const bool position = column.name == "x" || column.name == "y" || column.name == "z";
+    return position ? data.shift[static_cast<std::size_t>(column.name[0] - 'x')] : 0.0;
+  };
   for (const auto& column : data.columns) {
     const bool floats = std::holds_alternative<std::vector<float>>(column.values);
-    out.write(fmt::format("property {} {}\n", floats ? "float" : "uchar", column.name));
+    const char* type = !floats ? "uchar" : shift_of(column) != 0.0 ? "double" : "float";
+    out.write(fmt::format("property {} {}\n", type, column.name));
   }
   if (!data.triangles.empty()) {
     out.write(
@@ -298,7 +346,13 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
   out.write("end_header\n");
   for (std::size_t row = 0; row < data.vertex_count; ++row) {
     for (const auto& column : data.columns) {
-      std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
+      const auto* floats = std::get_if<std::vector<float>>(&column.values);
+      const double shift = floats != nullptr ? shift_of(column) : 0.0;
+      if (shift != 0.0) {
+        out.put(with_shift((*floats)[row], shift));
+      } else {
+        std::visit([&out, row](const auto& values) { out.put(values[row]); }, column.values);
+      }
     }
   }
   for (const auto& triangle : data.triangles) {

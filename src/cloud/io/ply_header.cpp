@@ -88,8 +88,9 @@ std::string parse_property(std::istringstream& words, PlyHeader& header) {
 core::Result<PlyHeader> read_ply_header(ByteReader& reader) {
   PlyHeader header;
   std::string line;
-  if (!reader.line(line, kLongestLine) || line != "ply")
-    return core::input_error("is not a PLY file (no 'ply' at its start)");
+  const bool begun = reader.line(line, kLongestLine);
+  line.erase(line.find_last_not_of(" \t\r") + 1);  // some programs end their lines with blanks
+  if (!begun || line != "ply") return core::input_error("is not a PLY file (no 'ply' at its start)");
   bool format = false;
   for (int number = 2; number <= kMostLines; ++number) {
     if (!reader.line(line, kLongestLine)) break;

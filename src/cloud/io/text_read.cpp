@@ -9,15 +9,16 @@
 #include "io/byte_reader.hpp"
 #include "io/cloud_table.hpp"
 #include "io/scalar.hpp"
+#include "plumbline/core/numbers.hpp"
 
 namespace plumbline::cloud {
 namespace {
 
-std::vector<std::string> split(const std::string& line) {
+std::vector<std::string> split(const std::string& line, std::string_view separators = " \t,;") {
   std::vector<std::string> words;
   std::string word;
   for (const char c : line + " ") {
-    const bool separator = c == ' ' || c == '\t' || c == ',' || c == ';';
+    const bool separator = separators.find(c) != std::string_view::npos;
     if (!separator) word.push_back(c);
     if (separator && !word.empty()) words.push_back(std::exchange(word, {}));
   }
@@ -28,7 +29,7 @@ std::vector<std::string> split(const std::string& line) {
 struct TextTable {
   std::vector<std::string> names;  ///< of a header line
   std::size_t columns = 0;
-  std::vector<float> values;
+  std::vector<double> values;
 };
 
 std::string read_table(ByteReader& reader, TextTable& table) {
@@ -39,6 +40,8 @@ std::string read_table(ByteReader& reader, TextTable& table) {
     if (line.compare(0, 2, "//") == 0) line.erase(0, 2);  // CloudCompare's header lines
     auto words = split(line);
     if (words.empty() || words[0][0] == '#') continue;
+    if (core::has_decimal_comma(split(line, " \t;")))
+      return fmt::format("line {}: decimal comma; write numbers with a point", number);
     const bool first = table.columns == 0;
     if (first && !parse_number(words[0])) {
       if (!table.names.empty()) return fmt::format("line {}: '{}' is not a number", number, words[0]);
@@ -55,7 +58,7 @@ std::string read_table(ByteReader& reader, TextTable& table) {
     for (const auto& word : words) {
       const auto value = parse_number(word);
       if (!value) return fmt::format("line {}: '{}' is not a number", number, word);
-      table.values.push_back(static_cast<float>(*value));
+      table.values.push_back(*value);
     }
   }
   if (reader.remaining() > 0) return fmt::format("line {}: longer than 4096 characters", number + 1);
@@ -65,8 +68,8 @@ std::string read_table(ByteReader& reader, TextTable& table) {
 bool looks_like_color(const TextTable& table, std::size_t from) {
   for (std::size_t i = 0; i < table.values.size(); i += table.columns) {
     for (std::size_t c = from; c < from + 3; ++c) {
-      const float value = table.values[i + c];
-      if (!(value >= 0.0F && value <= 255.0F) || value != std::floor(value)) return false;
+      const double value = table.values[i + c];
+      if (!(value >= 0.0 && value <= 255.0) || value != std::floor(value)) return false;
     }
   }
   return true;
@@ -96,7 +99,7 @@ std::vector<Meaning> meanings_of(const TextTable& table) {
 
 }  // namespace
 
-core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file) {
+core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file, LargeCoordinates large) {
   const auto error = [&file](const std::string& what) {
     return core::input_error(file.string() + ": " + what);
   };
@@ -109,9 +112,12 @@ core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file) {
   table.names.resize(table.columns);
   CloudBuilder builder(meanings, table.names, table.values.size() / table.columns);
   if (!builder.has_position()) return error("has no x, y and z; three columns at least are needed");
+  if (large == LargeCoordinates::kShifted) {
+    for (const Meaning meaning : meanings) builder.keep_digits(meaning);
+  }
   for (std::size_t i = 0; i < table.values.size(); ++i) {
     const std::size_t c = i % table.columns;
-    builder.set(i / table.columns, meanings[c], c, static_cast<double>(table.values[i]));
+    builder.set(i / table.columns, meanings[c], c, table.values[i]);
   }
   return builder.finish();
 }

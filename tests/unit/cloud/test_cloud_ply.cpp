@@ -76,6 +76,31 @@ TEST(Ply, AsciiWithPolygonsUnknownElementsAndCrLf) {
   EXPECT_EQ(data->triangles[1], (std::array<std::uint32_t, 3>{0, 2, 3}));
 }
 
+TEST(Ply, BlanksAtTheEndsOfHeaderLines) {
+  const auto data = read_ply(spill_ply("blanks.ply",
+                                       "ply \nformat ascii 1.0 \nelement vertex 2 \nproperty float x "
+                                       "\nproperty float y\t\nproperty float z \r\n"
+                                       "end_header \n0 0 1\n1 0 1\n"));
+  ASSERT_TRUE(data) << data.error().message;
+  EXPECT_EQ(data->vertex_count, 2U);
+  EXPECT_EQ((*data->floats("x"))[1], 1.0F);
+}
+
+TEST(Ply, ShiftIsAddedAsDoubles) {
+  PlyData data = triangle();
+  data.shift = {1000000.0, 0.0, 0.0};
+  ASSERT_TRUE(write_ply(ply_file("shifted.ply"), data));
+  EXPECT_NE(bytes_of(ply_file("shifted.ply")).find("property double x\nproperty float y\n"),
+            std::string::npos);
+  const auto rounded = read_ply(ply_file("shifted.ply"));
+  ASSERT_TRUE(rounded) << rounded.error().message;
+  EXPECT_EQ((*rounded->floats("x"))[1], 1000001.5F);
+  EXPECT_EQ(rounded->triangles, data.triangles);
+  const auto shifted = read_ply(ply_file("shifted.ply"), true);
+  ASSERT_TRUE(shifted);
+  EXPECT_EQ(shifted->shift[0] + static_cast<double>((*shifted->floats("x"))[1]), 1000001.5);
+}
+
 TEST(Ply, BigEndianAndIntegerProperties) {
   std::string text =
       "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\nproperty short y\n"
