@@ -50,16 +50,32 @@ bool decode(jpeg_decompress_struct& info, ErrorManager& errors, const Bytes& fil
   jpeg_create_decompress(&info);
   jpeg_mem_src(&info, file.data(), static_cast<unsigned long>(file.size()));
   jpeg_read_header(&info, TRUE);
-  info.out_color_space = JCS_EXT_BGR;
+  const bool cmyk = info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK;
+  info.out_color_space = cmyk ? JCS_CMYK : JCS_EXT_BGR;
   jpeg_start_decompress(&info);
   if (static_cast<std::int64_t>(info.output_width) * info.output_height > kMaxPixels) return false;
-  image.create(static_cast<int>(info.output_height), static_cast<int>(info.output_width), CV_8UC3);
+  image.create(static_cast<int>(info.output_height), static_cast<int>(info.output_width),
+               cmyk ? CV_8UC4 : CV_8UC3);
   while (info.output_scanline < info.output_height) {
     JSAMPROW row = image.ptr(static_cast<int>(info.output_scanline));
     jpeg_read_scanlines(&info, &row, 1);
   }
   jpeg_finish_decompress(&info);
   return true;
+}
+
+/// Cyan, magenta, yellow, black to BGR; Adobe's programs store them inverted.
+cv::Mat from_cmyk(const cv::Mat& cmyk, bool inverted) {
+  cv::Mat bgr(cmyk.size(), CV_8UC3);
+  for (int v = 0; v < cmyk.rows; ++v) {
+    const auto* from = cmyk.ptr<cv::Vec4b>(v);
+    auto* to = bgr.ptr<cv::Vec3b>(v);
+    for (int u = 0; u < cmyk.cols; ++u) {
+      const auto light = [&](int c) { return inverted ? from[u][c] : 255 - from[u][c]; };
+      for (int c = 0; c < 3; ++c) to[u][c] = static_cast<std::uint8_t>(light(2 - c) * light(3) / 255);
+    }
+  }
+  return bgr;
 }
 
 }  // namespace
@@ -77,8 +93,9 @@ Decoded decode_jpeg(const Bytes& file) {
   errors.base.output_message = be_quiet;
   cv::Mat image;
   const bool done = decode(info, errors, file, image);
+  const bool adobe = info.saw_Adobe_marker != 0;
   jpeg_destroy_decompress(&info);
-  if (done) return image;
+  if (done) return image.channels() == 4 ? from_cmyk(image, adobe) : image;
   return tl::unexpected<std::string>(errors.message[0] != '\0' ? errors.message : "the image is too large");
 }
 

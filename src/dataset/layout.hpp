@@ -18,6 +18,10 @@ struct Layout {
   std::string format;
   std::vector<PairInfo> pairs;  ///< sorted by colour stamp; files with their folder in front
   std::optional<geometry::Trajectory> truth;
+  std::string video{};  ///< the film that colour is in; "" where it is in files
+  /// Folder of masks named as the depth images, 0 where there is no measurement; "": none.
+  std::string confidence{};
+  int color_reduction = 1;  ///< colour images are made smaller by this factor while reading
 };
 
 struct LayoutOptions {
@@ -34,18 +38,53 @@ struct StampedFile {
 };
 
 /// The FrameSource behind every layout on disk.
-std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera);
+std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera,
+                                                std::string doubt = "");
 
-bool looks_like_tum(const std::filesystem::path& folder);
-bool looks_like_seven_scenes(const std::filesystem::path& folder);
-bool looks_like_redwood(const std::filesystem::path& folder);
+/// One layout: src/dataset/layouts has a source for each.
+struct LayoutFormat {
+  const char* name;        ///< of --format
+  const char* program;     ///< whose it is, for messages
+  const char* looked_for;  ///< for messages
+  /// What is needed; of alternatives, separated by '|', one. A name that ends in '/' is a folder.
+  std::vector<std::string> parts;
+  bool (*recognises)(const std::filesystem::path& folder);
+  core::Result<Layout> (*read)(const std::filesystem::path& folder, const LayoutOptions& options,
+                               core::Log& log);
+};
 
-core::Result<Layout> read_tum(const std::filesystem::path& folder, const LayoutOptions& options,
-                              core::Log& log);
-core::Result<Layout> read_seven_scenes(const std::filesystem::path& folder, const LayoutOptions& options,
-                                       core::Log& log);
-core::Result<Layout> read_redwood(const std::filesystem::path& folder, const LayoutOptions& options,
-                                  core::Log& log);
+const LayoutFormat& tum_layout();
+const LayoutFormat& seven_scenes_layout();
+const LayoutFormat& replica_layout();
+const LayoutFormat& scannet_layout();
+const LayoutFormat& stray_layout();
+const LayoutFormat& redwood_layout();
+
+/// In the order in which they are asked.
+const std::vector<const LayoutFormat*>& layout_formats();
+
+/// The first that recognises the folder; null when none does.
+const LayoutFormat* layout_of(const std::filesystem::path& folder);
+
+/// What to say of a folder that is no recording: what is there, and which layout is nearest.
+std::string not_a_recording(const std::filesystem::path& folder);
+
+/// Whether the path is a folder, or a file; false when it cannot be told.
+bool is_folder(const std::filesystem::path& path);
+bool is_file(const std::filesystem::path& path);
+
+/// The groups of digits of a name, left to right.
+std::vector<long long> numbers_of(const std::string& name);
+/// 4x4 world_from_camera in a file of its own; none where tracking was lost (NaN or infinity) or it is
+/// unusable.
+std::optional<geometry::Rigid3> read_pose_file(const std::string& file);
+/// Images of a folder whose names have a number, by the first number in them; a number seen twice keeps the
+/// first name.
+std::vector<std::pair<long long, std::string>> numbered_images(const std::filesystem::path& folder,
+                                                               const std::string& prefix = "");
+/// Pairs of images with one number, stamps number / fps.
+std::vector<PairInfo> pair_numbered(const std::vector<std::pair<long long, std::string>>& color,
+                                    const std::vector<std::pair<long long, std::string>>& depth, double fps);
 
 /// Pairs by when images were taken, depth `depth_delay_s` after its stamps: smallest difference first, each
 /// file used once; both lists sorted by stamp. The result has the lists' stamps and is sorted by that of

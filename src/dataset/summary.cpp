@@ -33,10 +33,11 @@ std::string to_text(const FrameSource& source) {
   const double usual_s = steps.empty() ? 0.0 : core::median(std::move(steps));
   text += fmt::format("duration: {:.2f} s, {:.1f} pairs a second, longest gap {:.3f} s\n", duration_s,
                       usual_s > 0.0 ? 1.0 / usual_s : 0.0, longest_s);
-  text += fmt::format("camera: {}, {}x{}, {}, depth {}, depth_scale {}\n", camera.name, camera.color.width,
-                      camera.color.height, camera.distorted() ? "undistorted while reading" : "no distortion",
-                      camera.color_from_depth ? "registered while reading" : "registered to colour",
-                      camera.depth_scale);
+  text += fmt::format(
+      "camera: {}, {}x{}, fx {:g} fy {:g} cx {:g} cy {:g}, {}, depth {}, depth_scale {}\n", camera.name,
+      camera.color.width, camera.color.height, camera.color.fx, camera.color.fy, camera.color.cx,
+      camera.color.cy, camera.distorted() ? "undistorted while reading" : "no distortion",
+      camera.color_from_depth ? "registered while reading" : "registered to colour", camera.depth_scale);
 
   DepthStatistics statistics;
   std::size_t read = 0;

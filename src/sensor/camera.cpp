@@ -193,50 +193,6 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   return camera;
 }
 
-core::Result<Camera> read_open3d_camera(const std::filesystem::path& file) {
-  auto root = core::read_yaml(file);  // JSON is YAML
-  if (!root) return tl::unexpected(root.error());
-  constexpr double millimetres = 1000.0;  // Open3D's convention for 16-bit depth
-  Camera camera;
-  camera.name = file.stem().string();
-  camera.depth_scale = millimetres;
-  std::vector<double> k;  // column by column
-  core::OptionTable table;
-  table.integer("width", camera.color.width, {1, 32768}, "px", "");
-  table.integer("height", camera.color.height, {1, 32768}, "px", "");
-  table.numbers("intrinsic_matrix", k, 9, {}, "", "");
-  ConfigProblems problems;
-  for (const char* key : {"width", "height", "intrinsic_matrix"}) {
-    const ConfigNode* node = root->find(key);
-    if (node == nullptr) {
-      problems.push_back({root->mark, key, "is missing (needed: width height intrinsic_matrix)"});
-    } else {
-      table.set(key, *node, key, problems);
-    }
-  }
-  if (k.size() == 9) {
-    camera.color.fx = k[0];
-    camera.color.fy = k[4];
-    camera.color.cx = k[6];
-    camera.color.cy = k[7];
-    const bool focal = k[0] > 0.0 && k[4] > 0.0;
-    const bool inside = k[6] >= 0.0 && k[7] >= 0.0 && k[6] < camera.color.width && k[7] < camera.color.height;
-    if (!focal || !inside) {
-      problems.push_back({root->find("intrinsic_matrix")->mark, "intrinsic_matrix",
-                          "is no camera of that size (expected: [fx, 0, 0, 0, fy, 0, cx, cy, 1])"});
-    }
-  }
-  if (!problems.empty()) return tl::unexpected(core::to_error(problems));
-  return camera;
-}
-
-core::Result<Camera> find_camera(const std::string& name_or_file,
-                                 const std::filesystem::path& cameras_folder) {
-  const auto file = core::find_yaml("camera", name_or_file, cameras_folder);
-  if (!file) return tl::unexpected<core::Error>(file.error());
-  return read_camera(*file);
-}
-
 std::string to_yaml(const Camera& camera) {
   std::string text = camera.name.empty() ? "" : fmt::format("name: {}\n", text_yaml(camera.name));
   text += "model: pinhole\n" + pinhole_yaml(camera.color, "");

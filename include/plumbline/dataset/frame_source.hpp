@@ -29,7 +29,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
   [[nodiscard]] virtual const std::string& name() const = 0;    ///< short, e.g. the folder's name
-  [[nodiscard]] virtual const std::string& format() const = 0;  ///< "tum", "7scenes", "redwood", "synth"
+  [[nodiscard]] virtual const std::string& format() const = 0;  ///< one of layout_names(), or "synth"
   [[nodiscard]] virtual const sensor::Camera& camera() const = 0;
   [[nodiscard]] virtual std::size_t size() const = 0;
   [[nodiscard]] virtual PairInfo info(std::size_t index) const = 0;
@@ -40,12 +40,14 @@ class FrameSource {
   [[nodiscard]] virtual std::unique_ptr<FrameSource> taken_by(const sensor::Camera& /*better*/) const {
     return nullptr;
   }
+  /// What makes a map of it doubtful whatever comes out, such as depth in an unlikely unit; "" if nothing.
+  [[nodiscard]] virtual std::string doubt() const { return ""; }
   /// Truth that comes with the recording, if any.
   [[nodiscard]] virtual std::optional<geometry::Trajectory> truth() const = 0;
 };
 
 struct OpenOptions {
-  std::string format = "auto";          ///< auto, tum, 7scenes, redwood
+  std::string format = "auto";          ///< one of layout_names()
   std::string camera;                   ///< shipped name or file; "" = camera.yaml in the folder
   std::optional<sensor::Camera> known;  ///< in the place of any file
   std::filesystem::path cameras_folder;
@@ -54,6 +56,9 @@ struct OpenOptions {
   double to_s = 1e300;           ///< seconds after the first pair
   int every = 1;                 ///< every n-th pair
 };
+
+/// "auto", and the layouts that open_recording knows.
+std::vector<std::string> layout_names();
 
 /// Opens a folder. Without a camera file the camera is a guess by the size of the images (Camera::guess;
 /// a warning), kUsage when no common device takes such. Checks camera, lists and the depth scale (median

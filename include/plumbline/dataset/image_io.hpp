@@ -11,9 +11,10 @@
 
 namespace plumbline::dataset {
 
-/// Decodes a file as it is stored: CV_8U with 1, 3 (BGR) or 4 channels, or CV_16U. PNG and JPEG are read
-/// by strict decoders, other formats by OpenCV. A file that ends early or whose checksums are wrong is an
-/// error ("truncated or damaged") and never a half-filled image. Thread-safe.
+/// Decodes a file as it is stored: CV_8U or CV_16U with 1, 3 (BGR) or 4 channels, or floats (TIFF; of EXR one
+/// channel). PNG and JPEG (of CMYK as BGR) are read by strict decoders, EXR by OpenEXR, other formats by
+/// OpenCV. A file that ends early or whose checksums are wrong is an error ("truncated or damaged") and never
+/// a half-filled image. Thread-safe.
 core::Result<cv::Mat> read_image(const std::filesystem::path& file);
 
 /// CV_8U with 1, 3 (BGR) or 4 channels, or CV_16U with one, as the bytes of a PNG file. `level`: 0 (large and

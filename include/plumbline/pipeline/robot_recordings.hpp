@@ -44,6 +44,8 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] std::size_t size() const override { return order_.size(); }
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  /// The first that one of the recordings has.
+  [[nodiscard]] std::string doubt() const override;
   [[nodiscard]] std::optional<geometry::Trajectory> truth_of(std::int32_t robot) const {
     return recordings_[static_cast<std::size_t>(robot)]->truth();
   }

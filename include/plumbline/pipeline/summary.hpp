@@ -37,8 +37,9 @@ Sigma sigma_of(const std::vector<T>& values) {
 struct RunSummary {
   std::string input;
   std::string pipeline;
-  std::string reason;    ///< why the result must not be trusted as it is; empty = nothing speaks against it
-  bool stopped = false;  ///< ended early on request
+  std::string reason;  ///< why the result must not be trusted as it is; empty = nothing speaks against it
+  std::string input_doubt;  ///< what the recording itself gives reason to doubt (FrameSource::doubt)
+  bool stopped = false;     ///< ended early on request
   struct Frames {
     std::size_t available = 0;   ///< in the recording, after --from --to --every
     std::size_t read = 0;        ///< decoded

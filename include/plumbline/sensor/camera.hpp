@@ -69,18 +69,10 @@ struct Camera {
   }
 };
 
-/// Reads a camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
+/// Reads our own camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
 /// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told
 /// together with file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
-
-/// Reads the intrinsics file of an Open3D recording (JSON: width, height, intrinsic_matrix of 9 numbers
-/// column by column). Depth is in millimetres there.
-core::Result<Camera> read_open3d_camera(const std::filesystem::path& file);
-
-/// `name_or_file`: a shipped calibration (a file of `cameras_folder` without .yaml) or a path.
-core::Result<Camera> find_camera(const std::string& name_or_file,
-                                 const std::filesystem::path& cameras_folder);
 
 /// The same calibration as camera.yaml text; read_camera(write) gives the same camera.
 std::string to_yaml(const Camera& camera);

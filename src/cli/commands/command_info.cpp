@@ -170,7 +170,7 @@ void add_info(CLI::App& app, Session& session) {
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");
   command->add_option("--format", request->open.format, "Layout of the recording (default: auto)")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
+      ->check(CLI::IsMember(dataset::layout_names()));
 }
 
 }  // namespace plumbline::cli

@@ -33,7 +33,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request) {
   command.add_option("--camera", request.open.camera, "Shipped calibration or file")->type_name("NAME|FILE");
   command.add_option("--format", request.open.format, "Layout of INPUT (default: auto)")
-      ->check(CLI::IsMember({"auto", "tum", "7scenes", "redwood"}));
+      ->check(CLI::IsMember(dataset::layout_names()));
   add_time_range(command, request.open);
   command.add_option("--every", request.open.every, "Use every N-th frame")
       ->type_name("N")

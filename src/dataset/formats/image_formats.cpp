@@ -3,10 +3,13 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "formats/exr.hpp"
+
 namespace plumbline::dataset {
 namespace {
 
 cv::Mat decode(const Bytes& file) {
+  if (is_exr(file)) return decode_exr(file);
   try {
     return cv::imdecode(file, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception&) {
@@ -16,8 +19,8 @@ cv::Mat decode(const Bytes& file) {
 
 Bytes encode_png(const cv::Mat& image, int level) {
   Bytes bytes;
-  // Left to itself OpenCV packs at level 1 what differs from the left neighbour; told to, it tries all filters
-  // on each row, which takes 1.7 times as long and makes the file no smaller.
+  // Left to itself OpenCV packs at level 1 what differs from the left neighbour; told to, it tries all
+  // filters on each row, which takes 1.7 times as long and makes the file no smaller.
   std::vector<int> how;
   if (level != 1) how = {cv::IMWRITE_PNG_COMPRESSION, level};
   try {

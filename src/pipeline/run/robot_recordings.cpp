@@ -52,6 +52,13 @@ dataset::PairInfo RobotRecordings::info(std::size_t index) const {
   return of(place).info(place.index);
 }
 
+std::string RobotRecordings::doubt() const {
+  for (const auto& recording : recordings_) {
+    if (std::string doubt = recording->doubt(); !doubt.empty()) return doubt;
+  }
+  return "";
+}
+
 void RobotRecordings::correct(std::size_t from, const std::vector<sensor::Camera>& cameras) {
   const std::lock_guard lock(mutex_);
   corrected_from_ = from;

@@ -228,6 +228,7 @@ void judge(RunSummary& summary) {
   } else {
     summary.reason = summary.unconnected;
   }
+  if (summary.reason.empty()) summary.reason = summary.input_doubt;
   for (const RunSummary::Camera& camera : summary.cameras) {
     if (summary.reason.empty()) summary.reason = camera.doubt;
   }

@@ -63,6 +63,7 @@ class ReadStage : public Stage {
   }
 
   void summarise(RunSummary& summary) const override {
+    summary.input_doubt = source_->doubt();
     summary.frames.read = read_;
     summary.frames.resumed = resumed_;
     summary.frames.unreadable = unreadable_;

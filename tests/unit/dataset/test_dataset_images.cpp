@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 
+#include <cstddef>
+#include <cstdio>
+// clang-format off
+#include <jpeglib.h>
+// clang-format on
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <thread>
 #include <vector>
 
@@ -200,8 +206,8 @@ TEST_F(Frames, SizesAndKindsAreChecked) {
   write_image("rgb/1.png", color_image(1, {32, 24}));
   write_image("depth/2.png", depth_image(10000, {32, 24}));
   write_image("depth/3.png", cv::Mat(48, 64, CV_8UC1, cv::Scalar(100)));
-  write_image("depth/4.png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(100, 100, 100)));
-  write_image("rgb/5.png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(100, 100, 100)));
+  write_image("depth/4.png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(100, 100, 101)));
+  write_image("rgb/5.png", cv::Mat(48, 64, CV_16UC1, cv::Scalar(100)));
   const auto source = open();
   ASSERT_TRUE(source) << source.error().message;
   const auto message = [&](std::size_t i) {
@@ -239,6 +245,139 @@ TEST_F(Frames, DepthOfItsOwnCameraIsRegistered) {
   ASSERT_TRUE(frame) << frame.error().message;
   EXPECT_EQ(frame->depth.size(), cv::Size(64, 48));
   EXPECT_FLOAT_EQ(frame->depth.at<float>(24, 32), 2.5F);
+}
+
+/// Depth of all frames of write_tum, 2 m, stored by `store` under names with another ending.
+class DepthKinds : public RecordingTest {
+ protected:
+  void write_depth(const cv::Mat& image, const std::string& ending) {
+    write_tum(3);
+    std::string list;
+    for (int i = 0; i < 3; ++i) {
+      const std::string id = std::to_string(i);
+      list += stamp(i, 0) + " rgb/" + id + ".png " + stamp(i, 0) + " depth\\" + id + ending + "\r\n";
+      write_image("depth/" + id + ending, image);
+    }
+    write_text("associations.txt", list);
+  }
+  void expect_two_metres(const std::string& word) {
+    const auto source = open();
+    ASSERT_TRUE(source) << source.error().message;
+    const auto frame = (*source)->read(1);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_FLOAT_EQ(frame->depth.at<float>(5, 5), 2.0F);
+    EXPECT_THAT(log_.infos, HasSubstr(word));
+  }
+};
+
+TEST_F(DepthKinds, FloatTiffInMetres) {
+  cv::Mat metres(48, 64, CV_32FC1, cv::Scalar(2.0));
+  metres.at<float>(0, 0) = std::numeric_limits<float>::quiet_NaN();
+  metres.at<float>(0, 1) = -1.0F;
+  metres.at<float>(0, 2) = std::numeric_limits<float>::infinity();
+  metres.at<float>(0, 3) = 20.0F;
+  write_depth(metres, ".tiff");
+  write_camera("depth_scale: 1000\n");  // of no meaning here
+  expect_two_metres("metres as floats");
+  const auto frame = (*open())->read(0);
+  for (int u = 0; u < 4; ++u) EXPECT_EQ(frame->depth.at<float>(0, u), 0.0F) << u;
+}
+
+TEST_F(DepthKinds, FloatsThatAreNoMetres) {
+  write_depth(cv::Mat(48, 64, CV_32FC1, cv::Scalar(2000.0)), ".tiff");
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("2000"), HasSubstr("store metres")));
+}
+
+TEST_F(DepthKinds, PgmAndThreeEqualChannels) {
+  write_depth(depth_image(10000), ".pgm");
+  expect_two_metres("");
+  cv::Mat three;
+  cv::merge(std::vector<cv::Mat>(3, depth_image(10000)), three);
+  write_depth(three, "_3.png");
+  expect_two_metres("three equal channels");
+  three.at<cv::Vec3w>(7, 7)[1] = 3;
+  write_depth(three, "_3.png");
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("3 channels of 16 bits"), HasSubstr("one channel")));
+}
+
+TEST_F(DepthKinds, OpenExrInMetres) {
+  write_tum(1);
+  // 2 x 1 pixels, one channel Z of floats, uncompressed: 2 m and 3 m.
+  const auto word = [](std::uint32_t v) {
+    std::string bytes;
+    for (int i = 0; i < 4; ++i) bytes += static_cast<char>(v >> (8 * i) & 255U);
+    return bytes;
+  };
+  const auto attribute = [&](const std::string& name, const std::string& type, const std::string& value) {
+    return name + '\0' + type + '\0' + word(static_cast<std::uint32_t>(value.size())) + value;
+  };
+  const std::string box = word(0) + word(0) + word(1) + word(0);
+  std::string exr = word(20000630) + word(2);
+  exr +=
+      attribute("channels", "chlist", std::string("Z\0", 2) + word(2) + word(0) + word(1) + word(1) + '\0');
+  exr += attribute("compression", "compression", std::string(1, '\0'));
+  exr += attribute("dataWindow", "box2i", box) + attribute("displayWindow", "box2i", box);
+  exr += attribute("lineOrder", "lineOrder", std::string(1, '\0'));
+  exr += attribute("pixelAspectRatio", "float", word(0x3F800000));
+  exr += attribute("screenWindowCenter", "v2f", word(0) + word(0));
+  exr += attribute("screenWindowWidth", "float", word(0x3F800000)) + '\0';
+  exr += word(static_cast<std::uint32_t>(exr.size()) + 8) + word(0);
+  exr += word(0) + word(8) + word(0x40000000) + word(0x40400000);
+  write_text("a.exr", exr);
+  const auto image = dataset::read_image(folder_ / "a.exr");
+  ASSERT_TRUE(image) << image.error().message;
+  ASSERT_EQ(image->type(), CV_32FC1);
+  EXPECT_EQ(image->at<float>(0, 0), 2.0F);
+  EXPECT_EQ(image->at<float>(0, 1), 3.0F);
+  for (std::size_t size = 5; size < exr.size(); size += 3) {
+    write_text("cut.exr", exr.substr(0, size));
+    EXPECT_FALSE(dataset::read_image(folder_ / "cut.exr")) << size;
+  }
+}
+
+/// A JPEG of one colour in cyan, magenta, yellow and black, as Adobe's programs write it: inverted.
+std::string cmyk_jpeg(const cv::Vec4b& stored) {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* memory = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&info, &memory, &size);
+  info.image_width = 64;
+  info.image_height = 48;
+  info.input_components = 4;
+  info.in_color_space = JCS_CMYK;
+  jpeg_set_defaults(&info);
+  info.write_Adobe_marker = TRUE;
+  jpeg_start_compress(&info, TRUE);
+  cv::Mat row(1, 64, CV_8UC4, cv::Scalar(stored[0], stored[1], stored[2], stored[3]));
+  JSAMPROW rows = row.ptr();
+  while (info.next_scanline < info.image_height) jpeg_write_scanlines(&info, &rows, 1);
+  jpeg_finish_compress(&info);
+  std::string bytes(reinterpret_cast<char*>(memory), size);
+  jpeg_destroy_compress(&info);
+  std::free(memory);
+  return bytes;
+}
+
+TEST_F(Frames, ColourInCmyk) {
+  write_tum(2);
+  write_text("rgb/0.png", cmyk_jpeg({200, 100, 50, 255}));  // kinds are told by content
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  const cv::Vec3b pixel = (*source)->read(0)->color.at<cv::Vec3b>(5, 5);
+  EXPECT_LE(cv::norm(cv::Vec3i(pixel) - cv::Vec3i(50, 100, 200)), 6.0) << pixel;
+}
+
+TEST_F(Frames, ColourOf16Bits) {
+  write_tum(2);
+  write_image("rgb/0.png", cv::Mat(48, 64, CV_16UC3, cv::Scalar(257, 2570, 65535)));
+  write_image("rgb/1.png", cv::Mat(48, 64, CV_8UC3, cv::Scalar(1, 2, 3)));
+  const auto source = open();
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ((*source)->read(0)->color.at<cv::Vec3b>(5, 5), cv::Vec3b(1, 10, 255));
+  EXPECT_THAT(log_.infos, HasSubstr("16 bits a channel"));
 }
 
 TEST_F(Frames, NothingUsable) {

@@ -13,7 +13,7 @@
 #include "plumbline/core/renamed_options.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
-#include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/camera_file.hpp"
 #include "plumbline/synth/scene.hpp"
 
 namespace plumbline::pipeline {

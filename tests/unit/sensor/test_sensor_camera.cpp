@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/camera_file.hpp"
 
 namespace plumbline::sensor {
 namespace {
@@ -172,25 +173,12 @@ TEST_F(CameraFile, FindsShippedNamesAndFiles) {
   write(kGood, "tum_fr2.yaml");
   const auto shipped = find_camera("tum_fr2", folder_);
   ASSERT_TRUE(shipped) << shipped.error().message;
-  EXPECT_EQ(shipped->name, "tum_fr2");
+  EXPECT_EQ(shipped->camera.name, "tum_fr2");
   EXPECT_TRUE(find_camera((folder_ / "tum_fr1.yaml").string(), "/nowhere"));
   const auto wrong = find_camera("tum_fr", folder_);
   ASSERT_FALSE(wrong);
   EXPECT_EQ(wrong.error().kind, core::ErrorKind::kUsage);
   EXPECT_THAT(wrong.error().message, AllOf(HasSubstr("tum_fr1, tum_fr2"), HasSubstr("did you mean")));
-}
-
-TEST_F(CameraFile, Open3dIntrinsics) {
-  const auto camera = read_open3d_camera(write(
-      "{\"width\": 640, \"height\": 480,\n\"intrinsic_matrix\": [525, 0, 0, 0, 526, 0, 319.5, 239.5, 1]}\n",
-      "camera_intrinsic.json"));
-  ASSERT_TRUE(camera) << camera.error().message;
-  EXPECT_EQ(camera->color.fy, 526.0);
-  EXPECT_EQ(camera->color.cx, 319.5);
-  EXPECT_EQ(camera->depth_scale, 1000.0);
-  const auto bad = read_open3d_camera(write("{\"width\": 640, \"height\": 480}\n", "bad.json"));
-  ASSERT_FALSE(bad);
-  EXPECT_THAT(bad.error().message, HasSubstr("intrinsic_matrix: is missing"));
 }
 
 TEST(ShippedCameras, AllLoad) {
@@ -205,10 +193,10 @@ TEST(ShippedCameras, AllLoad) {
   EXPECT_GE(count, 5);
   const auto fr1 = find_camera("tum_fr1", folder);
   ASSERT_TRUE(fr1);
-  EXPECT_TRUE(fr1->distorted());
-  EXPECT_EQ(fr1->color.cy, 255.3);
-  EXPECT_EQ(fr1->distortion[4], 1.1633);
-  EXPECT_EQ(find_camera("seven_scenes", folder)->depth_scale, 1000.0);
+  EXPECT_TRUE(fr1->camera.distorted());
+  EXPECT_EQ(fr1->camera.color.cy, 255.3);
+  EXPECT_EQ(fr1->camera.distortion[4], 1.1633);
+  EXPECT_EQ(find_camera("seven_scenes", folder)->camera.depth_scale, 1000.0);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 
@@ -25,11 +24,6 @@ struct NumberedFile {
   std::string file;
 };
 
-bool is_folder(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_directory(path, ignored);
-}
-
 std::optional<fs::path> color_folder(const fs::path& folder) {
   for (const char* name : {"color", "image", "rgb"}) {
     if (is_folder(folder / name)) return folder / name;
@@ -37,38 +31,12 @@ std::optional<fs::path> color_folder(const fs::path& folder) {
   return std::nullopt;
 }
 
-bool is_image(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-}
-
-/// The groups of digits of a name, left to right.
-std::vector<long long> numbers_of(const std::string& name) {
-  std::vector<long long> numbers;
-  for (std::size_t i = 0; i < name.size();) {
-    std::size_t end = i;
-    while (end < name.size() && name[end] >= '0' && name[end] <= '9') ++end;
-    if (end > i && end - i <= 18) numbers.push_back(std::stoll(name.substr(i, end - i)));
-    i = end + 1;
-  }
-  return numbers;
-}
-
 /// Images with a number in their name, by number; a number seen twice keeps the first name.
 std::map<long long, NumberedFile> list_images(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    if (is_image(entry.path())) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
   std::map<long long, NumberedFile> images;
-  for (const fs::path& file : files) {
-    const std::vector<long long> numbers = numbers_of(file.stem().string());
-    if (numbers.empty()) continue;
-    NumberedFile image{numbers[0], std::nullopt, file.string()};
+  for (const auto& [number, file] : numbered_images(folder)) {
+    const std::vector<long long> numbers = numbers_of(fs::path(file).stem().string());
+    NumberedFile image{number, std::nullopt, file};
     if (numbers.size() == 2) image.stamp = static_cast<double>(numbers[1]) * kMicroseconds;
     images.emplace(image.number, std::move(image));
   }
@@ -130,8 +98,6 @@ std::vector<PairInfo> pair_by_number(const std::map<long long, NumberedFile>& co
   return pairs;
 }
 
-}  // namespace
-
 bool looks_like_redwood(const fs::path& folder) {
   return color_folder(folder) && is_folder(folder / "depth");
 }
@@ -147,7 +113,8 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
   const auto depth = list_images(folder / "depth");
   for (const auto& [images, path] : {std::pair(&color, *colors), std::pair(&depth, folder / "depth")}) {
     if (images->empty()) {
-      return core::input_error(fmt::format("{}: no numbered image (looked for .png, .jpg)", path.string()));
+      return core::input_error(
+          fmt::format("{}: no numbered image (looked for .png, .jpg, .pgm, .tiff, .exr)", path.string()));
     }
   }
   Layout layout{"redwood", {}, std::nullopt};
@@ -179,6 +146,18 @@ core::Result<Layout> read_redwood(const fs::path& folder, const LayoutOptions& o
     if (!truth.empty()) layout.truth = std::move(truth);
   }
   return layout;
+}
+
+}  // namespace
+
+const LayoutFormat& redwood_layout() {
+  static const LayoutFormat format = {"redwood",
+                                      "Redwood, Open3D",
+                                      "color/ or image/ or rgb/ beside depth/",
+                                      {"color/|image/|rgb/", "depth/"},
+                                      &looks_like_redwood,
+                                      &read_redwood};
+  return format;
 }
 
 }  // namespace plumbline::dataset

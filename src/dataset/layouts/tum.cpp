@@ -16,9 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_file(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
+/// A list's name for a file as a path; lists from Windows separate folders by backslashes.
+std::string listed_file(const fs::path& list, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return (list.parent_path() / name).string();
 }
 
 core::Result<double> read_stamp(const std::string& list, const TextLine& line, std::size_t word) {
@@ -57,7 +58,7 @@ core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log
     if (!stamp) return tl::unexpected(stamp.error());
     std::string name = line.words[1];
     for (std::size_t i = 2; i < line.words.size(); ++i) name += " " + line.words[i];  // a name with blanks
-    files.push_back({*stamp, (list.parent_path() / name).string(), line.number});
+    files.push_back({*stamp, listed_file(list, name), line.number});
   }
   if (files.empty()) return core::input_error(fmt::format("{}: names no image", list.string()));
   sort_and_unique(list.string(), files, log);
@@ -114,8 +115,8 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
     if (!first) return tl::unexpected(first.error());
     const auto second = read_stamp(list.string(), line, 2);
     if (!second) return tl::unexpected(second.error());
-    StampedFile a{*first, (list.parent_path() / line.words[1]).string(), line.number};
-    StampedFile b{*second, (list.parent_path() / line.words[3]).string(), line.number};
+    StampedFile a{*first, listed_file(list, line.words[1]), line.number};
+    StampedFile b{*second, listed_file(list, line.words[3]), line.number};
     if (used.count(a.file) + used.count(b.file) > 0) continue;
     used.insert({a.file, b.file});
     if (depth_first(line.words[1], line.words[3])) std::swap(a, b);
@@ -141,8 +142,6 @@ core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core
   return pairs;
 }
 
-}  // namespace
-
 bool looks_like_tum(const fs::path& folder) {
   return is_file(folder / "associations.txt") || is_file(folder / "rgb.txt") || is_file(folder / "depth.txt");
 }
@@ -164,6 +163,18 @@ core::Result<Layout> read_tum(const fs::path& folder, const LayoutOptions& optio
     }
   }
   return layout;
+}
+
+}  // namespace
+
+const LayoutFormat& tum_layout() {
+  static const LayoutFormat format = {"tum",
+                                      "TUM RGB-D, ETH3D",
+                                      "associations.txt or rgb.txt and depth.txt",
+                                      {"associations.txt|rgb.txt", "associations.txt|depth.txt"},
+                                      &looks_like_tum,
+                                      &read_tum};
+  return format;
 }
 
 }  // namespace plumbline::dataset

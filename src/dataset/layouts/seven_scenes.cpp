@@ -3,12 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "layout.hpp"
-#include "plumbline/core/numbers.hpp"
-#include "text_lines.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -52,30 +49,6 @@ std::map<int, FrameFiles> list_frames(const fs::path& folder) {
   return frames;
 }
 
-/// 4x4 world_from_camera; none where tracking was lost (7-Scenes writes NaN or infinity) or the file is
-/// unusable.
-std::optional<geometry::Rigid3> read_pose(const std::string& file) {
-  const auto lines = read_lines(file);
-  if (!lines || lines->size() != 4) return std::nullopt;
-  Eigen::Matrix4d matrix;
-  for (std::size_t r = 0; r < 4; ++r) {
-    const std::vector<std::string>& words = (*lines)[r].words;
-    if (words.size() != 4) return std::nullopt;
-    for (std::size_t c = 0; c < 4; ++c) {
-      const std::optional<double> value = core::to_number(words[c]);
-      if (!value || !std::isfinite(*value)) return std::nullopt;
-      matrix(static_cast<int>(r), static_cast<int>(c)) = *value;
-    }
-  }
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  if ((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 0.01) {
-    return std::nullopt;
-  }
-  return geometry::Rigid3(Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>());
-}
-
-}  // namespace
-
 bool looks_like_seven_scenes(const fs::path& folder) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
@@ -97,7 +70,7 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
     const double stamp = number / options.fps;
     layout.pairs.push_back({stamp, stamp, files.color, files.depth});
     if (files.pose.empty()) continue;
-    if (const auto pose = read_pose(files.pose)) truth.push_back({stamp, *pose});
+    if (const auto pose = read_pose_file(files.pose)) truth.push_back({stamp, *pose});
   }
   if (layout.pairs.empty()) {
     return core::input_error(
@@ -111,6 +84,19 @@ core::Result<Layout> read_seven_scenes(const fs::path& folder, const LayoutOptio
   }
   if (!truth.empty()) layout.truth = std::move(truth);
   return layout;
+}
+
+}  // namespace
+
+const LayoutFormat& seven_scenes_layout() {
+  static const LayoutFormat format = {
+      "7scenes",
+      "7-Scenes",
+      "frame-000000.color.png",
+      {"frame-000000.color.png|frame-000000.color.jpg", "frame-000000.depth.png"},
+      &looks_like_seven_scenes,
+      &read_seven_scenes};
+  return format;
 }
 
 }  // namespace plumbline::dataset

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame_images.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdint>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "layout.hpp"
+#include "plumbline/core/numbers.hpp"
+#include "plumbline/dataset/image_io.hpp"
+#include "video_frames.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+constexpr double kFarthestMedian_m = 50.0;  // of floats that are metres
+
+std::string type_name(const cv::Mat& image) {
+  const int bits = image.depth() == CV_8U    ? 8
+                   : image.depth() == CV_16U ? 16
+                   : image.depth() == CV_64F ? 64
+                                             : 32;
+  return fmt::format("{} channel{} of {} bits", image.channels(), image.channels() == 1 ? "" : "s", bits);
+}
+
+core::Result<void> check_size(const std::string& file, const cv::Mat& image, const sensor::Pinhole& camera,
+                              const char* what) {
+  if (image.cols == camera.width && image.rows == camera.height) return {};
+  return core::input_error(fmt::format("{}: the {} image is {}x{}, the camera file says {}x{}", file, what,
+                                       image.cols, image.rows, camera.width, camera.height));
+}
+
+bool channels_are_equal(const cv::Mat& image) {
+  for (int v = 0; v < image.rows; ++v) {
+    const auto* pixel = image.ptr<cv::Vec3w>(v);
+    for (int u = 0; u < image.cols; ++u) {
+      if (pixel[u][0] != pixel[u][1] || pixel[u][0] != pixel[u][2]) return false;
+    }
+  }
+  return true;
+}
+
+/// Metres to units; what is not finite, not positive or too far is no measurement.
+cv::Mat units_of(const cv::Mat& metres, double depth_scale) {
+  constexpr double kMostUnits = 65534.0;  // 65535 is none
+  cv::Mat units(metres.size(), CV_16UC1);
+  for (int v = 0; v < metres.rows; ++v) {
+    const auto* from = metres.ptr<float>(v);
+    auto* to = units.ptr<std::uint16_t>(v);
+    for (int u = 0; u < metres.cols; ++u) {
+      const double value = std::round(static_cast<double>(from[u]) * depth_scale);
+      to[u] = value >= 1.0 && value <= kMostUnits ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+    }
+  }
+  return units;
+}
+
+/// The first image of the pairs that can be read; empty when none can.
+template <typename Name>
+cv::Mat first_image(const Layout& layout, const Name& name) {
+  for (const PairInfo& pair : layout.pairs) {
+    if (auto image = read_stored_color(name(pair))) return std::move(*image);
+  }
+  return {};
+}
+
+std::optional<double> median_of(const cv::Mat& metres) {
+  std::vector<float> measured;
+  for (int v = 0; v < metres.rows; ++v) {
+    const auto* row = metres.ptr<float>(v);
+    for (int u = 0; u < metres.cols; ++u) {
+      if (std::isfinite(row[u]) && row[u] > 0.0F) measured.push_back(row[u]);
+    }
+  }
+  if (measured.empty()) return std::nullopt;
+  return static_cast<double>(core::median(std::move(measured)));
+}
+
+}  // namespace
+
+core::Result<cv::Mat> read_stored_color(const std::string& name, VideoFrames* video) {
+  const auto frame = video_frame_of(name);
+  if (!frame || is_file(name)) return read_image(name);
+  if (video != nullptr) return video->read(frame->second);
+  return VideoFrames(frame->first).read(frame->second);
+}
+
+core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
+  auto mask = read_image(mask_file);
+  if (!mask) return tl::unexpected(mask.error());
+  if (mask->type() != CV_8UC1)
+    return core::input_error(fmt::format("{}: has {}; one of 8 bits is needed", mask_file, type_name(*mask)));
+  if (mask->size() != depth.size()) cv::resize(*mask, *mask, depth.size(), 0.0, 0.0, cv::INTER_NEAREST);
+  depth.setTo(0, *mask == 0);
+  return {};
+}
+
+core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole& camera, int reduction,
+                                 VideoFrames* video) {
+  auto image = read_stored_color(file, video);
+  if (!image) return image;
+  const bool deep = image->depth() == CV_16U && image->channels() >= 3;
+  if (image->depth() != CV_8U && !deep) {
+    return core::input_error(
+        fmt::format("{}: the colour image has {}; 8 bits are needed", file, type_name(*image)));
+  }
+  sensor::Pinhole stored = camera;
+  stored.width *= reduction;
+  stored.height *= reduction;
+  if (auto size = check_size(file, *image, stored, "colour"); !size) return tl::unexpected(size.error());
+  if (reduction > 1) cv::resize(*image, *image, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
+  if (deep) image->convertTo(*image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
+  if (image->channels() == 1) cv::cvtColor(*image, *image, cv::COLOR_GRAY2BGR);
+  if (image->channels() == 4) cv::cvtColor(*image, *image, cv::COLOR_BGRA2BGR);
+  return image;
+}
+
+core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole& camera, double depth_scale) {
+  auto image = read_image(file);
+  if (!image) return image;
+  if (image->type() == CV_64FC1) image->convertTo(*image, CV_32F);
+  if (image->type() == CV_16UC3 && channels_are_equal(*image)) cv::extractChannel(*image, *image, 0);
+  if (image->type() != CV_16UC1 && image->type() != CV_32FC1) {
+    return core::input_error(
+        fmt::format("{}: the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
+                    "of 32 bits in metres (TIFF or EXR)",
+                    file, type_name(*image)));
+  }
+  if (auto size = check_size(file, *image, camera, "depth"); !size) return tl::unexpected(size.error());
+  return image->type() == CV_32FC1 ? units_of(*image, depth_scale) : *image;
+}
+
+core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camera, core::Log& log) {
+  const cv::Mat color = first_image(layout, [](const PairInfo& pair) { return pair.color_file; });
+  if (!color.empty() && color.depth() == CV_16U && color.channels() >= 3)
+    log.info("the colour images have 16 bits a channel; the upper 8 are used");
+  const cv::Mat depth = first_image(layout, [](const PairInfo& pair) { return pair.depth_file; });
+  if (depth.type() == CV_16UC3 && channels_are_equal(depth))
+    log.info("the depth images have three equal channels; the first is used");
+  if (depth.type() != CV_32FC1 && depth.type() != CV_64FC1) return {};
+  cv::Mat metres;
+  depth.convertTo(metres, CV_32F);
+  const auto median = median_of(metres);
+  if (median && *median > kFarthestMedian_m) {
+    return core::input_error(
+        fmt::format("{}: depth stored as floats is taken as metres, and its median is {:.4g}; store metres "
+                    "(of millimetres: "
+                    "divide by 1000)",
+                    layout.pairs.front().depth_file, *median));
+  }
+  camera.depth_scale = kFloatDepthScale;
+  log.info("the depth images hold metres as floats; they are read in steps of 0.2 mm, up to 13.1 m");
+  return {};
+}
+
+}  // namespace plumbline::dataset

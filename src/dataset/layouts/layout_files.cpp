@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the readers of several layouts need: numbered images, poses in files of their own.
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+
+#include "layout.hpp"
+#include "plumbline/core/numbers.hpp"
+#include "text_lines.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_image(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".exr"}) {
+    if (extension == known) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+std::vector<long long> numbers_of(const std::string& name) {
+  std::vector<long long> numbers;
+  for (std::size_t i = 0; i < name.size();) {
+    std::size_t end = i;
+    while (end < name.size() && name[end] >= '0' && name[end] <= '9') ++end;
+    if (end > i && end - i <= 18) numbers.push_back(std::stoll(name.substr(i, end - i)));
+    i = end + 1;
+  }
+  return numbers;
+}
+
+std::vector<std::pair<long long, std::string>> numbered_images(const fs::path& folder,
+                                                               const std::string& prefix) {
+  std::vector<fs::path> files;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const bool wanted = entry.path().filename().string().compare(0, prefix.size(), prefix) == 0;
+    if (wanted && is_image(entry.path())) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::map<long long, std::string> images;
+  for (const fs::path& file : files) {
+    const std::vector<long long> numbers = numbers_of(file.stem().string().substr(prefix.size()));
+    if (!numbers.empty()) images.emplace(numbers[0], file.string());
+  }
+  return {images.begin(), images.end()};
+}
+
+std::vector<PairInfo> pair_numbered(const std::vector<std::pair<long long, std::string>>& color,
+                                    const std::vector<std::pair<long long, std::string>>& depth, double fps) {
+  const std::map<long long, std::string> partners(depth.begin(), depth.end());
+  std::vector<PairInfo> pairs;
+  for (const auto& [number, file] : color) {
+    const auto partner = partners.find(number);
+    if (partner == partners.end()) continue;
+    const double stamp = static_cast<double>(number) / fps;
+    pairs.push_back({stamp, stamp, file, partner->second});
+  }
+  return pairs;
+}
+
+std::optional<geometry::Rigid3> read_pose_file(const std::string& file) {
+  const auto lines = read_lines(file);
+  if (!lines || lines->size() != 4) return std::nullopt;
+  Eigen::Matrix4d matrix;
+  for (std::size_t r = 0; r < 4; ++r) {
+    const std::vector<std::string>& words = (*lines)[r].words;
+    if (words.size() != 4) return std::nullopt;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const std::optional<double> value = core::to_number(words[c]);
+      if (!value || !std::isfinite(*value)) return std::nullopt;
+      matrix(static_cast<int>(r), static_cast<int>(c)) = *value;
+    }
+  }
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  if ((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 0.01) {
+    return std::nullopt;
+  }
+  return geometry::Rigid3(Eigen::Quaterniond(rotation), matrix.topRightCorner<3, 1>());
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which layouts there are, and what is said of a folder that has none of them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "layout.hpp"
+#include "text_lines.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Whether one of the alternatives of a part is there.
+bool has_part(const fs::path& folder, const std::string& part) {
+  const std::vector<std::string> names = split_words(part, "|");
+  return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    return name.back() == '/' ? is_folder(folder / name) : is_file(folder / name);
+  });
+}
+
+std::string alternatives(const std::string& part) {
+  std::string text;
+  for (const std::string& name : split_words(part, "|")) text += (text.empty() ? "" : " or ") + name;
+  return text;
+}
+
+/// Folders by name, files by how many of each ending, at most a dozen words.
+std::string what_is_there(const fs::path& folder) {
+  std::vector<std::string> seen;
+  std::map<std::string, std::size_t> endings;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const fs::path& path = entry.path();
+    if (is_folder(path)) {
+      seen.push_back(path.filename().string() + "/");
+    } else {
+      ++endings[path.has_extension() ? path.extension().string() : "without ending"];
+    }
+  }
+  std::sort(seen.begin(), seen.end());
+  constexpr std::size_t kMost = 8;
+  const std::size_t folders = seen.size();
+  seen.resize(std::min(folders, kMost));
+  if (folders > kMost) seen.push_back(fmt::format("{} more folders", folders - kMost));
+  for (const auto& [ending, count] : endings) {
+    if (seen.size() < 2 * kMost)
+      seen.push_back(fmt::format("{} {} file{}", count, ending, count == 1 ? "" : "s"));
+  }
+  std::string text;
+  for (const std::string& word : seen) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+/// The layout with the largest share of its parts there, and what it lacks; "" when none has any.
+std::string nearest_layout(const fs::path& folder) {
+  double best = 0.0;
+  std::string text;
+  for (const LayoutFormat* format : layout_formats()) {
+    std::string missing;
+    std::size_t there = 0;
+    for (const std::string& part : format->parts) {
+      if (has_part(folder, part)) {
+        ++there;
+      } else {
+        missing += (missing.empty() ? "" : ", ") + alternatives(part);
+      }
+    }
+    const double share = static_cast<double>(there) / static_cast<double>(format->parts.size());
+    if (share <= best) continue;
+    best = share;
+    text =
+        fmt::format("the nearest layout is '{}' ({}), of which is missing: {}", format->name, format->program,
+                    missing.empty() ? "nothing by name, so look into its files" : missing);
+  }
+  return text;
+}
+
+}  // namespace
+
+const std::vector<const LayoutFormat*>& layout_formats() {
+  static const std::vector<const LayoutFormat*> formats = {&tum_layout(),     &seven_scenes_layout(),
+                                                           &replica_layout(), &scannet_layout(),
+                                                           &stray_layout(),   &redwood_layout()};
+  return formats;
+}
+
+std::vector<std::string> layout_names() {
+  std::vector<std::string> names = {"auto"};
+  for (const LayoutFormat* format : layout_formats()) names.emplace_back(format->name);
+  return names;
+}
+
+const LayoutFormat* layout_of(const fs::path& folder) {
+  for (const LayoutFormat* format : layout_formats()) {
+    if (format->recognises(folder)) return format;
+  }
+  return nullptr;
+}
+
+std::string not_a_recording(const fs::path& folder) {
+  std::string looked_for;
+  for (const LayoutFormat* format : layout_formats()) {
+    looked_for +=
+        fmt::format("{}{} ({})", looked_for.empty() ? "" : ", ", format->looked_for, format->program);
+  }
+  const std::string seen = what_is_there(folder);
+  std::string text = fmt::format("{}: {}; looked for {}", folder.string(),
+                                 seen.empty() ? "the folder is empty" : "no recording found", looked_for);
+  if (!seen.empty()) text += "; seen: " + seen;
+  if (const std::string nearest = nearest_layout(folder); !nearest.empty()) text += "; " + nearest;
+  return text;
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// ScanNet's exported frames: color/0.jpg, depth/0.png, pose/0.txt, intrinsic/intrinsic_color.txt and
+// intrinsic_depth.txt. Colour and depth have sizes and calibrations of their own; numbers have no zeros in
+// front.
+#include <fmt/format.h>
+
+#include "layout.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool looks_like_scannet(const fs::path& folder) {
+  return is_folder(folder / "color") && is_folder(folder / "depth") && is_folder(folder / "pose") &&
+         is_file(folder / "intrinsic" / "intrinsic_color.txt");
+}
+
+geometry::Trajectory scannet_truth(const fs::path& folder, const std::vector<PairInfo>& pairs,
+                                   core::Log& log) {
+  geometry::Trajectory truth;
+  std::size_t left_out = 0;
+  for (const PairInfo& pair : pairs) {
+    const fs::path file = folder / "pose" / (fs::path(pair.color_file).stem().string() + ".txt");
+    if (!is_file(file)) continue;
+    if (const auto pose = read_pose_file(file.string())) {
+      truth.push_back({pair.stamp, *pose});
+    } else {
+      ++left_out;
+    }
+  }
+  if (left_out > 0) {
+    log.warning(
+        fmt::format("{}: {} of {} poses are not finite or no rigid motion, and are left out of the truth",
+                    (folder / "pose").string(), left_out, left_out + truth.size()));
+  }
+  return truth;
+}
+
+core::Result<Layout> read_scannet(const fs::path& folder, const LayoutOptions& options, core::Log& log) {
+  const auto color = numbered_images(folder / "color");
+  const auto depth = numbered_images(folder / "depth");
+  Layout layout{"scannet", pair_numbered(color, depth, options.fps), std::nullopt};
+  if (layout.pairs.empty()) {
+    return core::input_error(fmt::format("{}: no number is in both color/ ({} images) and depth/ ({})",
+                                         folder.string(), color.size(), depth.size()));
+  }
+  const std::size_t unmatched = color.size() + depth.size() - 2 * layout.pairs.size();
+  if (unmatched > 0)
+    log.warning(fmt::format("{}: {} images have no partner and are skipped", folder.string(), unmatched));
+  geometry::Trajectory truth = scannet_truth(folder, layout.pairs, log);
+  if (!truth.empty()) layout.truth = std::move(truth);
+  return layout;
+}
+
+}  // namespace
+
+const LayoutFormat& scannet_layout() {
+  static const LayoutFormat format = {"scannet",
+                                      "ScanNet",
+                                      "color/, depth/, pose/ and intrinsic/intrinsic_color.txt",
+                                      {"color/", "depth/", "pose/", "intrinsic/intrinsic_color.txt"},
+                                      &looks_like_scannet,
+                                      &read_scannet};
+  return format;
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Stray Scanner (a phone with LiDAR): rgb.mp4, depth/000000.png of 256 x 192 in millimetres,
+// confidence/000000.png (0 is no measurement), odometry.csv with stamps and the phone's own poses,
+// camera_matrix.csv for the video.
+#include <fmt/format.h>
+
+#include "layout.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "video_frames.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool looks_like_stray(const fs::path& folder) {
+  return is_file(folder / "rgb.mp4") && is_folder(folder / "depth") && is_file(folder / "odometry.csv");
+}
+
+core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*options*/, core::Log& log) {
+  auto odometry = read_trajectory_file(folder / "odometry.csv");
+  if (!odometry) return tl::unexpected(odometry.error());
+  for (const std::string& note : odometry->notes)
+    log.warning(fmt::format("{}: {}", (folder / "odometry.csv").string(), note));
+  const std::string film = (folder / "rgb.mp4").string();
+  const auto frames = VideoFrames(film).count();
+  if (!frames) return tl::unexpected(frames.error());
+
+  Layout layout;
+  layout.format = "stray";
+  layout.video = film;
+  const fs::path confidence = folder / "confidence";
+  if (is_folder(confidence)) layout.confidence = confidence.string();
+  const auto rows = static_cast<long long>(odometry->rows.size());
+  for (const auto& [number, file] : numbered_images(folder / "depth")) {
+    if (number >= rows || number >= *frames) continue;
+    const double stamp = odometry->rows[static_cast<std::size_t>(number)];
+    layout.pairs.push_back({stamp, stamp, video_frame_name(film, number), file});
+  }
+  if (layout.pairs.empty()) {
+    return core::input_error(
+        fmt::format("{}: no number is in rgb.mp4 ({} frames), odometry.csv ({} rows) and depth/ at once",
+                    folder.string(), *frames, rows));
+  }
+  layout.truth = std::move(odometry->poses);
+  return layout;
+}
+
+}  // namespace
+
+const LayoutFormat& stray_layout() {
+  static const LayoutFormat format = {"stray",
+                                      "Stray Scanner",
+                                      "rgb.mp4 beside depth/ and odometry.csv",
+                                      {"rgb.mp4", "depth/", "odometry.csv", "camera_matrix.csv"},
+                                      &looks_like_stray,
+                                      &read_stray};
+  return format;
+}
+
+}  // namespace plumbline::dataset

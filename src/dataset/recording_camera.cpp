@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recording_camera.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "frame_images.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMaxScannedBytes = 65536;  // of files that may be camera files by their content
+
+/// Names that camera files have beside recordings, in the order in which they are looked for.
+constexpr std::array<const char*, 16> kCameraFiles = {"camera.yaml",
+                                                      "camera_intrinsic.json",
+                                                      "intrinsic.json",
+                                                      "calibration.txt",
+                                                      "calib.txt",
+                                                      "cameras.txt",
+                                                      "cam_params.json",
+                                                      "camera.txt",
+                                                      "intrinsics.txt",
+                                                      "intrinsic.txt",
+                                                      "camera_matrix.csv",
+                                                      "camera_matrix.txt",
+                                                      "camera_intrinsics.txt",
+                                                      "camera-intrinsics.txt",
+                                                      "intrinsic/intrinsic_color.txt",
+                                                      "../cam_params.json"};
+constexpr std::size_t kMustBeCameras = 3;  // of these names; the others may be notes of any kind
+
+/// YAML and JSON files of the folder that another program's camera is in.
+std::vector<fs::path> foreign_camera_files(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string ending = entry.path().extension().string();
+    if (ending != ".yaml" && ending != ".yml" && ending != ".json") continue;
+    const std::uintmax_t size = entry.file_size(ignored);
+    if (!ignored && size <= kMaxScannedBytes && sensor::is_foreign_camera_file(entry.path(), false))
+      found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, core::Log& log) {
+  std::error_code ignored;
+  for (std::size_t i = 0; i < kCameraFiles.size(); ++i) {
+    const fs::path file = folder / kCameraFiles[i];
+    if (!fs::exists(file, ignored)) continue;
+    if (i < kMustBeCameras || sensor::is_foreign_camera_file(file, true)) return file;
+    log.warning(fmt::format("{}: is no camera file that is known; not used", file.string()));
+  }
+  const std::vector<fs::path> found = foreign_camera_files(folder);
+  if (found.empty()) return std::nullopt;
+  const auto first = sensor::read_camera_file(found.front());
+  for (const fs::path& file : found) {
+    const auto reading = sensor::read_camera_file(file);
+    if (!first || !reading || sensor::camera_lines(reading->camera) == sensor::camera_lines(first->camera))
+      continue;
+    return core::usage_error(
+        fmt::format("{} and {} are both camera files, and they differ; name one with --camera",
+                    found.front().string(), file.string()));
+  }
+  return found.front();
+}
+
+/// A 4x4 matrix in ScanNet's intrinsic/ folder as a motion; none where it is not there or not rigid.
+geometry::Rigid3 scannet_extrinsic(const fs::path& file) {
+  return is_file(file) ? read_pose_file(file.string()).value_or(geometry::Rigid3()) : geometry::Rigid3();
+}
+
+/// ScanNet has a calibration of depth beside that of colour; its size comes from the images.
+core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& camera) {
+  const fs::path file = folder / "intrinsic_depth.txt";
+  if (!is_file(file)) return {};
+  const auto depth = sensor::read_camera_file(file);
+  if (!depth) return tl::unexpected(depth.error());
+  camera.depth = depth->camera.color;
+  camera.color_from_depth = scannet_extrinsic(folder / "extrinsic_color.txt").inverse() *
+                            scannet_extrinsic(folder / "extrinsic_depth.txt");
+  return {};
+}
+
+/// Of the first image of these that can be read.
+template <typename Name>
+std::optional<cv::Size> image_size(const Layout& layout, const Name& name) {
+  for (const PairInfo& pair : layout.pairs) {
+    if (const auto image = read_stored_color(name(pair))) return image->size();
+  }
+  return std::nullopt;
+}
+
+std::optional<cv::Size> color_size(const Layout& layout) {
+  return image_size(layout, [](const PairInfo& pair) { return pair.color_file; });
+}
+
+double usual_depth_scale(const Layout& layout) { return layout.format == "tum" ? 5000.0 : 1000.0; }
+
+/// Typical values of the devices that take images of this size, in the unit of depth that the layout's own
+/// recordings have. Nothing better is known without a file.
+std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
+  struct Device {
+    const char* name;
+    int width;
+    int height;
+    double focal_px;
+  };
+  constexpr std::array<Device, 4> kDevices = {{
+      {"Kinect or Xtion", 640, 480, 525.0},  // as their drivers and 7-Scenes, TUM and Redwood assume
+      {"RealSense D400", 1280, 720, 920.0},  // 69 x 42 degrees by its data sheet
+      {"RealSense D400", 848, 480, 610.0},   // the same, scaled
+      {"Kinect v2", 960, 540, 540.0},        // libfreenect2's default of 1081 px at 1920 x 1080, halved
+  }};
+  const auto size = color_size(layout);
+  if (!size) return std::nullopt;
+  for (const Device& device : kDevices) {
+    if (*size != cv::Size(device.width, device.height)) continue;
+    sensor::Camera camera;
+    camera.name = device.name;
+    camera.color = {size->width,
+                    size->height,
+                    device.focal_px,
+                    device.focal_px,
+                    0.5 * (size->width - 1),
+                    0.5 * (size->height - 1)};
+    camera.depth_scale = usual_depth_scale(layout);
+    camera.guess = true;
+    return camera;
+  }
+  return std::nullopt;
+}
+
+std::string distortion_text(const sensor::Camera& camera) {
+  if (!camera.distorted()) return "no distortion";
+  const sensor::Distortion& k = camera.distortion;
+  return fmt::format("distortion k1 {:g} k2 {:g} p1 {:g} p2 {:g} k3 {:g}", k[0], k[1], k[2], k[3], k[4]);
+}
+
+/// What was understood, and where each number comes from.
+std::string understood(const ChosenCamera& chosen, const sensor::Camera& camera, const Layout& layout) {
+  const sensor::CameraReading& reading = chosen.reading;
+  const sensor::Pinhole& p = camera.color;
+  std::string text = fmt::format("{}: camera file of {}: fx {:g} fy {:g} cx {:g} cy {:g}, {}", chosen.file,
+                                 reading.program, p.fx, p.fy, p.cx, p.cy, distortion_text(camera));
+  text +=
+      fmt::format("; size {}x{} {}", p.width, p.height, reading.has_size ? "(file)" : "(from the images)");
+  text += fmt::format(
+      "; depth scale {:g} {}", camera.depth_scale,
+      reading.has_depth_scale ? "(file)" : fmt::format("(usual in the layout {})", layout.format));
+  if (camera.depth) text += fmt::format("; depth camera {}x{}", camera.depth->width, camera.depth->height);
+  for (const std::string& note : reading.notes) text += "; " + note;
+  return text;
+}
+
+/// Where depth has another size, to which it is brought up, colour is made smaller by a whole factor, to at
+/// most 960 pixels across.
+void reduce_color(sensor::Camera& camera) {
+  constexpr int kWidest = 960;
+  sensor::Pinhole& color = camera.color;
+  if (!camera.depth || camera.depth->width == color.width) return;
+  for (int factor = 2; color.width > kWidest && factor <= 16; ++factor) {
+    const bool whole = color.width % factor == 0 && color.height % factor == 0;
+    if (whole && color.width / factor <= kWidest)
+      color = color.resized(color.width / factor, color.height / factor);
+  }
+}
+
+core::Result<cv::Size> size_in(const Layout& layout, bool depth) {
+  const auto size =
+      image_size(layout, [depth](const PairInfo& pair) { return depth ? pair.depth_file : pair.color_file; });
+  if (size) return *size;
+  const PairInfo& first = layout.pairs.front();
+  return core::input_error(fmt::format("{}: no {} image can be read to tell its size; this is the first",
+                                       depth ? first.depth_file : first.color_file,
+                                       depth ? "depth" : "colour"));
+}
+
+/// Sizes that the camera file does not say, from the images. A phone's one calibration is for both of its
+/// sizes.
+core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, sensor::Camera& camera) {
+  if (!chosen.reading.has_size) {
+    const auto size = size_in(layout, false);
+    if (!size) return tl::unexpected(size.error());
+    camera.color.width = size->width;
+    camera.color.height = size->height;
+  }
+  const bool one_for_both = layout.format == "stray";
+  if (!one_for_both && !(camera.depth && camera.depth->width == 0)) return {};
+  const auto size = size_in(layout, true);
+  if (!size) return tl::unexpected(size.error());
+  if (one_for_both) {
+    camera.depth = camera.color.resized(size->width, size->height);
+    camera.color_from_depth = geometry::Rigid3();
+  }
+  camera.depth->width = size->width;
+  camera.depth->height = size->height;
+  return {};
+}
+
+core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout, core::Log& log) {
+  const auto camera = guessed_camera(layout);
+  if (!camera) {
+    return core::usage_error(fmt::format(
+        "{}: no camera.yaml in the folder; put one there or name a calibration with --camera "
+        "(shipped: tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file, also of another program)",
+        folder.string()));
+  }
+  log.warning(
+      fmt::format("{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: a "
+                  "guess; put a camera.yaml there or name one with --camera",
+                  folder.string(), camera->name, camera->color.fx));
+  return *camera;
+}
+
+}  // namespace
+
+core::Result<std::optional<ChosenCamera>> choose_camera(const fs::path& folder, const OpenOptions& options,
+                                                        core::Log& log) {
+  if (options.known) return ChosenCamera{{*options.known, "", true, true, {}}, ""};
+  if (!options.camera.empty()) {
+    auto reading = sensor::find_camera(options.camera, options.cameras_folder);
+    if (!reading) return tl::unexpected(reading.error());
+    return ChosenCamera{std::move(*reading), options.camera};
+  }
+  const auto file = find_camera_file(folder, log);
+  if (!file) return tl::unexpected(file.error());
+  if (!*file) return std::nullopt;
+  auto reading = sensor::read_camera_file(**file);
+  if (!reading) return tl::unexpected(reading.error());
+  if ((*file)->filename() == "intrinsic_color.txt") {
+    if (auto added = add_depth_camera((*file)->parent_path(), reading->camera); !added)
+      return tl::unexpected(added.error());
+  }
+  return ChosenCamera{std::move(*reading), (**file).string()};
+}
+
+int stored_reduction(const Layout& layout, const sensor::Camera& camera) {
+  const auto size = camera.depth ? color_size(layout) : std::nullopt;
+  if (!size) return 1;
+  const int factor = size->width / camera.color.width;
+  const bool whole =
+      size->width == factor * camera.color.width && size->height == factor * camera.color.height;
+  return whole ? std::max(factor, 1) : 1;
+}
+
+core::Result<sensor::Camera> complete_camera(const fs::path& folder,
+                                             const std::optional<ChosenCamera>& chosen, const Layout& layout,
+                                             core::Log& log) {
+  if (!chosen) return guess(folder, layout, log);
+  sensor::Camera camera = chosen->reading.camera;
+  if (chosen->reading.program.empty()) return camera;  // our own: complete, and checked
+  if (auto sized = add_sizes(*chosen, layout, camera); !sized) return tl::unexpected(sized.error());
+  if (!chosen->reading.has_depth_scale) camera.depth_scale = usual_depth_scale(layout);
+  if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
+    return core::usage_error(fmt::format("{}: {}", chosen->file, wrong));
+  log.info(understood(*chosen, camera, layout));
+
+  const int full_width = camera.color.width;
+  reduce_color(camera);
+  if (camera.color.width < full_width) {
+    log.info(fmt::format("{}: colour is made smaller, to {}x{}, and depth of {}x{} brought up to that",
+                         folder.string(), camera.color.width, camera.color.height, camera.depth->width,
+                         camera.depth->height));
+  }
+  return camera;
+}
+
+}  // namespace plumbline::dataset

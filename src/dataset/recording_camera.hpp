@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which camera took a recording: named, found in its folder, or guessed by the size of its images.
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "layout.hpp"
+#include "plumbline/sensor/camera_file.hpp"
+
+namespace plumbline::dataset {
+
+struct ChosenCamera {
+  sensor::CameraReading reading;
+  std::string file;  ///< "" when it came with OpenOptions::known
+};
+
+/// OpenOptions::known, OpenOptions::camera, or a camera file in the folder; none when there is none of these.
+/// Errors are those of the file, or several files that differ.
+core::Result<std::optional<ChosenCamera>> choose_camera(const std::filesystem::path& folder,
+                                                        const OpenOptions& options, core::Log& log);
+
+/// What the file leaves open is taken from the images and the layout; without a file the camera is a guess (a
+/// warning). Says what was understood of another program's file. Error (kUsage): numbers that do not fit the
+/// images' size; no file, and images that no common device takes.
+core::Result<sensor::Camera> complete_camera(const std::filesystem::path& folder,
+                                             const std::optional<ChosenCamera>& chosen, const Layout& layout,
+                                             core::Log& log);
+
+/// How many times larger than the camera's the colour images are on both sides, of a camera with a depth
+/// camera of its own; 1 where that is no whole number.
+int stored_reduction(const Layout& layout, const sensor::Camera& camera);
+
+}  // namespace plumbline::dataset
