@@ -34,18 +34,25 @@ constexpr std::array<const char*, 16> kCameraFiles = {"camera.yaml",
                                                       "../cam_params.json"};
 constexpr std::size_t kMustBeCameras = 3;  // of these names; the others may be notes of any kind
 
-/// YAML and JSON files of the folder that another program's camera is in.
+/// YAML and JSON files of the folder that another program's camera is in; none where there are so many of
+/// them that they are one for each image.
 std::vector<fs::path> foreign_camera_files(const fs::path& folder) {
-  std::vector<fs::path> found;
+  constexpr std::size_t kFew = 32;
+  std::vector<fs::path> candidates;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string ending = entry.path().extension().string();
     if (ending != ".yaml" && ending != ".yml" && ending != ".json") continue;
-    const std::uintmax_t size = entry.file_size(ignored);
-    if (!ignored && size <= kMaxScannedBytes && sensor::is_foreign_camera_file(entry.path(), false))
-      found.push_back(entry.path());
+    std::error_code problem;
+    const std::uintmax_t size = entry.file_size(problem);
+    if (!problem && size <= kMaxScannedBytes) candidates.push_back(entry.path());
   }
-  std::sort(found.begin(), found.end());
+  if (candidates.size() > kFew) return {};
+  std::sort(candidates.begin(), candidates.end());
+  std::vector<fs::path> found;
+  for (const fs::path& file : candidates) {
+    if (sensor::is_foreign_camera_file(file, false)) found.push_back(file);
+  }
   return found;
 }
 

@@ -18,7 +18,7 @@ std::vector<std::string> split_words(std::string_view text, std::string_view sep
   return words;
 }
 
-core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file) {
+core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file, std::size_t most) {
   std::ifstream stream(file);
   std::error_code ignored;
   if (!stream || std::filesystem::is_directory(file, ignored)) {
@@ -26,7 +26,7 @@ core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& f
   }
   std::vector<RawLine> lines;
   std::string text;
-  for (int number = 1; std::getline(stream, text); ++number) {
+  for (int number = 1; lines.size() < most && std::getline(stream, text); ++number) {
     if (number == 1 && text.compare(0, 3, "\xEF\xBB\xBF") == 0) text.erase(0, 3);
     lines.push_back({number, text});
   }

@@ -2,7 +2,9 @@
 #pragma once
 
 // Lines of a text file as words, the way every list in this module is read.
+#include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,8 +29,10 @@ inline constexpr std::string_view kWordSeparators = " \t\r\n,\v\f";
 /// What stands between the separators.
 std::vector<std::string> split_words(std::string_view text, std::string_view separators = kWordSeparators);
 
-/// All lines, comments and blank ones too, without a byte order mark. Error (kInput): cannot be read.
-core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file);
+/// All lines, or the first `most`, comments and blank ones too, without a byte order mark. Error (kInput):
+/// cannot be read.
+core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& file,
+                                                  std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// Words are separated by blanks, tabs or commas. Comments ('#'), blank lines, a byte order mark and
 /// carriage returns are passed over.

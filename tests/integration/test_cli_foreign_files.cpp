@@ -71,7 +71,7 @@ TEST_F(ForeignTrajectories, EurocAndKittiAgainstTum) {
   expect_no_error("kitti.txt", "kitti.txt");
   EXPECT_TRUE(run("evaluate trajectory kitti.txt euroc.csv").told("paired by number: 40 poses"));
   const auto info = run("info kitti.txt");
-  EXPECT_NE(info.out.find("poses: 40\nformat: KITTI"), std::string::npos) << info;
+  EXPECT_NE(info.out.find("format: KITTI"), std::string::npos) << info;
 }
 
 TEST_F(ForeignTrajectories, WhatCannotBeComparedIsRefused) {

@@ -26,8 +26,8 @@ class Tools : public ProgramTest {
 
 TEST_F(Tools, HelpAndVersionEverywhere) {
   for (const char* command :
-       {"", "map", "info", "render", "report", "export", "evaluate", "evaluate trajectory", "evaluate cloud", "synth",
-        "filter", "filters", "filters list", "filters describe", "filters check", "pipelines",
+       {"", "map", "info", "render", "report", "export", "evaluate", "evaluate trajectory", "evaluate cloud",
+        "synth", "filter", "filters", "filters list", "filters describe", "filters check", "pipelines",
         "pipelines list", "pipelines check"}) {
     const Outcome help = run(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0) << command;
@@ -89,9 +89,12 @@ TEST_F(Tools, ExportsCloudPathAndLines) {
   EXPECT_EQ(run("export out --what lines -o l.ply").code, 0);
   EXPECT_EQ(run("export out -o c.obj").code, 2);
   EXPECT_EQ(run("export wall -o c.ply").code, 3);
-  const Outcome file = run("export out/map.ply -o c.ply");
+  EXPECT_EQ(run("export out/map.ply -o again.pcd").code, 0);  // a cloud by itself
+  EXPECT_EQ(points("again.pcd"), points("out/map.ply"));
+  EXPECT_EQ(run("export out/map.ply --what trajectory -o t.txt").code, 2);
+  const Outcome file = run("export out/summary.json -o c.ply");
   EXPECT_EQ(file.code, 3);
-  EXPECT_TRUE(file.told("out/map.ply: is a file; give the result folder")) << file;
+  EXPECT_TRUE(file.told("out/summary.json: is a file; give the result folder")) << file;
 }
 
 TEST_F(Tools, EvaluateTellsWhatIsThere) {

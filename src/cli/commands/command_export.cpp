@@ -2,6 +2,8 @@
 // plumbline export MAP -o FILE|--keyframes DIR
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
 #include <system_error>
 
@@ -116,10 +118,13 @@ core::Result<void> export_keyframes(const maps::MapPlace& place, const ExportReq
   return {};
 }
 
-/// Whether the input is a cloud by itself: no folder, and no map.db.
+/// Whether the input is a cloud by itself.
 bool is_cloud_file(const std::filesystem::path& input) {
+  constexpr std::array<const char*, 7> kEndings = {".ply", ".pcd", ".xyz", ".txt", ".csv", ".asc", ".pts"};
   std::error_code ec;
-  return std::filesystem::is_regular_file(input, ec) && input.extension() != ".db";
+  const bool known = std::any_of(kEndings.begin(), kEndings.end(),
+                                 [&](const char* ending) { return input.extension() == ending; });
+  return known && std::filesystem::is_regular_file(input, ec);
 }
 
 core::Result<void> write_as_mesh(const cloud::CloudFile& file, const ExportRequest& request) {

@@ -121,9 +121,9 @@ void describe_path(const dataset::TrajectoryReading& reading) {
   for (std::size_t i = 1; i < path.size(); ++i) {
     length_m += (path[i].world_from_camera.translation - path[i - 1].world_from_camera.translation).norm();
   }
-  fmt::print("poses: {}\nformat: {}\n", path.size(), reading.format);
+  fmt::print("poses: {}\n", path.size());
   if (reading.stamped) fmt::print("from: {:.6f} s\nto: {:.6f} s\n", path.front().stamp, path.back().stamp);
-  fmt::print("length: {:.3f} m\n", length_m);
+  fmt::print("length: {:.3f} m\nformat: {}\n", length_m, reading.format);
   for (const std::string& note : reading.notes) fmt::print("note: {}\n", note);
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 
 #include "plumbline/core/numbers.hpp"
 
@@ -50,6 +51,7 @@ std::optional<TrajectoryColumns> header_of(std::string line) {
     found[*role] = true;
     columns.at[*role] = i;
     if (*role == 0) columns.stamp_name = name;
+    if (name.rfind("p_rs", 0) == 0) columns.nanoseconds = true;
   }
   const bool all = std::all_of(found.begin(), found.end(), [](bool f) { return f; });
   return all ? std::optional<TrajectoryColumns>(columns) : std::nullopt;
@@ -63,8 +65,9 @@ bool eight_cut_in_two(const std::vector<std::string>& words) {
   return words.size() == 16 && words[15].size() > 1 && std::all_of(words.begin(), words.end(), whole);
 }
 
-core::Result<TrajectoryText> read_text(const std::filesystem::path& file) {
-  const auto lines = read_raw_lines(file);
+core::Result<TrajectoryText> read_text(const std::filesystem::path& file,
+                                       std::size_t most_lines = std::numeric_limits<std::size_t>::max()) {
+  const auto lines = read_raw_lines(file, most_lines);
   if (!lines) return tl::unexpected(lines.error());
   TrajectoryText text;
   text.file = file.string();
@@ -95,6 +98,7 @@ double units_per_second(const TrajectoryText& text) {
   const std::string name = text.header ? text.header->stamp_name : "";
   const auto says = [&](const char* unit) { return name.find(unit) != std::string::npos; };
   if (says("[ns]") || says("_ns") || says("(ns)") || says("nsec") || says("nano")) return 1e9;
+  if (text.header && text.header->nanoseconds) return 1e9;
   if (says("[us]") || says("_us") || says("micro")) return 1e6;
   if (says("[ms]") || says("_ms") || says("milli")) return 1e3;
   const std::vector<std::string>& first = text.rows.front().words;
@@ -203,7 +207,8 @@ core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& 
 }
 
 bool holds_poses(const std::filesystem::path& file) {
-  const auto text = read_text(file);
+  constexpr std::size_t kLooksAt = 200;  // lines; clouds have millions
+  const auto text = read_text(file, kLooksAt);
   if (!text || text->rows.empty()) return false;
   if (text->header || kKittiTrajectory.recognises(*text)) return true;
   const auto n = text->numbers(text->rows.front());

@@ -15,7 +15,8 @@ namespace plumbline::dataset {
 /// Which word of a row is what; the order is stamp, tx ty tz, qx qy qz qw.
 struct TrajectoryColumns {
   std::array<std::size_t, 8> at{};
-  std::string stamp_name;  ///< of the stamp's column, unit included
+  bool nanoseconds = false;  ///< EuRoC's own names (p_RS_R_x), which it writes nanoseconds with
+  std::string stamp_name;    ///< of the stamp's column, unit included
 };
 
 struct TrajectoryText {
