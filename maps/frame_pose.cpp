@@ -79,6 +79,13 @@ MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames) {
   return poses;
 }
 
+std::map<std::int32_t, geometry::Trajectory> by_robot(const MapPoses& map) {
+  std::map<std::int32_t, geometry::Trajectory> paths;
+  for (std::size_t i = 0; i < map.trajectory.size(); ++i)
+    paths[map.trajectory_ids[i].robot].push_back(map.trajectory[i]);
+  return paths;
+}
+
 void move(MapPoses& poses, const geometry::Rigid3& frame_from_map) {
   for (geometry::StampedPose& pose : poses.trajectory) {
     pose.world_from_camera = frame_from_map * pose.world_from_camera;

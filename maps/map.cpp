@@ -56,6 +56,17 @@ KeyframeId Map::add_keyframe(std::shared_ptr<const Keyframe> keyframe,
   return id;
 }
 
+void Map::replace_keyframe(std::shared_ptr<const Keyframe> keyframe) {
+  KeyframeEntry& entry = keyframes_.at(keyframe->id);
+  const auto counts = [](const Keyframe& k) {
+    return k.features == nullptr ? std::pair<std::size_t, std::size_t>()
+                                 : std::pair(k.features->points.size(), k.features->lines.size());
+  };
+  if (counts(*keyframe) != counts(*entry.data))
+    throw std::invalid_argument("replace_keyframe: it has other features");
+  entry.data = std::move(keyframe);
+}
+
 void Map::erase_patches(KeyframeId id) {
   if (!id.valid() || !keyframes_.contains(id)) return;
   std::shared_ptr<const Keyframe>& data = keyframes_.at(id).data;
@@ -205,6 +216,13 @@ void Map::add_edge(const SurfaceEdge& edge) {
   a.edges.push_back(next_edge_);
   b.edges.push_back(next_edge_);
   edges_.emplace(next_edge_++, edge);
+}
+
+void Map::replace_edge(std::uint64_t number, const SurfaceEdge& edge) {
+  SurfaceEdge& known = edges_.at(number);
+  if (known.a != edge.a || known.b != edge.b)
+    throw std::invalid_argument("replace_edge: it lies between other keyframes");
+  known = edge;
 }
 
 void Map::set_loops(std::vector<LoopEdge> loops) {

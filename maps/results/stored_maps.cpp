@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/maps/map_join.hpp"
 
 namespace plumbline::maps {
@@ -107,6 +108,10 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   std::vector<StoredPart> sorted;
   for (const std::size_t i : order) sorted.push_back(std::move(parts_[i]));
   parts_ = std::move(sorted);
+  for (StoredPart& part : parts_) {
+    part.cameras = CameraHistory(part.robots);
+    for (RobotInfo& robot : part.robots) robot.versions.clear();
+  }
   std::set<std::string> part_names;
   std::set<std::string> robot_names;
   std::int32_t number = 0;
@@ -130,7 +135,10 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   if (number > kMostRobots) {
     return core::usage_error(fmt::format("{} robots are too many; {} can be fused", number, kMostRobots));
   }
-  executor.parallel_for(parts_.size(), [&](std::size_t p) { renumber(parts_[p]); });
+  executor.parallel_for(parts_.size(), [&](std::size_t p) {
+    renumber(parts_[p]);
+    parts_[p].paths = by_robot(poses_of(parts_[p].map, parts_[p].frames));
+  });
   return {};
 }
 
@@ -160,17 +168,44 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
   return {};
 }
 
+geometry::Vector6d StoredMaps::velocity_of(const StoredCloud& cloud) const {
+  const auto& paths = parts_[cloud.part].paths;
+  const auto path = paths.find(cloud.id.valid() ? cloud.id.robot : cloud.frame.robot);
+  return path == paths.end() ? geometry::Vector6d(geometry::Vector6d::Zero())
+                             : geometry::velocity_at(path->second, cloud.stamp);
+}
+
 core::Result<std::vector<std::uint8_t>> StoredMaps::cloud_bytes(std::size_t index) const {
   const StoredCloud& cloud = clouds_.at(index);
   const StoreReader& reader = *parts_[cloud.part].reader;
-  return cloud.id.valid() ? reader.cloud_bytes(core::KeyframeId{cloud.stored_robot, cloud.id.index})
-                          : reader.cloud_bytes(FrameId{cloud.stored_robot, cloud.frame.index});
+  const CameraHistory& cameras = parts_[cloud.part].cameras;
+  const core::KeyframeId id{cloud.stored_robot, cloud.id.index};
+  const FrameId frame{cloud.stored_robot, cloud.frame.index};
+
+  auto bytes = cloud.id.valid() ? reader.cloud_bytes(id) : reader.cloud_bytes(frame);
+  if (!bytes || !(cloud.id.valid() ? cameras.changes(id) : cameras.changes(frame))) return bytes;
+  const auto decoded = cloud::decode_cloud(bytes->data(), bytes->size());
+  if (!decoded) return tl::unexpected(decoded.error());
+  const geometry::Vector6d velocity = velocity_of(cloud);
+  if (cloud.id.valid()) {
+    cameras.apply(id, velocity, **decoded);
+  } else {
+    cameras.apply(frame, velocity, **decoded);
+  }
+  return cloud::encode_cloud(**decoded);
 }
 
-core::Result<std::vector<std::uint8_t>> StoredMaps::surface_bytes(std::size_t index) const {
+core::Result<std::optional<StoredSurface>> StoredMaps::surface(std::size_t index) const {
   const StoredCloud& cloud = clouds_.at(index);
-  if (!cloud.id.valid()) return std::vector<std::uint8_t>();
-  return parts_[cloud.part].reader->surface_bytes({cloud.stored_robot, cloud.id.index});
+  if (!cloud.id.valid()) return std::nullopt;
+  const core::KeyframeId id{cloud.stored_robot, cloud.id.index};
+  const auto bytes = parts_[cloud.part].reader->surface_bytes(id);
+  if (!bytes) return tl::unexpected(bytes.error());
+  if (bytes->empty()) return std::nullopt;
+  auto surface = unpack_surface(*bytes);
+  if (!surface) return tl::unexpected(surface.error());
+  parts_[cloud.part].cameras.apply(id, velocity_of(cloud), surface->samples);
+  return std::optional(std::move(*surface));
 }
 
 core::Error StoredMaps::damaged(KeyframeId id, FrameId frame, const core::Error& how) const {

@@ -107,7 +107,7 @@ cloud::FilterChain StoredResult::fusion_filters() const {
 }
 
 core::Result<StoredViews> StoredResult::views() const {
-  return views_of(*reader_, poses_of(map_.map, map_.frames));
+  return views_of(*reader_, poses_of(map_.map, map_.frames), map_.header.robots);
 }
 
 core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,

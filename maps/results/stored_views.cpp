@@ -15,10 +15,19 @@
 namespace plumbline::maps {
 
 core::Result<cloud::CloudPtr> StoredViews::read(std::size_t view) const {
-  return keyframes[view].valid() ? reader->cloud(keyframes[view]) : reader->cloud(frames[view]);
+  const bool of_keyframe = keyframes[view].valid();
+  auto cloud = of_keyframe ? reader->cloud(keyframes[view]) : reader->cloud(frames[view]);
+  if (!cloud) return cloud;
+  if (of_keyframe) {
+    cameras.apply(keyframes[view], velocities[view], **cloud);
+  } else {
+    cameras.apply(frames[view], velocities[view], **cloud);
+  }
+  return cloud;
 }
 
-core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map, const Arrivals& arrivals) {
+core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
+                                   const std::vector<RobotInfo>& robots, const Arrivals& arrivals) {
   const auto keyframes = reader.cloud_ids();
   if (!keyframes) return tl::unexpected(keyframes.error());
   auto frames = reader.frame_cloud_ids();
@@ -31,6 +40,8 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
                    [&](FrameId a, FrameId b) { return arrival(a) < arrival(b); });
   StoredViews views;
   views.reader = &reader;
+  views.cameras = CameraHistory(robots);
+  const std::map<std::int32_t, geometry::Trajectory> paths = by_robot(map);
   const auto add = [&](core::KeyframeId keyframe, FrameId frame, double stamp,
                        const geometry::Rigid3& world_from_camera) {
     views.keyframes.push_back(keyframe);
@@ -38,6 +49,9 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     views.world_from_camera.push_back(world_from_camera);
     views.robots.push_back(keyframe.valid() ? keyframe.robot : frame.robot);
     views.stamps.push_back(stamp);
+    const auto path = paths.find(views.robots.back());
+    views.velocities.push_back(path == paths.end() ? geometry::Vector6d(geometry::Vector6d::Zero())
+                                                   : geometry::velocity_at(path->second, stamp));
   };
   const std::set<core::KeyframeId> there(keyframes->begin(), keyframes->end());
   std::set<std::pair<std::int32_t, double>> seen;  // a run that went on may make a keyframe of what was none

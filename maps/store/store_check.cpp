@@ -108,6 +108,7 @@ void check(const sensor::Camera& camera) {
   if (camera.color_from_depth) check(*camera.color_from_depth);
   for (const double k : camera.distortion) demand(std::isfinite(k), "the camera is not finite");
   for (const double k : camera.depth_slope) demand(std::isfinite(k), "the camera is not finite");
+  demand(std::isfinite(camera.depth_delay_s), "the camera is not finite");
 }
 
 void check_map(const Bytes& bytes) {
@@ -126,6 +127,13 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
     for (const RobotInfo& robot : robots) {
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
+    }
+  } else if (key == "cameras") {
+    for (const CameraVersions& of : decode<std::vector<CameraVersions>>(plain(kMostSmall))) {
+      for (const CameraVersion& version : of.versions) {
+        check(version.camera);
+        demand(version.first_keyframe >= 0 && version.first_frame >= 0, "a camera's version is out of range");
+      }
     }
   } else if (key == "result") {
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);

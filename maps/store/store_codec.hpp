@@ -36,7 +36,7 @@ void fields(Io& io, Pinhole& p) {
 template <typename Io>
 void fields(Io& io, Camera& c) {
   io(c.name, c.color, c.distortion, c.depth_scale, c.fps, c.color_from_depth, c.depth, c.readout_s,
-     c.depth_slope);
+     c.depth_slope, c.depth_delay_s);
 }
 
 }  // namespace plumbline::sensor
@@ -49,8 +49,33 @@ static_assert(kLandmarksPerPage == 64, "the store's format");
 constexpr std::size_t kFramesPerPage = 256;
 
 template <typename Io>
+void fields(Io& io, CameraVersion& version) {
+  io(version.camera, version.first_keyframe, version.first_frame);
+}
+
+/// Those of one robot's camera.
+struct CameraVersions {
+  std::int32_t robot = 0;
+  std::vector<CameraVersion> versions;
+};
+template <typename Io>
+void fields(Io& io, CameraVersions& versions) {
+  io(versions.robot, versions.versions);
+}
+
+template <typename Io>
 void fields(Io& io, RobotInfo& robot) {
-  io(robot.number, robot.name, robot.camera);
+  io(robot.number, robot.name, robot.camera);  // versions have a row of their own, that comes later
+}
+
+template <typename Io>
+void fields(Io& io, SeenPoint& seen) {
+  io(seen.point, seen.pixel, seen.depth, seen.sigma_px);
+}
+
+template <typename Io>
+void fields(Io& io, SeenPoints& seen) {
+  io(seen.depth_delay_s, seen.points);
 }
 
 template <typename Io>

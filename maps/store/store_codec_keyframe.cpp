@@ -127,6 +127,7 @@ void feature_columns(Io& io, FrameFeatures& f) {
   point_columns(io, f.points);
   io(f.descriptors);
   line_columns(io, f.lines);
+  io(f.shutter_motion);
   thumbnail(io, f.thumbnail);
   thumbnail(io, f.thumbnail_depth);
 }

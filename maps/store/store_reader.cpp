@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "plumbline/cloud/compact_cloud.hpp"
@@ -34,6 +35,18 @@ bool is_complete(Database& database) {
   return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
 }
 
+/// What frames saw, for a run that goes on.
+void read_seen(Database& database, std::vector<FramePose>& frames) {
+  std::map<std::int32_t, std::int32_t> next;  // number of a robot's next frame
+  Statement row(database, "SELECT data FROM seen WHERE robot = ? AND number = ?");
+  for (FramePose& frame : frames) {
+    const std::int32_t robot = frame.reference.robot;
+    if (row.bind(1, robot).bind(2, next[robot]++).step())
+      frame.seen = std::make_shared<SeenPoints>(decode<SeenPoints>(row.unpacked(0)));
+    row.reset();
+  }
+}
+
 std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) {
   const Transaction moment(database, false);  // one moment of a store that is being written
   MapRows rows;
@@ -47,6 +60,7 @@ std::vector<StoredMap> read_maps(Database& database, const StoreHeader& header) 
     map.header = header;
     map.complete = is_complete(database);
     if (map.complete) map.result = read_result_frame(database);
+    if (!map.complete) read_seen(database, map.frames);
   }
   return maps;
 }

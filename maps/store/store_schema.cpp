@@ -47,6 +47,9 @@ void create_tables(Database& database) {
   database.run("PRAGMA application_id = " + std::to_string(kStoreApplication));
   for (const RowTable& table : kRowTables) create_table(database, table);
   database.run(
+      "CREATE TABLE seen (robot INTEGER NOT NULL, number INTEGER NOT NULL, data BLOB NOT NULL,"
+      " PRIMARY KEY (robot, number))");
+  database.run(
       "CREATE TABLE removed (place INTEGER NOT NULL, robot INTEGER NOT NULL, number INTEGER NOT NULL,"
       " changed INTEGER NOT NULL, PRIMARY KEY (place, robot, number))");
   database.run("PRAGMA user_version = " + std::to_string(kStoreFormat));
@@ -63,6 +66,12 @@ void put_header(Database& database, const StoreHeader& header) {
 
 void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots) {
   put_header(database, transaction, "robots", pack(encoded(robots)));
+}
+
+void put_camera_versions(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots) {
+  std::vector<CameraVersions> versions;
+  for (const RobotInfo& robot : robots) versions.push_back({robot.number, robot.versions});
+  put_header(database, transaction, "cameras", pack(encoded(versions)));
 }
 
 void put_complete(Database& database, std::int64_t transaction, bool complete) {
@@ -121,6 +130,13 @@ StoreHeader read_header(Database& database) {
   Statement robots(database, "SELECT data FROM header WHERE key = 'robots'");
   if (!robots.step()) throw BadBytes("its header has no robots");
   header.robots = decode<std::vector<RobotInfo>>(robots.unpacked(0));
+  Statement cameras(database, "SELECT data FROM header WHERE key = 'cameras'");
+  if (!cameras.step()) return header;
+  for (const CameraVersions& of : decode<std::vector<CameraVersions>>(cameras.unpacked(0))) {
+    for (RobotInfo& robot : header.robots) {
+      if (robot.number == of.robot) robot.versions = of.versions;
+    }
+  }
   return header;
 }
 

@@ -50,6 +50,8 @@ bool is_blank(Database& database);
 void check_store(Database& database);
 StoreHeader read_header(Database& database);
 void put_robots(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
+/// What the robots' cameras turned out to be.
+void put_camera_versions(Database& database, std::int64_t transaction, const std::vector<RobotInfo>& robots);
 void put_complete(Database& database, std::int64_t transaction, bool complete);
 void put_result_frame(Database& database, std::int64_t transaction, const ResultFrame& frame);
 /// The map's own frame when none was put.

@@ -122,6 +122,7 @@ struct StoreWriter::Impl {
         edges(*database, "edge", transaction),
         frames(*database, "frame", transaction),
         log(*database, "log", transaction),
+        robots(read_header(*database).robots),
         frame_lists(read_lists<FramePose>(*database, "frame")),
         log_lines(read_lists<std::string>(*database, "log")) {}
 
@@ -129,6 +130,9 @@ struct StoreWriter::Impl {
   void put_map(const MapChanges& map, std::int32_t robot);
   void mirror_keyframes(const MapChanges& map, std::int32_t robot);
   void mirror_edges(const MapChanges& map, std::int32_t robot);
+  /// From now on keyframes and edges that are there are put again, if a camera became another.
+  void put_robots_of_map(const std::vector<RobotInfo>& all);
+  void put_seen(FrameId frame, const SeenPoints& seen);
   void put_map_row(const MapChanges& map, std::int32_t robot);
   void put_cloud(const StoreCloud& cloud);
   void put_log_and_clouds(const StoreStep& step);
@@ -142,6 +146,9 @@ struct StoreWriter::Impl {
   std::unique_ptr<Database> database;
   std::int64_t transaction;  ///< the number of the last one, or of the one that is going on
   Mirror maps, keyframes, states, points, lines, edges, frames, log;
+  std::vector<RobotInfo> robots;  ///< as in the file
+  bool anew =
+      false;  ///< keyframes and edges were made anew, for another camera: what is in the file is not kept
   ByRobot<FramePose> frame_lists;  ///< as in the file
   ByRobot<std::string> log_lines;  ///< as in the file
 };
@@ -152,6 +159,27 @@ void StoreWriter::Impl::put_map(const MapChanges& map, std::int32_t robot) {
   mirror_landmarks(map.lines, map.whole, robot, lines);
   mirror_edges(map, robot);
   put_map_row(map, robot);
+  anew = false;
+}
+
+void StoreWriter::Impl::put_robots_of_map(const std::vector<RobotInfo>& all) {
+  const auto versions = [](const std::vector<RobotInfo>& of) {
+    std::size_t count = 0;
+    for (const RobotInfo& robot : of) count += robot.versions.size();
+    return count;
+  };
+  anew = versions(all) != versions(robots);
+  if (anew) put_camera_versions(*database, transaction, all);
+  if (encoded(all) != encoded(robots)) put_robots(*database, transaction, all);
+  robots = all;
+}
+
+void StoreWriter::Impl::put_seen(FrameId frame, const SeenPoints& seen) {
+  Statement(*database, "REPLACE INTO seen VALUES (?, ?, ?)")
+      .bind(1, frame.robot)
+      .bind(2, frame.index)
+      .bind(3, pack(encoded(seen)))
+      .run();
 }
 
 void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t robot) {
@@ -159,7 +187,7 @@ void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t rob
   states.begin();
   for (const MapParts::KeyframePart& part : map.keyframes) {
     const Mirror::Key key = key_of(part.data->id);
-    if (!keyframes.keep(key)) keyframes.put(key, encoded(*part.data));
+    if (anew || !keyframes.keep(key)) keyframes.put(key, encoded(*part.data));
     states.put(key, encoded(KeyframeState{part.camera_from_world, part.parent}));
   }
   keyframes.end(robot);
@@ -170,7 +198,7 @@ void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) 
   edges.begin();
   for (const auto& [number, edge] : map.edges) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
-    if (!edges.keep(key)) edges.put(key, encoded(EdgeRow{number, edge}));
+    if (anew || !edges.keep(key)) edges.put(key, encoded(EdgeRow{number, edge}));
   }
   for (const auto& [number, owner] : map.edge_names) edges.stay({owner, static_cast<std::int64_t>(number)});
   edges.end(robot);
@@ -240,6 +268,7 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
       mirror->reread();
     }
     transaction = read_heads(*database).last();
+    robots = read_header(*database).robots;
     frame_lists = read_lists<FramePose>(*database, "frame");
     log_lines = read_lists<std::string>(*database, "log");
   });
@@ -301,12 +330,15 @@ core::Result<void> StoreWriter::add(const StoreStep& step) {
     for (const FramePose& pose : step.frames) {
       std::vector<FramePose>& list = impl_->frame_lists[pose.reference.robot];
       before.try_emplace(pose.reference.robot, list.size());
+      if (pose.seen != nullptr)
+        impl_->put_seen({pose.reference.robot, static_cast<std::int32_t>(list.size())}, *pose.seen);
       list.push_back(pose);
     }
     for (const auto& [robot, size] : before) {
       mirror_list(robot, impl_->frame_lists[robot], size, impl_->frames);
     }
     impl_->put_log_and_clouds(step);
+    if (step.robots != nullptr) impl_->put_robots_of_map(*step.robots);
     impl_->put_map(*step.map, step.robot);
     put_complete(*impl_->database, impl_->transaction, false);
   });
@@ -336,8 +368,8 @@ core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<Fra
   if (!synced) return synced;
   core::Result<void> done = impl_->transact([&] {
     for (const StoreStep& step : rest) impl_->put_log_and_clouds(step);
+    if (!robots.empty()) impl_->put_robots_of_map(robots);
     impl_->write(map, frames);
-    if (!robots.empty()) put_robots(*impl_->database, impl_->transaction, robots);
     put_complete(*impl_->database, impl_->transaction, true);
     put_result_frame(*impl_->database, impl_->transaction, result);
   });

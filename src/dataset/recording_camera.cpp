@@ -230,7 +230,6 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
 
 core::Result<std::optional<ChosenCamera>> choose_camera(const fs::path& folder, const OpenOptions& options,
                                                         core::Log& log) {
-  if (options.known) return ChosenCamera{{*options.known, "", true, true, {}}, ""};
   if (!options.camera.empty()) {
     auto reading = sensor::find_camera(options.camera, options.cameras_folder);
     if (!reading) return tl::unexpected(reading.error());

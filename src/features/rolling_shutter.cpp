@@ -3,17 +3,27 @@
 
 namespace plumbline::features {
 
+RowMotion::RowMotion(const geometry::Vector6d& shutter_motion, double share, bool has_depth)
+    : motion_(geometry::exp_se3(share * shutter_motion)) {
+  if (!has_depth) motion_.translation.setZero();
+}
+
+Eigen::Vector3d RowMotion::operator()(const Eigen::Vector3d& p) const {
+  constexpr double kNearest_m = 0.05;
+  const Eigen::Vector3d moved = motion_ * p;
+  return moved.z() > kNearest_m ? moved : p;
+}
+
 void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera,
                           const geometry::Vector6d& velocity, double readout_s) {
-  constexpr double kNearest = 0.05;  // metres: what would come nearer, or behind the camera, stays
   if (readout_s == 0.0 || velocity.isZero(0.0) || camera.height <= 0) return;
-  // Where what was at `from` in row `v` lies when the middle row is read; what has no depth is turned only.
-  const auto moved = [&](float v, const Eigen::Vector3d& from, bool has_depth) -> Eigen::Vector3d {
-    const double seconds = (static_cast<double>(v) / camera.height - 0.5) * readout_s;
-    geometry::Rigid3 motion = geometry::exp_se3(-seconds * velocity);
-    if (!has_depth) motion.translation.setZero();
-    const Eigen::Vector3d to = motion * from;
-    return to.z() > kNearest ? to : from;
+  const geometry::Vector6d motion = readout_s * velocity;
+  features.shutter_motion += motion;
+
+  // Where what was at `from` in row `v` lies when the middle row is read.
+  const auto moved = [&](float v, const Eigen::Vector3d& from, bool has_depth) {
+    const double share = static_cast<double>(v) / camera.height - 0.5;
+    return RowMotion(motion, -share, has_depth)(from);
   };
   const auto ray = [&](const Eigen::Vector2f& pixel, double z) -> Eigen::Vector3d {
     return camera.unproject(static_cast<double>(pixel.x()), static_cast<double>(pixel.y()), z);

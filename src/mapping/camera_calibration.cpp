@@ -11,12 +11,15 @@
 #include <optional>
 #include <utility>
 
+#include "plumbline/features/measurement.hpp"
 #include "plumbline/geometry/velocity.hpp"
 #include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
 namespace {
 
+using geometry::Rigid3;
 using optimize::CalibrationObservation;
 using optimize::CalibrationProblem;
 using optimize::CameraChange;
@@ -27,40 +30,104 @@ using optimize::kCameraUnknowns;
 
 constexpr int kParts = 4;
 constexpr int kRounds = 3;  // of linearising where the last one led
-constexpr int kLeastKeyframes = 8;
+constexpr std::size_t kLeastKeyframes = 8;
+constexpr int kLeastViewsInAll = 24;  // or so many with frames: fewer are one view again and again
 constexpr int kLeastViews = 2;
 constexpr int kLeastObservations = 300;
 
 using Parts = std::array<CalibrationProblem, kParts>;
 
-/// Stretches of neighbouring keyframes, one of each part, where there are more than are wanted.
-std::vector<std::pair<core::KeyframeId, int>> chosen(const maps::Map& map, int wanted) {
-  const std::vector<core::KeyframeId> ids = map.keyframe_ids();
-  const int count = static_cast<int>(ids.size());
-  std::vector<std::pair<core::KeyframeId, int>> result;
-  for (int part = 0; part < kParts; ++part) {
-    const int begin = count * part / kParts;
-    const int end = count * (part + 1) / kParts;
-    const int few = std::min(end - begin, std::max(1, wanted / kParts));
-    for (int i = begin; i < begin + few; ++i) result.emplace_back(ids[static_cast<std::size_t>(i)], part);
-  }
-  return result;
+/// A picture that takes part: a keyframe, or a frame that kept what it saw.
+struct View {
+  double stamp = 0.0;
+  Rigid3 camera_from_world;
+  std::vector<std::pair<core::PointId, CalibrationObservation>> seen;
+  double late_s =
+      0.0;  ///< by so much longer than was believed when it was read is the depth's delay known now
+};
+
+/// Some of many, spread evenly.
+template <typename Thing>
+std::vector<Thing> thinned(const std::vector<Thing>& all, std::size_t most) {
+  if (all.size() <= most) return all;
+  std::vector<Thing> some;
+  for (std::size_t i = 0; i < most; ++i) some.push_back(all[i * all.size() / most]);
+  return some;
 }
 
-/// As the lens showed it.
-CalibrationObservation observation_of(const features::PointFeature& feature, bool aligned,
-                                      const sensor::Camera& camera) {
-  static const ObservationNoise noise;
-  const optimize::BundlePointObservation in_bundle = noise.of(feature, aligned);
-  CalibrationObservation seen;
-  seen.pixel = optimize::distorted_pixel(camera, in_bundle.pixel);
-  seen.pixel_sigma = in_bundle.pixel_sigma;
-  seen.depth = in_bundle.depth;
-  seen.depth_sigma = in_bundle.depth_sigma;
-  const Eigen::Vector2d pixel = feature.pixel.cast<double>();
-  seen.ray = camera.color.unproject(pixel.x(), pixel.y(), 1.0).head<2>();
-  return seen;
-}
+/// The views of one run, as the lens showed them: keyframes, and where there are few of them frames between.
+class RunViews {
+ public:
+  RunViews(const CalibrationRun& run, const sensor::Camera& camera, std::size_t most)
+      : run_(run), model_(run.image, camera) {
+    const std::vector<core::KeyframeId> keyframes = thinned(run.map->keyframe_ids(), most);
+    add_keyframes(keyframes);
+    add_frames(most - keyframes.size());
+    std::sort(views_.begin(), views_.end(), [](const View& a, const View& b) { return a.stamp < b.stamp; });
+  }
+  [[nodiscard]] const std::vector<View>& views() const { return views_; }
+
+ private:
+  void add_keyframes(const std::vector<core::KeyframeId>& keyframes) {
+    std::map<core::KeyframeId, std::size_t> index;
+    for (const core::KeyframeId id : keyframes) {
+      index[id] = views_.size();
+      views_.push_back({run_.map->keyframe(id).stamp, run_.map->camera_from_world(id), {}, 0.0});
+    }
+    static const ObservationNoise noise;
+    for (const core::PointId id : run_.map->point_ids()) {
+      for (const maps::Observation& o : run_.map->point(id).observations) {
+        const auto view = index.find(o.keyframe);
+        if (view == index.end()) continue;
+        const features::FrameFeatures& picture = *run_.map->keyframe(o.keyframe).features;
+        const features::PointFeature& f = picture.points[static_cast<std::size_t>(o.feature)];
+        const auto measured = features::measurement_of({f.pixel.cast<double>(), static_cast<double>(f.depth)},
+                                                       picture.shutter_motion, model_);
+        views_[view->second].seen.emplace_back(id,
+                                               observation_of(measured, noise.of(f, o.aligned).pixel_sigma));
+      }
+    }
+  }
+
+  void add_frames(std::size_t most) {
+    std::vector<const maps::FramePose*> frames;
+    for (const maps::FramePose& frame : *run_.frames) {
+      if (frame.seen == nullptr || !frame.tracked || !run_.map->has_keyframe(frame.reference)) continue;
+      const bool is_keyframe = run_.map->keyframe(frame.reference).stamp == frame.stamp;
+      if (!is_keyframe) frames.push_back(&frame);
+    }
+    for (const maps::FramePose* chosen : thinned(frames, most)) {
+      const maps::FramePose& frame = *chosen;
+      View view{
+          frame.stamp, frame.camera_from_reference * run_.map->camera_from_world(frame.reference), {}, 0.0};
+      view.late_s = model_.camera().depth_delay_s - frame.seen->depth_delay_s;
+      for (const maps::SeenPoint& s : frame.seen->points) {
+        if (run_.map->find(s.point) == nullptr) continue;
+        view.seen.emplace_back(s.point, observation_of({s.pixel.cast<double>(), static_cast<double>(s.depth)},
+                                                       static_cast<double>(s.sigma_px)));
+      }
+      views_.push_back(std::move(view));
+    }
+  }
+
+  [[nodiscard]] CalibrationObservation observation_of(const features::PixelDepth& measured,
+                                                      double sigma_px) const {
+    static const ObservationNoise noise;
+    CalibrationObservation seen;
+    seen.pixel = measured.pixel;
+    seen.pixel_sigma = sigma_px;
+    const Eigen::Vector2d rectified = model_.rectified_pixel(measured.pixel);
+    seen.ray = run_.image.unproject(rectified.x(), rectified.y(), 1.0).head<2>();
+    if (!(measured.depth > 0.0)) return seen;
+    seen.depth = model_.true_depth(rectified, measured.depth);
+    seen.depth_sigma = noise.depth_factor * sensor::depth_sigma(seen.depth);
+    return seen;
+  }
+
+  const CalibrationRun& run_;
+  sensor::ImageModel model_;
+  std::vector<View> views_;  ///< by time
+};
 
 /// How fast the depth on the ray to a point changes, m/s: the surface that it lies on is carried along by the
 /// camera's motion. 0 where that surface is not known, or the ray grazes it.
@@ -73,40 +140,40 @@ double depth_rate(const maps::MapPoint& point, const optimize::CalibrationPose& 
   return p.z() * normal.dot(pose.velocity.head<3>() + pose.velocity.tail<3>().cross(p)) / along;
 }
 
-/// Each part has the keyframes of its stretch, and what two of them see.
+/// Some neighbouring views, with all that at least two of them see.
+void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, const View* begin,
+                 const View* end, CalibrationProblem& part) {
+  std::map<core::PointId, std::vector<CalibrationObservation>> by_point;
+  for (const View* view = begin; view != end; ++view) {
+    optimize::CalibrationPose pose;
+    pose.camera_from_world = view->camera_from_world;
+    pose.velocity = geometry::velocity_at(path, view->stamp);
+    pose.fixed = view == begin;
+    for (const auto& [id, observation] : view->seen) {
+      by_point[id].push_back(observation);
+      CalibrationObservation& seen = by_point[id].back();
+      seen.pose = static_cast<int>(part.poses.size());
+      seen.depth_rate = depth_rate(run.map->point(id), pose);
+      if (seen.depth > 0.0) seen.depth -= view->late_s * seen.depth_rate;
+    }
+    part.poses.push_back(pose);
+  }
+  for (auto& [id, seen] : by_point) {
+    if (static_cast<int>(seen.size()) < kLeastViews) continue;
+    for (CalibrationObservation& o : seen) o.point = static_cast<int>(part.points.size());
+    part.points.push_back(run.map->point(id).position);
+    part.observations.insert(part.observations.end(), seen.begin(), seen.end());
+  }
+}
+
+/// Each part gets a quarter of the run.
 void add_run(const CalibrationRun& run, int wanted, const sensor::Camera& camera, Parts& parts) {
   const geometry::Trajectory path = maps::trajectory(*run.frames, *run.map);
-  std::map<core::KeyframeId, std::pair<std::size_t, int>> index;  // part, pose
-  std::array<bool, kParts> anchored{};
-  for (const auto& [id, part] : chosen(*run.map, wanted)) {
-    const auto p = static_cast<std::size_t>(part);
-    index[id] = {p, static_cast<int>(parts[p].poses.size())};
-    optimize::CalibrationPose pose;
-    pose.camera_from_world = run.map->camera_from_world(id);
-    pose.velocity = geometry::velocity_at(path, run.map->keyframe(id).stamp);
-    pose.undone_s = run.undone_s;
-    pose.fixed = !std::exchange(anchored[p], true);
-    parts[p].poses.push_back(pose);
-  }
-  for (const core::PointId id : run.map->point_ids()) {
-    const maps::MapPoint& point = run.map->point(id);
-    std::array<std::vector<CalibrationObservation>, kParts> seen;
-    for (const maps::Observation& o : point.observations) {
-      const auto place = index.find(o.keyframe);
-      if (place == index.end()) continue;
-      const auto& [part, pose] = place->second;
-      const auto& features = *run.map->keyframe(o.keyframe).features;
-      seen[part].push_back(
-          observation_of(features.points[static_cast<std::size_t>(o.feature)], o.aligned, camera));
-      seen[part].back().pose = pose;
-      seen[part].back().point = static_cast<int>(parts[part].points.size());
-      seen[part].back().depth_rate = depth_rate(point, parts[part].poses[static_cast<std::size_t>(pose)]);
-    }
-    for (std::size_t p = 0; p < kParts; ++p) {
-      if (static_cast<int>(seen[p].size()) < kLeastViews) continue;
-      parts[p].points.push_back(point.position);
-      parts[p].observations.insert(parts[p].observations.end(), seen[p].begin(), seen[p].end());
-    }
+  const RunViews views(run, camera, static_cast<std::size_t>(wanted));
+  const std::size_t count = views.views().size();
+  for (std::size_t p = 0; p < kParts; ++p) {
+    const View* first = views.views().data();
+    add_stretch(run, path, first + count * p / kParts, first + count * (p + 1) / kParts, parts[p]);
   }
 }
 
@@ -164,6 +231,12 @@ std::vector<CameraNumber> numbers_of(const sensor::Camera& camera) {
 
 class Calibrator {
  public:
+  /// Whether linearising at the one says what linearising at the other does: to a thousandth of what is known
+  /// before.
+  [[nodiscard]] bool same(const CameraChange& a, const CameraChange& b) const {
+    return ((a - b).array().abs() < 1e-3 * prior_.sigma.array()).all();
+  }
+
   Calibrator(const sensor::Camera& given, const CalibrationOptions& options)
       : given_(given), options_(options), none_(nothing(given)) {
     prior_.mean = none_;
@@ -175,9 +248,12 @@ class Calibrator {
   /// What is believed, by the evidence of each part. What one unknown hides of another (a wrong distortion
   /// hides a wrong focal length) shows when the others are tried again after it was found.
   CameraChange choose(const std::vector<CameraEvidence>& evidence, CameraCalibration& result) const {
+    const Trial before = try_out(evidence, {});
+    const Group earlier = used_earlier();
     FreeUnknowns believed{};
-    const Trial before = try_out(evidence, believed);
-    Trial best = believed_again(evidence, before, believed);
+    for (const CameraUnknown u : earlier) believed[u] = true;
+    Trial best = earlier.empty() ? before : try_out(evidence, believed);
+    bool news = !earlier.empty() && is_believed(before, best, earlier, options_.earlier_least_gain);
     result.findings.clear();
     for (const CameraNumber& n : numbers_of(given_)) result.findings.push_back({n.name, n.value, n.value});
     std::size_t in_vain = 0;  // tried since something was believed
@@ -195,7 +271,12 @@ class Calibrator {
       if (!used) continue;
       believed = free;
       best = trial;
+      news = true;
       in_vain = 0;
+    }
+    if (!news) {
+      believed = {};
+      best = before;
     }
     result.gain = 1.0 - best.cost() / before.cost();
     const CameraChange change = most_likely(evidence, believed, prior_);
@@ -206,22 +287,15 @@ class Calibrator {
   }
 
  private:
-  /// What was believed earlier, all of it at once; `believed` stays none when it says nothing new.
-  [[nodiscard]] Trial believed_again(const std::vector<CameraEvidence>& evidence, const Trial& before,
-                                     FreeUnknowns& believed) const {
-    FreeUnknowns free{};
+  /// What was believed of the map before this one was made anew. What hides behind it (a distortion that was
+  /// found with a wrong focal length) shows only when it may change, too.
+  [[nodiscard]] Group used_earlier() const {
     Group all;
     for (const CameraNumber& n : numbers_of(given_)) {
       const auto was_used = [&](const CameraFinding& f) { return f.used && f.name == n.name; };
-      if (std::none_of(options_.earlier.begin(), options_.earlier.end(), was_used)) continue;
-      free[n.unknown] = true;
-      all.push_back(n.unknown);
+      if (std::any_of(options_.earlier.begin(), options_.earlier.end(), was_used)) all.push_back(n.unknown);
     }
-    if (all.empty()) return before;
-    Trial trial = try_out(evidence, free);
-    if (!is_believed(before, trial, all, options_.earlier_least_gain)) return before;
-    believed = free;
-    return trial;
+    return all;
   }
   [[nodiscard]] Trial try_out(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free) const {
     Trial trial;
@@ -268,7 +342,7 @@ class Calibrator {
 };
 
 /// None: some part tells nothing.
-std::optional<std::vector<CameraEvidence>> evidence_of(const Parts& parts, const CameraChange& change,
+std::optional<std::vector<CameraEvidence>> evidence_of(Parts& parts, const CameraChange& change,
                                                        const core::Executor& executor) {
   std::array<std::optional<CameraEvidence>, kParts> each;
   executor.parallel_for(kParts, [&](std::size_t i) { each[i] = camera_evidence(parts[i], change); });
@@ -288,25 +362,28 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
                                                  const core::Executor& executor) {
   Parts parts;
   for (CalibrationProblem& part : parts) part.camera = given;
+  std::size_t keyframes = 0;
+  for (const CalibrationRun& run : runs) keyframes += run.map->keyframe_count();
   for (const CalibrationRun& run : runs)
-    add_run(run, options.keyframes / static_cast<int>(runs.size()), given, parts);
+    add_run(run, options.views / static_cast<int>(runs.size()), given, parts);
   CameraCalibration result;
   for (const CalibrationProblem& part : parts) {
-    result.keyframes += static_cast<int>(part.poses.size());
+    result.views += static_cast<int>(part.poses.size());
     result.observations += static_cast<int>(part.observations.size());
   }
   const Calibrator calibrator(given, options);
   CameraChange change = nothing(given);
   for (int round = 0; round < kRounds; ++round) {
     const auto evidence = evidence_of(parts, change, executor);
-    if (!evidence || result.keyframes < kLeastKeyframes || result.observations < kLeastObservations) {
+    const bool few = keyframes < kLeastKeyframes && result.views < kLeastViewsInAll;
+    if (!evidence || few || result.observations < kLeastObservations) {
       return core::input_error(fmt::format(
-          "{} keyframes with {} observations of shared points are too few to estimate the camera from; "
+          "{} views with {} observations of shared points are too few to estimate the camera from; "
           "film a place with texture for 10 s or more while turning and moving the camera",
-          result.keyframes, result.observations));
+          result.views, result.observations));
     }
     const CameraChange before = std::exchange(change, calibrator.choose(*evidence, result));
-    if (change == before) break;
+    if (calibrator.same(before, change)) break;
   }
   result.camera = optimize::changed_camera(given, change);
   return result;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/mapping/slam.hpp"
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <utility>
 
 #include "loop_closing/relocalisation_check.hpp"
+#include "plumbline/features/measurement.hpp"
 
 namespace plumbline::mapping {
 
@@ -63,12 +65,15 @@ FrameReport FrameReport::of(const sensor::RgbdFrame& frame, const tracking::Trac
 Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32_t robot,
            const core::Executor& executor, core::Log& log)
     : options_(options),
+      executor_(executor),
+      image_(camera),
       tracker_(options.tracker, camera),
       keyframe_rule_(options.keyframe, camera),
       mapper_(mapper_of(options), camera, robot),
       bundle_({options.mapper.bundle_keyframes, noise_of(options)}, options.mapper.bundle_options,
               options.bundle_lag, camera, executor, log),
       closer_(options.loops, camera) {
+  camera_.color = camera;
   if (!options.loops.enabled) return;
   constexpr std::size_t kLookAlikes = 12;
   tracker_.set_place_finder([this](const features::FrameFeatures& picture) {
@@ -99,6 +104,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   }
   maps::FramePose pose = frames_.measured(map_, frame.stamp, track);
   if (pose.tracked) {
+    pose.seen = seen_points();
     mapper_.count_observations(map_, track);  // section 3.3: the share of keyframes that find a landmark
     report.decision.wanted = !track.reference.valid();  // where nothing of this map is seen
     if (!report.decision.wanted)
@@ -192,6 +198,68 @@ void Slam::close_loops(core::KeyframeId keyframe) {
 }
 
 void Slam::finish() { commit_bundles(); }
+
+void Slam::set_camera(const sensor::Camera& camera) {
+  camera_ = camera;
+  if (options_.tracker.readout_s > 0.0) camera_.readout_s = options_.tracker.readout_s;
+  tracker_.set_shutter(camera_.readout_s);
+}
+
+void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) {
+  const sensor::Camera before = camera_;
+  set_camera(camera);
+  if (map_.keyframe_count() == 0) return;
+  const sensor::Recalibration change(image_, before, camera_);
+  commit_bundles();
+
+  std::vector<maps::FramePose> frames = frames_.poses();
+  recalibrate_map(change, map_, frames);
+  const SurfaceMeasurement how{options_.mapper.surface, options_.mapper.edge_min_overlap,
+                               options_.mapper.edge_photometric};
+  if (read) measure_surfaces_again(image_, frames, read, how, executor_, map_);
+
+  GlobalAdjustmentOptions adjustment;
+  adjustment.noise.orb_scale_factor = options_.tracker.association.scale_factor;
+  adjust_recalibrated_map(image_, options_.mapper.fusion, adjustment, map_);
+
+  frames_ = FrameTrajectory(std::move(frames));
+  tracker_.recalibrate(change);
+  closer_.clear_pending();
+  const maps::FramePose& last = frames_.poses().back();
+  tracker_.map_changed(map_, tracker_.reference(),
+                       last.camera_from_reference * map_.camera_from_world(last.reference));
+}
+
+/// Of the landmarks that the last frame was matched with, spread over all of them; also such as do not fit.
+std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
+  constexpr std::size_t kMost = 150;
+  const tracking::TrackResult& track = last_track_;
+  if (track.features == nullptr || track.points.empty()) return nullptr;
+  const sensor::ImageModel model(image_, camera_);
+  const ObservationNoise noise = noise_of(options_);
+  auto seen = std::make_shared<maps::SeenPoints>();
+  seen->depth_delay_s = camera_.depth_delay_s;
+  const auto keep = [&](const tracking::PointMatch& m, const Eigen::Vector2f& shift) {
+    const features::PointFeature& f = track.features->points[static_cast<std::size_t>(m.feature)];
+    const Eigen::Vector2f pixel = f.pixel + shift;
+    const float depth = track.features->depth_beside(static_cast<std::size_t>(m.feature), shift);
+    const auto measured = features::measurement_of({pixel.cast<double>(), static_cast<double>(depth)},
+                                                   track.features->shutter_motion, model);
+    seen->points.push_back({m.point, measured.pixel.cast<float>(), static_cast<float>(measured.depth),
+                            static_cast<float>(noise.of(f, m.aligned).pixel_sigma)});
+  };
+  const std::size_t all = track.points.size() + track.doubtful.size();
+  const std::size_t count = std::min(kMost, all);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t n = i * all / count;
+    if (n < track.points.size()) {
+      keep(track.points[n], Eigen::Vector2f::Zero());  // it lies where it was aligned already
+    } else {
+      keep(track.doubtful[n - track.points.size()], track.doubtful[n - track.points.size()].shift);
+    }
+  }
+  return seen;
+}
 
 geometry::Trajectory Slam::trajectory() const { return maps::trajectory(frame_poses(), map_); }
 

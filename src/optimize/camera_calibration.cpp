@@ -2,11 +2,11 @@
 #include "plumbline/optimize/camera_calibration.hpp"
 
 #include <ceres/ceres.h>
-#include <ceres/rotation.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "ceres_solve.hpp"
@@ -14,106 +14,177 @@
 namespace plumbline::optimize {
 namespace {
 
-/// Radial-tangential distortion of (x, y), OpenCV's.
-template <typename T>
-void distort(const T& x, const T& y, const T& k1, const T& k2, const sensor::Distortion& k, T& xd, T& yd) {
-  const T r2 = x * x + y * y;
-  const T radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k[4]));
-  xd = x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x);
-  yd = y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y;
-}
+using CameraRow = Eigen::Matrix<double, 1, kCameraUnknowns>;
+constexpr int kStep = 6;  // turn, then shift
 
-/// A point in the camera when a row was read; the pose is that of the problem, turned and moved by `step`.
-class RowPoint {
- public:
-  RowPoint(const CalibrationPose& pose, double share) : pose_(pose), share_(share) {}
+/// A point in the camera when its row was read, and how it moves with the unknowns. The pose is that of the
+/// problem, turned and moved by `step`.
+struct RowPoint {
+  Eigen::Vector3d p;
+  Eigen::Vector3d by_readout;
+  Eigen::Matrix<double, 3, kStep> by_step;
+  Eigen::Matrix3d by_point;
 
-  template <typename T>
-  void operator()(const T* change, const T* step, const T* point, T* p) const {
-    const Eigen::Matrix3d& r = pose_.camera_from_world.rotation;
-    T turned[3];
-    for (int i = 0; i < 3; ++i) turned[i] = r(i, 0) * point[0] + r(i, 1) * point[1] + r(i, 2) * point[2];
-    T still[3];
-    ceres::AngleAxisRotatePoint(step, turned, still);
-    for (int i = 0; i < 3; ++i) still[i] += pose_.camera_from_world.translation(i) + step[3 + i];
-    const T s = (change[kReadout] - pose_.undone_s) * share_;
-    const geometry::Vector6d& v = pose_.velocity;
-    p[0] = still[0] + s * (v(0) + v(4) * still[2] - v(5) * still[1]);
-    p[1] = still[1] + s * (v(1) + v(5) * still[0] - v(3) * still[2]);
-    p[2] = still[2] + s * (v(2) + v(3) * still[1] - v(4) * still[0]);
+  /// `share`: of the readout, from the middle row to this one.
+  RowPoint(const CalibrationPose& pose, double share, const double* change, const double* step,
+           const double* point) {
+    const Eigen::Map<const Eigen::Vector3d> turn(step);
+    const Eigen::Map<const Eigen::Vector3d> shift(step + 3);
+    const Eigen::Map<const Eigen::Vector3d> world(point);
+    const Eigen::Matrix3d rotation = geometry::exp_so3(turn);
+    const Eigen::Vector3d turned = rotation * (pose.camera_from_world.rotation * world);
+    const Eigen::Vector3d still = turned + pose.camera_from_world.translation + shift;
+
+    const Eigen::Matrix3d spin = geometry::skew(pose.velocity.tail<3>());
+    const double seconds = change[kReadout] * share;
+    const Eigen::Matrix3d moved = Eigen::Matrix3d::Identity() + seconds * spin;
+    const Eigen::Vector3d motion = pose.velocity.head<3>() + spin * still;
+    p = still + seconds * motion;
+    by_readout = share * motion;
+    by_step.leftCols<3>() = -moved * geometry::skew(turned) * left_jacobian(turn);
+    by_step.rightCols<3>() = moved;
+    by_point = moved * rotation * pose.camera_from_world.rotation;
   }
 
  private:
-  CalibrationPose pose_;
-  double share_;  ///< of the readout, from the middle row to this one
+  /// exp(turn + d) = exp(J d) exp(turn), for small d.
+  static Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& turn) {
+    const double angle2 = turn.squaredNorm();
+    const Eigen::Matrix3d k = geometry::skew(turn);
+    if (angle2 < 1e-8) return Eigen::Matrix3d::Identity() + 0.5 * k + k * k / 6.0;
+    const double angle = std::sqrt(angle2);
+    return Eigen::Matrix3d::Identity() + (1.0 - std::cos(angle)) / angle2 * k +
+           (angle - std::sin(angle)) / (angle2 * angle) * k * k;
+  }
+};
+
+/// Rows of derivatives by the camera, by the step and by the point, where they are asked for.
+template <int kRows>
+class Derivatives {
+ public:
+  explicit Derivatives(double** blocks) : to_(blocks) {}
+  void put(const Eigen::Matrix<double, kRows, kCameraUnknowns>& by_camera,
+           const Eigen::Matrix<double, kRows, 3>& by_p, const RowPoint& row) const {
+    if (to_ == nullptr) return;
+    Eigen::Matrix<double, kRows, kCameraUnknowns> camera = by_camera;
+    camera.col(kReadout) += by_p * row.by_readout;
+    store<kCameraUnknowns>(0, camera);
+    store<kStep>(1, by_p * row.by_step);
+    store<3>(2, by_p * row.by_point);
+  }
+
+ private:
+  double** to_;
+  template <int kColumns>
+  void store(int block, const Eigen::Matrix<double, kRows, kColumns>& matrix) const {
+    if (to_[block] == nullptr) return;
+    Eigen::Map<Eigen::Matrix<double, kRows, kColumns, Eigen::RowMajor>> rows(to_[block]);
+    rows = matrix;
+  }
 };
 
 /// e = (u - K distort(pi(p))) / sigma.
-class PixelCost {
+class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kStep, 3> {
  public:
-  PixelCost(const CalibrationObservation& seen, const RowPoint& in_camera, const sensor::Camera& camera)
-      : seen_(seen), in_camera_(in_camera), camera_(&camera) {}
+  PixelCost(const CalibrationObservation& seen, const CalibrationPose& pose, double share,
+            const sensor::Camera& camera)
+      : seen_(&seen), pose_(&pose), share_(share), camera_(&camera) {}
 
-  template <typename T>
-  bool operator()(const T* change, const T* step, const T* point, T* residual) const {
-    T p[3];
-    in_camera_(change, step, point, p);
-    if (p[2] < 0.05) return false;
-    T x;
-    T y;
+  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
+    const double* change = parameters[0];
+    const RowPoint row(*pose_, share_, change, parameters[1], parameters[2]);
+    if (row.p.z() < 0.05) return false;
+    const double x = row.p.x() / row.p.z();
+    const double y = row.p.y() / row.p.z();
+    const double r2 = x * x + y * y;
     const sensor::Distortion& k = camera_->distortion;
-    distort<T>(p[0] / p[2], p[1] / p[2], k[0] + change[kK1], k[1] + change[kK2], k, x, y);
+    const double k1 = k[0] + change[kK1];
+    const double k2 = k[1] + change[kK2];
+    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k[4]));
+    const Eigen::Vector2d distorted(x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
+                                    y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y);
     const sensor::Pinhole& c = camera_->color;
-    const T longer = 1.0 + change[kFocal];
-    residual[0] = (seen_.pixel.x() - (c.fx * longer * x + c.cx + change[kCentreX])) / seen_.pixel_sigma;
-    residual[1] = (seen_.pixel.y() - (c.fy * longer * y + c.cy + change[kCentreY])) / seen_.pixel_sigma;
+    const Eigen::Vector2d focal = Eigen::Vector2d(c.fx, c.fy) * (1.0 + change[kFocal]);
+    const Eigen::Vector2d centre(c.cx + change[kCentreX], c.cy + change[kCentreY]);
+    const double weight = 1.0 / seen_->pixel_sigma;
+    Eigen::Map<Eigen::Vector2d>(residuals).noalias() =
+        weight * (seen_->pixel - focal.cwiseProduct(distorted) - centre);
+    if (jacobians == nullptr) return true;
+
+    const double by_r2 = k1 + r2 * (2.0 * k2 + 3.0 * r2 * k[4]);
+    Eigen::Matrix2d by_ray;
+    by_ray << radial + 2.0 * x * x * by_r2 + 2.0 * k[2] * y + 6.0 * k[3] * x,
+        2.0 * x * y * by_r2 + 2.0 * k[2] * x + 2.0 * k[3] * y,
+        2.0 * x * y * by_r2 + 2.0 * k[2] * x + 2.0 * k[3] * y,
+        radial + 2.0 * y * y * by_r2 + 6.0 * k[2] * y + 2.0 * k[3] * x;
+    Eigen::Matrix<double, 2, 3> ray_by_p;
+    ray_by_p << 1.0, 0.0, -x, 0.0, 1.0, -y;
+    const Eigen::Matrix<double, 2, 3> by_p = -weight / row.p.z() * focal.asDiagonal() * by_ray * ray_by_p;
+    Eigen::Matrix<double, 2, kCameraUnknowns> by_camera = Eigen::Matrix<double, 2, kCameraUnknowns>::Zero();
+    by_camera.col(kFocal) = -weight * Eigen::Vector2d(c.fx, c.fy).cwiseProduct(distorted);
+    by_camera(0, kCentreX) = -weight;
+    by_camera(1, kCentreY) = -weight;
+    by_camera.col(kK1) = -weight * r2 * focal.cwiseProduct(Eigen::Vector2d(x, y));
+    by_camera.col(kK2) = r2 * by_camera.col(kK1);
+    Derivatives<2>(jacobians).put(by_camera, by_p, row);
     return true;
   }
 
  private:
-  CalibrationObservation seen_;
-  RowPoint in_camera_;
+  const CalibrationObservation* seen_;
+  const CalibrationPose* pose_;
+  double share_;
   const sensor::Camera* camera_;
 };
 
 /// e = (z - p_z / (1 - p_z slope.(x, y)) - delay rate) / sigma: what the depth camera says of a point that
 /// lies at p.
-class DepthCost {
+class DepthCost final : public ceres::SizedCostFunction<1, kCameraUnknowns, kStep, 3> {
  public:
-  DepthCost(const CalibrationObservation& seen, const RowPoint& in_camera)
-      : seen_(seen), in_camera_(in_camera) {}
+  DepthCost(const CalibrationObservation& seen, const CalibrationPose& pose, double share)
+      : seen_(&seen), pose_(&pose), share_(share) {}
 
-  template <typename T>
-  bool operator()(const T* change, const T* step, const T* point, T* residual) const {
-    T p[3];
-    in_camera_(change, step, point, p);
-    const T grow = 1.0 - p[2] * (change[kSlopeX] * seen_.ray.x() + change[kSlopeY] * seen_.ray.y());
+  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
+    const double* change = parameters[0];
+    const RowPoint row(*pose_, share_, change, parameters[1], parameters[2]);
+    const double z = row.p.z();
+    const double grow = 1.0 - z * (change[kSlopeX] * seen_->ray.x() + change[kSlopeY] * seen_->ray.y());
     if (grow < 0.1) return false;
-    residual[0] = (seen_.depth - p[2] / grow - change[kDelay] * seen_.depth_rate) / seen_.depth_sigma;
+    const double weight = 1.0 / seen_->depth_sigma;
+    residuals[0] = weight * (seen_->depth - z / grow - change[kDelay] * seen_->depth_rate);
+    if (jacobians == nullptr) return true;
+
+    CameraRow by_camera = CameraRow::Zero();
+    by_camera(kSlopeX) = -weight * z * z * seen_->ray.x() / (grow * grow);
+    by_camera(kSlopeY) = -weight * z * z * seen_->ray.y() / (grow * grow);
+    by_camera(kDelay) = -weight * seen_->depth_rate;
+    const Eigen::RowVector3d by_p(0.0, 0.0, -weight / (grow * grow));
+    Derivatives<1>(jacobians).put(by_camera, by_p, row);
     return true;
   }
 
  private:
-  CalibrationObservation seen_;
-  RowPoint in_camera_;
+  const CalibrationObservation* seen_;
+  const CalibrationPose* pose_;
+  double share_;
 };
 
-constexpr std::size_t kStep = 6;  // turn, then shift
+constexpr std::size_t kSteps = kStep;
 
 /// All unknowns in one buffer, for the order of Ceres' sums hangs on addresses.
 class CameraUnknowns {
  public:
   CameraUnknowns(const CalibrationProblem& problem, const CameraChange& change)
       : poses_(problem.poses.size()) {
-    numbers_.assign(kCameraUnknowns + kStep * poses_ + 3 * problem.points.size(), 0.0);
+    numbers_.assign(kCameraUnknowns + kSteps * poses_ + 3 * problem.points.size(), 0.0);
     std::copy_n(change.data(), kCameraUnknowns, numbers_.data());
     for (std::size_t i = 0; i < problem.points.size(); ++i)
       std::copy_n(problem.points[i].data(), 3, point(static_cast<int>(i)));
   }
   double* change() { return numbers_.data(); }
-  double* step(int i) { return numbers_.data() + kCameraUnknowns + kStep * static_cast<std::size_t>(i); }
+  double* step(int i) { return numbers_.data() + kCameraUnknowns + kSteps * static_cast<std::size_t>(i); }
   double* point(int i) {
-    return numbers_.data() + kCameraUnknowns + kStep * poses_ + 3 * static_cast<std::size_t>(i);
+    return numbers_.data() + kCameraUnknowns + kSteps * poses_ + 3 * static_cast<std::size_t>(i);
   }
 
  private:
@@ -126,17 +197,14 @@ void add_observations(const CalibrationProblem& problem, CameraUnknowns& unknown
   const double height = problem.camera.color.height;
   for (const CalibrationObservation& o : problem.observations) {
     const CalibrationPose& pose = problem.poses[static_cast<std::size_t>(o.pose)];
-    const RowPoint in_camera(pose, o.pixel.y() / height - 0.5);
+    const double share = o.pixel.y() / height - 0.5;
     double* step = unknowns.step(o.pose);
     double* point = unknowns.point(o.point);
-    auto* pixel = new ceres::AutoDiffCostFunction<PixelCost, 2, kCameraUnknowns, kStep, 3>(
-        new PixelCost(o, in_camera, problem.camera));
-    to.AddResidualBlock(pixel, pixel_loss, unknowns.change(), step, point);
+    to.AddResidualBlock(new PixelCost(o, pose, share, problem.camera), pixel_loss, unknowns.change(), step,
+                        point);
     if (pose.fixed) to.SetParameterBlockConstant(step);
     if (!(o.depth > 0.0)) continue;
-    auto* depth =
-        new ceres::AutoDiffCostFunction<DepthCost, 1, kCameraUnknowns, kStep, 3>(new DepthCost(o, in_camera));
-    to.AddResidualBlock(depth, depth_loss, unknowns.change(), step, point);
+    to.AddResidualBlock(new DepthCost(o, pose, share), depth_loss, unknowns.change(), step, point);
   }
 }
 
@@ -152,8 +220,9 @@ bool adjust(const CalibrationProblem& problem, CameraUnknowns& unknowns, ceres::
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
   solver.linear_solver_ordering.reset(ordering);
-  solver.max_num_iterations = 50;
-  solver.function_tolerance = 1e-5;
+  solver.max_num_iterations = 15;
+  solver.function_tolerance = 1e-4;
+  solver.initial_trust_region_radius = 1e7;  // close to the minimum already: nearly Gauss-Newton
   const ceres::Solver::Summary summary = solve(std::move(solver), ceres_problem);
   ceres_problem.SetParameterBlockVariable(unknowns.change());
   return summary.IsSolutionUsable();
@@ -200,15 +269,6 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
 
 }  // namespace
 
-Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vector2d& undistorted) {
-  const sensor::Pinhole& c = camera.color;
-  double x = 0.0;
-  double y = 0.0;
-  distort<double>((undistorted.x() - c.cx) / c.fx, (undistorted.y() - c.cy) / c.fy, camera.distortion[0],
-                  camera.distortion[1], camera.distortion, x, y);
-  return {c.fx * x + c.cx, c.fy * y + c.cy};
-}
-
 sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& change) {
   sensor::Camera camera = given;
   camera.color.fx *= 1.0 + change[kFocal];
@@ -229,7 +289,7 @@ double CameraEvidence::cost_of(const CameraChange& change) const {
   return cost + gradient.dot(d) + 0.5 * d.dot(information * d);
 }
 
-std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem, const CameraChange& change) {
+std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change) {
   if (problem.observations.empty()) return std::nullopt;
   CameraUnknowns unknowns(problem, change);
   ceres::Problem::Options options;
@@ -239,7 +299,15 @@ std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem,
   ceres::Problem ceres_problem(options);
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
-  return eliminated(problem, unknowns, ceres_problem);
+  const auto evidence = eliminated(problem, unknowns, ceres_problem);
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    const Eigen::Map<const Eigen::Matrix<double, kStep, 1>> step(unknowns.step(static_cast<int>(i)));
+    geometry::Rigid3& pose = problem.poses[i].camera_from_world;
+    pose = {geometry::exp_so3(step.head<3>()) * pose.rotation, pose.translation + step.tail<3>()};
+  }
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    problem.points[i] = Eigen::Map<const Eigen::Vector3d>(unknowns.point(static_cast<int>(i)));
+  return evidence;
 }
 
 CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,

@@ -83,6 +83,7 @@ void FrameAligner::match_landmarks(const AlignmentRound& round) {
   const Rigid3& pose = result_.camera_from_world;
   result_.visible_points.clear();
   result_.visible_lines.clear();
+  result_.doubtful.clear();
   if (in_.options.points) {
     result_.points = match_points(in_.map, in_.local_map.points, features(), in_.camera, pose, radius, how,
                                   &result_.visible_points);
@@ -144,8 +145,11 @@ void FrameAligner::constrain_degenerate_directions() {
 }
 
 void FrameAligner::reject_outliers() {
-  keep_inliers(optimize::point_errors(problem_, result_.camera_from_world), kPointGate, result_.points,
-               problem_.points);
+  const std::vector<double> errors = optimize::point_errors(problem_, result_.camera_from_world);
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (errors[i] > kPointGate && result_.points[i].aligned) result_.doubtful.push_back(result_.points[i]);
+  }
+  keep_inliers(errors, kPointGate, result_.points, problem_.points);
   keep_inliers(optimize::line_errors(problem_, result_.camera_from_world), kLineGate, result_.lines,
                problem_.lines);
 }

@@ -85,6 +85,17 @@ void PhotometricKeyframes::add(core::KeyframeId id,
   kept_.emplace_back(id, std::move(samples));
 }
 
+void PhotometricKeyframes::recalibrate(const sensor::Recalibration& change) {
+  for (auto& [id, samples] : kept_) {
+    auto moved = std::make_shared<features::PhotometricSamples>(*samples);
+    for (std::vector<features::PhotometricSample>& level : *moved) {
+      for (features::PhotometricSample& s : level)
+        s.point = change.point(s.point.cast<double>()).cast<float>();
+    }
+    samples = std::move(moved);
+  }
+}
+
 std::shared_ptr<const features::PhotometricSamples> PhotometricKeyframes::find(core::KeyframeId id) const {
   for (auto it = kept_.rbegin(); it != kept_.rend(); ++it) {
     if (it->first == id) return it->second;

@@ -73,7 +73,7 @@ class Run {
     options.tracker.lines = set.lines;
     options.tracker.depth = set.depth;
     slam_ = std::make_unique<mapping::Slam>(options, camera.color, 0, executor_, *log_);
-    slam_->set_shutter(camera.readout_s);
+    slam_->set_camera(camera);
   }
   void process(const PreparedFrame& prepared) {
     if (!prepared.readable) return;

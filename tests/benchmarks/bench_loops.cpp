@@ -127,7 +127,7 @@ class Run {
       : name_(std::move(name)),
         log_(core::null_log()),
         slam_(std::make_unique<mapping::Slam>(options, camera.color, 0, executor_, *log_)) {
-    slam_->set_shutter(camera.readout_s);
+    slam_->set_camera(camera);
   }
   void process(const Prepared& prepared) {
     if (!prepared.readable) return;

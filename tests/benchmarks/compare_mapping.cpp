@@ -89,7 +89,7 @@ struct Prepared {
 struct Run {
   Run(const mapping::SlamOptions& options, const sensor::Camera& camera)
       : log(core::null_log()), slam(options, camera.color, 0, executor, *log) {
-    slam.set_shutter(camera.readout_s);
+    slam.set_camera(camera);
   }
   void process(std::size_t number, const Prepared& prepared) {
     if (!prepared.readable) return;

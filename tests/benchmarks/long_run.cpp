@@ -51,7 +51,7 @@ core::Result<void> run(const std::string& input, const std::string& pipelines,
   const sensor::Pinhole camera = (*source)->camera().color;
   const core::Executor executor(1);
   mapping::Slam slam(*options, camera, 0, executor, *log);
-  slam.set_shutter((*source)->camera().readout_s);
+  slam.set_camera((*source)->camera());
   features::FeatureExtractor extractor({}, camera);
   std::puts("frame,features_ms,slam_ms,rss_mb,keyframes,points,lines,tracked");
   for (std::size_t i = 0; i < (*source)->size(); ++i) {

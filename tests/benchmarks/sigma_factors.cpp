@@ -68,7 +68,7 @@ core::Result<World> mapped(const std::string& scene, int seed, int frames) {
   const sensor::Camera camera = (*source)->camera();
   const features::FeatureExtractor extractor({}, camera.color);
   mapping::Slam slam({}, camera.color, 0, executor, *log);
-  slam.set_shutter(camera.readout_s);
+  slam.set_camera(camera);
   std::map<core::KeyframeId, mapping::CoarseSurface> surfaces;
   for (std::size_t i = 0; i < (*source)->size(); ++i) {
     const auto frame = (*source)->read(i);

@@ -227,7 +227,7 @@ void draw_band(const Scene& scene, const Drawn& drawn, Raster& raster) {
 }
 
 /// Pictures of the same size, `over` with colours that are multiplied by their opacity.
-cv::Mat3b laid_over(const cv::Mat4b& below, const cv::Mat4b& over) {
+cv::Mat3b composited(const cv::Mat4b& below, const cv::Mat4b& over) {
   cv::Mat3b result(below.size());
   for (int y = 0; y < result.rows; ++y) {
     const cv::Vec4b *under = below[y], *top = over[y];
@@ -269,7 +269,7 @@ class Renderer {
       raster.clear(band.first, kBackground);
       draw_band(scene, drawn, raster);
       cv::Mat3b part = picture.rowRange(first_px, std::min(first_px + kBand_px, picture.rows));
-      const cv::Mat3b large = laid_over(raster.picture(), window_->draw())
+      const cv::Mat3b large = composited(raster.picture(), window_->draw())
                                   .rowRange(kMargin, kMargin + kSupersampling * part.rows);
       cv::resize(large, part, part.size(), 0.0, 0.0, cv::INTER_AREA);
     }

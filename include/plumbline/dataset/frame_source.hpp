@@ -47,9 +47,8 @@ class FrameSource {
 };
 
 struct OpenOptions {
-  std::string format = "auto";          ///< one of layout_names()
-  std::string camera;                   ///< shipped name or file; "" = camera.yaml in the folder
-  std::optional<sensor::Camera> known;  ///< in the place of any file
+  std::string format = "auto";  ///< one of layout_names()
+  std::string camera;           ///< shipped name or file; "" = camera.yaml in the folder
   std::filesystem::path cameras_folder;
   double max_pair_gap_s = 0.02;  ///< colour and depth further apart are no pair
   double from_s = 0.0;           ///< seconds after the first pair

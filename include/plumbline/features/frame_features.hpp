@@ -11,6 +11,7 @@
 #include "plumbline/features/line_extractor.hpp"
 #include "plumbline/features/orb.hpp"
 #include "plumbline/features/photometric.hpp"
+#include "plumbline/geometry/rigid3.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/frame.hpp"
 
@@ -45,6 +46,9 @@ struct FrameFeatures {
   std::vector<Eigen::Vector2f> slants;
   PointGrid grid;
   std::vector<LineFeature> lines;
+  /// Motion of the camera (m, rad, its own frame) while the image was read, as far as it was taken out of the
+  /// features: they lie where an image taken all at once shows them. Zero: they lie as they were read.
+  geometry::Vector6d shutter_motion = geometry::Vector6d::Zero();
   cv::Mat thumbnail;        ///< CV_32FC1, kThumbnailWidth wide, blurred grey values
   cv::Mat thumbnail_depth;  ///< CV_32FC1 of the same size, metres, 0 = none
 

@@ -8,6 +8,19 @@
 
 namespace plumbline::features {
 
+/// Where a point of the scene, in the camera's frame, lies a share of the readout later: while row `v` of an
+/// image of `height` rows is read, the share is v / height - 0.5 of the way from the middle row.
+class RowMotion {
+ public:
+  /// `shutter_motion`: FrameFeatures::shutter_motion. Of what has no depth only the turn is known.
+  RowMotion(const geometry::Vector6d& shutter_motion, double share, bool has_depth);
+  /// What would come nearer than 5 cm, or behind the camera, stays.
+  Eigen::Vector3d operator()(const Eigen::Vector3d& p) const;
+
+ private:
+  geometry::Rigid3 motion_;
+};
+
 /// Moves points and lines (and their 3D ends) to where an image taken all at once, when the middle row was
 /// read, would show them. `velocity`: (m/s, rad/s) in the camera frame, camera_from_world(t + dt) =
 /// Exp(velocity dt) camera_from_world(t). `readout_s`: from the first row to the last; 0 changes nothing.

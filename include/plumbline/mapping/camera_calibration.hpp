@@ -16,12 +16,12 @@
 
 namespace plumbline::mapping {
 
-/// A map of one recording, made with the given camera. Both must outlive the call.
+/// A map of one recording, made with the given camera. All must outlive the call.
 struct CalibrationRun {
   const maps::Map* map = nullptr;
-  const std::vector<maps::FramePose>* frames = nullptr;  ///< every frame: how fast the camera moved
-  double undone_s =
-      0.0;  ///< the readout that was undone in its features; 0: they are as the camera showed them
+  const std::vector<maps::FramePose>* frames =
+      nullptr;            ///< every frame: how fast the camera moved, what it saw
+  sensor::Pinhole image;  ///< of the images that the features lie in
 };
 
 /// One number of the camera.
@@ -35,7 +35,7 @@ struct CameraFinding {
 };
 
 struct CalibrationOptions {
-  int keyframes = 120;        ///< of all runs, at most: stretches spread over the runs
+  int views = 200;            ///< keyframes and frames between them of all runs, at most
   double least_gain = 0.002;  ///< share of the cost of parts held out that must go
   double least_sigmas = 3.0;  ///< by which what is found must differ from what was given
   double focal_prior = 0.02;  ///< standard deviation of the given focal length, share
@@ -51,7 +51,7 @@ struct CalibrationOptions {
 struct CameraCalibration {
   sensor::Camera camera;  ///< the given one with what is believed
   std::vector<CameraFinding> findings;
-  int keyframes = 0;
+  int views = 0;
   int observations = 0;
   double gain = 0.0;  ///< share of the cost of parts held out that all together take away
 };

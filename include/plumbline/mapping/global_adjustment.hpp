@@ -59,6 +59,10 @@ struct MapGraphResult {
 MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra, bool robust,
                                core::KeyframeId anchor = {});
 
+/// Where relative poses that are all believed put the keyframes, by id; the map's first one is held. None:
+/// the graph could not be solved.
+KeyframePoses solve_trusted_graph(const maps::Map& map, const std::vector<PoseEdge>& edges);
+
 /// Gives keyframes new poses; points and lines follow the keyframes that see them (mean over these).
 void move_keyframes(maps::Map& map, const KeyframePoses& poses);
 

@@ -118,6 +118,9 @@ class LoopCloser {
   /// map before.
   bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
 
+  /// Drops loops that wait for others to agree with them: they were measured with another camera.
+  void clear_pending() { pending_ = {}; }
+
   /// As an edge of the pose graph: where the query lies relative to the match.
   static PoseEdge to_edge(const Loop& loop);
 

@@ -21,6 +21,7 @@
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
+#include "plumbline/mapping/map_recalibration.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
@@ -67,9 +68,14 @@ class Slam {
   /// places known, as the map tells. A map without keyframes is no place to go on from: nothing happens.
   void restore(maps::Map map, std::vector<maps::FramePose> frames);
 
-  /// As Tracker::set_shutter(). Turns distort no image of a global shutter: keyframes count however fast
-  /// the camera turned.
-  void set_shutter(std::optional<double> readout_s) { tracker_.set_shutter(readout_s); }
+  /// The camera that took the pictures, of which rectified images are made: its shutter, and what is measured
+  /// in them. To be called before the first frame; without it they are those of the pinhole.
+  void set_camera(const sensor::Camera& camera);
+  /// It turns out to be another one. The map is made anew for it and adjusted (recalibrate_map), and frames
+  /// that come from now on have been read as that camera's. `read`: pictures of keyframes again; may be
+  /// empty.
+  void recalibrate(const sensor::Camera& camera, const PictureReader& read);
+  [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
 
   /// From now on maps of other robots serve for relocalisation and loops (without loops: for nothing). What
   /// comes in there, and when, decides what becomes of this map.
@@ -106,7 +112,12 @@ class Slam {
   void commit_bundles();
   void close_loops(core::KeyframeId keyframe);
 
+  [[nodiscard]] std::shared_ptr<const maps::SeenPoints> seen_points() const;
+
   SlamOptions options_;
+  const core::Executor& executor_;
+  sensor::Pinhole image_;
+  sensor::Camera camera_;
   maps::Map map_;
   tracking::Tracker tracker_;
   tracking::TrackResult last_track_;

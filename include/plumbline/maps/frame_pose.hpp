@@ -2,6 +2,8 @@
 #pragma once
 
 // Poses of frames that are not keyframes: kept relative to a keyframe, so that they move with it.
+#include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -15,6 +17,21 @@ class Map;
 
 using FrameId = core::Id<struct FrameTag>;  ///< a robot's frame: its place among the robot's FramePoses
 
+/// A landmark as the picture of a frame showed it (features::PixelDepth): what was measured, whatever the
+/// camera is believed to be.
+struct SeenPoint {
+  core::PointId point;
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< of the picture, as the lens showed it
+  float depth = 0.0F;                               ///< metres, as the depth camera gave it; 0: none
+  float sigma_px = 1.0F;
+};
+/// What a frame saw.
+struct SeenPoints {
+  double depth_delay_s =
+      0.0;  ///< of the camera that was believed then: so much of it is not in the depths any more
+  std::vector<SeenPoint> points;
+};
+
 struct FramePose {
   double stamp = 0.0;  ///< seconds
   core::KeyframeId reference;
@@ -23,6 +40,7 @@ struct FramePose {
   /// Motion since the frame before as the tracker saw it; none where one of the two was not tracked.
   std::optional<geometry::Rigid3> camera_from_previous;
   double step_sigma_m = 0.0;  ///< its standard deviation where it is known worst; half as much in radians
+  std::shared_ptr<const SeenPoints> seen = nullptr;  ///< what its camera is asked of; null: not kept
 };
 
 /// A step between neighbouring frames of the path as it lies now, beside the one that the tracker saw.
@@ -71,6 +89,9 @@ struct MapPoses {
 
 /// All poses as they lie in `map` now; frames in the order given.
 MapPoses poses_of(const Map& map, const std::vector<FramePose>& frames);
+
+/// The trajectory of each robot.
+std::map<std::int32_t, geometry::Trajectory> by_robot(const MapPoses& map);
 
 /// Gives poses in another frame in the place of their map's.
 void move(MapPoses& poses, const geometry::Rigid3& frame_from_map);

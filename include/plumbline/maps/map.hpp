@@ -71,15 +71,15 @@ constexpr int kPatchedKeyframes = 200;
 
 struct MapPoint {
   PointId id;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();         ///< world, metres
-  features::Descriptor256 descriptor{};                       ///< the most typical of its observations
-  float angle = 0.0F;                                         ///< of that observation, degrees in its image
-  KeyframeId angle_keyframe;                                  ///< whose image
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, metres
+  features::Descriptor256 descriptor{};                ///< the most typical of its observations
+  float angle = 0.0F;                                  ///< of that observation, degrees in its image
+  KeyframeId angle_keyframe;                           ///< whose image
+  int reference_octave = 0;                            ///< in which octave its first observation saw it
   Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< world, unit, of the surface it lies on, towards the
                                                      ///< camera that measured it; zero: unknown
   double reference_distance = 1.0;                   ///< metres from the camera of its first observation
-  int reference_octave = 0;                          ///< in which octave it was seen there
   std::vector<Observation> observations;
   int visible = 0;  ///< frames whose view contained it
   int found = 0;    ///< frames that matched it
@@ -173,6 +173,9 @@ class Map {
   // Keyframes. camera_from_world of each is an estimate that set_pose replaces.
   KeyframeId add_keyframe(std::shared_ptr<const Keyframe> keyframe,
                           const geometry::Rigid3& camera_from_world);
+  /// Puts a keyframe that was made anew, of the same measurements, in the place of the one with its id: as
+  /// many features, in the same order (else std::invalid_argument).
+  void replace_keyframe(std::shared_ptr<const Keyframe> keyframe);
   [[nodiscard]] KeyframeId next_keyframe_id(std::int32_t robot) const;
   [[nodiscard]] bool has_keyframe(KeyframeId id) const { return keyframes_.contains(id); }
   [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return *keyframes_.at(id).data; }
@@ -241,6 +244,8 @@ class Map {
   [[nodiscard]] int shared(KeyframeId a, KeyframeId b) const;
 
   void add_edge(const SurfaceEdge& edge);
+  /// Gives an edge, by its number in edges(), another measurement between the same keyframes.
+  void replace_edge(std::uint64_t number, const SurfaceEdge& edge);
   /// Edges that have `keyframe` at one end, in order of creation.
   [[nodiscard]] std::vector<SurfaceEdge> edges_of(KeyframeId keyframe) const;
 

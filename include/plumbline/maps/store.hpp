@@ -20,14 +20,24 @@
 namespace plumbline::maps {
 
 /// Stores of other formats are refused.
-constexpr int kStoreFormat = 8;
+constexpr int kStoreFormat = 9;
 constexpr const char* kStoreFile = "map.db";  ///< in a result folder
 
-/// A robot of a map.
+/// What a robot's camera turned out to be while its map grew, or when it was finished.
+struct CameraVersion {
+  sensor::Camera camera;
+  std::int32_t first_keyframe = 0;  ///< keyframes from this number on were read as this camera's
+  std::int32_t first_frame = 0;     ///< frames of the robot's path, likewise
+};
+
+/// A robot of a map. All images are rectified to the pinhole of `camera`, whatever it turned out to be.
+/// Keyframes and landmarks are those of the latest version; clouds and their surfaces are stored as they were
+/// read, and CameraHistory makes the latest version's of them.
 struct RobotInfo {
   std::int32_t number = 0;  ///< in the map's ids
   std::string name;
-  sensor::Camera camera;
+  sensor::Camera camera;                ///< as it was given
+  std::vector<CameraVersion> versions = {};  ///< in order; empty: it is as it was given
 };
 
 /// What is written once, when a store is made.
@@ -97,6 +107,9 @@ struct StoreStep {
   std::vector<FramePose> frames;          ///< that came since
   std::vector<std::string> log;           ///< lines that came since
   std::vector<StoreCloud> clouds;
+  /// All robots, when the camera of one became another: keyframes and edges of `map`, which is whole then,
+  /// were made anew. Null: no camera changed.
+  std::shared_ptr<const std::vector<RobotInfo>> robots = nullptr;
 };
 
 /// How a new store comes about.

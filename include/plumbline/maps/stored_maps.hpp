@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
+#include "plumbline/maps/camera_history.hpp"
 #include "plumbline/maps/store.hpp"
 
 namespace plumbline::maps {
@@ -21,7 +23,10 @@ struct StoredPart {
   std::unique_ptr<StoreReader> reader;
   Map map;
   std::vector<FramePose> frames;
-  std::vector<RobotInfo> robots;
+  std::vector<RobotInfo> robots;  ///< their clouds are given as the latest version of their camera has them
+  CameraHistory cameras;          ///< by the store's numbers
+  std::map<std::int32_t, geometry::Trajectory>
+      paths;                                     ///< of each robot in the part's map, by this run's numbers
   std::map<std::int32_t, std::int32_t> numbers;  ///< of robots: from the store's to this run's
 };
 
@@ -47,9 +52,9 @@ class StoredMaps {
   [[nodiscard]] const std::vector<StoredCloud>& clouds() const { return clouds_; }
   /// May be called from several threads at a time.
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(std::size_t index) const;
-  /// What unpack_surface makes the coarse surface of a keyframe's cloud of; empty: none was kept. May
-  /// be called from several threads at a time.
-  [[nodiscard]] core::Result<std::vector<std::uint8_t>> surface_bytes(std::size_t index) const;
+  /// The coarse surface of a keyframe's cloud; none: none was kept. May be called from several threads at a
+  /// time.
+  [[nodiscard]] core::Result<std::optional<StoredSurface>> surface(std::size_t index) const;
   /// Of all parts, by this run's numbers.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   /// What to say of a cloud that cannot be used.
@@ -62,6 +67,7 @@ class StoredMaps {
   static core::Result<StoredPart> read_part(const std::filesystem::path& map);
   core::Result<void> arrange(const core::Executor& executor);
   core::Result<void> list_clouds(std::size_t part);
+  [[nodiscard]] geometry::Vector6d velocity_of(const StoredCloud& cloud) const;
 
   std::vector<StoredPart> parts_;
   std::vector<RobotInfo> robots_;

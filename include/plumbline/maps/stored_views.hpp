@@ -8,6 +8,7 @@
 #include <map>
 #include <vector>
 
+#include "plumbline/maps/camera_history.hpp"
 #include "plumbline/maps/store.hpp"
 
 namespace plumbline::maps {
@@ -20,19 +21,23 @@ struct StoredViews {
   std::vector<geometry::Rigid3> world_from_camera;
   std::vector<std::int32_t> robots;
   std::vector<double> stamps;
+  std::vector<geometry::Vector6d> velocities;  ///< of camera_from_world, in its own frame; m/s, rad/s
+  CameraHistory cameras;                       ///< what the clouds were read as
 
   [[nodiscard]] std::size_t size() const { return stamps.size(); }
-  /// A view's cloud; from several threads at a time. Errors (kInput): damaged.
+  /// A view's cloud as the latest version of its camera has it; from several threads at a time. Errors
+  /// (kInput): damaged.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(std::size_t view) const;
 };
 
 /// When clouds of frames came; those that are not there came before.
 using Arrivals = std::map<FrameId, std::size_t>;
 
-/// `reader` must outlive the views. Frames stand in the order of their arrival, else by robot and order: sums
-/// of a dense cloud are rounded as they come. Errors (kInput): damaged.
+/// `reader` must outlive the views. `robots`: what their cameras turned out to be. Frames stand in the order
+/// of their arrival, else by robot and order: sums of a dense cloud are rounded as they come. Errors
+/// (kInput): damaged.
 core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& map,
-                                   const Arrivals& arrivals = {});
+                                   const std::vector<RobotInfo>& robots, const Arrivals& arrivals = {});
 
 /// The cloud of each keyframe as FOLDER/<number, six digits>.ply, laid by `output_from_map`; makes the
 /// folder. `read`: a view's cloud. Returns how many. Errors (kOutput), those of `read`.

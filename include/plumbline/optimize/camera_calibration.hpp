@@ -35,7 +35,6 @@ struct CalibrationPose {
   geometry::Rigid3 camera_from_world;  ///< when the middle row was read
   /// (m/s, rad/s): camera_from_world(t + dt) = Exp(velocity dt) camera_from_world(t).
   geometry::Vector6d velocity = geometry::Vector6d::Zero();
-  double undone_s = 0.0;  ///< the readout whose motion is no longer in pixels and depths
   bool fixed = false;
 };
 
@@ -75,15 +74,13 @@ struct CameraPrior {
   CameraChange sigma = CameraChange::Ones();  ///< > 0
 };
 
-/// Pixel of the picture, distortion and all, of the undistorted pixel.
-Eigen::Vector2d distorted_pixel(const sensor::Camera& camera, const Eigen::Vector2d& undistorted);
-
 /// The given camera, changed.
 sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& change);
 
 /// The evidence of a problem around the camera that `change` makes of the given one, poses (those that are
-/// not fixed) and points being adjusted to that. None: it could not be solved.
-std::optional<CameraEvidence> camera_evidence(const CalibrationProblem& problem, const CameraChange& change);
+/// not fixed) and points being adjusted to that: the problem has them afterwards, so that the next question
+/// begins there. None: it could not be solved.
+std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change);
 
 /// What all the evidence and the prior say together. Unknowns that are not free have the prior's mean.
 CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,

@@ -26,6 +26,8 @@
 
 namespace plumbline::pipeline {
 
+using maps::RobotInfo;
+
 /// One line of frames.csv.
 struct FrameRow {
   std::size_t frame = 0;  ///< number within the run
@@ -45,9 +47,9 @@ struct TrackedFrame {
   std::shared_ptr<const maps::MapChanges> changes;  ///< of the map since the last keyframe, with each
                                                     ///< keyframe, when somebody keeps the map
   std::shared_ptr<const maps::Map> map;             ///< of several robots: as it is with this keyframe
+  /// With a keyframe, when the robot's camera became another since the last one: all robots. Null: none did.
+  std::shared_ptr<const std::vector<RobotInfo>> robots;
 };
-
-using maps::RobotInfo;
 
 /// The map of one robot when its tracking has ended, or a finished map of one robot or several.
 struct RobotMap {
@@ -70,7 +72,7 @@ struct MapResult : maps::MapPoses {
   std::vector<maps::FramePose> frame_poses;         ///< empty when `map` is null
   std::vector<mapping::KeyframeAccuracy> accuracy;  ///< of the keyframes; empty: not known
   std::vector<maps::LineSegment3> lines;
-  std::vector<RobotInfo> robots;  ///< by number; empty: one robot with the recording's camera
+  std::vector<RobotInfo> robots;  ///< by number, with what their cameras turned out to be; empty: one robot
   std::string frame_columns;      ///< header of FrameRow::columns
   std::vector<FrameRow> frames;   ///< by frame
 };

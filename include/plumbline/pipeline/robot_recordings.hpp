@@ -38,6 +38,12 @@ class RobotRecordings : public dataset::FrameSource {
   /// robot(...).camera all the same. Of sources that cannot, nothing changes. Beside read().
   void correct(std::size_t from, const std::vector<sensor::Camera>& cameras);
 
+  /// A robot's recording as taken by another camera, rectified into the same images; null: it cannot be.
+  [[nodiscard]] std::unique_ptr<dataset::FrameSource> taken_by(std::int32_t robot,
+                                                               const sensor::Camera& camera) const {
+    return recordings_[static_cast<std::size_t>(robot)]->taken_by(camera);
+  }
+
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& format() const override { return recordings_.front()->format(); }
   [[nodiscard]] const sensor::Camera& camera() const override { return recordings_.front()->camera(); }

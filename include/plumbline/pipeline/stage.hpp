@@ -43,7 +43,6 @@ class StoredMaps;
 
 namespace plumbline::pipeline {
 
-struct CameraDecision;
 struct ResumedRun;
 struct RunSummary;
 class RobotRecordings;
@@ -139,7 +138,6 @@ struct RunContext {
   std::function<void(maps::Map&)>
       alter_map;                        ///< for tests: changes the map when tracking has ended; may be empty
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
-  CameraDecision* cameras = nullptr;    ///< what a track stage asks its maps; null: nothing is asked
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
 };
 

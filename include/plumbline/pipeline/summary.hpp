@@ -160,11 +160,6 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
 core::Result<void> write_timing(const std::filesystem::path& file, const RunReport& report,
                                 const std::vector<StageTiming>& parts, const dataset::FrameSource& source);
 
-/// What summary.json says of a camera, on one line.
-std::string camera_json(const RunSummary::Camera& camera);
-/// None: `text` is not that.
-std::optional<RunSummary::Camera> camera_from_json(const std::string& text);
-
 /// A few lines for people.
 std::string to_text(const RunSummary& summary);
 

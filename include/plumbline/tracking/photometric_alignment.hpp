@@ -14,6 +14,7 @@
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/photometric_terms.hpp"
 #include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/recalibration.hpp"
 
 namespace plumbline::tracking {
 
@@ -40,6 +41,8 @@ constexpr int kMinPhotometric = 500;
 class PhotometricKeyframes {
  public:
   void add(core::KeyframeId id, std::shared_ptr<const features::PhotometricSamples> samples);
+  /// Samples lie where another camera saw them.
+  void recalibrate(const sensor::Recalibration& change);
   /// Null: not known, or forgotten.
   [[nodiscard]] std::shared_ptr<const features::PhotometricSamples> find(core::KeyframeId id) const;
   /// associate_photometric() with the first of `keyframes` that has enough in view.

@@ -20,6 +20,7 @@
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/pose_solver.hpp"
 #include "plumbline/sensor/frame.hpp"
+#include "plumbline/sensor/recalibration.hpp"
 #include "plumbline/tracking/association.hpp"
 #include "plumbline/tracking/local_map.hpp"
 #include "plumbline/tracking/motion_model.hpp"
@@ -59,6 +60,8 @@ struct TrackResult {
   geometry::Rigid3 camera_from_world;
   geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
   std::vector<PointMatch> points;      ///< inliers
+  /// Matches that look like their landmark but lie too far from it: what a wrong camera does to right ones.
+  std::vector<PointMatch> doubtful;
   std::vector<LineMatch> lines;
   std::vector<core::PointId> visible_points;  ///< landmarks that should have been seen
   std::vector<core::LineId> visible_lines;
@@ -100,6 +103,9 @@ class Tracker {
   /// What the camera's file says of its shutter (sensor::Camera::readout_s), in the place of the option;
   /// none: as it was. A readout of 0 is a global shutter's.
   void set_shutter(std::optional<double> readout_s);
+
+  /// The camera turned out to be another one: what is kept of keyframes' intensities is made anew.
+  void recalibrate(const sensor::Recalibration& change) { photometric_.recalibrate(change); }
 
   /// The map has changed, or another keyframe becomes the reference: where the last pose lies now.
   void map_changed(const maps::Map& map, core::KeyframeId reference,

@@ -58,6 +58,7 @@ class Mapped {
     }
     runs_.push_back(
         std::make_unique<mapping::Slam>(slam_options(), camera.color, 0, session.executor(), console));
+    runs_.back()->set_camera(camera);
     track(**source, session);
     return {};
   }
@@ -65,7 +66,7 @@ class Mapped {
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
   [[nodiscard]] std::vector<mapping::CalibrationRun> runs() const {
     std::vector<mapping::CalibrationRun> runs;
-    for (const auto& slam : runs_) runs.push_back({&slam->map(), &slam->frame_poses()});
+    for (const auto& slam : runs_) runs.push_back({&slam->map(), &slam->frame_poses(), camera_.color});
     return runs;
   }
 
@@ -106,7 +107,7 @@ class Mapped {
 };
 
 void print(const mapping::CameraCalibration& calibration) {
-  fmt::print("{} keyframes, {} observations of points\n", calibration.keyframes, calibration.observations);
+  fmt::print("{} views, {} observations of points\n", calibration.views, calibration.observations);
   fmt::print("{:<14} {:>10} {:>10} {:>9} {:>7}\n", "", "given", "found", "+-", "gain");
   for (const mapping::CameraFinding& f : calibration.findings) {
     fmt::print("{:<14} {:>10.5g} {:>10.5g} {:>9.2g} {:>6.1f}% {}\n", f.name, f.given, f.found, f.sigma,
@@ -149,7 +150,7 @@ void add_calibrate(CLI::App& app, Session& session) {
   command->add_option("--camera", request->open.camera, "Shipped calibration or file to begin with")
       ->type_name("NAME|FILE");
   add_time_range(*command, request->open);
-  command->add_option("--keyframes", request->options.keyframes, "Keyframes that are adjusted at most")
+  command->add_option("--views", request->options.views, "Keyframes and frames that are adjusted at most")
       ->check(CLI::Range(16, 2000));
 }
 

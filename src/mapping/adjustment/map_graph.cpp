@@ -156,6 +156,32 @@ void add_verdicts(const Gating& gating, optimize::PoseGraphSummary& summary) {
   summary.edges = std::move(verdicts);
 }
 
+/// A pose graph of a map's keyframes, by id.
+class GraphBuilder {
+ public:
+  GraphBuilder(const maps::Map& map, KeyframeId anchor) : ids_(map.keyframe_ids()) {
+    for (const KeyframeId id : ids_) {
+      index_[id] = static_cast<int>(graph_.poses.size());
+      graph_.poses.push_back({map.camera_from_world(id), id == anchor});
+    }
+  }
+  void add(const PoseEdge& e, const Matrix6d& information) {
+    graph_.edges.push_back({index_.at(e.a), index_.at(e.b), e.b_from_a, information, e.trusted});
+  }
+  [[nodiscard]] optimize::PoseGraph& graph() { return graph_; }
+  [[nodiscard]] KeyframePoses poses() const {
+    KeyframePoses poses;
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      poses.emplace_back(ids_[i], graph_.poses[i].camera_from_world);
+    return poses;
+  }
+
+ private:
+  std::vector<KeyframeId> ids_;
+  std::map<KeyframeId, int> index_;
+  optimize::PoseGraph graph_;
+};
+
 /// Mean of the places where a landmark's keyframes would take it.
 Eigen::Vector3d carried(const Eigen::Vector3d& p, const std::vector<maps::Observation>& seen,
                         const std::map<KeyframeId, Rigid3>& new_from_old) {
@@ -212,6 +238,13 @@ void set_loops(maps::Map& map, const std::vector<PoseEdge>& edges) {
   map.set_loops(std::move(loops));
 }
 
+KeyframePoses solve_trusted_graph(const maps::Map& map, const std::vector<PoseEdge>& edges) {
+  GraphBuilder graph(map, map.keyframe_ids().front());
+  for (const PoseEdge& e : edges) graph.add(e, e.information);
+  if (!optimize::solve_pose_graph(graph.graph(), false).usable) return {};
+  return graph.poses();
+}
+
 MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra, bool robust,
                                KeyframeId anchor) {
   MapGraphResult result;
@@ -221,24 +254,15 @@ MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>
     return result;
   }
   if (!anchor.valid()) anchor = ids.front();
-  std::map<KeyframeId, int> index;
-  optimize::PoseGraph graph;
-  for (const KeyframeId id : ids) {
-    index[id] = static_cast<int>(graph.poses.size());
-    graph.poses.push_back({map.camera_from_world(id), id == anchor});
-  }
-  const auto add = [&](const PoseEdge& e, const Matrix6d& information) {
-    graph.edges.push_back({index.at(e.a), index.at(e.b), e.b_from_a, information, e.trusted});
-  };
+  GraphBuilder graph(map, anchor);
   const Gating gating = gate_edges(map, ids, extra, robust);
   for (std::size_t i = 0; i < extra.size(); ++i) {
-    if (!gating.refused[i]) add(extra[i], extra[i].information);
+    if (!gating.refused[i]) graph.add(extra[i], extra[i].information);
   }
-  for (const PoseEdge& e : map_edges(map)) add(e, e.information / gating.drift_factor);
-  result.summary = optimize::solve_pose_graph(graph, robust);
+  for (const PoseEdge& e : map_edges(map)) graph.add(e, e.information / gating.drift_factor);
+  result.summary = optimize::solve_pose_graph(graph.graph(), robust);
   add_verdicts(gating, result.summary);
-  for (std::size_t i = 0; i < ids.size(); ++i)
-    result.poses.emplace_back(ids[i], graph.poses[i].camera_from_world);
+  result.poses = graph.poses();
   return result;
 }
 

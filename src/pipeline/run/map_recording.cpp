@@ -18,7 +18,7 @@
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "run/result.hpp"
-#include "stages/camera_decision.hpp"
+#include "stages/camera_refinement.hpp"
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
 #include "stages/waiting_clouds.hpp"
@@ -89,19 +89,16 @@ MapRequest in_order(MapRequest request) {
   return request;
 }
 
-/// `cameras`: by robot, in the place of files; empty: as the recordings say.
 core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& request,
-                                                           const std::vector<sensor::Camera>& cameras,
                                                            const core::Executor& executor, core::Log& log) {
   const std::filesystem::path scenes = request.pipelines_folder / "scenes";
   std::vector<std::string> inputs{request.input};
   inputs.insert(inputs.end(), request.others.begin(), request.others.end());
   std::vector<std::unique_ptr<dataset::FrameSource>> all;
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
+  for (const std::string& input : inputs) {
     dataset::OpenOptions open = request.open;
     open.cameras_folder = request.pipelines_folder / "cameras";
-    if (!cameras.empty()) open.known = cameras[i];
-    auto recording = open_input(inputs[i], open, scenes, executor, log);
+    auto recording = open_input(input, open, scenes, executor, log);
     if (!recording) return tl::unexpected(recording.error());
     all.push_back(std::move(*recording));
   }
@@ -163,23 +160,22 @@ core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
   return error;
 }
 
-/// A recording once from its first frame to its last; a better camera that is found on the way asks for
-/// another one.
+/// A recording from its first frame to its last.
 class MapRun {
  public:
-  MapRun(const MapRequest& request, const core::Executor& executor, core::Log& log, CameraDecision& cameras)
-      : request_(request), executor_(executor), log_(log), cameras_(cameras) {}
+  MapRun(const MapRequest& request, const core::Executor& executor, core::Log& log)
+      : request_(request), executor_(executor), log_(log) {}
 
   /// Everything is checked, nothing begun.
   core::Result<void> open() {
     auto graph = load_pipeline(request_);
     if (!graph) return tl::unexpected(graph.error());
     graph_ = std::move(*graph);
-    if (cameras_.given.empty()) {
-      for (const std::string& warning : graph_.warnings) log_.warning(warning);
-    }
+    for (const std::string& warning : graph_.warnings) log_.warning(warning);
     if (auto can = fits(graph_, request_); !can) return can;
-    if (auto opened = open_source(); !opened) return opened;
+    auto source = open_inputs(request_, executor_, log_);
+    if (!source) return tl::unexpected(source.error());
+    source_ = std::move(*source);
     return can_resume(graph_, request_);
   }
 
@@ -187,15 +183,13 @@ class MapRun {
                                RunClock::time_point began) {
     if (auto prepared = prepare(); !prepared) return tl::unexpected(prepared.error());
     RunContext context = context_of(stop);
-    if (!cameras_.used.empty() || context.cameras == nullptr) {
-      if (auto ok = write_cameras(output_->path(), *source_, cameras_); !ok)
-        return tl::unexpected(ok.error());
-    }
+    std::vector<sensor::Camera> cameras;
+    for (const RobotInfo& robot : source_->robots()) cameras.push_back(robot.camera);
+    if (auto ok = write_cameras(output_->path(), source_->robots(), cameras); !ok)
+      return tl::unexpected(ok.error());
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress);
-    if (cameras_.again) return tl::unexpected(report.error());
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
-    if (auto ok = cameras_.settle(context); !ok) return tl::unexpected(ok.error());
     RunSummary summary = summary_of(*report);
     if (auto ok = write_timing(output_->path() / "timing.csv", *report, summary.parts, *source_); !ok)
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
@@ -208,20 +202,6 @@ class MapRun {
   }
 
  private:
-  core::Result<void> open_source() {
-    auto source = open_inputs(request_, cameras_.used, executor_, log_);
-    if (!source) return tl::unexpected(source.error());
-    source_ = std::move(*source);
-    if (!cameras_.given.empty()) return {};
-    for (const RobotInfo& robot : source_->robots()) cameras_.given.push_back(robot.camera);
-    if (!request_.resume) return {};
-    cameras_.restore(maps::OutputFolder::partial_of(request_.output), *source_);
-    if (cameras_.used.empty()) return {};
-    if (cameras_.from == 0) return open_source();
-    source_->correct(cameras_.from, cameras_.used);
-    return {};
-  }
-
   /// The folders that are written into, and what lies there already.
   core::Result<void> prepare() {
     auto output = maps::OutputFolder::prepare(request_.output, request_.replace, request_.resume);
@@ -262,7 +242,6 @@ class MapRun {
     context.alter_map = request_.alter_map;
     context.feedback = request_.feedback;
     if (resumed_) context.resumed = &*resumed_;
-    if (tracks(graph_) && source_->format() != "synth") context.cameras = &cameras_;  // no lens, no error
     return context;
   }
 
@@ -271,19 +250,12 @@ class MapRun {
     summary.input = request_.input;
     for (const std::string& other : request_.others) summary.input += " " + other;
     summary.pace_hz = request_.pace_hz;
-    summary.cameras = cameras_.said;
-    for (const RobotInfo& robot : source_->robots()) {
-      if (robot.camera.guess && cameras_.said.empty())
-        summary.cameras.push_back(
-            {robot.name, {}, 0.0, "", "no camera file was given: the camera is a guess", 0});
-    }
     return summary;
   }
 
   const MapRequest& request_;
   const core::Executor& executor_;
   core::Log& log_;
-  CameraDecision& cameras_;
   Graph graph_;
   std::unique_ptr<RobotRecordings> source_;
   std::optional<maps::OutputFolder> output_;
@@ -302,15 +274,10 @@ core::Result<RunSummary> map_recording(const MapRequest& given, const core::Exec
                                        core::Log& log, const core::StopToken& stop,
                                        const Progress& progress) {
   const auto began = RunClock::now();
-  MapRequest request = in_order(given);
-  CameraDecision cameras;
-  while (true) {
-    MapRun run(request, executor, log, cameras);
-    if (auto opened = run.open(); !opened) return tl::unexpected(opened.error());
-    auto summary = run.run(stop, progress, began);
-    if (!std::exchange(cameras.again, false)) return summary;
-    request.resume = false;  // what is there was made with another camera
-  }
+  const MapRequest request = in_order(given);
+  MapRun run(request, executor, log);
+  if (auto opened = run.open(); !opened) return tl::unexpected(opened.error());
+  return run.run(stop, progress, began);
 }
 
 }  // namespace plumbline::pipeline

@@ -298,11 +298,9 @@ std::string to_text(const RunSummary& s) {
   for (const std::string& without : {left_out_text(s), left_out_of_map_text(s)}) {
     if (!without.empty()) text += fmt::format("left out   {}\n", without);
   }
-  const bool again =
-      std::any_of(s.cameras.begin(), s.cameras.end(), [](const auto& camera) { return camera.asked > 1; });
-  text += fmt::format(
-      "time       {:.1f} s in all{}, {:.1f} s of it export: {:.1f} frames a second without that\n", s.wall_s,
-      again ? " (begun again with a better camera)" : "", s.export_s, s.fps());
+  text +=
+      fmt::format("time       {:.1f} s in all, {:.1f} s of it export: {:.1f} frames a second without that\n",
+                  s.wall_s, s.export_s, s.fps());
   if (s.pace_hz > 0.0) {
     text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", s.pace_hz, s.behind_s);
   }

@@ -28,26 +28,4 @@ Json cameras_of(const RunSummary& summary) {
   return list;
 }
 
-std::string camera_json(const RunSummary::Camera& camera) {
-  return camera_of(camera).dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-std::optional<RunSummary::Camera> camera_from_json(const std::string& text) try {
-  const auto json = nlohmann::json::parse(text);
-  RunSummary::Camera camera;
-  camera.robot = json.at("robot");
-  camera.gain = json.at("gain");
-  for (const auto& n : json.at("numbers")) {
-    camera.findings.push_back(
-        {n.at("name"), n.at("given"), n.at("found"), n.at("sigma"), n.at("gain"), n.at("used")});
-  }
-  camera.asked = json.at("asked");
-  camera.from_frame = json.at("from_frame");
-  camera.note = json.at("note");
-  camera.doubt = json.at("doubt");
-  return camera;
-} catch (const nlohmann::json::exception&) {
-  return std::nullopt;
-}
-
 }  // namespace plumbline::pipeline

@@ -173,8 +173,7 @@ core::Result<std::optional<ResumedRun>> open_resumed(const fs::path& folder, con
   if (auto same = check_same(run.store, "recording", header.input, input); !same)
     return tl::unexpected(same.error());
   for (const RobotInfo& robot : header.robots) {
-    sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
-    camera.depth_delay_s = 0.0;  // belongs to the recording's stamps
+    const sensor::Camera camera = maps::camera_of(recordings.robots(), robot.number);
     if (auto same = check_same(run.store, "camera", sensor::to_yaml(robot.camera), sensor::to_yaml(camera));
         !same) {
       return tl::unexpected(same.error());

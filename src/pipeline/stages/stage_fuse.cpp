@@ -67,7 +67,7 @@ class FuseStage : public Stage {
     const auto map = io.input<MapResult>("map");
     const auto stored = clouds_->open();
     if (!stored) return tl::unexpected(stored.error());
-    const auto views = views_of(**stored, *map, clouds_->arrivals());
+    const auto views = views_of(**stored, *map, map->robots, clouds_->arrivals());
     if (!views) return tl::unexpected(views.error());
     auto fused = fuse(*map, *views);
     if (!fused) return tl::unexpected(fused.error());
@@ -79,9 +79,9 @@ class FuseStage : public Stage {
     dense->state = state_;
     if (dense->upright) cloud::transform(*fused->cloud, report_.frame.output_from_map);
     if (keyframe_clouds_) {
-      const auto written = maps::write_keyframe_clouds(
-          context_->output_folder / "keyframes", *views, report_.frame.output_from_map,
-          [&](std::size_t i) { return read(*views, i); });
+      const auto written = maps::write_keyframe_clouds(context_->output_folder / "keyframes", *views,
+                                                       report_.frame.output_from_map,
+                                                       [&](std::size_t i) { return read(*views, i); });
       if (!written) return tl::unexpected(written.error());
     }
     clouds_->clear();

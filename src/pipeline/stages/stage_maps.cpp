@@ -49,12 +49,9 @@ class MapsStage : public Stage {
  private:
   /// As it was kept with the map, if it was.
   core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
-    const auto kept = maps_->surface_bytes(index);
-    if (!kept) return tl::unexpected(kept.error());
-    if (kept->empty()) return {};
-    auto surface = maps::unpack_surface(*kept);
+    auto surface = maps_->surface(index);
     if (!surface) return tl::unexpected(surface.error());
-    result.surface = std::make_shared<maps::StoredSurface>(std::move(*surface));
+    if (*surface) result.surface = std::make_shared<maps::StoredSurface>(std::move(**surface));
     return {};
   }
 

@@ -113,6 +113,7 @@ class MergeStage : public Stage {
       merged_.map = std::make_shared<MapResult>();
       merged_.map->map = maps->maps.front().map;
       merged_.map->frame_poses = maps->maps.front().frame_poses;
+      merged_.map->robots = maps->maps.front().robots;
       take_poses_from_map(*merged_.map);
     } else {
       merge(maps->maps);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "plumbline/mapping/refinement.hpp"
+#include "plumbline/maps/camera_history.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
@@ -39,6 +40,7 @@ class RefineStage : public Stage {
     const auto before = io.input<MapResult>("map");
     auto result = std::make_shared<MapResult>(*before);
     if (options_.adjust && before->map != nullptr && before->map->keyframe_count() > 1) {
+      correct_surfaces(*before);
       auto map = std::make_shared<maps::Map>(*before->map);
       auto refined = mapping::refine_map(*map, surfaces_, cameras_, options_, *executor_, *log_);
       result->map = map;
@@ -74,6 +76,16 @@ class RefineStage : public Stage {
     const auto cloud = cloud_of(keyframe);
     if (!cloud) return tl::unexpected(cloud.error());
     return mapping::coarse_surface(**cloud, options_.local_maps.voxel_m);
+  }
+  /// To what the latest version of their camera measured.
+  void correct_surfaces(const MapResult& map) {
+    const maps::CameraHistory cameras(map.robots);
+    const auto paths = maps::by_robot(map);
+    for (auto& [id, surface] : surfaces_) {
+      const auto path = paths.find(id.robot);
+      if (path == paths.end() || !cameras.changes(id) || !map.map->has_keyframe(id)) continue;
+      cameras.apply(id, geometry::velocity_at(path->second, map.map->keyframe(id).stamp), surface);
+    }
   }
   /// Of the keyframes of the run that this one goes on from.
   core::Result<void> read_surfaces(const ResumedRun& run) {

@@ -92,6 +92,7 @@ class StoreStage : public Stage {
           "store: only a map that was tracked can be stored; remove this stage where poses come from a file");
     }
     step.map = track.changes;
+    step.robots = track.robots;
     step.clouds = std::move(clouds);
     return writer_->add(step);
   }

@@ -12,7 +12,7 @@
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "plumbline/pipeline/summary.hpp"
-#include "stages/camera_decision.hpp"
+#include "stages/camera_refinement.hpp"
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
 #include "stages/stages.hpp"
@@ -23,46 +23,49 @@ namespace {
 // What a map has seen when it is asked for its camera: keyframes or seconds.
 constexpr std::size_t kCameraKeyframes = 40;
 constexpr double kCamera_s = 10.0;
-// Live the answer is waited for so many frames later, and used so many after that: by then no frame that it
-// is for has been read, whatever the number of threads.
-constexpr std::size_t kAnswerFrames = 96;
+// The answer is waited for so many frames after the question, and used so many after that: by then no frame
+// that it is for has been read, whatever the number of threads. Nobody asks when only a few frames would be
+// left.
+constexpr std::size_t kAnswerFrames = 32;
 constexpr std::size_t kUseFrames = kMostUnderWay;
+constexpr std::size_t kLeastFramesLeft = 60;
+constexpr int kMostQuestions =
+    2;  // of a finished map: what a wrong camera has bent shows when it is made anew
 
 /// What the cameras are, while it is being looked for.
-struct LiveAnswer {
-  CameraDecision decision;
-  std::size_t due = 0;      ///< the frame at which it is waited for
-  core::Executor::Job job;  ///< last: its destructor waits for it
+struct CameraQuestion {
+  std::vector<CameraRefinement> cameras;  ///< by robot
+  std::vector<bool> better;               ///< by robot: the answer
+  std::size_t due = 0;                    ///< the frame at which it is waited for
+  core::Executor::Job job;                ///< last: its destructor waits for it
 };
 
 class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice("camera.refine", refine_, {"auto", "live", "off"},
-                 "Whether a run looks for a better camera in its own map, after 40 keyframes, 10 s or at its "
-                 "end: auto begins again with it, live goes on with it 160 frames later");
+    table.choice<bool>(
+        "camera.refine", refine_, {{"auto", true}, {"off", false}},
+        "Look for a better camera in the map itself, after 40 keyframes or 10 s and at the end, "
+        "and make the map anew for it");
   }
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    for (const RobotInfo& robot : recordings().robots()) {
+    robots_ = recordings().robots();
+    for (const RobotInfo& robot : robots_) {
       slams_.push_back(std::make_unique<mapping::Slam>(options_, robot.camera.color, robot.number,
                                                        *context.executor, *context.log));
+      slams_.back()->set_camera(robot.camera);
       if (context.feedback != nullptr) slams_.back()->use(context.feedback);
+      cameras_.emplace_back(robot);
     }
+    stored_robots_ = robots_;
     revisions_.resize(slams_.size());
-    set_shutters(0);
-    if (refine_ == "off" && context.cameras != nullptr) {
-      if (auto settled = context.cameras->settle(context); !settled) return settled;
-    }
-    if (context.resumed == nullptr) return {};
-    rows_ = context.resumed->rows;
-    for (const auto& [robot, map] : context.resumed->maps) {
-      const auto number = static_cast<std::size_t>(robot);
-      slams_.at(number)->restore(map.map, map.frames);
-      revisions_[number] = slams_[number]->map().now();
-    }
+    camera_is_new_.resize(slams_.size());
+    asked_ = recordings().format() == "synth";  // filmed while it is mapped: no lens, no error
+    refine_ = refine_ && !asked_;
+    if (context.resumed != nullptr) restore(*context.resumed);
     return {};
   }
 
@@ -71,7 +74,7 @@ class TrackStage : public Stage {
     const auto features = io.input<features::FrameFeatures>("features");
     const RobotInfo& robot = recordings().robot(recordings().robot_of(io.frame()));
     const auto number = static_cast<std::size_t>(robot.number);
-    if (refine_ == "live") set_shutters(io.frame());
+    refine_camera(io.frame(), number);
     mapping::Slam& slam = *slams_[number];
     const std::size_t poses = slam.frame_poses().size();
     const mapping::FrameReport report = slam.process(*frame, features);
@@ -94,10 +97,15 @@ class TrackStage : public Stage {
       if (context_->keeps_map) {
         tracked->changes = std::make_shared<maps::MapChanges>(slam.map().changes_since(revisions_[number]));
         revisions_[number] = slam.map().now();
+        if (camera_is_new_[number]) {
+          stored_robots_[number] = robots_[number];
+          tracked->robots = std::make_shared<std::vector<RobotInfo>>(stored_robots_);
+          camera_is_new_[number] = false;
+        }
       }
     }
     io.output<TrackedFrame>("track", tracked);
-    if (auto decided = decide(io.frame()); !decided) return decided;
+    begin_question(io.frame());
     if (context_->debug_folder.empty()) return {};
     return write_debug_picture(context_->debug_folder, io.frame(), *frame, *features, slam, report,
                                robot.camera.color);
@@ -111,15 +119,15 @@ class TrackStage : public Stage {
     result->frame_columns = several() ? std::string("robot,") + kRowColumns : kRowColumns;
     result->frames = rows_;
     if (context_->resumed != nullptr && context_->resumed->merged) {
+      if (auto written = write_cameras(context_->output_folder, robots_, cameras()); !written) return written;
       result->maps.push_back(*context_->resumed->merged);
       io.output<RobotMaps>("maps", result);
       return {};
     }
     for (const auto& slam : slams_) slam->finish();
-    if (undecided() && !context_->stop.stop_requested()) {
-      if (auto decided = decide_now(); !decided) return decided;
-    }
-    for (const RobotInfo& robot : recordings().robots()) {
+    if (refine_ && !context_->stop.stop_requested()) refine_finished_maps();
+    if (auto written = write_cameras(context_->output_folder, robots_, cameras()); !written) return written;
+    for (const RobotInfo& robot : robots_) {
       mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
       if (several() && slam.map().keyframe_count() == 0) {
         return core::input_error(
@@ -154,6 +162,11 @@ class TrackStage : public Stage {
       summary.feedback.keyframes = others->map.keyframe_count();
     summary.causes = {count(mapping::KeyframeCause::kCone), count(mapping::KeyframeCause::kUrgent),
                       count(mapping::KeyframeCause::kPlain)};
+    for (std::size_t r = 0; r < cameras_.size(); ++r) {
+      if (refine_ || robots_[r].camera.guess) summary.cameras.push_back(cameras_[r].report());
+      if (!refine_ && robots_[r].camera.guess)
+        summary.cameras.back().doubt = "no camera file was given: the camera is a guess";
+    }
     summary.parts.push_back({"track.bundle_wait", bundle_wait_ms_, 0.0});
     summary.parts.push_back({"track.bundle", bundle_ms_, 0.0});
   }
@@ -171,59 +184,103 @@ class TrackStage : public Stage {
            std::all_of(slams_.begin(), slams_.end(),
                        [](const auto& slam) { return slam->map().keyframe_count() >= kCameraKeyframes; });
   }
-  /// The question to each robot's map as it is now; what is answered goes to `decision`.
-  [[nodiscard]] std::function<void(const core::Executor&)> question(CameraDecision& decision) const {
-    struct Robot {
-      RobotInfo info;
-      maps::Map map;
-      std::vector<maps::FramePose> poses;
-    };
-    auto robots = std::make_shared<std::vector<Robot>>();
-    for (const RobotInfo& robot : recordings().robots()) {
-      const mapping::Slam& slam = *slams_[static_cast<std::size_t>(robot.number)];
-      robots->push_back({robot, slam.map(), slam.frame_poses()});
-    }
-    const double told_s = options_.tracker.readout_s;
-    return [robots, told_s, &decision, log = context_->log](const core::Executor& executor) {
-      for (const Robot& robot : *robots) {
-        const double undone_s = told_s > 0.0 ? told_s : robot.info.camera.readout_s.value_or(0.0);
-        decision.ask(robot.info, {&robot.map, &robot.poses, undone_s}, executor, *log);
+  [[nodiscard]] std::vector<sensor::Camera> cameras() const {
+    std::vector<sensor::Camera> cameras;
+    for (const CameraRefinement& camera : cameras_) cameras.push_back(camera.camera());
+    return cameras;
+  }
+
+  /// Asks the maps as they are now, beside the tracker, once.
+  void begin_question(std::size_t frame) {
+    if (!refine_ || asked_ || !knows_enough(frame)) return;
+    asked_ = true;
+    if (frame + kAnswerFrames + kUseFrames + kLeastFramesLeft > recordings().size()) return;
+    question_ = std::make_unique<CameraQuestion>();
+    question_->cameras = cameras_;
+    question_->better.resize(cameras_.size());
+    question_->due = frame + kAnswerFrames;
+    std::vector<std::pair<maps::Map, std::vector<maps::FramePose>>> maps;
+    for (const auto& slam : slams_) maps.emplace_back(slam->map(), slam->frame_poses());
+    question_->job =
+        context_->executor->submit([question = question_.get(), maps = std::move(maps), log = context_->log] {
+          const core::Executor here(1);
+          for (std::size_t r = 0; r < maps.size(); ++r)
+            question->better[r] = question->cameras[r].ask(maps[r].first, maps[r].second, here, *log);
+        });
+  }
+
+  /// Waits for the answer when it is due, and goes on with it from the first frame on that is read with it.
+  void refine_camera(std::size_t frame, std::size_t robot) {
+    if (question_ != nullptr && frame >= question_->due) {
+      question_->job.wait();
+      use_from_ = frame + kUseFrames;
+      cameras_ = question_->cameras;
+      waiting_ = question_->better;
+      question_.reset();
+      if (std::count(waiting_.begin(), waiting_.end(), true) > 0)
+        context_->recordings->correct(use_from_, cameras());
+      for (std::size_t r = 0; r < cameras_.size(); ++r) {
+        if (waiting_[r]) cameras_[r].used_from(use_from_);
       }
-    };
-  }
-  [[nodiscard]] bool undecided() const { return context_->cameras != nullptr && !context_->cameras->made; }
-  core::Result<void> decide(std::size_t frame) {
-    if (!undecided() || !knows_enough(frame)) return {};
-    return refine_ == "live" ? decide_live(frame) : decide_now();
-  }
-  /// Asked beside the tracker; frames go on as they are until the answer is due, and some more.
-  core::Result<void> decide_live(std::size_t frame) {
-    if (live_ == nullptr) {
-      if (frame + kAnswerFrames + kUseFrames >= recordings().size()) return {};
-      live_ = std::make_unique<LiveAnswer>();
-      live_->due = frame + kAnswerFrames;
-      live_->job = context_->executor->submit([ask = question(live_->decision)] { ask(core::Executor(1)); });
     }
-    if (frame < live_->due) return {};
-    live_->job.wait();
-    CameraDecision& cameras = *context_->cameras;
-    cameras.used = live_->decision.used;
-    cameras.said = live_->decision.said;
-    cameras.news = live_->decision.news;
-    return cameras.settle(*context_, frame + kUseFrames);
+    if (waiting_.empty() || !waiting_[robot] || frame < use_from_) return;
+    waiting_[robot] = false;
+    use_camera(robot);
   }
-  core::Result<void> decide_now() {
-    question (*context_->cameras)(*context_->executor);
-    return context_->cameras->settle(*context_,
-                                     refine_ == "live" ? std::optional<std::size_t>(0) : std::nullopt);
+
+  /// What was mapped before is made anew for the robot's camera as it is known now.
+  void use_camera(std::size_t robot) {
+    mapping::Slam& slam = *slams_[robot];
+    const auto number = static_cast<std::int32_t>(robot);
+    robots_[robot].versions.push_back({cameras_[robot].camera(), slam.map().next_keyframe_id(number).index,
+                                       static_cast<std::int32_t>(slam.frame_poses().size())});
+    const auto pictures = recordings().taken_by(number, cameras_[robot].camera());
+    slam.recalibrate(cameras_[robot].camera(), [&](std::int64_t index) -> std::optional<sensor::RgbdFrame> {
+      if (pictures == nullptr) return std::nullopt;
+      auto frame = pictures->read(static_cast<std::size_t>(index));
+      if (!frame) return std::nullopt;
+      return std::move(*frame);
+    });
+    revisions_[robot] = {};  // all of it is another one for the store
+    camera_is_new_[robot] = true;
   }
-  /// As the cameras' files say, and from some frame on what was found; an option goes before.
-  void set_shutters(std::size_t frame) {
-    if (options_.tracker.readout_s > 0.0) return;
-    const CameraDecision* found = context_->cameras;
-    const bool better = found != nullptr && found->made && found->from > 0 && frame >= found->from;
-    for (std::size_t r = 0; r < slams_.size(); ++r)
-      slams_[r]->set_shutter((better ? found->used[r] : recordings().robots()[r].camera).readout_s);
+
+  /// Asks the finished maps, until they have nothing new to say.
+  void refine_finished_maps() {
+    for (std::size_t r = 0; r < slams_.size(); ++r) {
+      mapping::Slam& slam = *slams_[r];
+      if (!waiting_.empty() && waiting_[r]) use_camera(r);  // its last frame came before the answer was used
+      for (int i = 0; i < kMostQuestions; ++i) {
+        if (!cameras_[r].ask(slam.map(), slam.frame_poses(), *context_->executor, *context_->log)) break;
+        use_camera(r);
+      }
+    }
+  }
+
+  /// Goes on where another run stopped, with what it knew of the cameras.
+  void restore(const ResumedRun& run) {
+    rows_ = run.rows;
+    if (run.merged) {
+      for (const RobotInfo& stored : run.merged->robots) restore_camera(stored);
+    }
+    for (const auto& [robot, map] : run.maps) {
+      const auto number = static_cast<std::size_t>(robot);
+      for (const RobotInfo& stored : map.header.robots) {
+        if (stored.number == robot) restore_camera(stored);
+      }
+      slams_.at(number)->restore(map.map, map.frames);
+      revisions_[number] = slams_[number]->map().now();
+    }
+    stored_robots_ = robots_;
+    if (asked_ && refine_) context_->recordings->correct(0, cameras());
+  }
+  void restore_camera(const RobotInfo& stored) {
+    if (stored.versions.empty()) return;
+    const auto number = static_cast<std::size_t>(stored.number);
+    asked_ = true;
+    robots_.at(number).versions = stored.versions;
+    cameras_[number].restore(stored.versions.back().camera);
+    slams_[number]->set_camera(cameras_[number].camera());
   }
   void note_times(std::size_t frame, const mapping::BundleReport& bundle) {
     if (!bundle.keyframe.valid()) return;
@@ -235,10 +292,18 @@ class TrackStage : public Stage {
 
   const RunContext* context_ = nullptr;
   mapping::SlamOptions options_;
-  std::string refine_ = "auto";
+  bool refine_ = true;
   std::vector<std::unique_ptr<mapping::Slam>> slams_;  ///< by robot
+  std::vector<RobotInfo> robots_;                      ///< with what their cameras turned out to be
+  std::vector<RobotInfo>
+      stored_robots_;  ///< as the store has them: it learns of a robot's with its next keyframe
+  std::vector<CameraRefinement> cameras_;     ///< by robot
+  bool asked_ = false;                        ///< while mapping
+  std::unique_ptr<CameraQuestion> question_;  ///< under way; null: none is
+  std::size_t use_from_ = 0;                  ///< frame from which the answer is used
+  std::vector<bool> waiting_;  ///< by robot: its first frame from there on has not come; empty: no answer yet
+  std::vector<bool> camera_is_new_;           ///< by robot: since its last keyframe
   std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were reported
-  std::unique_ptr<LiveAnswer> live_;          ///< null: nobody has asked
   std::vector<FrameRow> rows_;
   std::map<mapping::KeyframeCause, std::size_t> causes_;  ///< of the keyframes
   std::vector<float> bundle_wait_ms_;                     ///< by frame; NaN: no bundle was put back

@@ -204,7 +204,7 @@ core::Result<void> run(const std::vector<std::string>& inputs, const std::string
     const sensor::Pinhole camera = robot.source->camera().color;
     robot.slam = std::make_unique<mapping::Slam>(mapping::SlamOptions{}, camera,
                                                  static_cast<std::int32_t>(robots.size()), executor, *log);
-    robot.slam->set_shutter(robot.source->camera().readout_s);
+    robot.slam->set_camera(robot.source->camera());
     robot.extractor = std::make_unique<features::FeatureExtractor>(features::FeatureOptions{}, camera);
     robots.push_back(std::move(robot));
   }

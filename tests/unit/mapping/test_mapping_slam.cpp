@@ -92,7 +92,10 @@ SlamRun run(const std::vector<Shot>& shots, int threads = 1, const SlamOptions& 
   const core::Executor executor(threads);
   const auto log = core::null_log();
   Slam slam(options, Recording::get().camera, 0, executor, *log);
-  slam.set_shutter(readout_s);
+  sensor::Camera camera;
+  camera.color = Recording::get().camera;
+  camera.readout_s = readout_s;
+  slam.set_camera(camera);
   SlamRun result;
   for (const Shot& shot : shots) {
     result.reports.push_back(slam.process(shot.frame, shot.features));

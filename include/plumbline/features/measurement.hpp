@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a camera measured and what is made of it. A measurement is a pixel of the picture as the lens showed
+// it, in the row in which the shutter read it, with the depth as the depth camera gave it. A feature is made
+// of it for a rectified image that was taken all at once. This is the one place where the one becomes the
+// other, so that features follow when the camera turns out to be another one than was believed.
+#include <Eigen/Core>
+#include <vector>
+
+#include "plumbline/features/frame_features.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/sensor/recalibration.hpp"
+
+namespace plumbline::features {
+
+struct PixelDepth {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double depth = 0.0;  ///< metres; 0: none
+};
+
+/// The measurement behind a feature. `shutter_motion`: as FrameFeatures::shutter_motion.
+PixelDepth measurement_of(const PixelDepth& feature, const geometry::Vector6d& shutter_motion,
+                          const sensor::ImageModel& model);
+/// The feature that a measurement gives.
+PixelDepth feature_of(const PixelDepth& measurement, const geometry::Vector6d& shutter_motion,
+                      const sensor::ImageModel& model);
+
+/// Makes the features anew for another camera. `velocity` (m/s, rad/s): of camera_from_world, in its own
+/// frame, as it is known now. `depth_rates` (m/s), one a point or none at all: how fast the depth on its ray
+/// changes as the camera moves, for a delay of the depth image that turned out longer.
+void recalibrate(FrameFeatures& features, const sensor::Recalibration& change,
+                 const geometry::Vector6d& velocity, const std::vector<double>& depth_rates);
+
+}  // namespace plumbline::features

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// From the pixels that a lens shows to those of a rectified image and back, and what changes in rectified
+// images when their camera turns out to be another one. Rectified images are those of one nominal pinhole,
+// whatever the camera is believed to be.
+#include <Eigen/Core>
+#include <vector>
+
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::sensor {
+
+/// One camera and the pinhole of the images that are made of its pictures.
+class ImageModel {
+ public:
+  ImageModel(const Pinhole& image, const Camera& camera) : image_(image), camera_(camera) {}
+
+  /// Pixel of the picture as the lens shows it, distortion and all, of a rectified pixel.
+  [[nodiscard]] Eigen::Vector2d lens_pixel(const Eigen::Vector2d& rectified) const;
+  /// The inverse; Newton's method, exact to 1e-6 px inside the image.
+  [[nodiscard]] Eigen::Vector2d rectified_pixel(const Eigen::Vector2d& lens) const;
+  /// Depth (metres, > 0) at a rectified pixel as the depth camera measured it, without its slope taken out.
+  [[nodiscard]] double measured_depth(const Eigen::Vector2d& rectified, double depth) const;
+  /// The inverse. 0: it would lie behind the camera.
+  [[nodiscard]] double true_depth(const Eigen::Vector2d& rectified, double measured) const;
+
+  [[nodiscard]] const Pinhole& image() const { return image_; }
+  [[nodiscard]] const Camera& camera() const { return camera_; }
+
+ private:
+  [[nodiscard]] double slope_at(const Eigen::Vector2d& rectified) const;
+  Pinhole image_;
+  Camera camera_;
+};
+
+/// What a camera `before` was believed to be and what it is believed to be `after`, for images of one
+/// pinhole. Const methods are thread-safe.
+class Recalibration {
+ public:
+  Recalibration(const Pinhole& image, const Camera& before, const Camera& after);
+
+  [[nodiscard]] const ImageModel& before() const { return before_; }
+  [[nodiscard]] const ImageModel& after() const { return after_; }
+  /// Where what lay at a rectified pixel lies now; by interpolation in a table, to a few thousandths of a pixel.
+  [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector2d& rectified) const;
+  /// The depth (> 0) that was read at `before`, now that this is the pixel `now`. 0: none any more.
+  [[nodiscard]] double depth(const Eigen::Vector2d& before, const Eigen::Vector2d& now, double z) const;
+  /// A place (camera frame, metres, z > 0) that the depth image measured. Where depth has a camera of its
+  /// own, the colour camera's lens does not move it.
+  [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector3d& p) const;
+  /// The normal of a surface there, unit or zero: a slope of depth tilts it.
+  [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) const;
+  /// So much later were depth images taken than was believed, seconds.
+  [[nodiscard]] double delay_s() const {
+    return after_.camera().depth_delay_s - before_.camera().depth_delay_s;
+  }
+  /// Neither pixels nor depths change: at most shutter and delay do.
+  [[nodiscard]] bool keeps_images() const { return !moves_pixels_ && !moves_depth_; }
+
+ private:
+  ImageModel before_;
+  ImageModel after_;
+  bool moves_pixels_ = false;
+  bool moves_depth_ = false;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<Eigen::Vector2d> shifts_;  ///< of every kCell-th pixel, row by row
+};
+
+}  // namespace plumbline::sensor

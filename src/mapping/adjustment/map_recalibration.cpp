@@ -1,0 +1,408 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/mapping/map_recalibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "plumbline/features/measurement.hpp"
+#include "plumbline/features/photometric.hpp"
+#include "plumbline/geometry/velocity.hpp"
+#include "plumbline/mapping/surface_edge.hpp"
+#include "plumbline/maps/camera_history.hpp"
+#include "plumbline/sensor/depth_noise.hpp"
+
+namespace plumbline::mapping {
+namespace {
+
+using core::KeyframeId;
+using geometry::Rigid3;
+using geometry::Vector6d;
+
+constexpr double kNearest_m = 0.1;
+constexpr std::size_t kSamples = 240;  // of what a keyframe saw, for relative poses
+constexpr std::size_t kLeastSamples = 20;
+
+/// How fast the depth on the ray to a place changes as the camera moves, m/s; 0 where its surface is not
+/// known, or the ray grazes it.
+double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal, const Vector6d& velocity) {
+  constexpr double kLeastCosine = 0.3;
+  const double along = normal.dot(p);
+  if (!(std::abs(along) > kLeastCosine * p.norm())) return 0.0;
+  return p.z() * normal.dot(velocity.head<3>() + velocity.tail<3>().cross(p)) / along;
+}
+
+/// What one image says with the one camera and with the other.
+struct ImageChange {
+  const sensor::Recalibration* change = nullptr;
+  Vector6d velocity = Vector6d::Zero();
+  Vector6d shutter_before = Vector6d::Zero();  ///< FrameFeatures::shutter_motion
+
+  /// Where a place seen at `p`, on a surface of that normal, is now (camera frame).
+  [[nodiscard]] Eigen::Vector3d place(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) const {
+    Eigen::Vector3d now = change->point(p);
+    const Vector6d shutter = change->after().camera().readout_s.value_or(0.0) * velocity - shutter_before;
+    if (!shutter.isZero(0.0)) {
+      const sensor::Pinhole& image = change->before().image();
+      const double share = std::clamp(image.project(now).y() / image.height - 0.5, -0.5, 0.5);
+      now = geometry::exp_se3(-share * shutter) * now;
+    }
+    const double rate = change->delay_s() != 0.0 ? depth_rate(p, normal, velocity) : 0.0;
+    return now * (1.0 - change->delay_s() * rate / p.z());
+  }
+};
+
+std::vector<maps::SurfaceSample> carried(std::vector<maps::SurfaceSample> samples,
+                                         const Rigid3& to_from_here) {
+  for (maps::SurfaceSample& s : samples) {
+    s.point = (to_from_here * s.point.cast<double>()).cast<float>();
+    s.normal = (to_from_here.rotation * s.normal.cast<double>()).cast<float>();
+  }
+  return samples;
+}
+
+/// A place as two images have it, each in its camera's frame.
+struct SharedPlace {
+  Eigen::Vector3d in_a;
+  Eigen::Vector3d in_b;
+  Eigen::Vector3d normal_in_b;
+};
+
+/// b_from_a that lays the places on one another as well as images and depth can tell: Gauss-Newton from
+/// `start`.
+Rigid3 aligned(const std::vector<SharedPlace>& places, const sensor::Pinhole& image, const Rigid3& start) {
+  constexpr int kIterations = 3;
+  constexpr double kSigma_px = 0.5;
+  Rigid3 b_from_a = start;
+  for (int i = 0; i < kIterations; ++i) {
+    geometry::Matrix6d normal = geometry::Matrix6d::Zero();
+    Vector6d gradient = Vector6d::Zero();
+    for (const SharedPlace& place : places) {
+      const Eigen::Vector3d y = b_from_a * place.in_a;
+      if (y.z() < kNearest_m) continue;
+      Eigen::Matrix<double, 3, 6> moves;
+      moves << Eigen::Matrix3d::Identity(), -geometry::skew(y);
+      Eigen::Matrix3d by_place;
+      by_place.row(0) = place.normal_in_b.transpose() / sensor::depth_sigma(y.z());
+      by_place.row(1) << image.fx / y.z(), 0.0, -image.fx * y.x() / (y.z() * y.z());
+      by_place.row(2) << 0.0, image.fy / y.z(), -image.fy * y.y() / (y.z() * y.z());
+      by_place.bottomRows<2>() /= kSigma_px;
+      Eigen::Vector3d residual;
+      residual(0) = by_place.row(0) * (y - place.in_b);
+      residual.tail<2>() = (image.project(y) - image.project(place.in_b)) / kSigma_px;
+      const Eigen::Matrix<double, 3, 6> jacobian = by_place * moves;
+      normal += jacobian.transpose() * jacobian;
+      gradient += jacobian.transpose() * residual;
+    }
+    b_from_a = geometry::exp_se3(-normal.ldlt().solve(gradient)) * b_from_a;
+  }
+  return b_from_a;
+}
+
+class MapRecalibration {
+ public:
+  MapRecalibration(const sensor::Recalibration& change, maps::Map& map, std::vector<maps::FramePose>& frames)
+      : change_(change), map_(map), frames_(frames), path_(maps::trajectory(frames, map)) {
+    for (const KeyframeId id : map.keyframe_ids()) {
+      before_[id] = map.camera_from_world(id);
+      images_[id] = image_of(map.keyframe(id).stamp, map.keyframe(id).features.get());
+      samples_[id] = samples_of(map.keyframe(id));
+    }
+  }
+
+  void run() {
+    const std::vector<PoseEdge> relative = relative_poses();  // as the map has them, corrected
+    correct_edges();
+    correct_frames();
+    make_keyframes_anew();
+    move_keyframes(relative);
+    move_landmarks();
+  }
+
+ private:
+  [[nodiscard]] ImageChange image_of(double stamp, const features::FrameFeatures* features) const {
+    ImageChange image;
+    image.change = &change_;
+    image.velocity = geometry::velocity_at(path_, stamp);
+    if (features != nullptr) image.shutter_before = features->shutter_motion;
+    return image;
+  }
+
+  /// A frame that is no keyframe was freed of the shutter by its own motion.
+  [[nodiscard]] ImageChange image_of(const maps::FramePose& frame) const {
+    ImageChange image = image_of(frame.stamp, nullptr);
+    image.shutter_before = change_.before().camera().readout_s.value_or(0.0) * image.velocity;
+    return image;
+  }
+
+  [[nodiscard]] std::vector<maps::SurfaceSample> samples_of(const maps::Keyframe& keyframe) const {
+    const std::size_t step = std::max<std::size_t>(1, keyframe.surface.size() / kSamples);
+    std::vector<maps::SurfaceSample> samples;
+    for (std::size_t i = 0; i < keyframe.surface.size(); i += step) samples.push_back(keyframe.surface[i]);
+    return samples;
+  }
+
+  /// A relative pose that was measured with the old camera as the new one would have measured it: what both
+  /// images saw stays one thing, in the image and along the surface's normal.
+  [[nodiscard]] Rigid3 corrected(const Rigid3& b_from_a, const ImageChange& a, const ImageChange& b,
+                                 const std::vector<maps::SurfaceSample>& seen_by_a) const {
+    const sensor::Pinhole& image = change_.before().image();
+    std::vector<SharedPlace> places;
+    for (const maps::SurfaceSample& s : seen_by_a) {
+      const Eigen::Vector3d p = s.point.cast<double>();
+      const Eigen::Vector3d normal = s.normal.cast<double>();
+      const Eigen::Vector3d q = b_from_a * p;
+      if (p.z() < kNearest_m || q.z() < kNearest_m || !image.contains(image.project(q))) continue;
+      const Eigen::Vector3d normal_in_b = b_from_a.rotation * normal;
+      places.push_back({a.place(p, normal), b.place(q, normal_in_b), normal_in_b});
+    }
+    return places.size() < kLeastSamples ? b_from_a : aligned(places, image, b_from_a);
+  }
+
+  [[nodiscard]] Rigid3 corrected(const Rigid3& b_from_a, KeyframeId a, KeyframeId b) const {
+    return corrected(b_from_a, images_.at(a), images_.at(b), samples_.at(a));
+  }
+
+  [[nodiscard]] std::vector<PoseEdge> relative_poses() const {
+    std::vector<PoseEdge> edges = map_edges(map_);
+    for (PoseEdge& edge : edges) edge.b_from_a = corrected(edge.b_from_a, edge.a, edge.b);
+    return edges;
+  }
+
+  void correct_edges() {
+    for (auto [number, edge] : map_.edges()) {
+      edge.b_from_a = corrected(edge.b_from_a, edge.a, edge.b);
+      map_.replace_edge(number, edge);
+    }
+    std::vector<maps::LoopEdge> loops = map_.loops();
+    for (maps::LoopEdge& loop : loops) loop.b_from_a = corrected(loop.b_from_a, loop.a, loop.b);
+    map_.set_loops(std::move(loops));
+  }
+
+  /// Where a frame lay to its keyframe, and to the frame before it.
+  void correct_frames() {
+    const maps::FramePose* previous = nullptr;
+    Rigid3 previous_before;
+    for (maps::FramePose& frame : frames_) {
+      if (!frame.tracked || !map_.has_keyframe(frame.reference)) {
+        previous = nullptr;
+        continue;
+      }
+      const ImageChange image = image_of(frame);
+      const Rigid3 before = frame.camera_from_reference;
+      if (frame.camera_from_previous && previous != nullptr) {
+        const std::vector<maps::SurfaceSample> seen =
+            carried(samples_.at(previous->reference), previous_before);
+        frame.camera_from_previous = corrected(*frame.camera_from_previous, image_of(*previous), image, seen);
+      }
+      if (map_.keyframe(frame.reference).stamp != frame.stamp) {
+        frame.camera_from_reference =
+            corrected(before, images_.at(frame.reference), image, samples_.at(frame.reference));
+      }
+      previous = &frame;
+      previous_before = before;
+    }
+  }
+
+  void make_keyframes_anew() {
+    for (const auto& [id, image] : images_) {
+      auto keyframe = std::make_shared<maps::Keyframe>(map_.keyframe(id));
+      if (keyframe->features != nullptr) {
+        auto features = std::make_shared<features::FrameFeatures>(*keyframe->features);
+        features::recalibrate(*features, change_, image.velocity, depth_rates(id, image));
+        keyframe->features = std::move(features);
+      }
+      for (maps::SurfaceSample& sample : keyframe->surface)
+        maps::recalibrate(change_, image.velocity, sample);
+      if (keyframe->reference.valid() && map_.has_keyframe(keyframe->reference)) {
+        keyframe->camera_from_reference = corrected(keyframe->camera_from_reference, keyframe->reference, id);
+      }
+      map_.replace_keyframe(std::move(keyframe));
+    }
+  }
+
+  /// Of each point feature, by the surface of the landmark that it sees.
+  [[nodiscard]] std::vector<double> depth_rates(KeyframeId id, const ImageChange& image) const {
+    std::vector<double> rates;
+    if (change_.delay_s() == 0.0) return rates;
+    const Rigid3& camera_from_world = before_.at(id);
+    for (const core::PointId seen : map_.points_of(id)) {
+      const maps::MapPoint* point = map_.find(seen);
+      rates.push_back(point == nullptr
+                          ? 0.0
+                          : depth_rate(camera_from_world * point->position,
+                                       camera_from_world.rotation * point->normal, image.velocity));
+    }
+    return rates;
+  }
+
+  void move_keyframes(const std::vector<PoseEdge>& relative) {
+    for (const auto& [id, pose] : solve_trusted_graph(map_, relative)) map_.set_pose(id, pose);
+  }
+
+  /// To the mean of where its keyframes see it now.
+  template <typename Place>
+  void move_place(const std::vector<maps::Observation>& seen, const Eigen::Vector3d& normal,
+                  Place& place) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int count = 0;
+    for (const maps::Observation& o : seen) {
+      const Rigid3& before = before_.at(o.keyframe);
+      const Eigen::Vector3d p = before * Eigen::Vector3d(place);
+      if (p.z() < kNearest_m) continue;
+      sum += map_.camera_from_world(o.keyframe).inverse() *
+             images_.at(o.keyframe).place(p, before.rotation * normal);
+      ++count;
+    }
+    if (count > 0) place = sum / count;
+  }
+
+  void move_landmarks() {
+    for (const core::PointId id : map_.point_ids()) {
+      maps::MapPoint& point = map_.point(id);
+      move_place(point.observations, point.normal, point.position);
+      map_.refresh_point(id);
+    }
+    for (const core::LineId id : map_.line_ids()) {
+      maps::MapLine& line = map_.line(id);
+      move_place(line.observations, Eigen::Vector3d::Zero(), line.start);
+      move_place(line.observations, Eigen::Vector3d::Zero(), line.end);
+    }
+  }
+
+  const sensor::Recalibration& change_;
+  maps::Map& map_;
+  std::vector<maps::FramePose>& frames_;
+  geometry::Trajectory path_;  ///< before
+  std::map<KeyframeId, Rigid3> before_;
+  std::map<KeyframeId, ImageChange> images_;
+  std::map<KeyframeId, std::vector<maps::SurfaceSample>> samples_;  ///< before
+};
+
+/// What pictures say of the keyframes' surfaces.
+class SurfaceReader {
+ public:
+  SurfaceReader(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,
+                const PictureReader& read, const SurfaceMeasurement& how, const core::Executor& executor,
+                maps::Map& map)
+      : camera_(camera),
+        path_(maps::trajectory(frames, map)),
+        read_(read),
+        how_(how),
+        executor_(executor),
+        map_(map) {
+    for (const auto& [number, edge] : map.edges()) by_later_[std::max(edge.a, edge.b)].push_back(number);
+  }
+
+  /// Keyframes in order of time, a few at a time: an edge needs the samples of the earlier one and the images
+  /// of the later one.
+  void run() {
+    constexpr std::size_t kAtOnce = 16;
+    const std::vector<KeyframeId> ids = map_.keyframe_ids();
+    for (std::size_t begin = 0; begin < ids.size(); begin += kAtOnce) {
+      const std::vector<KeyframeId> some(
+          ids.begin() + static_cast<std::ptrdiff_t>(begin),
+          ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), begin + kAtOnce)));
+      std::vector<Picture> pictures(some.size());
+      executor_.parallel_for(some.size(), [&](std::size_t i) { pictures[i] = picture_of(some[i]); });
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        if (pictures[i].surface.empty()) continue;
+        auto keyframe = std::make_shared<maps::Keyframe>(map_.keyframe(some[i]));
+        keyframe->surface = std::move(pictures[i].surface);
+        map_.replace_keyframe(std::move(keyframe));
+        samples_[some[i]] = std::move(pictures[i].samples);
+      }
+      align(some, pictures);
+    }
+  }
+
+ private:
+  struct Picture {
+    cv::Mat depth;
+    Rigid3 depth_from_camera;
+    std::shared_ptr<features::PhotometricImage> photometric;
+    std::shared_ptr<const features::PhotometricSamples> samples;
+    std::vector<maps::SurfaceSample> surface;
+  };
+
+  [[nodiscard]] Picture picture_of(KeyframeId id) const {
+    Picture picture;
+    const auto frame = read_(map_.keyframe(id).frame_index);
+    if (!frame || frame->depth.empty()) return picture;
+    picture.depth = frame->depth;
+    const double late_s = frame->depth_stamp - frame->stamp;
+    picture.depth_from_camera = geometry::exp_se3(late_s * geometry::velocity_at(path_, frame->stamp));
+    picture.surface = tracking::sample_surface(frame->depth, camera_, how_.sampler);
+    const Rigid3 camera_from_depth = picture.depth_from_camera.inverse();
+    picture.surface = carried(std::move(picture.surface), camera_from_depth);
+    if (!how_.photometric || frame->gray.empty()) return picture;
+    picture.photometric =
+        std::make_shared<features::PhotometricImage>(features::make_photometric_image(frame->gray));
+    picture.samples = std::make_shared<const features::PhotometricSamples>(
+        features::sample_photometric(*picture.photometric, frame->depth, camera_, camera_from_depth));
+    return picture;
+  }
+
+  void align(const std::vector<KeyframeId>& some, const std::vector<Picture>& pictures) {
+    struct Task {
+      std::uint64_t number = 0;
+      const Picture* picture = nullptr;
+      std::optional<maps::SurfaceEdge> found;
+    };
+    std::vector<Task> tasks;
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      if (pictures[i].depth.empty()) continue;
+      for (const std::uint64_t number : by_later_[some[i]]) tasks.push_back({number, &pictures[i], {}});
+    }
+    executor_.parallel_for(tasks.size(), [&](std::size_t i) {
+      const maps::SurfaceEdge& edge = map_.edges().at(tasks[i].number);
+      const Picture& of_b = *tasks[i].picture;
+      const auto of_a = samples_.find(edge.a);
+      const Rigid3 b_from_a = map_.camera_from_world(edge.b) * map_.camera_from_world(edge.a).inverse();
+      tasks[i].found =
+          align_surface_edge(map_.keyframe(edge.a), edge.b, of_b.depth, b_from_a, of_b.depth_from_camera,
+                             camera_, {how_.min_overlap},
+                             {of_a == samples_.end() ? nullptr : of_a->second.get(), of_b.photometric.get()});
+    });
+    for (const Task& task : tasks) {
+      if (task.found) map_.replace_edge(task.number, *task.found);
+    }
+  }
+
+  sensor::Pinhole camera_;
+  geometry::Trajectory path_;
+  const PictureReader& read_;
+  const SurfaceMeasurement& how_;
+  const core::Executor& executor_;
+  maps::Map& map_;
+  std::map<KeyframeId, std::vector<std::uint64_t>> by_later_;  ///< numbers of the edges to earlier keyframes
+  std::map<KeyframeId, std::shared_ptr<const features::PhotometricSamples>> samples_;
+};
+
+}  // namespace
+
+void recalibrate_map(const sensor::Recalibration& change, maps::Map& map,
+                     std::vector<maps::FramePose>& frames) {
+  MapRecalibration(change, map, frames).run();
+}
+
+void measure_surfaces_again(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,
+                            const PictureReader& read, const SurfaceMeasurement& how,
+                            const core::Executor& executor, maps::Map& map) {
+  SurfaceReader(camera, frames, read, how, executor, map).run();
+}
+
+GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,
+                                                const GlobalAdjustmentOptions& adjustment, maps::Map& map) {
+  for (const KeyframeId id : map.keyframe_ids()) {
+    const std::vector<KeyframeId> neighbours = map.neighbours(id, static_cast<std::size_t>(fusion.keyframes));
+    fuse_points(map, id, neighbours, {{id.robot, camera}}, fusion);
+    fuse_lines(map, id, neighbours, {{id.robot, camera}}, fusion);
+  }
+  const core::KeyframeId first = map.keyframe_ids().front();
+  return adjust_map(map, {{first.robot, camera}}, loop_edges(map), adjustment);
+}
+
+}  // namespace plumbline::mapping

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stages/camera_refinement.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <system_error>
+
+#include "plumbline/core/output_file.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+constexpr double kGuessedFocalSigma = 0.01;  // a guess is confirmed when its focal length is known so well
+
+std::string found_text(const std::vector<mapping::CameraFinding>& findings) {
+  std::string text;
+  for (const mapping::CameraFinding& f : findings) {
+    if (f.used)
+      text += fmt::format("{}{} {:.5g} +- {:.2g} in place of {:.5g}", text.empty() ? "" : ", ", f.name,
+                          f.found, f.sigma, f.given);
+  }
+  return text;
+}
+
+/// Why typical values in the place of a camera file are no camera; empty: the recording agrees.
+std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
+  const std::string doubt = "no camera file was given, and the recording cannot confirm the guessed camera: ";
+  if (!found) return doubt + found.error().message;
+  const auto& findings = found->findings;
+  const auto fx =
+      std::find_if(findings.begin(), findings.end(), [](const auto& f) { return f.name == "fx"; });
+  if (fx->sigma < kGuessedFocalSigma * fx->given) return "";
+  return fmt::format("{}fx is known to {:.1f} px only, {:.1f} px are needed", doubt, fx->sigma,
+                     kGuessedFocalSigma * fx->given);
+}
+
+/// What an earlier question found stays, and all is told against what was given at first.
+void keep_earlier(const std::vector<mapping::CameraFinding>& earlier,
+                  std::vector<mapping::CameraFinding>& findings) {
+  for (std::size_t i = 0; i < earlier.size(); ++i) {
+    mapping::CameraFinding& f = findings[i];
+    if (!f.used && earlier[i].used) f.found = f.given;
+    if (earlier[i].used) f.gain = earlier[i].gain;
+    f.used = f.used || earlier[i].used;
+    f.given = earlier[i].given;
+  }
+}
+
+}  // namespace
+
+CameraRefinement::CameraRefinement(const RobotInfo& robot) : robot_(robot), camera_(robot.camera) {
+  report_.robot = robot.name;
+}
+
+bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePose>& frames,
+                           const core::Executor& executor, core::Log& log) {
+  mapping::CalibrationOptions options;
+  options.earlier = report_.findings;
+  if (robot_.camera.guess) {
+    options.focal_prior = 0.1;
+    options.centre_prior_px = 20.0;
+  }
+  const auto found =
+      mapping::calibrate_camera({{&map, &frames, robot_.camera.color}}, camera_, options, executor);
+  ++report_.asked;
+  if (robot_.camera.guess) report_.doubt = doubt_of(found);
+  if (!found) {
+    if (report_.asked == 1) report_.note = found.error().message;
+    log.debug(fmt::format("{}: the camera is as given: {}", robot_.name, found.error().message));
+    return false;
+  }
+
+  for (const mapping::CameraFinding& f : found->findings)
+    log.debug(fmt::format("{}: {} of {} views: given {:.5g}, found {:.5g} +- {:.2g}, gain {:.2f} %, {}",
+                          robot_.name, f.name, found->views, f.given, f.found, f.sigma, 100.0 * f.gain,
+                          f.used ? "used" : "not used"));
+  report_.note.clear();
+  const bool better = !found_text(found->findings).empty();
+  if (!better && report_.asked > 1) return false;
+  std::vector<mapping::CameraFinding> findings = found->findings;
+  keep_earlier(options.earlier, findings);
+  report_.findings = std::move(findings);
+  report_.gain = 1.0 - (1.0 - report_.gain) * (1.0 - found->gain);
+  if (!better) return false;
+  camera_ = found->camera;
+  camera_.guess = false;
+  log.info(
+      fmt::format("{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better",
+                  robot_.name, found_text(report_.findings), 100.0 * report_.gain));
+  return true;
+}
+
+core::Result<void> write_cameras(const std::filesystem::path& folder, const std::vector<RobotInfo>& robots,
+                                 const std::vector<sensor::Camera>& cameras) {
+  for (std::size_t r = 0; r < robots.size(); ++r) {
+    const std::filesystem::path own = robots.size() == 1 ? folder : folder / "robots" / robots[r].name;
+    std::error_code ignored;
+    std::filesystem::create_directories(own, ignored);
+    const std::string text = "# what the run used\n" + sensor::to_yaml(cameras[r]);
+    if (auto ok = core::write_file(own / "camera.yaml", text); !ok) return ok;
+  }
+  return {};
+}
+
+}  // namespace plumbline::pipeline
