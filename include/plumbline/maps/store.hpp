@@ -36,7 +36,7 @@ struct CameraVersion {
 struct RobotInfo {
   std::int32_t number = 0;  ///< in the map's ids
   std::string name;
-  sensor::Camera camera;                ///< as it was given
+  sensor::Camera camera;                     ///< as it was given
   std::vector<CameraVersion> versions = {};  ///< in order; empty: it is as it was given
 };
 

@@ -42,7 +42,8 @@ class Recalibration {
 
   [[nodiscard]] const ImageModel& before() const { return before_; }
   [[nodiscard]] const ImageModel& after() const { return after_; }
-  /// Where what lay at a rectified pixel lies now; by interpolation in a table, to a few thousandths of a pixel.
+  /// Where what lay at a rectified pixel lies now; by interpolation in a table, to a few thousandths of a
+  /// pixel.
   [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector2d& rectified) const;
   /// The depth (> 0) that was read at `before`, now that this is the pixel `now`. 0: none any more.
   [[nodiscard]] double depth(const Eigen::Vector2d& before, const Eigen::Vector2d& now, double z) const;

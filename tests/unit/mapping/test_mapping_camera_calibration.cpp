@@ -93,7 +93,8 @@ World swing(const sensor::Camera& truth, int keyframes, int corners) {
 core::Result<CameraCalibration> calibrate(const World& world, int threads = 1,
                                           const CalibrationOptions& options = {}) {
   const core::Executor executor(threads);
-  return calibrate_camera({{&world.map, &world.frames, given_camera().color}}, given_camera(), options, executor);
+  return calibrate_camera({{&world.map, &world.frames, given_camera().color}}, given_camera(), options,
+                          executor);
 }
 
 const CameraFinding& finding(const CameraCalibration& calibration, const std::string& name) {
