@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/features/measurement.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "plumbline/features/rolling_shutter.hpp"
 
 namespace plumbline::features {
@@ -55,6 +58,13 @@ PixelDepth feature_of(const PixelDepth& measurement, const Vector6d& shutter_mot
   read.pixel = model.rectified_pixel(measurement.pixel);
   read.depth = measurement.depth > 0.0 ? model.true_depth(read.pixel, measurement.depth) : 0.0;
   return without_shutter(read, shutter_motion, model.image());
+}
+
+double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal, const Vector6d& velocity) {
+  constexpr double kLeastCosine = 0.3;  // between ray and normal
+  const double along = normal.dot(p);
+  if (!(std::abs(along) > kLeastCosine * p.norm())) return 0.0;
+  return p.z() * normal.dot(velocity.head<3>() + velocity.tail<3>().cross(p)) / along;
 }
 
 void recalibrate(FrameFeatures& features, const sensor::Recalibration& change, const Vector6d& velocity,

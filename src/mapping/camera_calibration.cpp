@@ -129,15 +129,9 @@ class RunViews {
   std::vector<View> views_;  ///< by time
 };
 
-/// How fast the depth on the ray to a point changes, m/s: the surface that it lies on is carried along by the
-/// camera's motion. 0 where that surface is not known, or the ray grazes it.
 double depth_rate(const maps::MapPoint& point, const optimize::CalibrationPose& pose) {
-  constexpr double kLeastCosine = 0.3;  // between ray and normal
-  const Eigen::Vector3d p = pose.camera_from_world * point.position;
-  const Eigen::Vector3d normal = pose.camera_from_world.rotation * point.normal;
-  const double along = normal.dot(p);
-  if (!(std::abs(along) > kLeastCosine * p.norm())) return 0.0;
-  return p.z() * normal.dot(pose.velocity.head<3>() + pose.velocity.tail<3>().cross(p)) / along;
+  return features::depth_rate(pose.camera_from_world * point.position,
+                              pose.camera_from_world.rotation * point.normal, pose.velocity);
 }
 
 /// Some neighbouring views, with all that at least two of them see.

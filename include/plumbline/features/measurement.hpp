@@ -26,6 +26,12 @@ PixelDepth measurement_of(const PixelDepth& feature, const geometry::Vector6d& s
 PixelDepth feature_of(const PixelDepth& measurement, const geometry::Vector6d& shutter_motion,
                       const sensor::ImageModel& model);
 
+/// How fast the depth on the ray to a place `p` of a surface changes as the camera moves, m/s (camera frame):
+/// the surface is carried along by the camera's motion. 0 where its normal is not known (zero), or the ray
+/// grazes it.
+double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal,
+                  const geometry::Vector6d& velocity);
+
 /// Makes the features anew for another camera. `velocity` (m/s, rad/s): of camera_from_world, in its own
 /// frame, as it is known now. `depth_rates` (m/s), one a point or none at all: how fast the depth on its ray
 /// changes as the camera moves, for a delay of the depth image that turned out longer.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map whose camera turned out to be another one than its keyframes were read with is made anew without
-// reading a picture again: every measurement is known, and with it what the other camera makes of it
+// A map whose camera turned out to be another one than its keyframes were read with is made anew: features
+// follow from their measurements, and only surfaces are looked up in the keyframes' pictures again
 // (docs/method/calibration.md).
 #include <cstdint>
 #include <functional>

@@ -25,15 +25,6 @@ constexpr double kNearest_m = 0.1;
 constexpr std::size_t kSamples = 240;  // of what a keyframe saw, for relative poses
 constexpr std::size_t kLeastSamples = 20;
 
-/// How fast the depth on the ray to a place changes as the camera moves, m/s; 0 where its surface is not
-/// known, or the ray grazes it.
-double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal, const Vector6d& velocity) {
-  constexpr double kLeastCosine = 0.3;
-  const double along = normal.dot(p);
-  if (!(std::abs(along) > kLeastCosine * p.norm())) return 0.0;
-  return p.z() * normal.dot(velocity.head<3>() + velocity.tail<3>().cross(p)) / along;
-}
-
 /// What one image says with the one camera and with the other.
 struct ImageChange {
   const sensor::Recalibration* change = nullptr;
@@ -49,7 +40,7 @@ struct ImageChange {
       const double share = std::clamp(image.project(now).y() / image.height - 0.5, -0.5, 0.5);
       now = geometry::exp_se3(-share * shutter) * now;
     }
-    const double rate = change->delay_s() != 0.0 ? depth_rate(p, normal, velocity) : 0.0;
+    const double rate = change->delay_s() != 0.0 ? features::depth_rate(p, normal, velocity) : 0.0;
     return now * (1.0 - change->delay_s() * rate / p.z());
   }
 };
@@ -232,8 +223,8 @@ class MapRecalibration {
       const maps::MapPoint* point = map_.find(seen);
       rates.push_back(point == nullptr
                           ? 0.0
-                          : depth_rate(camera_from_world * point->position,
-                                       camera_from_world.rotation * point->normal, image.velocity));
+                          : features::depth_rate(camera_from_world * point->position,
+                                                 camera_from_world.rotation * point->normal, image.velocity));
     }
     return rates;
   }
