@@ -22,6 +22,10 @@ void SlamOptions::declare(core::OptionTable& table) {
   loops.declare(table);
 }
 
+/// Frames after which what was measured beside the tracker goes into the map: a keyframe's work is spread
+/// over several frames, and its surfaces are aligned meanwhile.
+constexpr std::int64_t kConnectAfter = 2;
+
 /// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all
 /// that follows would be lost.
 static bool can_start_map(const sensor::RgbdFrame& frame) {
@@ -88,9 +92,15 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
 }
 
 FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& features) {
+  // What ran beside the tracker comes back at fixed frames, whatever the clock says.
+  ++frame_count_;
   BundleReport bundle;
-  if (bundle_.due(++frame_count_)) put_back_bundle(bundle);  // section 3.3, of an earlier keyframe
-  last_track_ = tracker_.track(map_, frame, features);       // section 3.2
+  while (!new_keyframes_.empty() && frame_count_ >= new_keyframes_.front().frame + kConnectAfter)
+    connect_keyframe(bundle);
+  if (bundle_.due(frame_count_)) put_back_bundle(bundle);
+
+  // Section 3.2: the frame's pose; a lost frame is looked for in the maps of other robots, too.
+  last_track_ = tracker_.track(map_, frame, features);
   const tracking::TrackResult& track = last_track_;
   if (tracker_.astray()) {
     const auto place = closer_.locate(frame, features, options_.mapper.surface);
@@ -98,21 +108,26 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   }
   FrameReport report = FrameReport::of(frame, track);
   report.bundle = bundle;
+
   if (track.state == tracking::TrackState::kInitialising) {
     if (can_start_map(frame)) start_map(frame, features, report);
     return report;
   }
+
+  // Sections 3.3 and 4.1: what the frame adds to the map.
   maps::FramePose pose = frames_.measured(map_, frame.stamp, track);
   if (pose.tracked) {
     pose.seen = seen_points();
-    mapper_.count_observations(map_, track);  // section 3.3: the share of keyframes that find a landmark
+    mapper_.count_observations(map_, track);            // the share of keyframes that find a landmark
     report.decision.wanted = !track.reference.valid();  // where nothing of this map is seen
     if (!report.decision.wanted)
-      report.decision = keyframe_rule_.decide(map_, track, bundle_.idle());  // section 4.1
+      report.decision = keyframe_rule_.decide(map_, track, new_keyframes_.empty() && bundle_.idle());
     if (report.decision.reuse.valid())  // else the map would grow as long as the camera moves
       set_reference(report.reference = report.decision.reuse);
     if (report.decision.wanted) insert_keyframe(frame, features, report);
   }
+
+  // The path.
   frames_.record(map_, pose, tracker_.reference(),
                  pose.tracked ? tracker_.camera_from_world() : track.camera_from_world);
   if (options_.tracker.align_stamps) report.depth_from_camera = frames_.depth_from_camera(map_, frame);
@@ -132,18 +147,35 @@ void Slam::start_map(const sensor::RgbdFrame& frame, const Features& features, F
 }
 
 void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
-  const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels);  // section 3.3
-  mapper_.add_surface_edges(map_, id, frame.depth, last_track_, tracker_.photometric(),
-                            tracker_.local_map().keyframes);  // relative poses with covariance
+  // Section 3.3: observations and new landmarks, doubles merged, bad ones culled.
+  const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels);
+  NewKeyframe made{id, frame_count_,
+                   mapper_.begin_surface_edges(map_, id, frame.depth, last_track_, tracker_.photometric(),
+                                               tracker_.local_map().keyframes, executor_)};
+  new_keyframes_.push_back(std::move(made));
   tracker_.add_keyframe(id, frame, last_track_);
-  mapper_.refine(map_, id);  // section 3.3: merges duplicates, culls
+  mapper_.refine(map_, id);
   set_reference(id);
-  close_loops(id);  // section 4.2
   report.keyframe = report.reference = id;
+
+  if (options_.bundle_lag < kConnectAfter) connect_keyframe(report.bundle);
+}
+
+void Slam::connect_keyframe(BundleReport& report) {
+  NewKeyframe made = std::move(new_keyframes_.front());
+  new_keyframes_.pop_front();
+
+  // Relative poses with covariance.
+  if (made.edges) {
+    for (const maps::SurfaceEdge& edge : made.edges->take()) map_.add_edge(edge);
+  }
+
+  close_loops(made.id);  // section 4.2
   if (!options_.mapper.bundle) return;
-  bundle_.request(map_, id,
-                  frame_count_);  // section 3.3: local bundle adjustment, put back `lag` frames later
-  if (bundle_.due(frame_count_)) put_back_bundle(report.bundle);
+
+  // Section 3.3: local bundle adjustment, put back `lag` frames later.
+  bundle_.request(map_, made.id, frame_count_);
+  if (bundle_.due(frame_count_)) put_back_bundle(report);
 }
 
 void Slam::set_reference(core::KeyframeId keyframe) {
@@ -182,6 +214,11 @@ void Slam::commit_bundles() {
   }
 }
 
+void Slam::connect_keyframes() {
+  BundleReport ignored;
+  while (!new_keyframes_.empty()) connect_keyframe(ignored);
+}
+
 /// The whole map may move: what was taken from it before must be back. The tracker waits, so that the next
 /// frame is tracked against the map as it is then, whatever the clock says.
 void Slam::close_loops(core::KeyframeId keyframe) {
@@ -189,15 +226,19 @@ void Slam::close_loops(core::KeyframeId keyframe) {
   const std::vector<Loop> loops = closer_.detect(map_, keyframe);
   if (loops.empty()) return;
   commit_bundles();
-  const Rigid3 camera_from_keyframe =
-      tracker_.camera_from_world() * map_.camera_from_world(keyframe).inverse();
+  const core::KeyframeId reference = tracker_.reference();
+  const Rigid3 camera_from_reference =
+      tracker_.camera_from_world() * map_.camera_from_world(reference).inverse();
   std::vector<PoseEdge> edges;
   for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
   if (!closer_.close(map_, edges)) return;
-  tracker_.map_changed(map_, keyframe, camera_from_keyframe * map_.camera_from_world(keyframe));
+  tracker_.map_changed(map_, reference, camera_from_reference * map_.camera_from_world(reference));
 }
 
-void Slam::finish() { commit_bundles(); }
+void Slam::finish() {
+  connect_keyframes();
+  commit_bundles();
+}
 
 void Slam::set_camera(const sensor::Camera& camera) {
   camera_ = camera;
@@ -210,6 +251,7 @@ void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) 
   set_camera(camera);
   if (map_.keyframe_count() == 0) return;
   const sensor::Recalibration change(image_, before, camera_);
+  connect_keyframes();
   commit_bundles();
 
   std::vector<maps::FramePose> frames = frames_.poses();

@@ -21,7 +21,7 @@ constexpr AlignmentRound kFine[] = {{kFineRadius_px, 0.05, 1200, 0, true, true},
                                     {kFineRadius_px, 0.03, 2400, 0, false, true},
                                     {kFineRadius_px, 0.03, 2400, 0, false, false}};
 
-constexpr int kIterations = 4;      // of a round; the next one associates anew
+constexpr int kIterations = 3;      // of a round; the next one associates anew
 constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
 constexpr double kLineGate = 9.2;   // 99 %: line ends are less exact than corners
 constexpr double kLineSigma_px = 0.6;

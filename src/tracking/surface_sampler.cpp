@@ -211,4 +211,13 @@ std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sens
   return result;
 }
 
+std::vector<maps::SurfaceSample> transformed(std::vector<maps::SurfaceSample> samples,
+                                             const geometry::Rigid3& to_from_here) {
+  for (maps::SurfaceSample& s : samples) {
+    s.point = (to_from_here * s.point.cast<double>()).cast<float>();
+    s.normal = (to_from_here.rotation * s.normal.cast<double>()).cast<float>();
+  }
+  return samples;
+}
+
 }  // namespace plumbline::tracking

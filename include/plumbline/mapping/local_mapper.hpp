@@ -3,6 +3,7 @@
 
 // Turns frames into keyframes and keeps the landmarks worth having (docs/method/mapping.md).
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "plumbline/core/options.hpp"
@@ -11,6 +12,7 @@
 #include "plumbline/mapping/landmark_fusion.hpp"
 #include "plumbline/mapping/landmark_triangulation.hpp"
 #include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/mapping/surface_edge_job.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/optimize/bundle_adjustment.hpp"
 #include "plumbline/sensor/frame.hpp"
@@ -62,12 +64,13 @@ class LocalMapper {
   /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
   void count_observations(maps::Map& map, const tracking::TrackResult& track) const;
 
-  /// Aligns the surfaces of neighbouring keyframes, and what is known of their grey values, with the depth
-  /// image and the image of the new one; what they say about its pose stays in the map as edges.
-  void add_surface_edges(maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
-                         const tracking::TrackResult& track,
-                         const tracking::PhotometricKeyframes& photometric,
-                         const std::vector<core::KeyframeId>& neighbours);
+  /// Begins to align the surfaces of neighbouring keyframes, and what is known of their grey values, with the
+  /// depth image and the image of the new one: what they say about its pose becomes edges of the map. Nothing
+  /// without the option `edges`.
+  [[nodiscard]] std::optional<SurfaceEdgeJob> begin_surface_edges(
+      const maps::Map& map, core::KeyframeId keyframe, const cv::Mat& depth,
+      const tracking::TrackResult& track, const tracking::PhotometricKeyframes& photometric,
+      const std::vector<core::KeyframeId>& neighbours, const core::Executor& executor) const;
 
   /// What a new keyframe has to say about the map around it, in this order: doubles are fused, landmarks
   /// that did not prove themselves go.

@@ -6,6 +6,7 @@
 // 24(17), 5743. Bundles are adjusted beside the tracker; what comes out is the same for any number of
 // threads.
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -107,8 +108,11 @@ class Slam {
  private:
   void start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
   void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
+  /// What came of a keyframe beside the tracker goes into the map, and what waited for it is begun.
+  void connect_keyframe(BundleReport& report);
   void set_reference(core::KeyframeId keyframe);
   void put_back_bundle(BundleReport& report);
+  void connect_keyframes();
   void commit_bundles();
   void close_loops(core::KeyframeId keyframe);
 
@@ -125,7 +129,14 @@ class Slam {
   LocalMapper mapper_;
   BackgroundBundle bundle_;
   LoopCloser closer_;
-  std::int64_t frame_count_ = 0;  ///< logical time
+  /// A new keyframe whose surfaces are being aligned beside the tracker.
+  struct NewKeyframe {
+    core::KeyframeId id;
+    std::int64_t frame = 0;               ///< of frame_count_, with which it was made
+    std::optional<SurfaceEdgeJob> edges;  ///< none: they are not wanted
+  };
+  std::deque<NewKeyframe> new_keyframes_;  ///< the oldest first
+  std::int64_t frame_count_ = 0;           ///< logical time
   FrameTrajectory frames_;
 };
 

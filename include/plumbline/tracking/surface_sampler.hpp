@@ -26,4 +26,8 @@ struct SurfaceSamplerOptions {
 std::vector<maps::SurfaceSample> sample_surface(const cv::Mat& depth, const sensor::Pinhole& camera,
                                                 const SurfaceSamplerOptions& options);
 
+/// The samples in another camera's frame.
+std::vector<maps::SurfaceSample> transformed(std::vector<maps::SurfaceSample> samples,
+                                             const geometry::Rigid3& to_from_here);
+
 }  // namespace plumbline::tracking

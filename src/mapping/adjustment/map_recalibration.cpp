@@ -8,9 +8,7 @@
 #include <utility>
 
 #include "plumbline/features/measurement.hpp"
-#include "plumbline/features/photometric.hpp"
 #include "plumbline/geometry/velocity.hpp"
-#include "plumbline/mapping/surface_edge.hpp"
 #include "plumbline/maps/camera_history.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
@@ -44,15 +42,6 @@ struct ImageChange {
     return now * (1.0 - change->delay_s() * rate / p.z());
   }
 };
-
-std::vector<maps::SurfaceSample> carried(std::vector<maps::SurfaceSample> samples,
-                                         const Rigid3& to_from_here) {
-  for (maps::SurfaceSample& s : samples) {
-    s.point = (to_from_here * s.point.cast<double>()).cast<float>();
-    s.normal = (to_from_here.rotation * s.normal.cast<double>()).cast<float>();
-  }
-  return samples;
-}
 
 /// A place as two images have it, each in its camera's frame.
 struct SharedPlace {
@@ -185,7 +174,7 @@ class MapRecalibration {
       const Rigid3 before = frame.camera_from_reference;
       if (frame.camera_from_previous && previous != nullptr) {
         const std::vector<maps::SurfaceSample> seen =
-            carried(samples_.at(previous->reference), previous_before);
+            tracking::transformed(samples_.at(previous->reference), previous_before);
         frame.camera_from_previous = corrected(*frame.camera_from_previous, image_of(*previous), image, seen);
       }
       if (map_.keyframe(frame.reference).stamp != frame.stamp) {
@@ -272,117 +261,11 @@ class MapRecalibration {
   std::map<KeyframeId, std::vector<maps::SurfaceSample>> samples_;  ///< before
 };
 
-/// What pictures say of the keyframes' surfaces.
-class SurfaceReader {
- public:
-  SurfaceReader(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,
-                const PictureReader& read, const SurfaceMeasurement& how, const core::Executor& executor,
-                maps::Map& map)
-      : camera_(camera),
-        path_(maps::trajectory(frames, map)),
-        read_(read),
-        how_(how),
-        executor_(executor),
-        map_(map) {
-    for (const auto& [number, edge] : map.edges()) by_later_[std::max(edge.a, edge.b)].push_back(number);
-  }
-
-  /// Keyframes in order of time, a few at a time: an edge needs the samples of the earlier one and the images
-  /// of the later one.
-  void run() {
-    constexpr std::size_t kAtOnce = 16;
-    const std::vector<KeyframeId> ids = map_.keyframe_ids();
-    for (std::size_t begin = 0; begin < ids.size(); begin += kAtOnce) {
-      const std::vector<KeyframeId> some(
-          ids.begin() + static_cast<std::ptrdiff_t>(begin),
-          ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), begin + kAtOnce)));
-      std::vector<Picture> pictures(some.size());
-      executor_.parallel_for(some.size(), [&](std::size_t i) { pictures[i] = picture_of(some[i]); });
-      for (std::size_t i = 0; i < some.size(); ++i) {
-        if (pictures[i].surface.empty()) continue;
-        auto keyframe = std::make_shared<maps::Keyframe>(map_.keyframe(some[i]));
-        keyframe->surface = std::move(pictures[i].surface);
-        map_.replace_keyframe(std::move(keyframe));
-        samples_[some[i]] = std::move(pictures[i].samples);
-      }
-      align(some, pictures);
-    }
-  }
-
- private:
-  struct Picture {
-    cv::Mat depth;
-    Rigid3 depth_from_camera;
-    std::shared_ptr<features::PhotometricImage> photometric;
-    std::shared_ptr<const features::PhotometricSamples> samples;
-    std::vector<maps::SurfaceSample> surface;
-  };
-
-  [[nodiscard]] Picture picture_of(KeyframeId id) const {
-    Picture picture;
-    const auto frame = read_(map_.keyframe(id).frame_index);
-    if (!frame || frame->depth.empty()) return picture;
-    picture.depth = frame->depth;
-    const double late_s = frame->depth_stamp - frame->stamp;
-    picture.depth_from_camera = geometry::exp_se3(late_s * geometry::velocity_at(path_, frame->stamp));
-    picture.surface = tracking::sample_surface(frame->depth, camera_, how_.sampler);
-    const Rigid3 camera_from_depth = picture.depth_from_camera.inverse();
-    picture.surface = carried(std::move(picture.surface), camera_from_depth);
-    if (!how_.photometric || frame->gray.empty()) return picture;
-    picture.photometric =
-        std::make_shared<features::PhotometricImage>(features::make_photometric_image(frame->gray));
-    picture.samples = std::make_shared<const features::PhotometricSamples>(
-        features::sample_photometric(*picture.photometric, frame->depth, camera_, camera_from_depth));
-    return picture;
-  }
-
-  void align(const std::vector<KeyframeId>& some, const std::vector<Picture>& pictures) {
-    struct Task {
-      std::uint64_t number = 0;
-      const Picture* picture = nullptr;
-      std::optional<maps::SurfaceEdge> found;
-    };
-    std::vector<Task> tasks;
-    for (std::size_t i = 0; i < some.size(); ++i) {
-      if (pictures[i].depth.empty()) continue;
-      for (const std::uint64_t number : by_later_[some[i]]) tasks.push_back({number, &pictures[i], {}});
-    }
-    executor_.parallel_for(tasks.size(), [&](std::size_t i) {
-      const maps::SurfaceEdge& edge = map_.edges().at(tasks[i].number);
-      const Picture& of_b = *tasks[i].picture;
-      const auto of_a = samples_.find(edge.a);
-      const Rigid3 b_from_a = map_.camera_from_world(edge.b) * map_.camera_from_world(edge.a).inverse();
-      tasks[i].found =
-          align_surface_edge(map_.keyframe(edge.a), edge.b, of_b.depth, b_from_a, of_b.depth_from_camera,
-                             camera_, {how_.min_overlap},
-                             {of_a == samples_.end() ? nullptr : of_a->second.get(), of_b.photometric.get()});
-    });
-    for (const Task& task : tasks) {
-      if (task.found) map_.replace_edge(task.number, *task.found);
-    }
-  }
-
-  sensor::Pinhole camera_;
-  geometry::Trajectory path_;
-  const PictureReader& read_;
-  const SurfaceMeasurement& how_;
-  const core::Executor& executor_;
-  maps::Map& map_;
-  std::map<KeyframeId, std::vector<std::uint64_t>> by_later_;  ///< numbers of the edges to earlier keyframes
-  std::map<KeyframeId, std::shared_ptr<const features::PhotometricSamples>> samples_;
-};
-
 }  // namespace
 
 void recalibrate_map(const sensor::Recalibration& change, maps::Map& map,
                      std::vector<maps::FramePose>& frames) {
   MapRecalibration(change, map, frames).run();
-}
-
-void measure_surfaces_again(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,
-                            const PictureReader& read, const SurfaceMeasurement& how,
-                            const core::Executor& executor, maps::Map& map) {
-  SurfaceReader(camera, frames, read, how, executor, map).run();
 }
 
 GlobalAdjustmentSummary adjust_recalibrated_map(const sensor::Pinhole& camera, const FusionOptions& fusion,

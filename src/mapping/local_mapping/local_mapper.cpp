@@ -2,29 +2,16 @@
 #include "plumbline/mapping/local_mapper.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "plumbline/features/depth_delay.hpp"
 #include "plumbline/mapping/landmark_normal.hpp"
-#include "plumbline/mapping/surface_edge.hpp"
 
 namespace plumbline::mapping {
 namespace {
 
 bool still(const geometry::Rigid3& motion) {
   return motion.translation.isZero(0.0) && motion.rotation.isIdentity(0.0);
-}
-
-/// A keyframe's pose is that of its colour image. What its depth image measured a little later or earlier is
-/// carried there: left where it is, every keyframe would be a few milliseconds of motion off what the next
-/// ones see, all in the direction of travel.
-void move(std::vector<maps::SurfaceSample>& surface, const geometry::Rigid3& camera_from_depth) {
-  if (still(camera_from_depth)) return;
-  const Eigen::Matrix3f rotation = camera_from_depth.rotation.cast<float>();
-  const Eigen::Vector3f translation = camera_from_depth.translation.cast<float>();
-  for (maps::SurfaceSample& s : surface) {
-    s.point = rotation * s.point + translation;
-    s.normal = rotation * s.normal;
-  }
 }
 
 }  // namespace
@@ -73,8 +60,13 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   if (!still(track.depth_from_camera))
     features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
   keyframe->features = own;
+  // A keyframe's pose is that of its colour image. What its depth image measured a little later or earlier is
+  // carried there: left where it is, every keyframe would be a few milliseconds of motion off what the next
+  // ones see, all in the direction of travel.
   keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
-  move(keyframe->surface, track.depth_from_camera.inverse());
+  if (!still(track.depth_from_camera))
+    keyframe->surface =
+        tracking::transformed(std::move(keyframe->surface), track.depth_from_camera.inverse());
   const core::KeyframeId id = map.add_keyframe(keyframe, track.camera_from_world);
   for (const tracking::PointMatch& m : track.points) {
     if (map.observe(m.point, id, m.feature, m.aligned)) map.refresh_point(m.point);
@@ -145,24 +137,23 @@ void LocalMapper::count(maps::Map& map, const tracking::TrackResult& track) {
   for (const tracking::LineMatch& m : track.lines) ++map.line(m.line).found;
 }
 
-void LocalMapper::add_surface_edges(maps::Map& map, core::KeyframeId id, const cv::Mat& depth,
-                                    const tracking::TrackResult& track,
-                                    const tracking::PhotometricKeyframes& photometric,
-                                    const std::vector<core::KeyframeId>& neighbours) {
-  if (!options_.edges) return;
-  int made = 0;
-  for (core::KeyframeId other : neighbours) {
-    if (made >= options_.edge_keyframes) break;
+std::optional<SurfaceEdgeJob> LocalMapper::begin_surface_edges(
+    const maps::Map& map, core::KeyframeId id, const cv::Mat& depth, const tracking::TrackResult& track,
+    const tracking::PhotometricKeyframes& photometric, const std::vector<core::KeyframeId>& neighbours,
+    const core::Executor& executor) const {
+  if (!options_.edges) return std::nullopt;
+
+  std::vector<NeighbourSurface> surfaces;
+  const geometry::Rigid3& camera_from_world = map.camera_from_world(id);
+  for (const core::KeyframeId other : neighbours) {
     if (other == id) continue;
-    const geometry::Rigid3 id_from_other = map.camera_from_world(id) * map.camera_from_world(other).inverse();
-    const auto seen = options_.edge_photometric ? photometric.find(other) : nullptr;
-    const auto edge =
-        align_surface_edge(map.keyframe(other), id, depth, id_from_other, track.depth_from_camera, camera_,
-                           {options_.edge_min_overlap}, {seen.get(), track.photometric.get()});
-    if (!edge) continue;
-    map.add_edge(*edge);
-    ++made;
+    surfaces.push_back({&map.keyframe(other), camera_from_world * map.camera_from_world(other).inverse(),
+                        options_.edge_photometric ? photometric.find(other) : nullptr});
   }
+
+  NewestSurface newest{id, depth, track.depth_from_camera, track.photometric};
+  return SurfaceEdgeJob(std::move(newest), std::move(surfaces), options_.edge_keyframes, camera_,
+                        {options_.edge_min_overlap}, executor);
 }
 
 /// Images taken while turning fast are distorted: their rays lie, and what they show does not lie where it
