@@ -25,7 +25,7 @@ struct FilmedWall {
       const core::KeyframeId id = world.add_keyframe(
           turn * Rigid3(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-0.1 * (i - 2), 0.0, -0.1 * (i - 2))));
       auto keyframe = std::make_shared<maps::Keyframe>(world.map.keyframe(id));
-      keyframe->stamp = 0.5 * i;
+      keyframe->stamp = 0.1 * i;
       if (i > 0) {
         keyframe->reference = keyframes.back();
         keyframe->camera_from_reference =
@@ -131,11 +131,11 @@ TEST(MapRecalibration, ADelayOfDepthMovesSurfacesAlongTheirRays) {
   wall.change(wall.given(), late);
   const std::vector<maps::SurfaceSample>& after = wall.world.map.keyframe(middle).surface;
   ASSERT_EQ(before.size(), after.size());
-  double most = 0.0;
+  double sum = 0.0;
   for (std::size_t i = 0; i < before.size(); ++i)
-    most = std::max(most, static_cast<double>((after[i].point - before[i].point).norm()));
-  EXPECT_GT(most, 0.002);  // 0.2 m/s towards the wall for 20 ms
-  EXPECT_LT(most, 0.02);
+    sum += static_cast<double>(after[i].point.z() - before[i].point.z());
+  // 1 m/s towards the wall for 20 ms; what it measured was nearer than the wall at the colour image.
+  EXPECT_NEAR(sum / static_cast<double>(before.size()), 0.02, 0.004);
 }
 
 }  // namespace
