@@ -14,6 +14,7 @@
 #include "plumbline/features/measurement.hpp"
 #include "plumbline/geometry/velocity.hpp"
 #include "plumbline/mapping/observation_noise.hpp"
+#include "plumbline/maps/components.hpp"
 #include "plumbline/sensor/depth_noise.hpp"
 
 namespace plumbline::mapping {
@@ -41,6 +42,7 @@ using Parts = std::array<CalibrationProblem, kParts>;
 struct View {
   double stamp = 0.0;
   Rigid3 camera_from_world;
+  core::KeyframeId root;  ///< of its component
   std::vector<std::pair<core::PointId, CalibrationObservation>> seen;
   double late_s =
       0.0;  ///< by so much longer than was believed when it was read is the depth's delay known now
@@ -72,7 +74,11 @@ class RunViews {
     std::map<core::KeyframeId, std::size_t> index;
     for (const core::KeyframeId id : keyframes) {
       index[id] = views_.size();
-      views_.push_back({run_.map->keyframe(id).stamp, run_.map->camera_from_world(id), {}, 0.0});
+      views_.push_back({run_.map->keyframe(id).stamp,
+                        run_.map->camera_from_world(id),
+                        maps::root_of(*run_.map, id),
+                        {},
+                        0.0});
     }
     static const ObservationNoise noise;
     for (const core::PointId id : run_.map->point_ids()) {
@@ -98,8 +104,11 @@ class RunViews {
     }
     for (const maps::FramePose* chosen : thinned(frames, most)) {
       const maps::FramePose& frame = *chosen;
-      View view{
-          frame.stamp, frame.camera_from_reference * run_.map->camera_from_world(frame.reference), {}, 0.0};
+      View view{frame.stamp,
+                frame.camera_from_reference * run_.map->camera_from_world(frame.reference),
+                maps::root_of(*run_.map, frame.reference),
+                {},
+                0.0};
       view.late_s = model_.camera().depth_delay_s - frame.seen->depth_delay_s;
       for (const maps::SeenPoint& s : frame.seen->points) {
         if (run_.map->find(s.point) == nullptr) continue;
@@ -142,7 +151,8 @@ void add_stretch(const CalibrationRun& run, const geometry::Trajectory& path, co
     optimize::CalibrationPose pose;
     pose.camera_from_world = view->camera_from_world;
     pose.velocity = geometry::velocity_at(path, view->stamp);
-    pose.fixed = view == begin;
+    // Components lie anywhere to each other: each has a pose of its own that is held.
+    pose.fixed = view == begin || view->root != (view - 1)->root;
     for (const auto& [id, observation] : view->seen) {
       by_point[id].push_back(observation);
       CalibrationObservation& seen = by_point[id].back();

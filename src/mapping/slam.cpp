@@ -7,6 +7,7 @@
 
 #include "loop_closing/relocalisation_check.hpp"
 #include "plumbline/features/measurement.hpp"
+#include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {
 
@@ -20,11 +21,17 @@ void SlamOptions::declare(core::OptionTable& table) {
                 "Frames after which an adjusted bundle is put back into the map; the tracker goes on "
                 "meanwhile. 0: it waits on the spot");
   loops.declare(table);
+  table.boolean(
+      "components", components,
+      "When the camera stays lost, go on in a second map and join the two where they show the same place");
 }
 
 /// Frames after which what was measured beside the tracker goes into the map: a keyframe's work is spread
 /// over several frames, and its surfaces are aligned meanwhile.
 constexpr std::int64_t kConnectAfter = 2;
+
+/// Frames in a row that are lost before a new component begins: half a second of a common camera.
+constexpr int kLostFrames = 15;
 
 /// A map's first frame must have depth to make landmarks and surfaces of: on a covered camera's nothing, all
 /// that follows would be lost.
@@ -32,6 +39,17 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
   constexpr double kMinMeasured = 0.05;  // share of the pixels
   return !frame.depth.empty() &&
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
+}
+
+/// A frame that begins a component must show what the next ones can be tracked by: not the dark, a hand or a
+/// bare wall.
+static bool can_begin_component(const sensor::RgbdFrame& frame, const features::FrameFeatures& features) {
+  constexpr std::ptrdiff_t kLeastLandmarks = 60;  // points and lines (twice) with depth
+  const auto points = std::count_if(features.points.begin(), features.points.end(),
+                                    [](const features::PointFeature& f) { return f.depth > 0.0F; });
+  const auto lines = std::count_if(features.lines.begin(), features.lines.end(),
+                                   [](const features::LineFeature& f) { return f.line3.has_value(); });
+  return can_start_map(frame) && points + 2 * lines >= kLeastLandmarks;
 }
 
 static ObservationNoise noise_of(const SlamOptions& options) {
@@ -76,7 +94,8 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
       mapper_(mapper_of(options), camera, robot),
       bundle_({options.mapper.bundle_keyframes, noise_of(options)}, options.mapper.bundle_options,
               options.bundle_lag, camera, executor, log),
-      closer_(options.loops, camera) {
+      closer_(options.loops, camera),
+      joiner_(camera, executor) {
   camera_.color = camera;
   if (!options.loops.enabled) return;
   constexpr std::size_t kLookAlikes = 12;
@@ -87,7 +106,8 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
                                                               options.loops.seed, options.mapper.surface}](
                                const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                                core::KeyframeId keyframe, const Rigid3& found_at) {
-    return check.passes(map_, tracker_.camera_from_world(), frame, features, keyframe, found_at);
+    const LostAt lost{tracker_.reference(), tracker_.camera_from_world(), tracker_.astray()};
+    return check.passes(map_, lost, frame, features, keyframe, found_at);
   });
 }
 
@@ -108,6 +128,10 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   }
   FrameReport report = FrameReport::of(frame, track);
   report.bundle = bundle;
+  if (options_.components && tracker_.lost_frames() >= kLostFrames && can_begin_component(frame, *features)) {
+    begin_component(frame, features, report);
+    return report;
+  }
 
   if (track.state == tracking::TrackState::kInitialising) {
     if (can_start_map(frame)) start_map(frame, features, report);
@@ -146,6 +170,21 @@ void Slam::start_map(const sensor::RgbdFrame& frame, const Features& features, F
   frames_.record(map_, origin, report.keyframe, {});
 }
 
+void Slam::begin_component(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
+  last_track_ = tracker_.begin_at({}, frame, features);
+  const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels, true);
+  new_keyframes_.push_back({id, frame_count_, std::nullopt});
+  tracker_.add_keyframe(id, frame, last_track_);
+  set_reference(id);
+  report.state = tracking::TrackState::kTracked;
+  report.keyframe = report.reference = id;
+
+  maps::FramePose origin;
+  origin.stamp = frame.stamp;
+  origin.tracked = true;
+  frames_.record(map_, origin, id, {});
+}
+
 void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
   // Section 3.3: observations and new landmarks, doubles merged, bad ones culled.
   const core::KeyframeId id = mapper_.insert(map_, frame, last_track_, features->levels);
@@ -171,6 +210,7 @@ void Slam::connect_keyframe(BundleReport& report) {
   }
 
   close_loops(made.id);  // section 4.2
+  join_components(made.id);
   if (!options_.mapper.bundle) return;
 
   // Section 3.3: local bundle adjustment, put back `lag` frames later.
@@ -233,6 +273,39 @@ void Slam::close_loops(core::KeyframeId keyframe) {
   for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
   if (!closer_.close(map_, edges)) return;
   tracker_.map_changed(map_, reference, camera_from_reference * map_.camera_from_world(reference));
+}
+
+/// The component that began later moves into the frame of the other one. Nothing is changed when the pose
+/// graph takes what joins them for wrong.
+void Slam::join_components(core::KeyframeId keyframe) {
+  if (!options_.loops.enabled || !options_.components) return;
+  auto overlap = joiner_.look_up(map_, keyframe, closer_.database());
+  if (!overlap) return;
+  commit_bundles();
+
+  // Laid over each other, connected by the pair of keyframes that share most, and adjusted together.
+  maps::Map map = map_;
+  maps::move_component(map, overlap->b, overlap->evidence.alignment.a_from_b);
+  std::vector<PoseEdge> edges;
+  const VerifiedPair* best = nullptr;
+  const auto share = [](const VerifiedPair& pair) { return pair.evidence.points + 2 * pair.evidence.lines; };
+  for (const VerifiedPair& pair : overlap->evidence.pairs) {
+    edges.push_back(
+        {pair.match, pair.query, pair.evidence.query_from_match, pair.evidence.information, false});
+    if (best == nullptr || share(pair) > share(*best)) best = &pair;
+  }
+  const bool query_in_a = maps::root_of(map, best->query) == overlap->a;
+  map.set_parent(overlap->b, query_in_a ? best->query : best->match);
+  if (!closer_.close(map, edges)) return;
+
+  // The tracker goes on where it was beside its keyframe.
+  const core::KeyframeId reference = tracker_.reference();
+  const Rigid3 camera_from_reference =
+      tracker_.camera_from_world() * map_.camera_from_world(reference).inverse();
+  map_ = std::move(map);
+  tracker_.map_changed(map_, reference, camera_from_reference * map_.camera_from_world(reference));
+  joiner_.joined(overlap->a, overlap->b);
+  joins_.push_back({std::move(*overlap), map_.keyframe(keyframe).stamp});
 }
 
 void Slam::finish() {

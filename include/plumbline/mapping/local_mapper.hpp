@@ -58,8 +58,9 @@ class LocalMapper {
   /// Adds a keyframe: observations of the landmarks it tracked, new landmarks from its depth, where older
   /// keyframes saw these, and landmarks without depth, triangulated. `levels`: the pyramid of its image;
   /// empty: none.
+  /// `begins_component`: it hangs on no other keyframe (maps/components.hpp).
   core::KeyframeId insert(maps::Map& map, const sensor::RgbdFrame& frame, const tracking::TrackResult& track,
-                          const std::vector<cv::Mat>& levels);
+                          const std::vector<cv::Mat>& levels, bool begins_component = false);
 
   /// Counts which landmarks a tracked frame should have seen and did; not where keyframes alone count.
   void count_observations(maps::Map& map, const tracking::TrackResult& track) const;

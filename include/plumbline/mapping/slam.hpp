@@ -18,6 +18,7 @@
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/mapping/background_bundle.hpp"
+#include "plumbline/mapping/component_joiner.hpp"
 #include "plumbline/mapping/frame_trajectory.hpp"
 #include "plumbline/mapping/keyframe_rule.hpp"
 #include "plumbline/mapping/local_mapper.hpp"
@@ -34,6 +35,7 @@ struct SlamOptions {
   LocalMapperOptions mapper;
   int bundle_lag = 8;  ///< frames
   LoopOptions loops;
+  bool components = true;
   void declare(core::OptionTable& table);
 };
 
@@ -55,6 +57,12 @@ struct FrameReport {
   KeyframeDecision decision;
   BundleReport bundle;  ///< put back before this frame was tracked (with a lag of 0: after)
   static FrameReport of(const sensor::RgbdFrame& frame, const tracking::TrackResult& track);
+};
+
+/// Two components that were joined while the robot mapped.
+struct ComponentJoin {
+  ComponentOverlap overlap;
+  double stamp = 0.0;  ///< of the keyframe that made it certain, seconds
 };
 
 class Slam {
@@ -90,7 +98,9 @@ class Slam {
   /// Ends what still runs beside the tracker; call once, after the last frame.
   void finish();
 
+  /// All components (maps/components.hpp).
   [[nodiscard]] const maps::Map& map() const { return map_; }
+  [[nodiscard]] const std::vector<ComponentJoin>& joins() const { return joins_; }
   [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
   /// Bundles and loops that would have torn the map, and were not put into it.
   [[nodiscard]] int refused() const { return bundle_.refused() + closer_.counts().refused; }
@@ -107,6 +117,8 @@ class Slam {
 
  private:
   void start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
+  void begin_component(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
+  void join_components(core::KeyframeId keyframe);
   void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
   /// What came of a keyframe beside the tracker goes into the map, and what waited for it is begun.
   void connect_keyframe(BundleReport& report);
@@ -129,6 +141,8 @@ class Slam {
   LocalMapper mapper_;
   BackgroundBundle bundle_;
   LoopCloser closer_;
+  ComponentJoiner joiner_;
+  std::vector<ComponentJoin> joins_;
   /// A new keyframe whose surfaces are being aligned beside the tracker.
   struct NewKeyframe {
     core::KeyframeId id;

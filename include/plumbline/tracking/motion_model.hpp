@@ -35,6 +35,7 @@ class MotionModel {
   [[nodiscard]] bool reliable(double stamp) const;
   /// After a while without a pose the last one says little: surfaces near it fit by chance.
   [[nodiscard]] bool outdated() const { return lost_frames_ >= 5; }
+  [[nodiscard]] int lost_frames() const { return lost_frames_; }
   /// After some more it says nothing.
   [[nodiscard]] bool expired() const { return lost_frames_ >= 30; }
   /// Of the search for features around their prediction.

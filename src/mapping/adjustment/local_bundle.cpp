@@ -256,7 +256,7 @@ LocalBundle take_local_bundle(const maps::Map& map, KeyframeId keyframe, const s
                               const LocalBundleOptions& options, const std::vector<KeyframeId>& also) {
   Builder builder(map, camera, options);
   const std::vector<KeyframeId> window = window_of(map, keyframe, also, options.keyframes);
-  for (KeyframeId id : window) builder.add_pose(id, id.index == 0);
+  for (KeyframeId id : window) builder.add_pose(id, !map.parent(id).valid());
   builder.hold_neighbours_on_the_way();
   builder.add_landmarks(window);
   builder.add_edges();

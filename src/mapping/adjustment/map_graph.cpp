@@ -199,7 +199,8 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared, int max_ne
   EdgeCollector edges(map);
   KeyframeId last;
   for (const KeyframeId id : map.keyframe_ids()) {
-    if (last.valid() && last.robot == id.robot) {
+    const bool begins_component = !map.parent(id).valid();
+    if (last.valid() && last.robot == id.robot && !begins_component) {
       edges.add(last, id, geometry::information_of(kNextSigma_m, kNextSigma_rad));
     }
     last = id;

@@ -43,7 +43,8 @@ void LocalMapperOptions::declare(core::OptionTable& table) {
 }
 
 core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& frame,
-                                     const tracking::TrackResult& track, const std::vector<cv::Mat>& levels) {
+                                     const tracking::TrackResult& track, const std::vector<cv::Mat>& levels,
+                                     bool begins_component) {
   auto keyframe = std::make_shared<maps::Keyframe>();
   keyframe->id = map.next_keyframe_id(robot_);
   keyframe->frame_index = frame.index;
@@ -74,7 +75,7 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   for (const tracking::LineMatch& m : track.lines) map.observe(m.line, id, m.feature);
   add_points(map, id, frame.depth);
   add_lines(map, id);
-  map.attach(id);
+  if (!begins_component) map.attach(id);
   if (options_.triangulate && !distorted(map, id)) triangulate(map, id, {levels, *own});
   own->slants = {};  // corners stay where they are from here on
   return id;

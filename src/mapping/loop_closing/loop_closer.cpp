@@ -8,6 +8,7 @@
 
 #include "loop_closing/inter_robot_loops.hpp"
 #include "loop_closing/relocalisation_check.hpp"
+#include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {
 namespace {
@@ -135,8 +136,10 @@ std::vector<Loop> LoopCloser::detect(const maps::Map& map, KeyframeId keyframe) 
   if (features == nullptr) return {};
   const auto related = map.covisible(keyframe, kRelated);
   const double now = map.keyframe(keyframe).stamp;
+  const KeyframeId root = maps::root_of(map, keyframe);
   const auto allowed = [&](KeyframeId id) {
     if (!map.has_keyframe(id) || std::abs(now - map.keyframe(id).stamp) < options_.min_gap_s) return false;
+    if (maps::root_of(map, id) != root) return false;  // another component: not a loop
     return std::none_of(related.begin(), related.end(), [&](const auto& r) { return r.first == id; });
   };
   const auto neighbours = [&](KeyframeId id) { return map.neighbours(id, kAroundLoop); };

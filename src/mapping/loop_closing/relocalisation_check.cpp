@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "plumbline/maps/components.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -27,10 +29,12 @@ maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const featur
   return map;
 }
 
-bool RelocalisationCheck::passes(const maps::Map& map, const Rigid3& lost_at, const sensor::RgbdFrame& frame,
+bool RelocalisationCheck::passes(const maps::Map& map, const LostAt& lost, const sensor::RgbdFrame& frame,
                                  const features::FrameFeatures& features, core::KeyframeId keyframe,
                                  const Rigid3& found_at) const {
-  if (within(found_at, lost_at, 0.6, 0.6)) return true;
+  if (maps::root_of(map, keyframe) != maps::root_of(map, lost.reference)) return false;
+  const bool near = within(found_at, lost.camera_from_world, 0.6, 0.6);
+  if (near && !lost.astray) return true;
   if (features.points.empty() && features.lines.empty()) return true;  // depth alone: nothing to match
   const maps::Map image =
       image_map(frame, std::make_shared<features::FrameFeatures>(features), camera, surface);

@@ -12,21 +12,28 @@ namespace plumbline::mapping {
 
 /// A map of nothing but one frame, as keyframe 0 of `robot` in the origin: what places are verified with.
 maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
-                      const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface);
+                    const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface);
 
-/// A camera that turns up far from where it was lost must pass as a loop would: corridors look alike from
-/// both ends. Near by there is nothing to confuse.
+/// Where a camera was lost.
+struct LostAt {
+  core::KeyframeId reference;          ///< in whose surroundings
+  geometry::Rigid3 camera_from_world;  ///< the last pose that was known
+  bool astray = false;                 ///< several frames ago: it may be elsewhere by now
+};
+
+/// A camera that turns up far from where it was lost, or after several frames, must pass as a loop would:
+/// corridors look alike from both ends. Near by there is nothing to confuse. In another component it never
+/// is: components are joined by more evidence than one frame has.
 struct RelocalisationCheck {
   sensor::Pinhole camera;
   VerificationOptions verify;
   std::uint64_t seed = 0;
   tracking::SurfaceSamplerOptions surface;
 
-  /// `lost_at`: the last pose that was known; `keyframe`: near which the camera was found. All
-  /// camera_from_world.
-  [[nodiscard]] bool passes(const maps::Map& map, const geometry::Rigid3& lost_at,
-                            const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
-                            core::KeyframeId keyframe, const geometry::Rigid3& found_at) const;
+  /// `keyframe`: near which the camera was found; `found_at`: its camera_from_world.
+  [[nodiscard]] bool passes(const maps::Map& map, const LostAt& lost, const sensor::RgbdFrame& frame,
+                            const features::FrameFeatures& features, core::KeyframeId keyframe,
+                            const geometry::Rigid3& found_at) const;
 };
 
 }  // namespace plumbline::mapping

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <optional>
 
+#include "plumbline/cloud/cell_map.hpp"
 #include "plumbline/cloud/constrained_point_to_plane.hpp"
 #include "plumbline/cloud/two_way_correspondences.hpp"
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Finds out how two components of one robot's map lie to each other (docs/method/components.md): keyframes of
+// the one are held against those of the other, by the same verification and the same decision that maps of
+// two robots are merged by.
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/mapping/map_fusion.hpp"
+#include "plumbline/maps/map.hpp"
+#include "plumbline/places/recogniser.hpp"
+#include "plumbline/sensor/camera.hpp"
+
+namespace plumbline::mapping {
+
+/// Two components that show the same place.
+struct ComponentOverlap {
+  core::KeyframeId a;  ///< roots, a < b
+  core::KeyframeId b;
+  MergeEvidence evidence;  ///< its alignment leads from b's world to a's
+};
+
+class ComponentJoiner {
+ public:
+  /// The executor must outlive this.
+  ComponentJoiner(const sensor::Pinhole& camera, const core::Executor& executor)
+      : camera_(camera), executor_(&executor) {}
+
+  /// Holds a keyframe against those of other components that look like it, as `places` says. What it returns
+  /// is certain; none while it is not.
+  std::optional<ComponentOverlap> look_up(const maps::Map& map, core::KeyframeId keyframe,
+                                          const places::Database& places);
+  /// The component of root `b` became part of that of root `a`.
+  void joined(core::KeyframeId a, core::KeyframeId b);
+
+ private:
+  using Roots = std::pair<core::KeyframeId, core::KeyframeId>;
+  struct Pairs {
+    std::vector<VerifiedPair> verified;
+    std::size_t decided = 0;  ///< when it was decided last
+  };
+  void verify(const maps::Map& map, core::KeyframeId keyframe, core::KeyframeId root,
+              const places::Database& places);
+
+  sensor::Pinhole camera_;
+  const core::Executor* executor_;
+  MapFusionOptions options_;
+  std::map<Roots, Pairs> pairs_;
+};
+
+}  // namespace plumbline::mapping

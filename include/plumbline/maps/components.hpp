@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Connected components of a map. A robot that lost itself goes on in a new component with an origin of its
+// own: poses of different components say nothing of each other until the components are joined. Each
+// component is one tree of keyframes (Map::parent).
+#include <vector>
+
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/map.hpp"
+
+namespace plumbline::maps {
+
+/// The root of the tree in which a keyframe is; std::out_of_range when it is not in the map.
+[[nodiscard]] core::KeyframeId root_of(const Map& map, core::KeyframeId keyframe);
+
+/// Roots of all components, ascending.
+[[nodiscard]] std::vector<core::KeyframeId> roots(const Map& map);
+
+/// The component with this root as a map of its own: ids stay, and the next ids are those of the whole.
+/// Edges, loops and observations that lead out of it are left out.
+[[nodiscard]] Map component(const Map& map, core::KeyframeId root);
+
+/// The keyframes, points and lines of the component with this root move by new_from_old of their world.
+void move_component(Map& map, core::KeyframeId root, const geometry::Rigid3& new_from_old_world);
+
+/// The frames whose reference keyframe is in `map`, in their order.
+[[nodiscard]] std::vector<FramePose> frames_in(const Map& map, const std::vector<FramePose>& frames);
+
+}  // namespace plumbline::maps

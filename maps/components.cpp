@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/maps/components.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace plumbline::maps {
+namespace {
+
+using core::KeyframeId;
+
+std::set<KeyframeId> members(const Map& map, KeyframeId root) {
+  std::set<KeyframeId> found;
+  std::vector<KeyframeId> open{root};
+  while (!open.empty()) {
+    const KeyframeId id = open.back();
+    open.pop_back();
+    found.insert(id);
+    const std::vector<KeyframeId>& children = map.children(id);
+    open.insert(open.end(), children.begin(), children.end());
+  }
+  return found;
+}
+
+/// Landmarks with what the members see of them; those that none of them sees are left out.
+template <typename Id, typename Landmark>
+void add_landmarks(const Map& map, const std::vector<Id>& ids, const std::set<KeyframeId>& members,
+                   std::vector<Landmark>& parts) {
+  for (const Id id : ids) {
+    Landmark landmark = *map.find(id);
+    const auto outside = [&](const Observation& o) { return members.count(o.keyframe) == 0; };
+    auto& seen = landmark.observations;
+    seen.erase(std::remove_if(seen.begin(), seen.end(), outside), seen.end());
+    if (!seen.empty()) parts.push_back(std::move(landmark));
+  }
+}
+
+}  // namespace
+
+KeyframeId root_of(const Map& map, KeyframeId keyframe) {
+  for (KeyframeId above = map.parent(keyframe); above.valid(); above = map.parent(keyframe)) keyframe = above;
+  return keyframe;
+}
+
+std::vector<KeyframeId> roots(const Map& map) {
+  std::vector<KeyframeId> found = map.keyframe_ids();
+  found.erase(
+      std::remove_if(found.begin(), found.end(), [&](KeyframeId id) { return map.parent(id).valid(); }),
+      found.end());
+  return found;
+}
+
+Map component(const Map& map, KeyframeId root) {
+  const std::set<KeyframeId> inside = members(map, root);
+  const MapChanges whole = map.changes_since({});
+  MapParts parts;
+  for (const MapParts::KeyframePart& keyframe : whole.keyframes) {
+    if (inside.count(keyframe.data->id) != 0) parts.keyframes.push_back(keyframe);
+  }
+
+  add_landmarks(map, map.point_ids(), inside, parts.points);
+  add_landmarks(map, map.line_ids(), inside, parts.lines);
+
+  const auto between_members = [&](const auto& edge) {
+    return inside.count(edge.a) != 0 && inside.count(edge.b) != 0;
+  };
+  for (const auto& [number, edge] : map.edges()) {
+    if (between_members(edge)) parts.edges.emplace_back(number, edge);
+  }
+  std::copy_if(whole.loops.begin(), whole.loops.end(), std::back_inserter(parts.loops), between_members);
+
+  parts.next = whole.next;
+  return Map(std::move(parts));
+}
+
+void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_old_world) {
+  const std::set<KeyframeId> inside = members(map, root);
+  const auto is_inside = [&](const auto& landmark) {
+    return !landmark.observations.empty() && inside.count(landmark.observations.front().keyframe) != 0;
+  };
+  const geometry::Rigid3 old_from_new_world = new_from_old_world.inverse();
+  for (const KeyframeId id : inside) map.set_pose(id, map.camera_from_world(id) * old_from_new_world);
+
+  for (const core::PointId id : map.point_ids()) {
+    if (!is_inside(std::as_const(map).point(id))) continue;
+    MapPoint& point = map.point(id);
+    point.position = new_from_old_world * point.position;
+    point.normal = new_from_old_world.rotation * point.normal;
+    point.view_direction = new_from_old_world.rotation * point.view_direction;
+  }
+  for (const core::LineId id : map.line_ids()) {
+    if (!is_inside(std::as_const(map).line(id))) continue;
+    MapLine& line = map.line(id);
+    line.start = new_from_old_world * line.start;
+    line.end = new_from_old_world * line.end;
+  }
+}
+
+std::vector<FramePose> frames_in(const Map& map, const std::vector<FramePose>& frames) {
+  std::vector<FramePose> inside;
+  std::copy_if(frames.begin(), frames.end(), std::back_inserter(inside), [&](const FramePose& frame) {
+    return frame.reference.valid() && map.has_keyframe(frame.reference);
+  });
+  return inside;
+}
+
+}  // namespace plumbline::maps
