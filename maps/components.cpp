@@ -2,6 +2,8 @@
 #include "plumbline/maps/components.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -97,12 +99,22 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
   }
 }
 
-std::vector<FramePose> frames_in(const Map& map, const std::vector<FramePose>& frames) {
-  std::vector<FramePose> inside;
-  std::copy_if(frames.begin(), frames.end(), std::back_inserter(inside), [&](const FramePose& frame) {
-    return frame.reference.valid() && map.has_keyframe(frame.reference);
-  });
-  return inside;
+std::vector<FramePose> frames_in(const Map& map, std::vector<FramePose> frames) {
+  for (FramePose& frame : frames)
+    frame.tracked = frame.tracked && frame.reference.valid() && map.has_keyframe(frame.reference);
+  return frames;
+}
+
+KeyframeId main_root(const Map& map, const std::vector<FramePose>& frames) {
+  const std::vector<KeyframeId> all = roots(map);
+  if (all.size() == 1) return all.front();
+
+  std::map<KeyframeId, std::size_t> tracked;
+  for (const FramePose& frame : frames) {
+    if (frame.tracked && map.has_keyframe(frame.reference)) ++tracked[root_of(map, frame.reference)];
+  }
+  return *std::max_element(all.begin(), all.end(),
+                           [&](KeyframeId x, KeyframeId y) { return tracked[x] < tracked[y]; });
 }
 
 }  // namespace plumbline::maps

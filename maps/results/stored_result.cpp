@@ -11,6 +11,7 @@
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/core/config.hpp"
+#include "plumbline/maps/components.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_views.hpp"
@@ -64,6 +65,10 @@ core::Result<StoredResult> StoredResult::open(const fs::path& store, const std::
   if (!reader) return tl::unexpected(reader.error());
   auto map = reader->load(robot);
   if (!map) return tl::unexpected(map.error());
+  if (roots(map->map).size() > 1) {  // what never joined lies in frames of its own
+    map->map = component(map->map, main_root(map->map, map->frames));
+    map->frames = frames_in(map->map, std::move(map->frames));
+  }
   return StoredResult(store, std::move(*reader), std::move(*map));
 }
 

@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "loop_closing/relocalisation_check.hpp"
 #include "plumbline/features/measurement.hpp"
+#include "plumbline/mapping/relocalisation_check.hpp"
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {
@@ -88,6 +88,7 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
            const core::Executor& executor, core::Log& log)
     : options_(options),
       executor_(executor),
+      relocalisation_{camera, options.loops.verify, options.loops.seed, options.mapper.surface},
       image_(camera),
       tracker_(options.tracker, camera),
       keyframe_rule_(options.keyframe, camera),
@@ -102,12 +103,10 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
   tracker_.set_place_finder([this](const features::FrameFeatures& picture) {
     return closer_.look_alikes(map_, picture, kLookAlikes);
   });
-  tracker_.set_place_judge([this, check = RelocalisationCheck{camera, options.loops.verify,
-                                                              options.loops.seed, options.mapper.surface}](
-                               const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
-                               core::KeyframeId keyframe, const Rigid3& found_at) {
+  tracker_.set_place_judge([this](const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
+                                  core::KeyframeId keyframe, const Rigid3& found_at) {
     const LostAt lost{tracker_.reference(), tracker_.camera_from_world(), tracker_.astray()};
-    return check.passes(map_, lost, frame, features, keyframe, found_at);
+    return relocalisation_.passes(map_, lost, frame, features, keyframe, found_at);
   });
 }
 
@@ -120,7 +119,9 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   if (bundle_.due(frame_count_)) put_back_bundle(bundle);
 
   // Section 3.2: the frame's pose; a lost frame is looked for in the maps of other robots, too.
+  const int lost_before = tracker_.lost_frames();
   last_track_ = tracker_.track(map_, frame, features);
+  if (!believes_place(frame, features, lost_before)) last_track_.state = tracking::TrackState::kLost;
   const tracking::TrackResult& track = last_track_;
   if (tracker_.astray()) {
     const auto place = closer_.locate(frame, features, options_.mapper.surface);
@@ -135,6 +136,7 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
 
   if (track.state == tracking::TrackState::kInitialising) {
     if (can_start_map(frame)) start_map(frame, features, report);
+    report.component = report.keyframe;
     return report;
   }
 
@@ -154,8 +156,33 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   // The path.
   frames_.record(map_, pose, tracker_.reference(),
                  pose.tracked ? tracker_.camera_from_world() : track.camera_from_world);
+  if (pose.tracked) report.component = maps::root_of(map_, tracker_.reference());
   if (options_.tracker.align_stamps) report.depth_from_camera = frames_.depth_from_camera(map_, frame);
   return report;
+}
+
+/// What surrounds a camera must bear it out for several frames in a row, in which no keyframe changes the
+/// map.
+bool Slam::believes_place(const sensor::RgbdFrame& frame, const Features& features, int lost_before) {
+  constexpr int kFrames = 5;
+  constexpr int kOutdated = 5;  // lost frames after which the camera may be anywhere
+  const tracking::TrackResult& track = last_track_;
+  if (!options_.loops.enabled) return true;
+  if (!probation_ && track.relocalised && lost_before >= kOutdated) probation_ = Probation{lost_before, 0};
+  if (!probation_) return true;
+
+  ++probation_->frames;
+  const int lost_frames = probation_->lost_before + probation_->frames;
+  bool stands = track.state == tracking::TrackState::kTracked;
+  if (stands && probation_->frames < kFrames) return false;
+  if (stands) {
+    const LostAt lost{tracker_.reference(), tracker_.camera_from_world(), true};
+    stands =
+        relocalisation_.passes(map_, lost, frame, *features, tracker_.reference(), track.camera_from_world);
+  }
+  probation_.reset();
+  if (!stands) tracker_.take_back(lost_frames);
+  return stands;
 }
 
 void Slam::start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report) {
@@ -177,7 +204,7 @@ void Slam::begin_component(const sensor::RgbdFrame& frame, const Features& featu
   tracker_.add_keyframe(id, frame, last_track_);
   set_reference(id);
   report.state = tracking::TrackState::kTracked;
-  report.keyframe = report.reference = id;
+  report.keyframe = report.reference = report.component = id;
 
   maps::FramePose origin;
   origin.stamp = frame.stamp;
@@ -285,6 +312,7 @@ void Slam::join_components(core::KeyframeId keyframe) {
 
   // Laid over each other, connected by the pair of keyframes that share most, and adjusted together.
   maps::Map map = map_;
+  const std::size_t joining = maps::component(map, overlap->b).keyframe_count();
   maps::move_component(map, overlap->b, overlap->evidence.alignment.a_from_b);
   std::vector<PoseEdge> edges;
   const VerifiedPair* best = nullptr;
@@ -305,7 +333,7 @@ void Slam::join_components(core::KeyframeId keyframe) {
   map_ = std::move(map);
   tracker_.map_changed(map_, reference, camera_from_reference * map_.camera_from_world(reference));
   joiner_.joined(overlap->a, overlap->b);
-  joins_.push_back({std::move(*overlap), map_.keyframe(keyframe).stamp});
+  joins_.push_back({std::move(*overlap), map_.keyframe(keyframe).stamp, joining});
 }
 
 void Slam::finish() {

@@ -24,6 +24,7 @@
 #include "plumbline/mapping/local_mapper.hpp"
 #include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_recalibration.hpp"
+#include "plumbline/mapping/relocalisation_check.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/tracking/tracker.hpp"
 
@@ -46,6 +47,7 @@ struct FrameReport {
   tracking::TrackState state = tracking::TrackState::kLost;
   core::KeyframeId reference;  ///< keyframe the pose is relative to
   core::KeyframeId keyframe;   ///< made of this frame; invalid: none
+  core::KeyframeId component;  ///< its root, when the frame was tracked; invalid: it stands in none
   optimize::FamilySummary points;
   optimize::FamilySummary lines;
   optimize::FamilySummary surface;
@@ -62,7 +64,8 @@ struct FrameReport {
 /// Two components that were joined while the robot mapped.
 struct ComponentJoin {
   ComponentOverlap overlap;
-  double stamp = 0.0;  ///< of the keyframe that made it certain, seconds
+  double stamp = 0.0;         ///< of the keyframe that made it certain, seconds
+  std::size_t keyframes = 0;  ///< of the later component
 };
 
 class Slam {
@@ -117,6 +120,8 @@ class Slam {
 
  private:
   void start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
+  /// Whether the camera is believed to be where it was found again; while it is not, its frames have no pose.
+  bool believes_place(const sensor::RgbdFrame& frame, const Features& features, int lost_before);
   void begin_component(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
   void join_components(core::KeyframeId keyframe);
   void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
@@ -132,6 +137,7 @@ class Slam {
 
   SlamOptions options_;
   const core::Executor& executor_;
+  RelocalisationCheck relocalisation_;
   sensor::Pinhole image_;
   sensor::Camera camera_;
   maps::Map map_;
@@ -150,7 +156,13 @@ class Slam {
     std::optional<SurfaceEdgeJob> edges;  ///< none: they are not wanted
   };
   std::deque<NewKeyframe> new_keyframes_;  ///< the oldest first
-  std::int64_t frame_count_ = 0;           ///< logical time
+  /// A camera that was found again, but is not believed to be there yet.
+  struct Probation {
+    int lost_before = 0;  ///< frames in a row
+    int frames = 0;       ///< since it was found
+  };
+  std::optional<Probation> probation_;
+  std::int64_t frame_count_ = 0;  ///< logical time
   FrameTrajectory frames_;
 };
 

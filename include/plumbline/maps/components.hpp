@@ -24,7 +24,11 @@ namespace plumbline::maps {
 /// The keyframes, points and lines of the component with this root move by new_from_old of their world.
 void move_component(Map& map, core::KeyframeId root, const geometry::Rigid3& new_from_old_world);
 
-/// The frames whose reference keyframe is in `map`, in their order.
-[[nodiscard]] std::vector<FramePose> frames_in(const Map& map, const std::vector<FramePose>& frames);
+/// All of the robots' frames, of which those whose reference keyframe is not in `map` are not tracked:
+/// numbers of frames (FrameId) stay.
+[[nodiscard]] std::vector<FramePose> frames_in(const Map& map, std::vector<FramePose> frames);
+
+/// The root of the component in which most frames are tracked; of several the lowest. The map has keyframes.
+[[nodiscard]] core::KeyframeId main_root(const Map& map, const std::vector<FramePose>& frames);
 
 }  // namespace plumbline::maps

@@ -57,6 +57,7 @@ struct RobotMap {
   std::vector<RobotInfo> robots;
   std::shared_ptr<const maps::Map> map;
   std::vector<maps::FramePose> frame_poses;
+  bool component = false;  ///< one of several that its robots' map consists of
 };
 
 /// What there is to be merged.
@@ -75,6 +76,10 @@ struct MapResult : maps::MapPoses {
   std::vector<RobotInfo> robots;  ///< by number, with what their cameras turned out to be; empty: one robot
   std::string frame_columns;      ///< header of FrameRow::columns
   std::vector<FrameRow> frames;   ///< by frame
+  /// Components of the robots' maps that never joined this one, each in a frame of its own; they have none
+  /// themselves.
+  std::vector<std::shared_ptr<const MapResult>> apart;
+  std::string name;  ///< of such a component
 };
 
 /// Filtered cloud of one keyframe, or of a frame between keyframes, camera frame; or of such a frame what it
@@ -108,6 +113,7 @@ struct DenseCloud {
   geometry::Rigid3 output_from_map;
   bool upright = false;                                      ///< z is up in the output's frame
   std::shared_ptr<const maps::FusionState> state = nullptr;  ///< what it was laid down with
+  std::vector<std::shared_ptr<const DenseCloud>> apart;      ///< of the components MapResult::apart
 };
 
 /// The poses of one robot among `map.trajectory`.

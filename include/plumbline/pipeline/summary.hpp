@@ -119,7 +119,24 @@ struct RunSummary {
     std::size_t keyframes = 0;
   };
   std::vector<Robot> robots;  ///< of several recordings
-  std::string unconnected;    ///< maps of robots that are left out, and what was tried; empty: none
+  /// A robot that lost itself goes on in another component of its map.
+  struct Component {
+    std::string name;        ///< of its folder, or of the robot and the keyframe that began it
+    std::size_t frames = 0;  ///< tracked in it
+    std::size_t keyframes = 0;
+    bool joined = false;  ///< it is part of the result
+    double joined_s =
+        -1.0;             ///< of the recording, when that was found out while mapping; negative: at the end
+    int agreeing = 0;     ///< keyframes that say so
+    std::string why_not;  ///< empty: joined
+  };
+  std::vector<Component> components;  ///< empty: the map is in one piece from the first frame on
+  /// Components of too few keyframes, whose frames have no pose.
+  struct Dropped {
+    std::size_t components = 0;
+    std::size_t frames = 0;
+  } dropped;
+  std::string unconnected;  ///< maps of robots that are left out, and what was tried; empty: none
   std::size_t cloud_points = 0;
   double voxel_m = 0.0;             ///< of the merged cloud; 0: none was to be made
   Sigma cloud_sigma_m;              ///< of its points along their normals

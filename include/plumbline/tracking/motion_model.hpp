@@ -21,6 +21,8 @@ class MotionModel {
   void update(double stamp, const TrackResult& result);
   /// A frame was not.
   void lost();
+  /// What was found since so many frames were lost was a mistake.
+  void lost_since(int frames) { lost_frames_ = frames; }
   /// The camera turned up elsewhere: the past says nothing.
   void reset();
   /// Goes on from a keyframe, with this velocity of camera_from_world per second.

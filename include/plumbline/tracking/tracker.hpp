@@ -141,6 +141,8 @@ class Tracker {
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return motion_.camera_from_world(); }
   /// The last frame was lost, and several before it.
   [[nodiscard]] bool astray() const { return motion_.outdated(); }
+  /// The frames since `lost_frames` were lost are taken back: they are lost, too.
+  void take_back(int lost_frames) { motion_.lost_since(lost_frames); }
   /// So many frames in a row were lost.
   [[nodiscard]] int lost_frames() const { return motion_.lost_frames(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }

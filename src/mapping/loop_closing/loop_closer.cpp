@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "loop_closing/inter_robot_loops.hpp"
-#include "loop_closing/relocalisation_check.hpp"
+#include "plumbline/mapping/relocalisation_check.hpp"
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {

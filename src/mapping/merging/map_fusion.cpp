@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <set>
 
+#include "plumbline/maps/components.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -14,8 +16,26 @@ using geometry::Rigid3;
 
 constexpr std::size_t kAroundPair = 4;  // keyframes around each end of a pair whose landmarks are compared
 
-/// Where each part of the anchor's group lies: along the merges with most pairs first (a spanning tree).
-std::map<std::size_t, Rigid3> lay_out(const std::vector<MergeEvidence>& merges, std::size_t anchor) {
+/// Where the parts of the anchor's group lie, and by which keyframes they hang together.
+struct Layout {
+  std::map<std::size_t, Rigid3> anchor_from_part;
+  std::vector<std::pair<KeyframeId, KeyframeId>> ties;  ///< root of a part, and the keyframe that it hangs on
+};
+
+/// How a part hangs on those that are laid already: by the pair of keyframes that share most.
+std::pair<KeyframeId, KeyframeId> tie_of(const MergeEvidence& merge, const maps::Map& part) {
+  const auto share = [](const VerifiedPair& pair) { return pair.evidence.points + 2 * pair.evidence.lines; };
+  const auto best =
+      std::max_element(merge.pairs.begin(), merge.pairs.end(),
+                       [&](const VerifiedPair& x, const VerifiedPair& y) { return share(x) < share(y); });
+  const bool query_in_part = part.has_keyframe(best->query);
+  const KeyframeId inside = query_in_part ? best->query : best->match;
+  return {maps::root_of(part, inside), query_in_part ? best->match : best->query};
+}
+
+/// Along the merges with most pairs first (a spanning tree).
+Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidence>& merges,
+               std::size_t anchor) {
   std::vector<const MergeEvidence*> order;
   for (const MergeEvidence& merge : merges) {
     if (merge.accepted) order.push_back(&merge);
@@ -23,7 +43,10 @@ std::map<std::size_t, Rigid3> lay_out(const std::vector<MergeEvidence>& merges, 
   std::stable_sort(order.begin(), order.end(), [](const MergeEvidence* x, const MergeEvidence* y) {
     return x->pairs.size() > y->pairs.size();
   });
-  std::map<std::size_t, Rigid3> anchor_from_part{{anchor, Rigid3{}}};
+
+  Layout layout;
+  auto& anchor_from_part = layout.anchor_from_part;
+  anchor_from_part[anchor] = {};
   for (bool grown = true; grown;) {
     grown = false;
     for (const MergeEvidence* merge : order) {
@@ -35,11 +58,12 @@ std::map<std::size_t, Rigid3> lay_out(const std::vector<MergeEvidence>& merges, 
       } else {
         anchor_from_part[merge->a] = anchor_from_part[merge->b] * merge->alignment.a_from_b.inverse();
       }
+      layout.ties.push_back(tie_of(*merge, *parts[has_a ? merge->b : merge->a].map));
       grown = true;
       break;  // the best merge that is left, again
     }
   }
-  return anchor_from_part;
+  return layout;
 }
 
 /// The pairs of one merge as edges of the pose graph.
@@ -155,13 +179,16 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
                    const MapFusionOptions& options) {
   FusedMap fused;
   std::vector<const maps::Map*> maps;
-  for (const auto& [part, anchor_from_part] : lay_out(merges, anchor)) {
+  const Layout layout = lay_out(parts, merges, anchor);
+  for (const auto& [part, anchor_from_part] : layout.anchor_from_part) {
     fused.parts.push_back(part);
     fused.anchor_from_part.push_back(anchor_from_part);
     maps.push_back(parts[part].map);
     fused.cameras.insert(parts[part].cameras.begin(), parts[part].cameras.end());
   }
   fused.map = joined(maps, fused.anchor_from_part);
+  for (const auto& [root, parent] : layout.ties) fused.map.set_parent(root, parent);
+
   std::vector<PoseEdge> edges;
   std::vector<MergeEvidence*> used;
   for (MergeEvidence& merge : merges) {

@@ -5,6 +5,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "plumbline/maps/components.hpp"
+
 namespace plumbline::mapping {
 namespace {
 
@@ -69,6 +71,12 @@ std::size_t MergeServer::join(const Cameras& cameras) {
 void MergeServer::add(std::shared_ptr<const maps::Map> map, KeyframeId id, std::int64_t frame) {
   if (!id.valid() || static_cast<std::size_t>(id.robot) >= places_.size() || !map->has_keyframe(id)) {
     throw std::invalid_argument("a keyframe that no robot has");
+  }
+  // A robot that lost itself: its first component alone, until others were joined to it.
+  const std::vector<KeyframeId> roots = maps::roots(*map);
+  if (roots.size() > 1) {
+    if (maps::root_of(*map, id) != roots.front()) return;
+    map = std::make_shared<maps::Map>(maps::component(*map, roots.front()));
   }
   waiting_.push_back({std::move(map), id, frame});
 }

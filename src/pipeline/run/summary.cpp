@@ -51,6 +51,43 @@ Json robots_of(const RunSummary& summary) {
   return list;
 }
 
+Json components_of(const RunSummary& summary) {
+  Json list = Json::array();
+  for (const RunSummary::Component& c : summary.components) {
+    Json one = {{"name", c.name}, {"frames", c.frames}, {"keyframes", c.keyframes}, {"joined", c.joined}};
+    if (c.joined) {
+      one["joined_s"] = c.joined_s < 0.0 ? Json() : Json(rounded(c.joined_s));
+      one["agreeing_keyframes"] = c.agreeing;
+    } else {
+      one["why_not"] = c.why_not;
+    }
+    list.push_back(std::move(one));
+  }
+  return {
+      {"list", list}, {"dropped", summary.dropped.components}, {"dropped_frames", summary.dropped.frames}};
+}
+
+/// Components that are not part of the result, in words; empty: none.
+std::string apart_text(const RunSummary& summary) {
+  const std::size_t all = summary.frames.read + summary.frames.unreadable;
+  std::size_t apart = 0;
+  std::size_t frames = 0;
+  std::string names;
+  for (const RunSummary::Component& c : summary.components) {
+    if (c.joined) continue;
+    ++apart;
+    frames += c.frames;
+    names += (names.empty() ? "" : ", ") + c.name;
+  }
+  if (apart == 0) return {};
+  const double percent = all > 0 ? 100.0 * static_cast<double>(frames) / static_cast<double>(all) : 0.0;
+  const std::string which =
+      apart == 1 ? "a second map that shares" : fmt::format("{} more maps that share", apart);
+  return fmt::format(
+      "{:.0f} % of the frames form {} no place with the first: film a place of both (components/: {})",
+      percent, which, names);
+}
+
 Json sigma_json(const Sigma& sigma) {
   const auto rounded_finely = [](double value) { return std::round(value * 1e6) / 1e6; };
   return {{"median", rounded_finely(sigma.median)}, {"p90", rounded_finely(sigma.p90)}};
@@ -211,6 +248,7 @@ void judge(RunSummary& summary) {
   const RunSummary::Frames& frames = summary.frames;
   const std::size_t all = frames.read + frames.unreadable;
   const double lost_percent = 100.0 - frames.tracked_percent();
+  const std::string apart = apart_text(summary);
   summary.reason.clear();
   if (all > 0 && lost_percent > kMostLostPercent) {
     summary.reason = fmt::format(
@@ -218,6 +256,9 @@ void judge(RunSummary& summary) {
         "the longest loss is {} frames",
         all - frames.tracked, all, lost_percent, kMostLostPercent, frames.lost, frames.unreadable,
         frames.longest_loss);
+    if (!apart.empty()) summary.reason += "; " + apart;
+  } else if (!apart.empty()) {
+    summary.reason = apart;
   } else if (!summary.path.check.tears.empty()) {
     summary.reason = torn_text(summary.path.check);
   } else if (all > 0 && summary.voxel_m > 0.0 && summary.cloud_points == 0) {
@@ -251,6 +292,7 @@ core::Result<void> write_summary(const std::filesystem::path& file, const RunSum
       {"merges", merges_of(s)},
       {"meetings", meetings_of(s)},
       {"robots", robots_of(s)},
+      {"components", components_of(s)},
       {"cloud", cloud_of(s)},
       {"frame", {{"up", s.up}, {"yaw", s.yaw}, {"output_from_map", rows(s.output_from_map)}}},
       {"camera", cameras_of(s)},

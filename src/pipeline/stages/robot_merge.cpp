@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/robot_components.hpp"
+
 namespace plumbline::pipeline {
 namespace {
 
@@ -44,7 +46,7 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
                      const std::vector<RunSummary::Merge>& merges) {
   std::string names;
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    if (std::binary_search(used.begin(), used.end(), p)) continue;
+    if (parts[p].component || std::binary_search(used.begin(), used.end(), p)) continue;
     names += (names.empty() ? "" : ", ") + parts[p].name;
   }
   if (names.empty()) return {};
@@ -57,6 +59,23 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
                         e.refused, e.candidates, e.tried, e.consistency.verified);
   }
   return text;
+}
+
+/// Components that hang together with nothing.
+std::vector<std::shared_ptr<const MapResult>> components_apart(const std::vector<RobotMap>& parts,
+                                                               const std::vector<std::size_t>& used) {
+  std::vector<std::shared_ptr<const MapResult>> apart;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (!parts[p].component || std::binary_search(used.begin(), used.end(), p)) continue;
+    auto map = std::make_shared<MapResult>();
+    map->name = parts[p].name;
+    map->map = parts[p].map;
+    map->robots = parts[p].robots;
+    map->frame_poses = parts[p].frame_poses;
+    take_poses_from_map(*map);
+    apart.push_back(std::move(map));
+  }
+  return apart;
 }
 
 }  // namespace
@@ -82,11 +101,17 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   result.unconnected = left_out(parts, fused.parts, result.merges);
   auto map = std::make_shared<MapResult>();
   map->map = std::make_shared<maps::Map>(std::move(fused.map));
+  std::vector<const RobotMap*> used;
   for (const std::size_t p : fused.parts) {
-    map->robots.insert(map->robots.end(), parts[p].robots.begin(), parts[p].robots.end());
-    map->frame_poses.insert(map->frame_poses.end(), parts[p].frame_poses.begin(), parts[p].frame_poses.end());
+    used.push_back(&parts[p]);
+    for (const RobotInfo& robot : parts[p].robots) {
+      const auto same = [&](const RobotInfo& other) { return other.number == robot.number; };
+      if (std::none_of(map->robots.begin(), map->robots.end(), same)) map->robots.push_back(robot);
+    }
   }
+  map->frame_poses = frames_of(used);
   take_poses_from_map(*map);
+  map->apart = components_apart(parts, fused.parts);
   log.debug(fmt::format(
       "fused {} maps: {} pairs of keyframes, {} taken for wrong; {} points and {} lines were doubles",
       fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));

@@ -14,7 +14,7 @@
 namespace plumbline::pipeline {
 
 struct MergedRobots {
-  std::shared_ptr<MapResult> map;
+  std::shared_ptr<MapResult> map;  ///< with the components that stay apart
   std::vector<RunSummary::Merge> merges;
   std::string unconnected;  ///< which maps are left out and what was tried; empty: none
   std::size_t refused = 0;  ///< adjustments that would have torn a map

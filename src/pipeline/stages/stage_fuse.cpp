@@ -67,36 +67,18 @@ class FuseStage : public Stage {
     const auto map = io.input<MapResult>("map");
     const auto stored = clouds_->open();
     if (!stored) return tl::unexpected(stored.error());
-    const auto views = views_of(**stored, *map, map->robots, clouds_->arrivals());
-    if (!views) return tl::unexpected(views.error());
-    auto fused = fuse(*map, *views);
-    if (!fused) return tl::unexpected(fused.error());
-    auto dense = std::make_shared<DenseCloud>();
-    dense->voxel_m = options_.voxels.voxel_m;
-    report_.frame = find_up(up_, yaw_, fused->cloud, map->trajectory);
-    dense->output_from_map = report_.frame.output_from_map;
-    dense->upright = report_.frame.up != "none";
-    dense->state = state_;
-    if (dense->upright) cloud::transform(*fused->cloud, report_.frame.output_from_map);
-    if (keyframe_clouds_) {
-      const auto written = maps::write_keyframe_clouds(context_->output_folder / "keyframes", *views,
-                                                       report_.frame.output_from_map,
-                                                       [&](std::size_t i) { return read(*views, i); });
-      if (!written) return tl::unexpected(written.error());
+
+    auto dense = lay_down(*map, **stored, report_);
+    if (!dense) return tl::unexpected(dense.error());
+    for (const auto& component : map->apart) {
+      Report own;
+      auto apart = lay_down(*component, **stored, own);
+      if (!apart) return tl::unexpected(apart.error());
+      (*dense)->apart.push_back(std::move(*apart));
     }
+
     clouds_->clear();
-    auto filtered =
-        filters_.chain().apply(std::move(*fused), dense->voxel_m, *context_->executor, &report_.filters);
-    if (!filtered) return tl::unexpected(filtered.error());
-    if (!report_.filters.empty())
-      context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(report_.filters));
-    dense->cloud = std::move(filtered->cloud);
-    dense->columns = std::move(filtered->columns);
-    report_.points = dense->cloud->size();
-    for (const auto& column : dense->columns.others) {
-      if (column.name == cloud::kSigmaColumn) report_.sigma = sigma_of(column.values);
-    }
-    io.output<DenseCloud>("cloud", dense);
+    io.output<DenseCloud>("cloud", std::move(*dense));
     return {};
   }
 
@@ -111,6 +93,50 @@ class FuseStage : public Stage {
   }
 
  private:
+  /// What the summary says.
+  struct Report {
+    std::vector<cloud::FilterReport> filters;  ///< of the merged cloud
+    UpFrame frame;
+    std::size_t points = 0;
+    Sigma sigma;
+  };
+
+  /// The clouds of one connected map as one, filtered, in the frame of the output.
+  core::Result<std::shared_ptr<DenseCloud>> lay_down(const MapResult& map, const maps::StoreReader& stored,
+                                                     Report& report) {
+    const auto views = views_of(stored, map, map.robots, clouds_->arrivals());
+    if (!views) return tl::unexpected(views.error());
+    auto fused = fuse(map, *views);
+    if (!fused) return tl::unexpected(fused.error());
+
+    auto dense = std::make_shared<DenseCloud>();
+    dense->voxel_m = options_.voxels.voxel_m;
+    report.frame = find_up(up_, yaw_, fused->cloud, map.trajectory);
+    dense->output_from_map = report.frame.output_from_map;
+    dense->upright = report.frame.up != "none";
+    dense->state = state_;
+    if (dense->upright) cloud::transform(*fused->cloud, report.frame.output_from_map);
+    if (keyframe_clouds_ && map.name.empty()) {
+      const auto written = maps::write_keyframe_clouds(context_->output_folder / "keyframes", *views,
+                                                       report.frame.output_from_map,
+                                                       [&](std::size_t i) { return read(*views, i); });
+      if (!written) return tl::unexpected(written.error());
+    }
+
+    auto filtered =
+        filters_.chain().apply(std::move(*fused), dense->voxel_m, *context_->executor, &report.filters);
+    if (!filtered) return tl::unexpected(filtered.error());
+    if (!report.filters.empty())
+      context_->log->debug("filters of the merged cloud:\n" + cloud::to_table(report.filters));
+    dense->cloud = std::move(filtered->cloud);
+    dense->columns = std::move(filtered->columns);
+    report.points = dense->cloud->size();
+    for (const auto& column : dense->columns.others) {
+      if (column.name == cloud::kSigmaColumn) report.sigma = sigma_of(column.values);
+    }
+    return dense;
+  }
+
   core::Result<cloud::FusedCloud> fuse(const MapResult& map, const maps::StoredViews& stored) {
     cloud::FusionViews views;
     views.world_from_camera = stored.world_from_camera;
@@ -158,13 +184,6 @@ class FuseStage : public Stage {
   ChainOption filters_{"filters/map.yaml"};
   std::optional<WaitingClouds> clouds_;
   std::shared_ptr<maps::FusionState> state_ = std::make_shared<maps::FusionState>();
-  /// What the summary says.
-  struct Report {
-    std::vector<cloud::FilterReport> filters;  ///< of the merged cloud
-    UpFrame frame;
-    std::size_t points = 0;
-    Sigma sigma;
-  };
   Report report_;
 };
 

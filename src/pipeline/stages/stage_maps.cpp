@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "plumbline/maps/stored_maps.hpp"
+#include "stages/robot_components.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -40,7 +41,8 @@ class MapsStage : public Stage {
   core::Result<void> finish(StageIo& io) override {
     auto result = std::make_shared<RobotMaps>();
     for (const maps::StoredPart& part : maps_->parts()) {
-      result->maps.push_back({part.name, part.robots, std::make_shared<maps::Map>(part.map), part.frames});
+      const RobotMap whole{part.name, part.robots, std::make_shared<maps::Map>(part.map), part.frames};
+      for (RobotMap& component : components_of(whole).maps) result->maps.push_back(std::move(component));
     }
     io.output<RobotMaps>("maps", result);
     return {};

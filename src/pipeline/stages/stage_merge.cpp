@@ -3,6 +3,7 @@
 // goes on as it is.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <optional>
@@ -118,6 +119,7 @@ class MergeStage : public Stage {
     } else {
       merge(maps->maps);
     }
+    note_components(maps->maps);
     merged_.map->frame_columns = maps->frame_columns;
     merged_.map->frames = maps->frames;
     io.output<MapResult>("map", merged_.map);
@@ -132,6 +134,7 @@ class MergeStage : public Stage {
     summary.merges = merged_.merges;
     if (live_) summary.meetings = live_->meetings();
     summary.unconnected = merged_.unconnected;
+    summary.components.insert(summary.components.end(), components_.begin(), components_.end());
     summary.path.refused += merged_.refused;
     if (context_->stored_maps == nullptr) return;
     for (const maps::FramePose& frame : result.frame_poses)
@@ -140,6 +143,29 @@ class MergeStage : public Stage {
   }
 
  private:
+  /// What became of the components that were not joined while their robot mapped.
+  void note_components(const std::vector<RobotMap>& parts) {
+    for (const RobotMap& part : parts) {
+      if (!part.component) continue;
+      RunSummary::Component component;
+      component.name = part.name;
+      component.keyframes = part.map->keyframe_count();
+      component.frames = static_cast<std::size_t>(std::count_if(
+          part.frame_poses.begin(), part.frame_poses.end(), [](const auto& frame) { return frame.tracked; }));
+      const auto& apart = merged_.map->apart;
+      component.joined = std::none_of(apart.begin(), apart.end(),
+                                      [&](const auto& other) { return other->name == part.name; });
+      for (const RunSummary::Merge& merge : merged_.merges) {
+        if (merge.a != part.name && merge.b != part.name) continue;
+        component.agreeing = std::max(component.agreeing, merge.evidence.consistency.agreeing);
+        const std::string& other = merge.a == part.name ? merge.b : merge.a;
+        if (!component.joined)
+          component.why_not +=
+              (component.why_not.empty() ? "" : "; ") + other + ": " + merge.evidence.refused;
+      }
+      components_.push_back(std::move(component));
+    }
+  }
   void merge(const std::vector<RobotMap>& maps) {
     std::size_t anchor = maps.size();
     if (!context_->anchor.empty()) anchor = *context_->stored_maps->find_part(context_->anchor);
@@ -155,6 +181,7 @@ class MergeStage : public Stage {
   int lag_ = 10;
   std::optional<LiveMeetings> live_;
   MergedRobots merged_;
+  std::vector<RunSummary::Component> components_;
 };
 
 }  // namespace

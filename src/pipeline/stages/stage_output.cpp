@@ -87,6 +87,7 @@ class OutputStage : public Stage {
         [&] { return write_trajectories(folder, map); },
         [&] { return write_keyframes(folder / "keyframes.csv", map); },
         [&] { return map.frames.empty() ? nothing : write_frames(folder / "frames.csv", map, io.frame()); },
+        [&] { return write_components(*given, *dense); },
     };
     std::vector<core::Result<void>> written(steps.size());
     std::vector<core::Executor::Job> jobs;
@@ -111,6 +112,28 @@ class OutputStage : public Stage {
       end = output_from_map * end;
     }
     return map;
+  }
+
+  /// Components that never joined, each in a folder and a frame of its own.
+  core::Result<void> write_components(const MapResult& given, const DenseCloud& dense) const {
+    for (std::size_t i = 0; i < given.apart.size(); ++i) {
+      const DenseCloud& own = *dense.apart[i];
+      const MapResult map = moved(*given.apart[i], own.output_from_map);
+      const std::filesystem::path folder = context_->output_folder / "components" / map.name;
+      if (auto made = core::make_folder(folder); !made) return made;
+      if (ply_) {
+        if (auto written = cloud::write_ply(folder / "map.ply", *own.cloud, own.columns); !written)
+          return written;
+      }
+      if (lines_) {
+        if (auto written = maps::write_lines_ply(folder / "lines.ply", map.lines); !written) return written;
+      }
+      if (auto written = dataset::write_trajectory(folder / "trajectory.txt", map.trajectory); !written)
+        return written;
+      auto written = dataset::write_trajectory(folder / "keyframes.txt", maps::trajectory(map.keyframes));
+      if (!written) return written;
+    }
+    return {};
   }
 
   core::Result<void> write_levels(const std::filesystem::path& folder, const DenseCloud& dense) const {

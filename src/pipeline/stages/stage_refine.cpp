@@ -38,15 +38,11 @@ class RefineStage : public Stage {
 
   core::Result<void> finish(StageIo& io) override {
     const auto before = io.input<MapResult>("map");
-    auto result = std::make_shared<MapResult>(*before);
-    if (options_.adjust && before->map != nullptr && before->map->keyframe_count() > 1) {
-      correct_surfaces(*before);
-      auto map = std::make_shared<maps::Map>(*before->map);
-      auto refined = mapping::refine_map(*map, surfaces_, cameras_, options_, *executor_, *log_);
-      result->map = map;
-      take_poses_from_map(*result);
-      result->accuracy = std::move(refined.accuracy);
-      summary_ = refined.summary;
+    const std::shared_ptr<MapResult> result = refined(*before, summary_);
+    for (auto& component : result->apart) {
+      mapping::RefinementSummary own;
+      component = refined(*component, own);
+      summary_.refused += own.refused;
     }
     surfaces_.clear();
     result_ = result;
@@ -67,6 +63,20 @@ class RefineStage : public Stage {
   }
 
  private:
+  [[nodiscard]] std::shared_ptr<MapResult> refined(const MapResult& before,
+                                                   mapping::RefinementSummary& summary) {
+    auto result = std::make_shared<MapResult>(before);
+    if (!options_.adjust || before.map == nullptr || before.map->keyframe_count() < 2) return result;
+
+    std::map<core::KeyframeId, mapping::CoarseSurface> surfaces = corrected_surfaces(before);
+    auto map = std::make_shared<maps::Map>(*before.map);
+    auto refined = mapping::refine_map(*map, surfaces, cameras_, options_, *executor_, *log_);
+    result->map = map;
+    take_poses_from_map(*result);
+    result->accuracy = std::move(refined.accuracy);
+    summary = refined.summary;
+    return result;
+  }
   [[nodiscard]] bool wants_surfaces() const { return options_.icp && options_.adjust; }
   /// As it came, when it has our voxels.
   [[nodiscard]] core::Result<mapping::CoarseSurface> surface_of(const KeyframeCloud& keyframe) const {
@@ -77,15 +87,19 @@ class RefineStage : public Stage {
     if (!cloud) return tl::unexpected(cloud.error());
     return mapping::coarse_surface(**cloud, options_.local_maps.voxel_m);
   }
-  /// To what the latest version of their camera measured.
-  void correct_surfaces(const MapResult& map) {
+  /// The surfaces of a map's keyframes, as the latest version of their camera measured them.
+  [[nodiscard]] std::map<core::KeyframeId, mapping::CoarseSurface> corrected_surfaces(const MapResult& map) {
     const maps::CameraHistory cameras(map.robots);
     const auto paths = maps::by_robot(map);
+    std::map<core::KeyframeId, mapping::CoarseSurface> own;
     for (auto& [id, surface] : surfaces_) {
+      if (!map.map->has_keyframe(id)) continue;
       const auto path = paths.find(id.robot);
-      if (path == paths.end() || !cameras.changes(id) || !map.map->has_keyframe(id)) continue;
-      cameras.apply(id, geometry::velocity_at(path->second, map.map->keyframe(id).stamp), surface);
+      if (path != paths.end() && cameras.changes(id))
+        cameras.apply(id, geometry::velocity_at(path->second, map.map->keyframe(id).stamp), surface);
+      own[id] = std::move(surface);
     }
+    return own;
   }
   /// Of the keyframes of the run that this one goes on from.
   core::Result<void> read_surfaces(const ResumedRun& run) {

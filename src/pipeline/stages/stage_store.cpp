@@ -74,7 +74,10 @@ class StoreStage : public Stage {
     }
     std::vector<maps::StoreStep> rest;
     for (auto& [robot, step] : steps_) rest.push_back(std::move(step));
-    auto saved = writer_->save_final(*map->map, map->frame_poses, frame, rest, map->robots);
+    auto saved = map->apart.empty()
+                     ? writer_->save_final(*map->map, map->frame_poses, frame, rest, map->robots)
+                     : writer_->save_final(with_components(*map), frames_with_components(*map), frame, rest,
+                                           map->robots);
     writer_.reset();
     return saved;
   }
@@ -95,6 +98,25 @@ class StoreStage : public Stage {
     step.robots = track.robots;
     step.clouds = std::move(clouds);
     return writer_->add(step);
+  }
+
+  /// All components as one map; each keeps its own frame, as its tree tells.
+  static maps::Map with_components(const MapResult& map) {
+    std::vector<const maps::Map*> all{map.map.get()};
+    for (const auto& component : map.apart) all.push_back(component->map.get());
+    return maps::joined(all, std::vector<geometry::Rigid3>(all.size()));
+  }
+  static std::vector<maps::FramePose> frames_with_components(const MapResult& map) {
+    std::vector<maps::FramePose> frames = map.frame_poses;
+    for (const auto& component : map.apart) {
+      std::size_t begin = 0;
+      const std::int32_t robot = component->robots.front().number;
+      while (begin < frames.size() && frames[begin].reference.robot != robot) ++begin;
+      for (std::size_t i = 0; i < component->frame_poses.size(); ++i) {
+        if (component->frame_poses[i].tracked) frames[begin + i] = component->frame_poses[i];
+      }
+    }
+    return frames;
   }
 
   bool enabled_ = true;

@@ -15,6 +15,7 @@
 #include "stages/camera_refinement.hpp"
 #include "stages/debug_video.hpp"
 #include "stages/resumed_run.hpp"
+#include "stages/robot_components.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -81,6 +82,7 @@ class TrackStage : public Stage {
     rows_.push_back({io.frame(), tracking::to_string(report.state),
                      several() ? robot.name + "," + row_columns(report) : row_columns(report)});
     if (report.keyframe.valid()) ++causes_[report.decision.cause];
+    if (report.component.valid()) ++component_frames_[report.component];
     note_times(io.frame(), report.bundle);
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->robot = robot.number;
@@ -120,7 +122,7 @@ class TrackStage : public Stage {
     result->frames = rows_;
     if (context_->resumed != nullptr && context_->resumed->merged) {
       if (auto written = write_cameras(context_->output_folder, robots_, cameras()); !written) return written;
-      result->maps.push_back(*context_->resumed->merged);
+      result->maps = components_of(*context_->resumed->merged).maps;
       io.output<RobotMaps>("maps", result);
       return {};
     }
@@ -135,7 +137,10 @@ class TrackStage : public Stage {
       }
       auto map = std::make_shared<maps::Map>(slam.map());
       if (context_->alter_map) context_->alter_map(*map);
-      result->maps.push_back({robot.name, {robot}, std::move(map), slam.frame_poses()});
+      RobotComponents components = components_of({robot.name, {robot}, std::move(map), slam.frame_poses()});
+      dropped_ += components.dropped;
+      dropped_frames_ += components.dropped_frames;
+      for (RobotMap& component : components.maps) result->maps.push_back(std::move(component));
     }
     io.output<RobotMaps>("maps", result);
     return {};
@@ -156,7 +161,11 @@ class TrackStage : public Stage {
       summary.feedback.loops += static_cast<std::size_t>(loops.by_others);
       summary.path.refused += static_cast<std::size_t>(slam.refused());
       if (several()) summary.robots.push_back({robot.name, slam.map().keyframe_count()});
+      add_joins(robot, slam, summary);
     }
+    summary.dropped = {dropped_, dropped_frames_};
+    summary.frames.tracked -= dropped_frames_;
+    summary.frames.lost += dropped_frames_;
     summary.feedback.on = context_->feedback != nullptr;
     if (const auto others = summary.feedback.on ? context_->feedback->get() : nullptr)
       summary.feedback.keyframes = others->map.keyframe_count();
@@ -172,6 +181,21 @@ class TrackStage : public Stage {
   }
 
  private:
+  /// Components that were joined while the robot mapped.
+  void add_joins(const RobotInfo& robot, const mapping::Slam& slam, RunSummary& summary) const {
+    const double first_s = slam.frame_poses().empty() ? 0.0 : slam.frame_poses().front().stamp;
+    for (const mapping::ComponentJoin& join : slam.joins()) {
+      RunSummary::Component component;
+      component.name = fmt::format("{}, from keyframe {} on", robot.name, join.overlap.b.index);
+      const auto counted = component_frames_.find(join.overlap.b);
+      component.frames = counted == component_frames_.end() ? 0 : counted->second;
+      component.keyframes = join.keyframes;
+      component.joined = true;
+      component.joined_s = join.stamp - first_s;
+      component.agreeing = join.overlap.evidence.consistency.agreeing;
+      summary.components.push_back(std::move(component));
+    }
+  }
   [[nodiscard]] const RobotRecordings& recordings() const { return *context_->recordings; }
   [[nodiscard]] bool several() const { return slams_.size() > 1; }
   [[nodiscard]] std::size_t count(mapping::KeyframeCause cause) const {
@@ -305,8 +329,11 @@ class TrackStage : public Stage {
   std::vector<bool> camera_is_new_;           ///< by robot: since its last keyframe
   std::vector<maps::MapRevision> revisions_;  ///< by robot, of its map, up to which changes were reported
   std::vector<FrameRow> rows_;
-  std::map<mapping::KeyframeCause, std::size_t> causes_;  ///< of the keyframes
-  std::vector<float> bundle_wait_ms_;                     ///< by frame; NaN: no bundle was put back
+  std::map<mapping::KeyframeCause, std::size_t> causes_;      ///< of the keyframes
+  std::map<core::KeyframeId, std::size_t> component_frames_;  ///< by root, as the frames were tracked
+  std::size_t dropped_ = 0;                                   ///< components, as too small
+  std::size_t dropped_frames_ = 0;
+  std::vector<float> bundle_wait_ms_;  ///< by frame; NaN: no bundle was put back
   std::vector<float> bundle_ms_;
 };
 

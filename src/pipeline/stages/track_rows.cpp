@@ -24,7 +24,7 @@ std::string columns_of(const mapping::BundleReport& b) {
 }  // namespace
 
 const char* const kRowColumns =
-    "stamp,reference,keyframe,relocalised,points,points_rms,lines,lines_rms,surface,surface_rms,"
+    "stamp,reference,keyframe,component,relocalised,points,points_rms,lines,lines_rms,surface,surface_rms,"
     "photometric,photometric_rms,min_eigenvalue,weak_directions,frames_since_keyframe,shared,overlap,"
     "parallax,rotation_rad,mapper_idle,cone_candidate,cone_shared,cone_matched,cone_all,cone_changed,"
     "cone_theta,cone_beta,cone_alpha,cone_initial,cone_adaptive,cone_ecog,cone_offset,wanted,urgent,"
@@ -33,13 +33,14 @@ const char* const kRowColumns =
 std::string row_columns(const mapping::FrameReport& r) {
   const mapping::KeyframeDecision& d = r.decision;
   return fmt::format(
-      "{:.6f},{},{},{},{},{:.4f},{},{:.4f},{},{:.4f},{},{:.4f},{:.6g},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{},{}"
+      "{:.6f},{},{},{},{},{},{:.4f},{},{:.4f},{},{:.4f},{},{:.4f},{:.6g},{},{},{:.4f},{:.4f},{:.4f},{:.4f},{}"
+      ",{}"
       ",{},{},{}",
-      r.stamp, r.reference.index, r.keyframe.index, r.relocalised ? 1 : 0, r.points.inliers, r.points.rms,
-      r.lines.inliers, r.lines.rms, r.surface.inliers, r.surface.rms, r.photometric.inliers,
-      r.photometric.rms, r.min_eigenvalue, r.degenerate_directions, d.frames_since, d.shared, d.overlap,
-      d.parallax, d.rotation_rad, d.mapper_idle ? 1 : 0, columns_of(d.cone), d.wanted ? 1 : 0,
-      d.urgent ? 1 : 0, columns_of(r.bundle));
+      r.stamp, r.reference.index, r.keyframe.index, r.component.index, r.relocalised ? 1 : 0,
+      r.points.inliers, r.points.rms, r.lines.inliers, r.lines.rms, r.surface.inliers, r.surface.rms,
+      r.photometric.inliers, r.photometric.rms, r.min_eigenvalue, r.degenerate_directions, d.frames_since,
+      d.shared, d.overlap, d.parallax, d.rotation_rad, d.mapper_idle ? 1 : 0, columns_of(d.cone),
+      d.wanted ? 1 : 0, d.urgent ? 1 : 0, columns_of(r.bundle));
 }
 
 }  // namespace plumbline::pipeline

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stages/robot_components.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+
+#include "plumbline/maps/components.hpp"
+
+namespace plumbline::pipeline {
+
+RobotComponents components_of(const RobotMap& whole) {
+  constexpr std::size_t kLeastKeyframes = 5;
+  RobotComponents result;
+  const std::vector<core::KeyframeId> roots = maps::roots(*whole.map);
+  if (roots.size() < 2) {
+    result.maps.push_back(whole);
+    return result;
+  }
+
+  const core::KeyframeId main = maps::main_root(*whole.map, whole.frame_poses);
+  for (const core::KeyframeId root : roots) {
+    auto map = std::make_shared<maps::Map>(maps::component(*whole.map, root));
+    std::vector<maps::FramePose> frames = maps::frames_in(*map, whole.frame_poses);
+    if (root != main && map->keyframe_count() < kLeastKeyframes) {
+      ++result.dropped;
+      result.dropped_frames += static_cast<std::size_t>(
+          std::count_if(frames.begin(), frames.end(), [](const auto& frame) { return frame.tracked; }));
+      continue;
+    }
+    const std::size_t number = result.maps.size() + 1;
+    result.maps.push_back({number == 1 ? whole.name : fmt::format("{}-{}", whole.name, number), whole.robots,
+                           std::move(map), std::move(frames), true});
+  }
+  if (result.maps.size() == 1) result.maps.front().component = false;
+  return result;
+}
+
+std::vector<maps::FramePose> frames_of(const std::vector<const RobotMap*>& parts) {
+  std::vector<maps::FramePose> all;
+  std::map<std::int32_t, std::size_t> begin;  // in `all`, by the first robot of a part
+  for (const RobotMap* part : parts) {
+    const auto [found, is_new] = begin.emplace(part->robots.front().number, all.size());
+    if (is_new) {
+      all.insert(all.end(), part->frame_poses.begin(), part->frame_poses.end());
+      continue;
+    }
+    for (std::size_t i = 0; i < part->frame_poses.size(); ++i) {
+      if (part->frame_poses[i].tracked) all[found->second + i] = part->frame_poses[i];
+    }
+  }
+  return all;
+}
+
+}  // namespace plumbline::pipeline

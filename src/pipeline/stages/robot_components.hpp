@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The components of robots' maps (maps/components.hpp) as maps of their own.
+#include <cstddef>
+#include <vector>
+
+#include "plumbline/pipeline/data.hpp"
+
+namespace plumbline::pipeline {
+
+struct RobotComponents {
+  std::vector<RobotMap> maps;      ///< by their first keyframe
+  std::size_t dropped = 0;         ///< components of too few keyframes
+  std::size_t dropped_frames = 0;  ///< that were tracked in them
+};
+
+/// A map without further components comes back as it is. Components of fewer than five keyframes are dropped,
+/// but for the one with most frames. All maps have all frames, of which only their own are tracked.
+RobotComponents components_of(const RobotMap& whole);
+
+/// The maps of components put together again, one frame list for all: of several components with a robot in
+/// common each frame is that of the component in which it is tracked.
+std::vector<maps::FramePose> frames_of(const std::vector<const RobotMap*>& parts);
+
+}  // namespace plumbline::pipeline
