@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline map: what comes out, that it is the same every time, and what happens to OUT.
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
 #include <chrono>
 #include <cmath>
 #include <csignal>
