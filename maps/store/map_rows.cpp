@@ -147,7 +147,7 @@ std::vector<StoredMap> MapRows::maps() const {
     maps.push_back(map(key.first, row));
     if (maps_.size() > 1) maps.back().robot = static_cast<std::int32_t>(key.first);
   }
-  if (maps_.empty()) maps.push_back(map(0, {}));  // nothing was added yet
+  if (maps_.empty()) maps.push_back(map(0, {}));  // no row yet
   return maps;
 }
 
@@ -156,13 +156,13 @@ struct MapFollower::Impl {
   std::vector<RobotInfo> robots;
   std::int64_t head = 0;
 
-  void take(const StoreRow& row) {
-    const RowTable& table = kRowTables[row.name.place];
+  void apply(const StoreRow& row) {
+    const RowTable& table = kRowTables[row.name.table];
     const MapRows::Key key{row.name.robot, row.name.number};
     if (row.removed) return rows.remove(table.name, key);
     const bool header = std::string(table.name) == "header";
     if (table.named && !(header && row.name.key == "robots")) return;
-    check_row(row.name, row.data, robots);  // learns of robots, too
+    check_row(row.name, row.data, robots);  // adds new robots to `robots`, too
     rows.put(table.name, key, unpack(row.data.data(), row.data.size()), robots);
   }
 };
@@ -174,10 +174,10 @@ MapFollower::~MapFollower() = default;
 
 std::int64_t MapFollower::head() const { return impl_->head; }
 
-core::Result<void> MapFollower::take(const StoreTransaction& transaction) {
+core::Result<void> MapFollower::apply(const StoreTransaction& transaction) {
   try {
     Bytes rows = transaction.rows;
-    take_rows(rows, [&](const StoreRow& row, std::size_t) { impl_->take(row); });
+    consume_rows(rows, [&](const StoreRow& row, std::size_t) { impl_->apply(row); });
     if (!rows.empty()) throw BadBytes("a row ends too early");
   } catch (const BadBytes& bad) {
     return core::input_error(std::string("rows of a map: ") + bad.what());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What of a store others have not been told.
+// Reads the rows of a store that a copy lacks.
 #include <sqlite3.h>
 
 #include "store/store_row.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 using core::ErrorKind;
 
-/// Opens the store and gives `read` one moment of it.
+/// Opens the store and calls `read` in one read transaction.
 template <typename Read>
 auto in_one_transaction(const std::filesystem::path& file, const Read& read) {
   return guarded(file, ErrorKind::kInput, [&] {
@@ -22,8 +22,8 @@ auto in_one_transaction(const std::filesystem::path& file, const Read& read) {
   });
 }
 
-/// The lowest number above `after` in a share's tables; 0: there is none.
-std::int64_t next_number(Database& database, StoreShare share, std::int64_t after) {
+/// The lowest number above `after` in a stream's tables; 0: there is none.
+std::int64_t next_number(Database& database, StoreStream stream, std::int64_t after) {
   std::int64_t next = 0;
   const auto look = [&](const std::string& table) {
     Statement lowest(database, ("SELECT min(changed) FROM " + table + " WHERE changed > ?").c_str());
@@ -32,9 +32,9 @@ std::int64_t next_number(Database& database, StoreShare share, std::int64_t afte
     if (number != 0 && (next == 0 || number < next)) next = number;
   };
   for (const RowTable& table : kRowTables) {
-    if (table.share == share) look(table.name);
+    if (table.stream == stream) look(table.name);
   }
-  if (share == StoreShare::kMap) look("removed");
+  if (stream == StoreStream::kMap) look("removed");
   return next;
 }
 
@@ -45,15 +45,15 @@ void read_removed(Database& database, std::int64_t number, ByteWriter& to) {
   while (rows.step()) {
     StoreRow row;
     row.removed = true;
-    row.name.place = static_cast<std::size_t>(rows.integer(0));
+    row.name.table = static_cast<std::size_t>(rows.integer(0));
     row.name.robot = rows.integer(1);
     row.name.number = rows.integer(2);
     append(row, to);
   }
 }
 
-void read_rows(Database& database, std::size_t place, std::int64_t number, ByteWriter& to) {
-  const RowTable& table = kRowTables[place];
+void read_rows(Database& database, std::size_t index, std::int64_t number, ByteWriter& to) {
+  const RowTable& table = kRowTables[index];
   const std::string key = table.named ? "key" : "robot, number";
   Statement rows(
       database,
@@ -61,7 +61,7 @@ void read_rows(Database& database, std::size_t place, std::int64_t number, ByteW
   rows.bind(1, number);
   while (rows.step()) {
     StoreRow row;
-    row.name.place = place;
+    row.name.table = index;
     if (table.named) {
       row.name.key = rows.text(1);
     } else {
@@ -83,14 +83,14 @@ core::Result<StoreHeads> store_heads(const std::filesystem::path& file) {
 }
 
 core::Result<std::optional<StoreTransaction>> next_transaction(const std::filesystem::path& file,
-                                                               StoreShare share, std::int64_t after) {
+                                                               StoreStream stream, std::int64_t after) {
   return in_one_transaction(file, [&](Database& database) -> std::optional<StoreTransaction> {
-    const std::int64_t number = next_number(database, share, after);
+    const std::int64_t number = next_number(database, stream, after);
     if (number == 0) return std::nullopt;
     ByteWriter rows;
-    if (share == StoreShare::kMap) read_removed(database, number, rows);
-    for (std::size_t place = 0; place < std::size(kRowTables); ++place) {
-      if (kRowTables[place].share == share) read_rows(database, place, number, rows);
+    if (stream == StoreStream::kMap) read_removed(database, number, rows);
+    for (std::size_t index = 0; index < std::size(kRowTables); ++index) {
+      if (kRowTables[index].stream == stream) read_rows(database, index, number, rows);
     }
     return StoreTransaction{number, rows.bytes()};
   });

@@ -26,13 +26,13 @@ void demand(bool holds, const char* otherwise) {
 void check(const geometry::Rigid3& pose) {
   demand(pose.rotation.allFinite() && pose.translation.allFinite(), "a pose is not finite");
   const Eigen::Matrix3d unit = pose.rotation * pose.rotation.transpose();
-  demand(unit.isIdentity(1e-3) && pose.rotation.determinant() > 0.0, "a pose is no rotation");
+  demand(unit.isIdentity(1e-3) && pose.rotation.determinant() > 0.0, "a pose has an invalid rotation");
 }
 
 void check(const sensor::Pinhole& c) {
   const bool finite =
       std::isfinite(c.fx) && std::isfinite(c.fy) && std::isfinite(c.cx) && std::isfinite(c.cy);
-  demand(finite && c.fx > 0.0 && c.fy > 0.0, "a camera's focal length is none");
+  demand(finite && c.fx > 0.0 && c.fy > 0.0, "a camera's focal length is not positive");
   demand(c.width > 0 && c.height > 0 && c.width <= kMostSide && c.height <= kMostSide,
          "a camera's image has no size");
 }
@@ -151,7 +151,7 @@ void check_cloud(const Bytes& bytes) {
 }  // namespace
 
 void check_name(const RowName& name) {
-  const RowTable& table = kRowTables[name.place];
+  const RowTable& table = kRowTables[name.table];
   if (table.named) {
     demand(!name.key.empty() && name.key.size() <= 64, "its name is out of range");
   } else {
@@ -166,7 +166,7 @@ void check_name(const RowName& name) {
 
 void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots) {
   check_name(name);
-  const std::string table = kRowTables[name.place].name;
+  const std::string table = kRowTables[name.table].name;
   const auto plain = [&](std::size_t most) { return unpack(bytes.data(), bytes.size(), most); };
   if (table == "header") return check_header(name.key, bytes, robots);
   if (table == "map") return check_map(plain(kMostPlain));

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Rows from a stranger, looked at before they are stored.
+// Checks rows from a stranger before they are stored.
 #include <vector>
 
 #include "store/store_schema.hpp"
 
 namespace plumbline::maps {
 
-/// A row on its way: of a table of kRowTables, by its place there.
+/// Key of a row; `table` is an index into kRowTables.
 struct RowName {
-  std::size_t place = 0;
+  std::size_t table = 0;
   std::string key;  ///< of a named table
   std::int64_t robot = 0;
   std::int64_t number = 0;
 };
 
-/// The most bytes that a row of a table takes, packed.
+/// Largest size of a packed row, bytes.
 constexpr std::size_t kMostRowBytes = 16U << 20U;
 
 /// Throws BadBytes with the reason: a key out of range, bytes that do not decode or that belong to another
-/// row, numbers that are not finite. `robots` are learned from the header's row.
+/// row, numbers that are not finite. Robots in the row of the header are added to `robots`.
 void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& robots);
-/// The same of a row that goes.
+/// The same for a row that is removed.
 void check_name(const RowName& name);
 
 }  // namespace plumbline::maps

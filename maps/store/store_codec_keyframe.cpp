@@ -159,7 +159,7 @@ void rounded_column(Io& io, std::vector<SurfaceSample>& samples, double step, do
     for (std::size_t i = 0; i < codes.size(); ++i) {
       const double value = static_cast<double>(get(samples[i]));
       if (!std::isfinite(value))
-        throw std::invalid_argument("store: a surface has places that are no numbers");
+        throw std::invalid_argument("store: a surface has coordinates that are not finite");
       const auto now = static_cast<std::uint32_t>(std::lround(std::clamp(value, -most, most) / step));
       const std::uint32_t difference = now - before;
       codes[i] = difference << 1U ^ (0U - (difference >> 31U));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The copy of a store, row by row.
+// Writes the rows of a store's copy.
 #include "plumbline/maps/store_replica.hpp"
 
 #include <system_error>
@@ -39,7 +39,7 @@ std::unique_ptr<Database> open_database(const std::filesystem::path& file) {
   }
   check_store(*database);
   database->run("PRAGMA journal_mode = WAL");
-  // What was acknowledged is nowhere else for sure: it survives a power cut, too.
+  // What was acknowledged may exist nowhere else: it must survive a power cut, too.
   database->run("PRAGMA synchronous = FULL");
   return database;
 }
@@ -49,27 +49,27 @@ std::unique_ptr<Database> open_database(const std::filesystem::path& file) {
 struct StoreReplica::Impl {
   Impl(std::filesystem::path path, std::unique_ptr<Database> opened)
       : file(std::move(path)), database(std::move(opened)) {
-    learn();
+    reread();
   }
-  void learn() {
+  void reread() {
     heads = read_heads(*database);
     robots = read_robots(*database);
     keyframes = static_cast<std::size_t>(database->number("SELECT count(*) FROM keyframe"));
     complete = database->number("SELECT data FROM header WHERE key = 'complete'") == 1;
   }
-  void forget() {
+  void roll_back() {
     open.reset();
-    waiting.clear();
-    coming = {};
+    partial_row.clear();
+    pending = {};
   }
-  void take_row(const StoreRow& row);
+  void apply_row(const StoreRow& row);
   void put(const RowTable& table, const StoreRow& row);
   void count(const RowTable& table, std::size_t size);
-  /// `action`; when it fails the transaction is over.
+  /// Runs `action`; the transaction ends if it fails.
   template <typename Action>
   core::Result<void> guard(const Action& action) {
     core::Result<void> done = guarded(file, ErrorKind::kOutput, action);
-    if (!done) forget();
+    if (!done) roll_back();
     return done;
   }
 
@@ -80,22 +80,22 @@ struct StoreReplica::Impl {
   std::size_t keyframes = 0;
   bool complete = false;
   ReplicaBytes bytes;
-  // Of the transaction that was begun:
+  // The open transaction:
   std::unique_ptr<Transaction> open;
-  StoreShare share = StoreShare::kMap;
+  StoreStream stream = StoreStream::kMap;
   std::int64_t number = 0;
-  Bytes waiting;        ///< the beginning of a row
-  ReplicaBytes coming;  ///< taken so far
+  Bytes partial_row;     ///< beginning of a row whose end has not been received
+  ReplicaBytes pending;  ///< received so far
 };
 
 void StoreReplica::Impl::count(const RowTable& table, std::size_t size) {
   const std::string name = table.name;
-  if (table.share == StoreShare::kClouds) {
-    coming.cloud += size;
+  if (table.stream == StoreStream::kClouds) {
+    pending.cloud += size;
   } else if (name == "keyframe" || name == "state") {
-    coming.place += size;
+    pending.place += size;
   } else {
-    coming.map += size;
+    pending.map += size;
   }
 }
 
@@ -104,27 +104,27 @@ void StoreReplica::Impl::put(const RowTable& table, const StoreRow& row) {
   Statement put(
       *database,
       ("REPLACE INTO " + name + (table.named ? " VALUES (?, ?, ?)" : " VALUES (?, ?, ?, ?)")).c_str());
-  int place = 1;
+  int column = 1;
   if (table.named) {
-    put.bind(place++, row.name.key);
+    put.bind(column++, row.name.key);
   } else {
-    put.bind(place++, row.name.robot);
-    put.bind(place++, row.name.number);
+    put.bind(column++, row.name.robot);
+    put.bind(column++, row.name.number);
   }
-  put.bind(place++, number);
-  if (row.type == SQLITE_INTEGER) put.bind(place, row.integer);
-  if (row.type == SQLITE_TEXT) put.bind(place, row.text);
-  if (row.type == SQLITE_BLOB) put.bind(place, row.data);
+  put.bind(column++, number);
+  if (row.type == SQLITE_INTEGER) put.bind(column, row.integer);
+  if (row.type == SQLITE_TEXT) put.bind(column, row.text);
+  if (row.type == SQLITE_BLOB) put.bind(column, row.data);
   put.run();
 }
 
-void StoreReplica::Impl::take_row(const StoreRow& row) {
-  const RowTable& table = kRowTables[row.name.place];
+void StoreReplica::Impl::apply_row(const StoreRow& row) {
+  const RowTable& table = kRowTables[row.name.table];
   const std::string where =
       std::string(table.name) + " " +
       (table.named ? row.name.key : std::to_string(row.name.robot) + "/" + std::to_string(row.name.number));
   try {
-    if (table.share != share) throw BadBytes("it belongs to the other share");
+    if (table.stream != stream) throw BadBytes("it belongs to the other stream");
     if (row.removed) {
       if (table.named) throw BadBytes("rows of this table stay");
       check_name(row.name);
@@ -142,14 +142,14 @@ void StoreReplica::Impl::take_row(const StoreRow& row) {
         .bind(2, row.name.number)
         .run();
   };
-  const std::string place = std::to_string(row.name.place);
+  const std::string index = std::to_string(row.name.table);
   if (!row.removed) {
-    by_key("DELETE FROM removed WHERE place = ", place);
+    by_key("DELETE FROM removed WHERE place = ", index);
     return put(table, row);
   }
   by_key("DELETE FROM ", std::string(table.name) + " WHERE 1");
   Statement(*database, "REPLACE INTO removed VALUES (?, ?, ?, ?)")
-      .bind(1, static_cast<std::int64_t>(row.name.place))
+      .bind(1, static_cast<std::int64_t>(row.name.table))
       .bind(2, row.name.robot)
       .bind(3, row.name.number)
       .bind(4, number)
@@ -161,10 +161,10 @@ StoreReplica::StoreReplica(StoreReplica&& other) noexcept = default;
 StoreReplica& StoreReplica::operator=(StoreReplica&& other) noexcept = default;
 StoreReplica::~StoreReplica() {
   if (impl_ == nullptr) return;
-  impl_->forget();
+  impl_->roll_back();
   const auto left =
       guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA journal_mode = DELETE"); });
-  (void)left;  // somebody reads: file and log together are whole as well
+  (void)left;  // it fails while somebody reads; then file and log together are complete
 }
 
 core::Result<StoreReplica> StoreReplica::open(const std::filesystem::path& file) {
@@ -176,26 +176,26 @@ const StoreHeads& StoreReplica::heads() const { return impl_->heads; }
 std::size_t StoreReplica::keyframes() const { return impl_->keyframes; }
 bool StoreReplica::complete() const { return impl_->complete; }
 const ReplicaBytes& StoreReplica::bytes() const { return impl_->bytes; }
-void StoreReplica::forget() { impl_->forget(); }
+void StoreReplica::roll_back() { impl_->roll_back(); }
 
-core::Result<void> StoreReplica::begin(StoreShare share, std::int64_t number) {
-  impl_->forget();
+core::Result<void> StoreReplica::begin(StoreStream stream, std::int64_t number) {
+  impl_->roll_back();
   return impl_->guard([&] {
-    if (number <= impl_->heads[share]) throw BadBytes("transaction " + std::to_string(number) + " is old");
+    if (number <= impl_->heads[stream]) throw BadBytes("transaction " + std::to_string(number) + " is old");
     impl_->open = std::make_unique<Transaction>(*impl_->database, true);
-    impl_->share = share;
+    impl_->stream = stream;
     impl_->number = number;
   });
 }
 
-core::Result<void> StoreReplica::take(const std::uint8_t* bytes, std::size_t size) {
+core::Result<void> StoreReplica::append(const std::uint8_t* bytes, std::size_t size) {
   return impl_->guard([&] {
     if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
-    Bytes& waiting = impl_->waiting;
-    waiting.insert(waiting.end(), bytes, bytes + size);
-    take_rows(waiting, [&](const StoreRow& row, std::size_t length) {
-      impl_->take_row(row);
-      impl_->count(kRowTables[row.name.place], length);
+    Bytes& partial_row = impl_->partial_row;
+    partial_row.insert(partial_row.end(), bytes, bytes + size);
+    consume_rows(partial_row, [&](const StoreRow& row, std::size_t length) {
+      impl_->apply_row(row);
+      impl_->count(kRowTables[row.name.table], length);
     });
   });
 }
@@ -203,19 +203,19 @@ core::Result<void> StoreReplica::take(const std::uint8_t* bytes, std::size_t siz
 core::Result<void> StoreReplica::commit() {
   return impl_->guard([&] {
     if (impl_->open == nullptr) throw BadBytes("no transaction was begun");
-    if (!impl_->waiting.empty()) throw BadBytes("a row ends too early");
+    if (!impl_->partial_row.empty()) throw BadBytes("a row ends too early");
     impl_->open->commit();
-    const ReplicaBytes taken = impl_->coming;
-    impl_->forget();
-    impl_->bytes.place += taken.place;
-    impl_->bytes.map += taken.map;
-    impl_->bytes.cloud += taken.cloud;
-    impl_->learn();
+    const ReplicaBytes received = impl_->pending;
+    impl_->roll_back();
+    impl_->bytes.place += received.place;
+    impl_->bytes.map += received.map;
+    impl_->bytes.cloud += received.cloud;
+    impl_->reread();
   });
 }
 
 core::Result<void> StoreReplica::clear() {
-  forget();
+  impl_->roll_back();
   return impl_->guard([&] {
     Transaction whole(*impl_->database, true);
     for (const RowTable& table : kRowTables) {
@@ -223,7 +223,7 @@ core::Result<void> StoreReplica::clear() {
     }
     impl_->database->run("DELETE FROM removed");
     whole.commit();
-    impl_->learn();
+    impl_->reread();
   });
 }
 

@@ -9,14 +9,14 @@ namespace {
 template <typename Io>
 void row_fields(Io& io, StoreRow& row) {
   constexpr std::uint8_t kRemoved = 0x80;
-  auto head = static_cast<std::uint8_t>(row.name.place | (row.removed ? kRemoved : 0));
+  auto head = static_cast<std::uint8_t>(row.name.table | (row.removed ? kRemoved : 0));
   io(head);
   if constexpr (Io::kReads) {
     row.removed = (head & kRemoved) != 0;
-    row.name.place = head & ~std::size_t{kRemoved};
+    row.name.table = head & ~std::size_t{kRemoved};
   }
-  io.check(row.name.place < std::size(kRowTables), "there is no such table");
-  if (kRowTables[row.name.place].named) {
+  io.check(row.name.table < std::size(kRowTables), "there is no such table");
+  if (kRowTables[row.name.table].named) {
     io(row.name.key);
   } else {
     io(row.name.robot, row.name.number);
@@ -44,9 +44,9 @@ void append(StoreRow row, ByteWriter& to) {
   to.raw(bytes.bytes());
 }
 
-void take_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::size_t)>& row) {
+void consume_rows(Bytes& bytes, const std::function<void(const StoreRow&, std::size_t)>& row) {
   constexpr std::size_t kLength = sizeof(std::uint32_t);  // in front of each
-  const auto at = [&](std::size_t place) { return bytes.begin() + static_cast<std::ptrdiff_t>(place); };
+  const auto at = [&](std::size_t offset) { return bytes.begin() + static_cast<std::ptrdiff_t>(offset); };
   std::size_t done = 0;
   while (bytes.size() - done >= kLength) {
     const auto length = decode<std::uint32_t>(Bytes(at(done), at(done + kLength)));

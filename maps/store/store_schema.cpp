@@ -37,7 +37,7 @@ std::string get_text(Database& database, const char* key) {
 
 }  // namespace
 
-std::string place_of(const std::string& table) {
+std::string index_of(const std::string& table) {
   const auto* found = std::find_if(std::begin(kRowTables), std::end(kRowTables),
                                    [&](const RowTable& t) { return table == t.name; });
   return std::to_string(std::distance(std::begin(kRowTables), found));
@@ -84,7 +84,7 @@ StoreHeads read_heads(Database& database) {
     return database.number(("SELECT max(changed) FROM " + table + where).c_str());
   };
   for (const RowTable& table : kRowTables) {
-    std::int64_t& head = heads[table.share];
+    std::int64_t& head = heads[table.stream];
     head = std::max(head, last(table.name, ""));
   }
   heads.map = std::max(heads.map, last("removed", ""));  // clouds stay

@@ -40,12 +40,12 @@ class Statement : public SQLite::Statement {
   using SQLite::Statement::Statement;
   /// Places count from 1. Bytes are not copied: they must live until all rows were read.
   template <typename T>
-  Statement& bind(int place, const T& value) {
+  Statement& bind(int parameter, const T& value) {
     if constexpr (std::is_same_v<T, Bytes>) {  // a null pointer would be NULL instead of an empty blob
-      bindNoCopy(place, value.empty() ? static_cast<const void*>("") : value.data(),
+      bindNoCopy(parameter, value.empty() ? static_cast<const void*>("") : value.data(),
                  static_cast<int>(value.size()));
     } else {
-      SQLite::Statement::bind(place, value);
+      SQLite::Statement::bind(parameter, value);
     }
     return *this;
   }

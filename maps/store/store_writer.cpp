@@ -56,7 +56,7 @@ template <typename Landmark>
 void mirror_landmarks(const std::vector<LandmarkPage<Landmark>>& pages, bool whole, std::int32_t robot,
                       Mirror& mirror) {
   ByteWriter bytes;
-  mirror.begin();
+  mirror.begin_round();
   for (const LandmarkPage<Landmark>& page : pages) {
     const Mirror::Key key{page.robot, page.page};
     if (page.landmarks.empty()) {
@@ -67,7 +67,7 @@ void mirror_landmarks(const std::vector<LandmarkPage<Landmark>>& pages, bool who
     for (const Landmark& landmark : page.landmarks) encode(landmark, bytes);
     mirror.put(key, bytes.bytes());
   }
-  if (whole) mirror.end(robot);
+  if (whole) mirror.delete_unmarked(robot);
 }
 
 /// Things of a robot in rows of kFramesPerPage each; those before `from` are in the file.
@@ -138,7 +138,7 @@ struct StoreWriter::Impl {
   void put_log_and_clouds(const StoreStep& step);
   /// All there is of the only map and its frames.
   void write(const Map& map, const std::vector<FramePose>& poses);
-  /// `change` in a transaction; when it fails the mirrors learn what the file holds.
+  /// `change` in a transaction; if it fails, the mirrors are reloaded from the file.
   template <typename Change>
   core::Result<void> transact(const Change& change);
 
@@ -183,25 +183,26 @@ void StoreWriter::Impl::put_seen(FrameId frame, const SeenPoints& seen) {
 }
 
 void StoreWriter::Impl::mirror_keyframes(const MapChanges& map, std::int32_t robot) {
-  keyframes.begin();
-  states.begin();
+  keyframes.begin_round();
+  states.begin_round();
   for (const MapParts::KeyframePart& part : map.keyframes) {
     const Mirror::Key key = key_of(part.data->id);
-    if (anew || !keyframes.keep(key)) keyframes.put(key, encoded(*part.data));
+    if (anew || !keyframes.mark_unchanged(key)) keyframes.put(key, encoded(*part.data));
     states.put(key, encoded(KeyframeState{part.camera_from_world, part.parent}));
   }
-  keyframes.end(robot);
-  states.end(robot);
+  keyframes.delete_unmarked(robot);
+  states.delete_unmarked(robot);
 }
 
 void StoreWriter::Impl::mirror_edges(const MapChanges& map, std::int32_t robot) {
-  edges.begin();
+  edges.begin_round();
   for (const auto& [number, edge] : map.edges) {
     const Mirror::Key key{edge.a.robot, static_cast<std::int64_t>(number)};
-    if (anew || !edges.keep(key)) edges.put(key, encoded(EdgeRow{number, edge}));
+    if (anew || !edges.mark_unchanged(key)) edges.put(key, encoded(EdgeRow{number, edge}));
   }
-  for (const auto& [number, owner] : map.edge_names) edges.stay({owner, static_cast<std::int64_t>(number)});
-  edges.end(robot);
+  for (const auto& [number, owner] : map.edge_names)
+    edges.mark_present({owner, static_cast<std::int64_t>(number)});
+  edges.delete_unmarked(robot);
 }
 
 void StoreWriter::Impl::put_map_row(const MapChanges& map, std::int32_t robot) {
@@ -214,9 +215,9 @@ void StoreWriter::Impl::put_map_row(const MapChanges& map, std::int32_t robot) {
   row.log = count(log_lines, robot);
   row.next = map.next;
   row.loops = map.loops;
-  maps.begin();
+  maps.begin_round();
   maps.put({std::max(robot, 0), 0}, encoded(row));
-  if (robot < 0) maps.end();
+  if (robot < 0) maps.delete_unmarked();
 }
 
 void StoreWriter::Impl::put_cloud(const StoreCloud& cloud) {
@@ -248,9 +249,9 @@ void StoreWriter::Impl::put_log_and_clouds(const StoreStep& step) {
 void StoreWriter::Impl::write(const Map& map, const std::vector<FramePose>& poses) {
   frame_lists.clear();
   for (const FramePose& pose : poses) frame_lists[pose.reference.robot].push_back(pose);
-  frames.begin();
+  frames.begin_round();
   for (const auto& [robot, list] : frame_lists) mirror_list(robot, list, 0, frames);
-  frames.end();
+  frames.delete_unmarked();
   put_map(map.changes_since({}), -1);
 }
 
@@ -263,16 +264,16 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
     whole.commit();
   });
   if (done) return done;
-  const core::Result<void> reread = guarded(file, ErrorKind::kOutput, [&] {
+  const core::Result<void> reloaded = guarded(file, ErrorKind::kOutput, [&] {
     for (Mirror* mirror : {&maps, &keyframes, &states, &points, &lines, &edges, &frames, &log}) {
-      mirror->reread();
+      mirror->reload();
     }
     transaction = read_heads(*database).last();
     robots = read_header(*database).robots;
     frame_lists = read_lists<FramePose>(*database, "frame");
     log_lines = read_lists<std::string>(*database, "log");
   });
-  return reread ? done : reread;
+  return reloaded ? done : reloaded;
 }
 
 StoreWriter::StoreWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

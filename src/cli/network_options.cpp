@@ -9,7 +9,8 @@ namespace plumbline::cli {
 
 void add_network_options(CLI::App& command, net::NetworkOptions& options) {
   command
-      .add_option("--domain", options.domain, "Only hub and robots of one domain see each other (default: 0)")
+      .add_option("--domain", options.domain,
+                  "DDS domain; only hub and robots of the same domain see each other (default: 0)")
       ->type_name("D")
       ->check(CLI::Range(0, 230));
   command
@@ -18,7 +19,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
       ->type_name("IF");
   command
       .add_option("--peers", options.peers,
-                  "Where to look for the others, for networks without multicast (default: ask all)")
+                  "Addresses of the others, for networks without multicast (default: find them by multicast)")
       ->type_name("HOST[:PORT],...")
       ->delimiter(',')
       ->allow_extra_args(false);
@@ -32,12 +33,12 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
       ->check(CLI::IsMember({"udp", "tcp"}));
   command
       .add_option("--port", options.port,
-                  "TCP: port of the hub (default: 7500); UDP: where ports are counted from (default: 7400)")
+                  "TCP: port of the hub (default: 7500); UDP: first port (default: 7400)")
       ->type_name("P")
       ->check(CLI::Range(1, 60000));
   command
       .add_option("--security", options.security,
-                  "Folder with this one's keys, made by plumbline keys create (default: none)")
+                  "Folder with the keys of this robot or hub, made by plumbline keys create (default: none)")
       ->type_name("DIR");
 }
 

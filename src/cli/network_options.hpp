@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What `hub` and `robot` have in common on the command line.
+// Command line options common to `hub` and `robot`.
 #include <CLI/CLI.hpp>
 #include <string>
 
@@ -11,9 +11,9 @@ namespace plumbline::cli {
 
 /// --domain, --interface, --peers, --transport, --port, --security.
 void add_network_options(CLI::App& command, net::NetworkOptions& options);
-/// The same options again, for a command that is shown to the user; without those that were not given.
+/// The options that were given, for a command that is shown to the user.
 std::string network_arguments(const net::NetworkOptions& options);
-/// 16 letters and digits that nobody else has.
+/// A random id of 16 letters and digits.
 std::string fresh_id();
 
 }  // namespace plumbline::cli

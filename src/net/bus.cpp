@@ -19,7 +19,7 @@ core::Result<void> warn_of_security(const NetworkOptions& options, const std::st
                                     core::Log& log) {
   if (options.security.empty()) {
     if (options.interface != "lo")
-      log.warning(fmt::format("on {} without --security: {}", options.interface, danger));
+      log.warning(fmt::format("no --security on interface {}: {}", options.interface, danger));
     return {};
   }
   constexpr int kSoon = 30;

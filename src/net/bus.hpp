@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Messages and who carries them. The carrier is CycloneDDS, in the part plumbline_dds.so (core/part.hpp): a
-// run without a network loads none of it.
+// Messages between robots and hub, and their transport. The transport is CycloneDDS, in the part
+// plumbline_dds.so (core/part.hpp): a run without a network does not load it.
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -20,40 +20,42 @@ namespace plumbline::net {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint32_t kProtocol = 2;
+constexpr std::uint32_t kProtocol = 3;
 
-/// messages.idl says what the fields are.
-struct Hello {
+/// A robot's identity and what its store holds. messages.idl documents the fields.
+struct RobotStatus {
   std::uint32_t protocol = kProtocol;
   std::uint32_t store_format = 0;
   std::string program;
   std::string name;
   std::string run;
   std::uint64_t incarnation = 0;
-  std::vector<std::uint64_t> began;
+  std::vector<std::uint64_t> heads_at_start;
   std::int64_t map_head = 0;
   std::int64_t clouds_head = 0;
-  bool over = false;
+  bool finished = false;
   double lag_median_s = 0.0;
   double lag_p95_s = 0.0;
 };
 
 enum class Answer : std::uint8_t {
-  kPresence,  ///< to all: there is a hub
-  kAccepted,  ///< go on
-  kRefused,   ///< this robot as it is will never be accepted
-  kTrouble,   ///< the hub cannot take it now, and asks again
-  kDone,      ///< everything is here: the robot may leave
+  kPresence,  ///< to all robots: there is a hub
+  kAccepted,  ///< the robot may send
+  kRefused,   ///< this run of the robot will never be accepted
+  kTrouble,   ///< the hub cannot store the rows now, and asks for them again later
+  kDone,      ///< the hub holds everything: the robot may leave
 };
 
-struct Place {
+/// Pose of a robot in the frame that it shares with those it met.
+struct SharedFrame {
   std::string frame_of;
   std::array<double, 7> frame_from_robot{};
   std::array<double, 7> frame_from_camera{};
   std::array<double, 21> covariance{};
 };
 
-struct Word {
+/// The hub's identity and what it holds of one robot.
+struct HubStatus {
   std::uint32_t protocol = kProtocol;
   std::uint32_t store_format = 0;
   std::string program;
@@ -64,77 +66,78 @@ struct Word {
   std::uint64_t incarnation = 0;
   Answer answer = Answer::kPresence;
   std::string problem;
-  std::int64_t map = 0;
-  std::int64_t clouds = 0;
-  std::int64_t number = 0;
-  std::uint64_t edition = 0;
-  std::uint32_t pieces = 0;
-  Place place;
+  std::int64_t map_held = 0;
+  std::int64_t clouds_held = 0;
+  std::int64_t incoming = 0;
+  std::uint64_t checksum = 0;
+  std::uint32_t chunks = 0;
+  SharedFrame frame;
 };
 
-struct Piece {
+/// Part of a transaction's rows.
+struct Chunk {
   std::uint32_t protocol = kProtocol;
   std::string name;
   std::string run;
   std::uint64_t incarnation = 0;
-  std::uint8_t share = 0;
+  std::uint8_t stream = 0;
   std::int64_t after = 0;
   std::int64_t number = 0;
-  std::uint64_t edition = 0;
+  std::uint64_t checksum = 0;
   std::uint32_t index = 0;
   std::uint32_t count = 0;
   std::uint64_t hash = 0;
   std::vector<std::uint8_t> bytes;
 };
 
-/// What the carrier tells of itself: whole lines of its log.
+/// Receives whole lines of the transport's own log.
 using BusLog = std::function<void(const std::string&)>;
 
-/// A robot's end. Not thread-safe; no call waits longer than 0.2 s but wait().
+/// The robot's side of the transport. Not thread-safe; no call but wait() blocks for more than 0.2 s.
 class RobotBus {
  public:
   virtual ~RobotBus() = default;
-  virtual void say(const Hello& hello) = 0;
-  /// False: no room now; try again.
-  virtual bool send(const Piece& piece) = 0;
-  virtual std::vector<Word> hear() = 0;  ///< also those to other robots
-  /// Rows of other robots' maps; the hub sends them from the first call on.
-  virtual std::vector<Piece> hear_of_others() = 0;
-  [[nodiscard]] virtual bool listened_to() = 0;   ///< somebody takes this robot's pieces
-  [[nodiscard]] virtual bool all_received() = 0;  ///< of those who take them, all have all that was sent
-  [[nodiscard]] virtual int others() = 0;         ///< participants that are there, of any kind
+  virtual void publish(const RobotStatus& status) = 0;
+  /// False: the queue is full; try again.
+  virtual bool send(const Chunk& chunk) = 0;
+  virtual std::vector<HubStatus> poll_hub() = 0;  ///< statuses addressed to other robots included
+  /// Chunks of other robots' maps; the hub sends them from the first call on.
+  virtual std::vector<Chunk> poll_feedback() = 0;
+  [[nodiscard]] virtual bool has_reader() = 0;    ///< somebody subscribes to this robot's chunks
+  [[nodiscard]] virtual bool all_received() = 0;  ///< every subscriber has acknowledged all sent chunks
+  [[nodiscard]] virtual int participants() = 0;   ///< others on the network, of any kind
   virtual void wait(std::chrono::milliseconds most) = 0;
 };
 
-/// A hello, and in which partition it came: only who may speak for that name is let in there.
-struct HeardHello {
-  Hello hello;
+/// A status and the partition it came in: only a process that may publish under that name is admitted.
+struct ReceivedStatus {
+  RobotStatus status;
   std::string partition;
 };
 
-/// The hub's end. As RobotBus.
+/// The hub's side of the transport. Threads and blocking as RobotBus.
 class HubBus {
  public:
   virtual ~HubBus() = default;
-  virtual void say(const Word& word) = 0;
-  virtual std::vector<HeardHello> hear() = 0;
-  virtual std::vector<Word> hear_hubs() = 0;  ///< also this one's own
-  /// From now on takes the pieces of this robot.
-  virtual core::Result<void> listen_to(const std::string& robot) = 0;
-  virtual std::vector<Piece> take(const std::string& robot, int most) = 0;
-  /// How many times this robot has begun to hear of others; 0: it does not now. What was sent before the last
-  /// time may be lost.
-  [[nodiscard]] virtual int begun_to_hear(const std::string& robot) = 0;
-  /// A piece of another one's map for this robot. False: no room now; try again. Never waits.
-  virtual bool tell(const std::string& robot, const Piece& piece) = 0;
+  virtual void publish(const HubStatus& status) = 0;
+  virtual std::vector<ReceivedStatus> poll_robots() = 0;
+  virtual std::vector<HubStatus> poll_hubs() = 0;  ///< this hub's own included
+  /// Chunks of this robot are received from now on.
+  virtual core::Result<void> subscribe(const std::string& robot) = 0;
+  virtual std::vector<Chunk> receive(const std::string& robot, int most) = 0;
+  /// How many times this robot has subscribed to feedback; 0: it does not subscribe now. Chunks sent before
+  /// the last subscription may be lost.
+  [[nodiscard]] virtual int feedback_subscriptions(const std::string& robot) = 0;
+  /// Sends a chunk of another robot's map to this robot. False: the queue is full; try again. Never waits.
+  virtual bool send_feedback(const std::string& robot, const Chunk& chunk) = 0;
   virtual void wait(std::chrono::milliseconds most) = 0;
 };
 
-/// The part.
+/// Functions of the part.
 struct BusPart {
   static constexpr const char* kPart = "dds";
   static constexpr std::uint64_t layout() {
-    return core::layout_of<BusPart, Hello, Word, Piece, NetworkOptions>();
+    return core::layout_of<BusPart, RobotStatus, HubStatus, Chunk, NetworkOptions>();
   }
   core::Result<std::unique_ptr<RobotBus>> (*open_robot)(const NetworkOptions& options,
                                                         const std::string& name, const BusLog& log);
@@ -146,8 +149,8 @@ struct BusPart {
   core::Result<int> (*days_left)(const std::filesystem::path& folder);
 };
 
-/// Through the part. Errors: (kUsage) no such interface, port in use, keys that cannot be read; (kInternal)
-/// the part is missing.
+/// Open the transport of the part. Errors: (kUsage) no such interface, port in use, keys that cannot be read;
+/// (kInternal) the part is missing.
 core::Result<std::unique_ptr<RobotBus>> open_robot_bus(const NetworkOptions& options, const std::string& name,
                                                        const BusLog& log);
 core::Result<std::unique_ptr<HubBus>> open_hub_bus(const NetworkOptions& options, const BusLog& log);

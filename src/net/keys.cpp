@@ -14,17 +14,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The part that makes keys, when these names may have some.
+/// The part that makes keys. Errors (kUsage): an invalid or repeated name.
 core::Result<const BusPart*> part_for(const std::vector<std::string>& robots) {
   std::set<std::string> names = {"ca", "hub"};
   for (const std::string& name : robots) {
     if (!is_robot_name(name)) {
       return core::usage_error(
-          fmt::format("--robots: '{}' is no name: letters, digits, '.', '_' and '-'", name));
+          fmt::format("--robots: '{}' is not a valid name: use letters, digits, '.', '_' and '-'", name));
     }
     if (!names.insert(name).second) {
-      return core::usage_error(
-          fmt::format("--robots: {} is there twice, or is none that a robot may have", name));
+      return core::usage_error(fmt::format("--robots: {} is given twice or is reserved", name));
     }
   }
   return core::part<BusPart>();
@@ -39,7 +38,7 @@ core::Result<void> create_keys(const fs::path& folder, const std::vector<std::st
   if (fs::exists(folder, ec)) {
     return core::usage_error(
         folder.string() +
-        ": is there already; more robots are added by plumbline keys add, new keys need a new folder");
+        ": exists already; add robots with plumbline keys add, or choose a new folder for new keys");
   }
   if (auto made = (*keys)->make_authority(folder); !made) return made;
   if (auto made = (*keys)->make_keys(folder, "hub"); !made) return made;
@@ -55,7 +54,7 @@ core::Result<void> add_keys(const fs::path& folder, const std::vector<std::strin
   std::error_code ec;
   for (const std::string& name : robots) {
     if (fs::exists(folder / name, ec))
-      return core::usage_error((folder / name).string() + ": is there already");
+      return core::usage_error((folder / name).string() + ": exists already");
   }
   for (const std::string& name : robots) {
     if (auto made = (*keys)->make_keys(folder, name); !made) return made;

@@ -16,7 +16,7 @@ namespace plumbline::net {
 namespace {
 
 constexpr int kTcpPort = 7500;
-constexpr int kMostPort = 60000;  // ports are counted upwards from there
+constexpr int kMostPort = 60000;  // further ports follow it
 constexpr int kMostDomain = 230;  // 250 ports each from 7400 on
 
 bool made_of(const std::string& text, const char* others) {
@@ -26,7 +26,7 @@ bool made_of(const std::string& text, const char* others) {
   });
 }
 
-/// Those that are up and have an IPv4 address.
+/// Names of the interfaces that are up and have an IPv4 address.
 std::vector<std::string> interfaces() {
   std::vector<std::string> names;
   ifaddrs* list = nullptr;
@@ -77,27 +77,29 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
   if (options.port < 0 || options.port > kMostPort) {
     return core::usage_error(fmt::format("--port: {} is not between 1 and {}", options.port, kMostPort));
   }
+
   const std::vector<std::string> there = interfaces();
   if (options.interface.empty()) {
     options.interface = choose_interface();
   } else if (std::find(there.begin(), there.end(), options.interface) == there.end()) {
-    return core::usage_error(fmt::format("--interface: there is no '{}' that is up; there are {}",
+    return core::usage_error(fmt::format("--interface: no interface '{}' is up; up are: {}",
                                          options.interface,
                                          there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", "))));
   }
   if (!made_of(options.interface, "._-@")) {
     return core::usage_error(fmt::format("--interface: '{}' cannot be used", options.interface));
   }
+
   const bool tcp = options.transport == Transport::kTcp;
   if (tcp && options.port == 0) options.port = kTcpPort;
   for (std::string& peer : options.peers) {
     if (peer.empty() || !made_of(peer, "._-:[]")) {
-      return core::usage_error(fmt::format("--peers: '{}' is no HOST or HOST:PORT", peer));
+      return core::usage_error(fmt::format("--peers: '{}' is not HOST or HOST:PORT", peer));
     }
     if (tcp && peer.find(':') == std::string::npos) peer += fmt::format(":{}", options.port);
   }
   if (tcp && !hub && options.peers.empty()) {
-    return core::usage_error("--transport tcp: say where the hub is with --peers HOST[:PORT]");
+    return core::usage_error("--transport tcp: name the hub with --peers HOST[:PORT]");
   }
   return options;
 }

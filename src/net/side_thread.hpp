@@ -8,7 +8,7 @@
 
 namespace plumbline::net {
 
-/// Work beside the rest that goes on until this ends. The last member: what it works with must be there.
+/// A thread that works until this object is destroyed. Declare it as the last member, after what it uses.
 class SideThread {
  public:
   explicit SideThread(const std::function<void(const core::StopToken&)>& work)

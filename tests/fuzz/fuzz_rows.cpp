@@ -13,7 +13,7 @@ namespace {
 maps::Bytes packed(maps::Bytes plain) {
   maps::ByteWriter rows;
   try {
-    maps::take_rows(plain, [&](const maps::StoreRow& row, std::size_t) {
+    maps::consume_rows(plain, [&](const maps::StoreRow& row, std::size_t) {
       maps::StoreRow again = row;
       if (row.type == SQLITE_BLOB && !row.removed) again.data = maps::pack(row.data);
       maps::append(again, rows);
@@ -35,8 +35,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const maps::StoreTransaction rows{1, packed({data, data + size})};
   fuzz::require(copy.clear().has_value(), "a copy can be emptied");
   const fuzz::MemoryWatch watch;
-  core::Result<void> taken = copy.begin(maps::StoreShare::kMap, rows.number);
-  if (taken) taken = copy.take(rows.rows.data(), rows.rows.size());
+  core::Result<void> taken = copy.begin(maps::StoreStream::kMap, rows.number);
+  if (taken) taken = copy.append(rows.rows.data(), rows.rows.size());
   if (taken) taken = copy.commit();
   if (!taken) {
     fuzz::require_message(taken.error().message, file.path().string());
@@ -45,7 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } else if (copy.heads().last() > 0) {
     const auto stored = maps::load_map(file.path());
     maps::MapFollower follower;
-    const bool followed = follower.take(rows) && follower.map();
+    const bool followed = follower.apply(rows) && follower.map();
     // A map may be of several robots, or a file without header: then who follows has none of it or more of
     // it.
     if (stored) fuzz::require(followed, "who follows rows has the map that the copy has");

@@ -2,9 +2,9 @@
 #pragma once
 
 // A copy of a growing map store on another machine. Transactions of a store are numbered from 1 on; every row
-// knows the one that last wrote it, and a row that was removed leaves a note with the number. So a copy that
-// has all rows up to a number asks for those above, whatever it missed, and holds the same rows as the store
-// in the end (docs/reference/store.md, docs/method/network.md).
+// carries the number of the one that last wrote it, and a removed row leaves a tombstone with that number. So
+// a copy that has all rows up to a number requests those above, and finally holds the same rows as the store
+// (docs/reference/store.md, docs/method/network.md).
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -19,20 +19,20 @@
 
 namespace plumbline::maps {
 
-/// Clouds are most of the bytes and may come later than the rest; each share is copied in its own order.
-enum class StoreShare : std::uint8_t { kMap, kClouds };
-constexpr StoreShare kStoreShares[] = {StoreShare::kMap, StoreShare::kClouds};
+/// Clouds are most of the bytes and may follow later; each stream is copied in its own order.
+enum class StoreStream : std::uint8_t { kMap, kClouds };
+constexpr StoreStream kStoreStreams[] = {StoreStream::kMap, StoreStream::kClouds};
 
-/// Numbers of the last transactions that touched each share; 0: none did.
+/// Number of the last transaction that changed each stream; 0: none did.
 struct StoreHeads {
   std::int64_t map = 0;
   std::int64_t clouds = 0;
-  std::int64_t& operator[](StoreShare share) { return share == StoreShare::kMap ? map : clouds; }
-  std::int64_t operator[](StoreShare share) const { return share == StoreShare::kMap ? map : clouds; }
+  std::int64_t& operator[](StoreStream stream) { return stream == StoreStream::kMap ? map : clouds; }
+  std::int64_t operator[](StoreStream stream) const { return stream == StoreStream::kMap ? map : clouds; }
   [[nodiscard]] std::int64_t last() const { return std::max(map, clouds); }
 };
 
-/// Rows that a transaction wrote and no later one wrote again, as bytes for StoreReplica::take.
+/// Rows that a transaction wrote and no later one wrote again, as bytes for StoreReplica::append.
 struct StoreTransaction {
   std::int64_t number = 0;
   std::vector<std::uint8_t> rows;
@@ -42,52 +42,51 @@ struct StoreTransaction {
   }
 };
 
-/// What a store holds at this moment, while it may be written; opens and closes the file. Errors (kInput) as
-/// StoreReader::open.
+/// Heads of a store at this moment; it may be written meanwhile. Opens and closes the file. Errors (kInput):
+/// as StoreReader::open.
 core::Result<StoreHeads> store_heads(const std::filesystem::path& file);
-/// The first transaction above `after` that left rows in `share`: keyframes before landmarks, surfaces before
-/// clouds. None: `after` is all there is. Errors as store_heads.
+/// The first transaction above `after` that left rows in `stream`: keyframes before landmarks, surfaces
+/// before clouds. None: `after` is all there is. Errors as store_heads.
 core::Result<std::optional<StoreTransaction>> next_transaction(const std::filesystem::path& file,
-                                                               StoreShare share, std::int64_t after);
+                                                               StoreStream stream, std::int64_t after);
 
-/// Bytes that were taken, by what they are for.
+/// Received bytes by purpose.
 struct ReplicaBytes {
-  std::uint64_t place = 0;  ///< keyframes with features and poses: what recognises places
+  std::uint64_t place = 0;  ///< keyframes with features and poses, for recognising places
   std::uint64_t map = 0;    ///< landmarks, edges, frames and everything else
   std::uint64_t cloud = 0;  ///< clouds and their surfaces
 };
 
-/// The copy. Rows come from others and are looked at before they are stored: known tables, keys in range,
-/// bytes that unpack to no more than their kind can need and that decode, finite numbers. One writer; not
-/// thread-safe.
+/// The copy. Rows come from others and are checked before they are stored: known tables, keys in range, bytes
+/// that decode and unpack to no more than their kind can need, finite numbers. One writer; not thread-safe.
 class StoreReplica {
  public:
-  /// Goes on in the copy that is there, or makes an empty one. What was not committed is forgotten. Errors
-  /// (kOutput): cannot be made; (kInput): it is no copy.
+  /// Continues an existing copy, or makes an empty one. What was not committed is lost. Errors (kOutput): it
+  /// cannot be made; (kInput): the file is no copy.
   static core::Result<StoreReplica> open(const std::filesystem::path& file);
   StoreReplica(StoreReplica&& other) noexcept;
   StoreReplica& operator=(StoreReplica&& other) noexcept;
-  /// Leaves one file.
+  /// Leaves a single file.
   ~StoreReplica();
 
-  /// Up to where the copy is the store's.
+  /// The copy equals the store up to these transactions.
   [[nodiscard]] const StoreHeads& heads() const;
-  /// Keyframes in it.
+  /// Number of keyframes in it.
   [[nodiscard]] std::size_t keyframes() const;
   /// Whether the run came to its end (StoredMap::complete); true only for the last transaction's.
   [[nodiscard]] bool complete() const;
 
-  /// Begins to take transaction `number`, which must be above heads()[share]; what was begun before and not
-  /// committed is forgotten.
-  core::Result<void> begin(StoreShare share, std::int64_t number);
-  /// Its bytes, in parts of any size. An error ends the transaction: (kInput) they are not what a store
-  /// sends, (kOutput) they cannot be written.
-  core::Result<void> take(const std::uint8_t* bytes, std::size_t size);
-  /// All bytes were taken; from now on they are kept whatever happens. Errors as take().
+  /// Begins transaction `number`, which must be above heads()[stream]; one that was not committed is rolled
+  /// back.
+  core::Result<void> begin(StoreStream stream, std::int64_t number);
+  /// Appends its bytes, in parts of any size. An error ends the transaction: (kInput) a store does not send
+  /// such bytes, (kOutput) they cannot be written.
+  core::Result<void> append(const std::uint8_t* bytes, std::size_t size);
+  /// Commits after the last byte; from now on the rows survive a power cut. Errors as append().
   core::Result<void> commit();
-  /// Forgets what was begun.
-  void forget();
-  /// Everything goes.
+  /// Drops the transaction that was begun.
+  void roll_back();
+  /// Removes all rows.
   core::Result<void> clear();
   [[nodiscard]] const ReplicaBytes& bytes() const;  ///< since open(), of committed transactions
 
@@ -97,16 +96,16 @@ class StoreReplica {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The map in a store of one robot as it grows: what was taken once stays decoded.
+/// The map of one robot as its store grows; each row is decoded once.
 class MapFollower {
  public:
   MapFollower();
   MapFollower(MapFollower&& other) noexcept;
   MapFollower& operator=(MapFollower&& other) noexcept;
   ~MapFollower();
-  /// The next one, of the share kMap. Errors (kInput): it is not what a store sends.
-  core::Result<void> take(const StoreTransaction& transaction);
-  [[nodiscard]] std::int64_t head() const;  ///< number of the last one
+  /// Applies the next transaction of the stream kMap. Errors (kInput): a store does not send such bytes.
+  core::Result<void> apply(const StoreTransaction& transaction);
+  [[nodiscard]] std::int64_t head() const;  ///< number of the last transaction applied
   /// With the robots' cameras as header. Errors (kInput): rows that belong together are not all here yet, or
   /// are of several robots whose maps are not one.
   [[nodiscard]] core::Result<StoredMap> map() const;
@@ -116,14 +115,15 @@ class MapFollower {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A few texts by name in a file of their own, which survive the process and a power cut: who is who on the
-/// network. The file is open only while a call lasts, so that its folder may be renamed between calls.
+/// A few texts by name in a file of their own, which survive the process and a power cut: identities on the
+/// network. The file is open only during a call, so that its folder may be renamed between calls.
 class Ledger {
  public:
   explicit Ledger(std::filesystem::path file) : file_(std::move(file)) {}
-  /// Several at once: all or none. Makes the file when it is not there. Errors (kOutput): disk full, I/O.
+  /// Stores several texts, all or none. Makes the file if it does not exist. Errors (kOutput): disk full,
+  /// I/O.
   [[nodiscard]] core::Result<void> put(const std::map<std::string, std::string>& texts) const;
-  /// All of them by name; none when the file is not there. Errors (kInput): damaged.
+  /// All texts by name; none if the file does not exist. Errors (kInput): it is damaged.
   [[nodiscard]] core::Result<std::map<std::string, std::string>> all() const;
 
  private:

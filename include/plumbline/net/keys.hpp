@@ -10,14 +10,15 @@
 
 namespace plumbline::net {
 
-/// Makes `folder`, which must not exist, with ca/ (stays with who makes keys), hub/ and one folder for each
-/// robot, each complete. Folders 0700, files 0600. Errors: (kUsage) it exists, a name that cannot be or is
-/// there twice; (kOutput) it cannot be written.
+/// Makes `folder`, which must not exist, with ca/ (keep it private), hub/ and one complete folder for each
+/// robot. Folders have mode 0700, files 0600. Errors: (kUsage) it exists, an invalid or repeated name;
+/// (kOutput) it cannot be written.
 core::Result<void> create_keys(const std::filesystem::path& folder, const std::vector<std::string>& robots);
-/// More robots, by the same authority. Errors as create_keys; (kInput) `folder` has no authority.
+/// Adds keys for more robots, signed by the same authority. Errors as create_keys; (kInput) `folder` has no
+/// authority.
 core::Result<void> add_keys(const std::filesystem::path& folder, const std::vector<std::string>& robots);
-/// From now on these robots are let in nowhere that has the new crl.pem: it is written into ca/, hub/ and all
-/// robots' folders that are here. Errors as add_keys; (kUsage) nobody has this name.
+/// Revokes robots' keys: whoever has the new crl.pem no longer admits them. It is written into ca/, hub/ and
+/// all robots' folders below `folder`. Errors as add_keys; (kUsage) no keys have this name.
 core::Result<void> revoke_keys(const std::filesystem::path& folder, const std::vector<std::string>& robots);
 
 }  // namespace plumbline::net

@@ -13,20 +13,20 @@ namespace plumbline::net {
 enum class Transport { kUdp, kTcp };
 
 struct NetworkOptions {
-  int domain = 0;         ///< 0 to 230: who has another one is not seen
-  std::string interface;  ///< name; empty: the one of the default route, or lo
-  std::vector<std::string>
-      peers;  ///< HOST or HOST:PORT to look for others at, instead of asking all by multicast
+  int domain = 0;         ///< 0 to 230: only participants of one domain see each other
+  std::string interface;  ///< name; empty: that of the default route, or lo
+  /// HOST or HOST:PORT to look for others at, instead of multicast.
+  std::vector<std::string> peers;
   Transport transport = Transport::kUdp;
-  int port = 0;                    ///< TCP: the hub's (0: 7500); UDP: where ports are counted from (0: 7400)
+  int port = 0;                    ///< TCP: the hub's port (0: 7500); UDP: the first port (0: 7400)
   std::filesystem::path security;  ///< folder with keys of this robot or hub; empty: none
 };
 
-/// Interface and peers as they will be used. Errors (kUsage): no such interface, a name or number that cannot
-/// be, a TCP robot without peer.
+/// Checks the options and fills in interface, port and peers. Errors (kUsage): no such interface, an invalid
+/// name or number, a TCP robot without peer.
 core::Result<NetworkOptions> checked(NetworkOptions options, bool hub);
 
-/// Names become folders, lines of logs and text on terminals: [A-Za-z0-9][A-Za-z0-9._-]{0,63}.
+/// Whether a name matches [A-Za-z0-9][A-Za-z0-9._-]{0,63}: names become folders and text in logs.
 bool is_robot_name(const std::string& name);
 
 }  // namespace plumbline::net

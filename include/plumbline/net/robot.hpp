@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// `plumbline robot` as a call: a recording is mapped, and the map sent to a hub beside it
+// `plumbline robot` as a call: maps a recording and sends the map to a hub meanwhile
 // (docs/method/network.md).
 #include <filesystem>
 #include <optional>
@@ -18,29 +18,29 @@
 namespace plumbline::net {
 
 struct RobotRequest {
-  pipeline::MapRequest map;  ///< `output` is the result folder; a `prepared` of the caller's is called, too
+  pipeline::MapRequest map;  ///< `output` is the result folder; the caller's `prepared` is called, too
   std::string name;
   NetworkOptions network;
-  bool feedback = false;       ///< maps of other robots serve for relocalisation and loops
-  double wait_s = 30.0;        ///< for a hub that was never heard, after the last frame
-  double wait_lost_s = 600.0;  ///< for one that was, since it acknowledged something
+  bool feedback = false;       ///< use maps of other robots for relocalisation and loops
+  double wait_s = 30.0;        ///< after the last frame, for a hub to answer at all
+  double wait_lost_s = 600.0;  ///< since the last acknowledgement of a hub that has answered
   std::string fresh_id;        ///< made up at random, 16 letters or digits
-  std::string hand_in;         ///< arguments of the command that hands the map in later, without the folder
+  std::string hand_in;         ///< arguments of the command that sends the map later, without the folder
 };
 
 struct RobotOutcome {
-  std::optional<pipeline::RunSummary> summary;  ///< of the run; none when a map was only handed in
-  bool delivered = false;                       ///< a hub has all of it
-  std::string undelivered;                      ///< why not, and the command that does it later
+  std::optional<pipeline::RunSummary> summary;  ///< of the run; none if an existing map was sent
+  bool delivered = false;                       ///< a hub holds the whole map
+  std::string undelivered;  ///< why it was not delivered, and the command that sends it later
 };
 
-/// The folder with the map of an earlier run that `input` names, finished or interrupted; empty: it is none.
+/// Folder of the earlier run, finished or interrupted, that `input` names; empty: it names none.
 std::filesystem::path earlier_run(const std::string& input);
 
-/// The map is a function of recording, camera and configuration, whatever the network does, but with
-/// feedback: nothing of it is waited for before the last frame. Errors as pipeline::map_recording; (kUsage)
-/// options, a hub that refuses this robot; (kUntrustworthy) a hub was there and has not got everything: the
-/// message has the command. `status` and `progress` may be empty.
+/// Without feedback the map depends on recording, camera and configuration only: the run never waits for the
+/// network before its last frame. Errors as pipeline::map_recording; (kUsage) options, a hub that refuses
+/// this robot; (kUntrustworthy) a hub has answered but not received everything: the message has the command
+/// to continue. `status` and `progress` may be empty.
 core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Executor& executor,
                                      core::Log& log, const core::StopToken& stop, const Status& status,
                                      const pipeline::Progress& progress);

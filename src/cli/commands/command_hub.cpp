@@ -15,14 +15,14 @@ const char* const kTwoTerminals =
     "In one terminal:    plumbline hub -o building --robots 2 --interface lo\n"
     "In another one:     plumbline robot 'synth:room?frames=240&seed=1' --to 6 --name r0 --interface lo &\n"
     "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 --interface lo\n"
-    "Hub and robots may start in any order; docs/guide/network.md has more.";
+    "Hub and robots may start in any order. More: docs/guide/network.md";
 
 int hub(Session& session, net::HubRequest request, double quota_gb) {
   if (auto equipped = session.equip(request.fuse); !equipped) return session.fail(equipped.error());
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
   if (request.resume && pipeline::is_finished(request.fuse.output)) {
-    session.console().info(request.fuse.output.string() + ": is finished; there is nothing to go on with");
+    session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
     return 0;
   }
   Console& console = session.console();
@@ -44,16 +44,16 @@ void add_hub(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->fuse.output, "Folder for the result")
       ->required()
       ->type_name("OUT");
-  command->add_option("--robots", request->robots, "Fuse when so many are done (default: at Ctrl-C)")
+  command->add_option("--robots", request->robots, "Fuse when this many robots are done (default: at Ctrl-C)")
       ->type_name("N")
       ->check(CLI::Range(1, 64));
   add_network_options(*command, request->network);
-  command->add_option("--quota", *quota_gb, "Disk that the map of one robot may take, GB (default: 20)")
+  command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")
       ->check(CLI::PositiveNumber);
-  command->add_option("--anchor", request->fuse.anchor, "Robot whose frame the maps are laid into")
+  command->add_option("--anchor", request->fuse.anchor, "Robot whose map defines the frame of the result")
       ->type_name("NAME");
-  command->add_flag("--resume", request->resume, "Go on with what an interrupted hub left in OUT.partial");
+  command->add_flag("--resume", request->resume, "Continue an interrupted hub from OUT.partial");
   add_pipeline_options(*command, session, request->fuse);
 }
 

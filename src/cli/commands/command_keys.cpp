@@ -28,7 +28,7 @@ void add_action(CLI::App& group, Session& session, const char* name, const char*
     return 0;
   });
   command->add_option("DIR", request->folder, "Folder of the keys")->required();
-  command->add_option("--robots", request->robots, "Names, with commas between")
+  command->add_option("--robots", request->robots, "Robot names, separated by commas")
       ->required()
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -40,11 +40,11 @@ void add_action(CLI::App& group, Session& session, const char* name, const char*
 void add_keys(CLI::App& app, Session& session) {
   CLI::App* group = add_group(app, "keys", "Make and revoke keys for hub and robots (--security)");
   add_action(*group, session, "create", "Make an authority, and keys for a hub and robots", &net::create_keys,
-             "give hub/ to the hub and each robot its own folder; ca/ stays here");
+             "give hub/ to the hub and each robot its own folder; keep ca/ here");
   add_action(*group, session, "add", "Make keys for more robots", &net::add_keys,
              "give each new robot its folder; the others need nothing new");
-  add_action(*group, session, "revoke", "Let robots in no longer", &net::revoke_keys,
-             "give the new crl.pem of hub/ to the hub, and begin that again");
+  add_action(*group, session, "revoke", "Revoke robots' keys", &net::revoke_keys,
+             "give the new hub/crl.pem to the hub and restart it");
 }
 
 }  // namespace plumbline::cli

@@ -18,7 +18,7 @@ int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
   if (!outcome) return session.fail(outcome.error());
   const int code = outcome->summary ? session.finish(*outcome->summary, folder) : 0;
   if (outcome->delivered) {
-    session.console().info("the hub has everything");
+    session.console().info("the hub has received everything");
   } else {
     session.console().warning(outcome->undelivered);
   }
@@ -57,17 +57,15 @@ void add_robot(CLI::App& app, Session& session) {
       add_command(app, session, "robot", "Map a recording and send the map to a hub meanwhile",
                   [&session, request] { return robot(session, *request); });
   command->footer(
-      "Beside a hub:       plumbline hub -o building --robots 1 --interface lo\n"
-      "a robot:            plumbline robot 'synth:room?frames=300&seed=1' --name r0 --interface lo\n"
-      "and once more:      plumbline robot r0 --name r0 --interface lo   (hands in what is in folder r0)\n"
-      "Exit code 4: the hub was there, but has not got everything. docs/guide/network.md has more.");
+      "Start a hub:        plumbline hub -o building --robots 1 --interface lo\n"
+      "and a robot:        plumbline robot 'synth:room?frames=300&seed=1' --name r0 --interface lo\n"
+      "or once more:       plumbline robot r0 --name r0 --interface lo   (sends the map in folder r0)\n"
+      "Exit code 4: a hub has answered, but not received everything. More: docs/guide/network.md");
   command
-      ->add_option(
-          "INPUT", request->map.input,
-          "A recording, as for plumbline map; or the result folder of an earlier run, whose map is only "
-          "handed in")
+      ->add_option("INPUT", request->map.input,
+                   "Recording, as for plumbline map; or the result folder of an earlier run, to send its map")
       ->required();
-  command->add_option("--name", request->name, "The robot's name, one of its own in the domain")
+  command->add_option("--name", request->name, "Robot name, unique in the domain")
       ->required()
       ->type_name("NAME");
   command->add_option("-o,--output", request->map.output, "Folder for the result (default: NAME)")
@@ -76,17 +74,17 @@ void add_robot(CLI::App& app, Session& session) {
   command
       ->add_option_function<std::string>(
           "--feedback", [request](const std::string& choice) { request->feedback = choice == "on"; },
-          "on: maps of other robots serve for this one's relocalisation and loops; its map then depends on "
-          "the network (default: off)")
+          "on: use maps of other robots for relocalisation and loops; the map then depends on the network "
+          "(default: off)")
       ->check(CLI::IsMember({"off", "on"}));
   command
       ->add_option("--wait", request->wait_s,
-                   "For a hub that was never heard, after the last frame (default: 30)")
+                   "Seconds to wait after the last frame for a hub to answer at all (default: 30)")
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--wait-lost", request->wait_lost_s,
-                   "For a hub that was heard, since it acknowledged something (default: 600)")
+                   "Seconds to wait since the hub's last acknowledgement (default: 600)")
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
   add_map_options(*command, session, request->map);

@@ -17,19 +17,19 @@
 namespace plumbline::net {
 namespace {
 
-constexpr const char* kHubs = "_hub";  ///< a partition that is no robot's: hubs hear each other there
+constexpr const char* kHubs = "_hub";  ///< partition for messages between hubs; no robot may have this name
 constexpr const char* kEverybody = "*";
 
 struct Topic {
   const dds_topic_descriptor_t& type;
   const char* name;
 };
-const Topic kHello{plumbline_wire_Hello_desc, "plumbline_hello"};
-const Topic kWord{plumbline_wire_Word_desc, "plumbline_word"};
-const Topic kPiece{plumbline_wire_Piece_desc, "plumbline_piece"};
-const Topic kFeedback{plumbline_wire_Piece_desc, "plumbline_feedback"};
+const Topic kRobotStatus{plumbline_wire_RobotStatus_desc, "plumbline_robot_status"};
+const Topic kHubStatus{plumbline_wire_HubStatus_desc, "plumbline_hub_status"};
+const Topic kChunk{plumbline_wire_Chunk_desc, "plumbline_chunk"};
+const Topic kFeedback{plumbline_wire_Chunk_desc, "plumbline_feedback"};
 
-/// A robot is spoken to in its own partition; an entity goes with what was made in it.
+/// Owner of a DDS entity, and with it of all entities made in it.
 struct Entity {
   dds_entity_t handle = 0;
   Entity() = default;
@@ -50,13 +50,13 @@ void report(void* log, const dds_log_data_t* data) {
   if (log != nullptr && *static_cast<BusLog*>(log)) (*static_cast<BusLog*>(log))(line);
 }
 
-/// What CycloneDDS complained of first, from whichever thread.
-class Complaint {
+/// The first error that CycloneDDS logged, from whichever thread.
+class FirstError {
  public:
   void note(const std::string& line) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const bool of_another_one = line.rfind("Remote ", 0) == 0;
-    if (text_.empty() && !of_another_one) text_ = line;
+    const bool of_remote = line.rfind("Remote ", 0) == 0;
+    if (text_.empty() && !of_remote) text_ = line;
   }
   std::string text() {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -68,11 +68,12 @@ class Complaint {
   std::string text_;
 };
 
-/// A participant in a domain of its own configuration.
+/// A participant in a domain with its own configuration.
 class Participant {
  public:
   explicit Participant(const BusLog& log)
-      : complaint_(std::make_shared<Complaint>()), log_([log, first = complaint_](const std::string& line) {
+      : first_error_(std::make_shared<FirstError>()),
+        log_([log, first = first_error_](const std::string& line) {
           first->note(line);
           if (log) log(line);
         }) {
@@ -95,15 +96,16 @@ class Participant {
     const auto qos = participant_qos(options);
     if (!qos) return tl::unexpected(qos.error());
     if (domain_.handle > 0) participant_ = Entity(dds_create_participant(id, qos->get(), nullptr));
+
     if (participant_.handle > 0) {
       waitset_ = dds_create_waitset(participant_.handle);
       others_ = dds_create_reader(participant_.handle, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
       return {};
     }
-    const std::string complaint = complaint_->text();
-    if (!options.security.empty() && !complaint.empty()) {
+    const std::string error = first_error_->text();
+    if (!options.security.empty() && !error.empty()) {
       return core::usage_error(
-          fmt::format("--security: the keys in {} cannot be used: {}", options.security.string(), complaint));
+          fmt::format("--security: the keys in {} cannot be used: {}", options.security.string(), error));
     }
     const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
     return core::usage_error(
@@ -122,7 +124,7 @@ class Participant {
   [[nodiscard]] dds_entity_t topic(const Topic& topic) const {
     return dds_create_topic(handle(), &topic.type, topic.name, nullptr, nullptr);
   }
-  /// wait() ends when it has something.
+  /// From now on wait() returns when this reader has data.
   void watch(dds_entity_t reader) const {
     dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS | DDS_SUBSCRIPTION_MATCHED_STATUS);
     dds_waitset_attach(waitset_, dds_create_readcondition(reader, DDS_ANY_STATE), reader);
@@ -143,7 +145,7 @@ class Participant {
   }
 
  private:
-  std::shared_ptr<Complaint> complaint_;
+  std::shared_ptr<FirstError> first_error_;
   BusLog log_;
   Entity domain_;
   Entity participant_;
@@ -151,7 +153,7 @@ class Participant {
   dds_entity_t others_ = 0;
 };
 
-/// Calls use(sample, info) for at most `most` samples that are there.
+/// Calls use(sample, info) for at most `most` available samples.
 template <typename Sample, typename Use>
 void take_some(dds_entity_t reader, int most, const Use& use) {
   for (int i = 0; i < most; ++i) {
@@ -164,7 +166,7 @@ void take_some(dds_entity_t reader, int most, const Use& use) {
   }
 }
 
-constexpr int kMostWords = 256;
+constexpr int kMaxStatuses = 256;
 constexpr int kFeedbackAtATime = 4;
 
 template <typename Wire>
@@ -196,44 +198,48 @@ class CycloneRobot : public RobotBus {
     if (auto opened = participant_.open(options, false); !opened) return opened;
     publisher_ = participant_.publisher({name});
     subscriber_ = participant_.subscriber({name});
-    hellos_ = writer_in(publisher_, participant_.topic(kHello), word_qos());
-    pieces_ = writer_in(publisher_, participant_.topic(kPiece), piece_qos());
-    words_ = reader_in(subscriber_, participant_.topic(kWord), word_qos());
-    if (hellos_ < 0 || pieces_ < 0 || words_ < 0) {
+    statuses_ = writer_in(publisher_, participant_.topic(kRobotStatus), status_qos());
+    chunks_ = writer_in(publisher_, participant_.topic(kChunk), chunk_qos());
+    hub_reader_ = reader_in(subscriber_, participant_.topic(kHubStatus), status_qos());
+    if (statuses_ < 0 || chunks_ < 0 || hub_reader_ < 0) {
       return core::usage_error(fmt::format(
-          "the network lets nobody speak as {} here ({}); with --security, give the keys made for this name",
-          name, dds_strretcode(std::min(std::min(hellos_, pieces_), words_))));
+          "publishing as {} is not permitted here ({}); with --security, give the keys made for this name",
+          name, dds_strretcode(std::min({statuses_, chunks_, hub_reader_}))));
     }
-    participant_.watch(words_);
+    participant_.watch(hub_reader_);
     return {};
   }
 
-  void say(const Hello& hello) override { write_message<plumbline_wire_Hello>(hellos_, hello); }
-  bool send(const Piece& piece) override {
-    return write_message<plumbline_wire_Piece>(pieces_, piece) == DDS_RETCODE_OK;
+  void publish(const RobotStatus& status) override {
+    write_message<plumbline_wire_RobotStatus>(statuses_, status);
   }
-  std::vector<Word> hear() override { return take_all<plumbline_wire_Word>(words_, kMostWords); }
-  std::vector<Piece> hear_of_others() override {
-    if (others_pieces_ == 0)
-      others_pieces_ = reader_in(subscriber_, participant_.topic(kFeedback), piece_qos());
-    return take_all<plumbline_wire_Piece>(others_pieces_, kFeedbackAtATime);
+  bool send(const Chunk& chunk) override {
+    return write_message<plumbline_wire_Chunk>(chunks_, chunk) == DDS_RETCODE_OK;
   }
-  bool listened_to() override {
+  std::vector<HubStatus> poll_hub() override {
+    return take_all<plumbline_wire_HubStatus>(hub_reader_, kMaxStatuses);
+  }
+  std::vector<Chunk> poll_feedback() override {
+    if (feedback_reader_ == 0)
+      feedback_reader_ = reader_in(subscriber_, participant_.topic(kFeedback), chunk_qos());
+    return take_all<plumbline_wire_Chunk>(feedback_reader_, kFeedbackAtATime);
+  }
+  bool has_reader() override {
     dds_publication_matched_status_t status;
-    return dds_get_publication_matched_status(pieces_, &status) == DDS_RETCODE_OK && status.current_count > 0;
+    return dds_get_publication_matched_status(chunks_, &status) == DDS_RETCODE_OK && status.current_count > 0;
   }
-  bool all_received() override { return dds_wait_for_acks(pieces_, 0) == DDS_RETCODE_OK; }
-  int others() override { return participant_.others(); }
+  bool all_received() override { return dds_wait_for_acks(chunks_, 0) == DDS_RETCODE_OK; }
+  int participants() override { return participant_.others(); }
   void wait(std::chrono::milliseconds most) override { participant_.wait(most); }
 
  private:
   Participant participant_;
   Entity publisher_;
   Entity subscriber_;
-  dds_entity_t hellos_ = 0;
-  dds_entity_t pieces_ = 0;
-  dds_entity_t words_ = 0;
-  dds_entity_t others_pieces_ = 0;  ///< 0: not asked for
+  dds_entity_t statuses_ = 0;
+  dds_entity_t chunks_ = 0;
+  dds_entity_t hub_reader_ = 0;
+  dds_entity_t feedback_reader_ = 0;  ///< 0: feedback was not requested
 };
 
 class CycloneHub : public HubBus {
@@ -244,74 +250,80 @@ class CycloneHub : public HubBus {
     publisher_ = participant_.publisher({kEverybody, kHubs});
     subscriber_ = participant_.subscriber({kEverybody});
     hub_subscriber_ = participant_.subscriber({kHubs});
-    const dds_entity_t words = participant_.topic(kWord);
-    words_ = writer_in(publisher_, words, word_qos());
-    hubs_ = reader_in(hub_subscriber_, words, word_qos());
-    hellos_ = reader_in(subscriber_, participant_.topic(kHello), word_qos());
-    piece_topic_ = participant_.topic(kPiece);
-    if (words_ < 0 || hubs_ < 0 || hellos_ < 0 || piece_topic_ < 0) {
-      return core::usage_error("the network lets nobody be a hub here; with --security, give the hub's keys");
+    const dds_entity_t statuses = participant_.topic(kHubStatus);
+    statuses_ = writer_in(publisher_, statuses, status_qos());
+    hub_reader_ = reader_in(hub_subscriber_, statuses, status_qos());
+    robot_reader_ = reader_in(subscriber_, participant_.topic(kRobotStatus), status_qos());
+    chunk_topic_ = participant_.topic(kChunk);
+    if (statuses_ < 0 || hub_reader_ < 0 || robot_reader_ < 0 || chunk_topic_ < 0) {
+      return core::usage_error("a hub is not permitted here; with --security, give the hub's keys");
     }
-    participant_.watch(hellos_);
+    participant_.watch(robot_reader_);
     return {};
   }
 
-  void say(const Word& word) override { write_message<plumbline_wire_Word>(words_, word); }
-  std::vector<HeardHello> hear() override {
-    std::vector<HeardHello> hellos;
-    take_some<plumbline_wire_Hello>(
-        hellos_, kMostWords, [&](const plumbline_wire_Hello& hello, const dds_sample_info_t& info) {
-          hellos.push_back({from_wire(hello), partition_of(info.publication_handle)});
-        });
-    return hellos;
+  void publish(const HubStatus& status) override {
+    write_message<plumbline_wire_HubStatus>(statuses_, status);
   }
-  std::vector<Word> hear_hubs() override { return take_all<plumbline_wire_Word>(hubs_, kMostWords); }
-  core::Result<void> listen_to(const std::string& robot) override {
+  std::vector<ReceivedStatus> poll_robots() override {
+    std::vector<ReceivedStatus> received;
+    take_some<plumbline_wire_RobotStatus>(
+        robot_reader_, kMaxStatuses,
+        [&](const plumbline_wire_RobotStatus& status, const dds_sample_info_t& info) {
+          received.push_back({from_wire(status), partition_of(info.publication_handle)});
+        });
+    return received;
+  }
+  std::vector<HubStatus> poll_hubs() override {
+    return take_all<plumbline_wire_HubStatus>(hub_reader_, kMaxStatuses);
+  }
+  core::Result<void> subscribe(const std::string& robot) override {
     if (robots_.count(robot) != 0) return {};
-    Robot listener;
-    listener.subscriber = participant_.subscriber({robot});
-    listener.pieces = reader_in(listener.subscriber, piece_topic_, piece_qos());
-    listener.publisher = participant_.publisher({robot});
-    listener.feedback = writer_in(listener.publisher, participant_.topic(kFeedback), piece_qos(0));
-    if (listener.pieces < 0) {
+    Robot entities;
+    entities.subscriber = participant_.subscriber({robot});
+    entities.chunks = reader_in(entities.subscriber, chunk_topic_, chunk_qos());
+    entities.publisher = participant_.publisher({robot});
+    entities.feedback = writer_in(entities.publisher, participant_.topic(kFeedback), chunk_qos(0));
+    if (entities.chunks < 0) {
       return core::usage_error(
-          fmt::format("{}: cannot be listened to ({})", robot, dds_strretcode(listener.pieces)));
+          fmt::format("{}: cannot be subscribed to ({})", robot, dds_strretcode(entities.chunks)));
     }
-    participant_.watch(listener.pieces);
-    robots_.emplace(robot, std::move(listener));
+    participant_.watch(entities.chunks);
+    robots_.emplace(robot, std::move(entities));
     return {};
   }
-  std::vector<Piece> take(const std::string& robot, int most) override {
+  std::vector<Chunk> receive(const std::string& robot, int most) override {
     const auto found = robots_.find(robot);
-    return found == robots_.end() ? std::vector<Piece>()
-                                  : take_all<plumbline_wire_Piece>(found->second.pieces, most);
+    return found == robots_.end() ? std::vector<Chunk>()
+                                  : take_all<plumbline_wire_Chunk>(found->second.chunks, most);
   }
-  int begun_to_hear(const std::string& robot) override {
+  int feedback_subscriptions(const std::string& robot) override {
     const auto found = robots_.find(robot);
     dds_publication_matched_status_t status;
-    const bool heard =
+    const bool subscribed =
         found != robots_.end() &&
         dds_get_publication_matched_status(found->second.feedback, &status) == DDS_RETCODE_OK &&
         status.current_count > 0;
-    return heard ? static_cast<int>(status.total_count) : 0;
+    return subscribed ? static_cast<int>(status.total_count) : 0;
   }
-  bool tell(const std::string& robot, const Piece& piece) override {
+  bool send_feedback(const std::string& robot, const Chunk& chunk) override {
     const auto found = robots_.find(robot);
     return found != robots_.end() &&
-           write_message<plumbline_wire_Piece>(found->second.feedback, piece) == DDS_RETCODE_OK;
+           write_message<plumbline_wire_Chunk>(found->second.feedback, chunk) == DDS_RETCODE_OK;
   }
   void wait(std::chrono::milliseconds most) override { participant_.wait(most); }
 
  private:
   struct Robot {
     Entity subscriber;
-    dds_entity_t pieces = 0;
+    dds_entity_t chunks = 0;
     Entity publisher;
-    dds_entity_t feedback = 0;  ///< what it is told of others; negative: keys do not permit it
+    dds_entity_t feedback = 0;  ///< writer of other robots' maps; negative: keys do not permit it
   };
-  /// Empty: not known, or several.
+
+  /// Partition of a writer; empty: unknown, or several.
   std::string partition_of(dds_instance_handle_t writer) const {
-    dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(hellos_, writer);
+    dds_builtintopic_endpoint_t* endpoint = dds_get_matched_publication_data(robot_reader_, writer);
     if (endpoint == nullptr) return {};
     std::string partition;
     std::uint32_t count = 0;
@@ -329,10 +341,10 @@ class CycloneHub : public HubBus {
   Entity publisher_;
   Entity subscriber_;
   Entity hub_subscriber_;
-  dds_entity_t words_ = 0;
-  dds_entity_t hubs_ = 0;
-  dds_entity_t hellos_ = 0;
-  dds_entity_t piece_topic_ = 0;
+  dds_entity_t statuses_ = 0;
+  dds_entity_t hub_reader_ = 0;
+  dds_entity_t robot_reader_ = 0;
+  dds_entity_t chunk_topic_ = 0;
   std::map<std::string, Robot> robots_;
 };
 

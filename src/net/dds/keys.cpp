@@ -47,7 +47,7 @@ void demand(bool holds, const std::string& what) {
   if (!holds) throw Failure(what);
 }
 
-/// What `write` puts into a file of 0600 that replaces one of that name.
+/// Writes a file of mode 0600 through `write`, replacing one of that name.
 template <typename Write>
 void write_file(const fs::path& file, const Write& write) {
   const fs::path fresh = file.string() + ".new";
@@ -117,7 +117,7 @@ Certificate new_certificate(EVP_PKEY* key, const std::string& name, long days) {
   return certificate;
 }
 
-void extend(X509* certificate, X509* issuer, int what, const char* value) {
+void add_extension(X509* certificate, X509* issuer, int what, const char* value) {
   X509V3_CTX context;
   X509V3_set_ctx(&context, issuer, certificate, nullptr, nullptr, 0);
   X509_EXTENSION* extension = X509V3_EXT_conf_nid(nullptr, &context, what, value);
@@ -140,7 +140,7 @@ Authority read_authority(const fs::path& folder) {
   return {read_certificate(folder / "ca" / kAuthorityFile), read_key(folder / "ca" / kKeyFile)};
 }
 
-/// S/MIME, as DDS security wants its documents.
+/// Writes a document as signed S/MIME, as DDS security requires.
 void write_signed(const fs::path& file, const std::string& xml, const Authority& authority) {
   const Bio in(BIO_new_mem_buf(xml.data(), static_cast<int>(xml.size())));
   constexpr int kFlags = PKCS7_TEXT | PKCS7_DETACHED | PKCS7_STREAM;
@@ -182,7 +182,7 @@ std::string allow(const char* what, const std::vector<std::string>& topics,
   return xml + fmt::format("</partitions></{}>\n", what);
 }
 
-/// A robot speaks and listens in the partition of its name; the hub in all.
+/// A robot may publish and subscribe in the partition of its name; the hub in all.
 std::string permissions(const std::string& name) {
   const bool hub = name == "hub";
   const std::vector<std::string> where =
@@ -194,11 +194,11 @@ std::string permissions(const std::string& name) {
       "validity>\n";
   xml += std::string("<allow_rule>\n") + kDomains;
   if (hub) {
-    xml += allow("publish", {"plumbline_word", "plumbline_feedback"}, where);
-    xml += allow("subscribe", {"plumbline_hello", "plumbline_piece", "plumbline_word"}, where);
+    xml += allow("publish", {"plumbline_hub_status", "plumbline_feedback"}, where);
+    xml += allow("subscribe", {"plumbline_robot_status", "plumbline_chunk", "plumbline_hub_status"}, where);
   } else {
-    xml += allow("publish", {"plumbline_hello", "plumbline_piece"}, where);
-    xml += allow("subscribe", {"plumbline_word", "plumbline_feedback"}, where);
+    xml += allow("publish", {"plumbline_robot_status", "plumbline_chunk"}, where);
+    xml += allow("subscribe", {"plumbline_hub_status", "plumbline_feedback"}, where);
   }
   return xml + "</allow_rule><default>DENY</default></grant></permissions></dds>\n";
 }
@@ -243,10 +243,10 @@ core::Result<void> make_authority(const fs::path& folder) {
     make_folder(folder / "ca" / "issued");
     Authority authority{nullptr, new_key()};
     authority.certificate = new_certificate(authority.key.get(), kAuthority, kAuthorityDays);
-    extend(authority.certificate.get(), authority.certificate.get(), NID_basic_constraints,
-           "critical,CA:TRUE");
-    extend(authority.certificate.get(), authority.certificate.get(), NID_key_usage,
-           "critical,keyCertSign,cRLSign,digitalSignature");
+    add_extension(authority.certificate.get(), authority.certificate.get(), NID_basic_constraints,
+                  "critical,CA:TRUE");
+    add_extension(authority.certificate.get(), authority.certificate.get(), NID_key_usage,
+                  "critical,keyCertSign,cRLSign,digitalSignature");
     sign(authority.certificate.get(), authority.certificate.get(), authority.key.get());
     write_key(folder / "ca" / kKeyFile, authority.key.get());
     write_certificate(folder / "ca" / kAuthorityFile, authority.certificate.get());

@@ -12,8 +12,8 @@
 namespace plumbline::net {
 namespace {
 
-constexpr std::int32_t kWordsKept = 64;  // as many robots as may speak between two looks
-constexpr std::int32_t kPiecesKept = 8;  // 8 MB a robot at most wait at either end
+constexpr std::int32_t kStatusesKept = 64;  // as many robots as may publish between two polls
+constexpr std::int32_t kChunksKept = 8;     // at most 8 MB a robot wait at either end
 
 Qos new_qos() { return {dds_create_qos(), &dds_delete_qos}; }
 
@@ -23,34 +23,34 @@ Qos partition_qos(const std::vector<std::string>& partitions) {
   Qos qos = new_qos();
   std::vector<const char*> names;
   for (const std::string& name : partitions) names.push_back(name.c_str());
-  // Permissions name partitions: who speaks in a robot's may speak for that robot.
+  // Permissions name partitions: only keys of a robot may publish in its partition.
   dds_qset_partition(qos.get(), static_cast<std::uint32_t>(names.size()), names.data());
   return qos;
 }
 
-Qos word_qos() {
+Qos status_qos() {
   Qos qos = new_qos();
-  // Each word says all that matters, and comes again in half a second: one that is lost does no harm, and who
-  // speaks never waits for who does not listen.
+  // Each status is complete and repeated after half a second: a lost one does no harm, and a publisher never
+  // waits for a slow reader.
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
-  // A word of before is worth nothing to who comes late.
+  // Old statuses are of no use to a late joiner.
   dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
-  // Bounded: of a flood the latest words are kept.
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kWordsKept);
+  // Bounded: of a flood the latest statuses are kept.
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kStatusesKept);
   return qos;
 }
 
-Qos piece_qos(int most_ms) {
+Qos chunk_qos(int most_ms) {
   Qos qos = new_qos();
-  // What is lost on the way is sent again by DDS, fragment by fragment; what is lost with a link or a process
-  // by the robot, which knows what was acknowledged. Who sends waits a moment for room, then looks around.
+  // DDS sends lost fragments again; the robot, which knows what was acknowledged, sends again what was lost
+  // with a link or a process. A writer waits a moment for room, then returns to its loop.
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_MSECS(most_ms));
-  // History would die with its process and come twice: the store is the history.
+  // The store is the history: one in DDS would end with its process and arrive twice.
   dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
-  // Nothing is overwritten: a piece that is missing costs the whole transaction.
+  // Nothing is overwritten: a missing chunk costs the whole transaction.
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
   // Bounded: a reader that is full refuses, and the writer waits.
-  dds_qset_resource_limits(qos.get(), kPiecesKept, 1, kPiecesKept);
+  dds_qset_resource_limits(qos.get(), kChunksKept, 1, kChunksKept);
   return qos;
 }
 
@@ -71,7 +71,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
                                    {"dds.sec.access.permissions", kPermissionsFile}}) {
     if (!std::filesystem::exists(folder / file, ec)) {
       return core::usage_error(fmt::format(
-          "--security: {} is not there; give a robot's or the hub's folder that plumbline keys create made",
+          "--security: {} is missing; give a robot's or the hub's folder made by plumbline keys create",
           (options.security / file).string()));
     }
     set(name, "file:" + (folder / file).string());
@@ -92,28 +92,28 @@ std::string domain_configuration(const NetworkOptions& options, bool hub) {
   const bool local = options.interface == "lo";
   std::string peers;
   for (const std::string& peer : options.peers) peers += fmt::format("<Peer Address=\"{}\"/>", peer);
-  // lo has no multicast everywhere; there, others are looked for at every port that they may have.
+  // lo may lack multicast: there every possible port is asked.
   if (local && !tcp && options.peers.empty()) peers = "<Peer Address=\"127.0.0.1\"/>";
-  // Data by multicast floods a WiFi: it is for looking for others at most.
+  // Multicast of data floods a WiFi: it is used for discovery only.
   const bool multicast = !tcp && peers.empty();
   std::string xml = "<CycloneDDS><Domain Id=\"any\"><General>";
   xml += fmt::format("<Interfaces><NetworkInterface name=\"{}\"/></Interfaces>", options.interface);
   xml += fmt::format("<AllowMulticast>{}</AllowMulticast>", multicast ? "spdp" : "false");
   xml += fmt::format("<Transport>{}</Transport>", tcp ? "tcp" : "udp");
   xml += "</General><Discovery>";
-  // Peers without a port are looked for at the ports of so many participants of their host; 9 are too few.
+  // Number of ports asked at a peer without a port; the default of 9 is too small.
   if (!tcp)
     xml += "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>63</MaxAutoParticipantIndex>";
-  // A cable that is back is noticed at once, not after 30 s.
+  // A cable that is plugged in again is noticed at once, not after 30 s.
   xml += "<SPDPInterval>1 s</SPDPInterval>";
-  // Who was not heard for so long is gone: what waits for it is let go.
+  // A participant silent for this long is gone: data queued for it is dropped.
   xml += "<LeaseDuration>10 s</LeaseDuration>";
   if (!peers.empty()) xml += "<Peers>" + peers + "</Peers>";
   if (!tcp && options.port > 0) xml += fmt::format("<Ports><Base>{}</Base></Ports>", options.port);
   xml += "</Discovery>";
-  // A hub is called, a robot calls.
+  // The hub listens, robots connect.
   if (tcp) xml += fmt::format("<TCP><Port>{}</Port></TCP>", hub ? options.port : -1);
-  // More than a message of ours can have takes no memory.
+  // No memory for samples larger than any message.
   xml += "<Internal><MaxSampleSize>16 MB</MaxSampleSize></Internal>";
   return xml + "</Domain></CycloneDDS>";
 }

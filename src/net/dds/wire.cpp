@@ -12,7 +12,7 @@ std::int64_t number(std::uint64_t value) { return static_cast<std::int64_t>(valu
 
 }  // namespace
 
-void to_wire(const Hello& from, plumbline_wire_Hello& to) {
+void to_wire(const RobotStatus& from, plumbline_wire_RobotStatus& to) {
   to = {};
   to.protocol = from.protocol;
   to.store_format = from.store_format;
@@ -20,33 +20,36 @@ void to_wire(const Hello& from, plumbline_wire_Hello& to) {
   put_text(from.name, to.name);
   put_text(from.run, to.run);
   to.incarnation = from.incarnation;
-  to.began._buffer = const_cast<std::uint64_t*>(from.began.data());
-  to.began._length = to.began._maximum = static_cast<std::uint32_t>(from.began.size());
+  to.heads_at_start._buffer = const_cast<std::uint64_t*>(from.heads_at_start.data());
+  to.heads_at_start._length = to.heads_at_start._maximum =
+      static_cast<std::uint32_t>(from.heads_at_start.size());
   to.map_head = number(from.map_head);
   to.clouds_head = number(from.clouds_head);
-  to.over = from.over;
+  to.finished = from.finished;
   to.lag_median_s = from.lag_median_s;
   to.lag_p95_s = from.lag_p95_s;
 }
 
-Hello from_wire(const plumbline_wire_Hello& from) {
-  Hello to;
+RobotStatus from_wire(const plumbline_wire_RobotStatus& from) {
+  RobotStatus to;
   to.protocol = from.protocol;
   to.store_format = from.store_format;
   to.program = get_text(from.program);
   to.name = get_text(from.name);
   to.run = get_text(from.run);
   to.incarnation = from.incarnation;
-  if (from.began._length > 0) to.began.assign(from.began._buffer, from.began._buffer + from.began._length);
+  if (from.heads_at_start._length > 0)
+    to.heads_at_start.assign(from.heads_at_start._buffer,
+                             from.heads_at_start._buffer + from.heads_at_start._length);
   to.map_head = number(from.map_head);
   to.clouds_head = number(from.clouds_head);
-  to.over = from.over;
+  to.finished = from.finished;
   to.lag_median_s = from.lag_median_s;
   to.lag_p95_s = from.lag_p95_s;
   return to;
 }
 
-void to_wire(const Word& from, plumbline_wire_Word& to) {
+void to_wire(const HubStatus& from, plumbline_wire_HubStatus& to) {
   to = {};
   to.protocol = from.protocol;
   to.store_format = from.store_format;
@@ -58,21 +61,21 @@ void to_wire(const Word& from, plumbline_wire_Word& to) {
   to.incarnation = from.incarnation;
   to.answer = static_cast<std::uint8_t>(from.answer);
   put_text(from.problem, to.problem);
-  to.map_held = number(from.map);
-  to.clouds_held = number(from.clouds);
-  to.number = number(from.number);
-  to.edition = from.edition;
-  to.pieces = from.pieces;
-  put_text(from.place.frame_of, to.place.frame_of);
-  std::copy(from.place.frame_from_robot.begin(), from.place.frame_from_robot.end(),
-            to.place.frame_from_robot);
-  std::copy(from.place.frame_from_camera.begin(), from.place.frame_from_camera.end(),
-            to.place.frame_from_camera);
-  std::copy(from.place.covariance.begin(), from.place.covariance.end(), to.place.covariance);
+  to.map_held = number(from.map_held);
+  to.clouds_held = number(from.clouds_held);
+  to.incoming = number(from.incoming);
+  to.checksum = from.checksum;
+  to.chunks = from.chunks;
+  put_text(from.frame.frame_of, to.frame.frame_of);
+  std::copy(from.frame.frame_from_robot.begin(), from.frame.frame_from_robot.end(),
+            to.frame.frame_from_robot);
+  std::copy(from.frame.frame_from_camera.begin(), from.frame.frame_from_camera.end(),
+            to.frame.frame_from_camera);
+  std::copy(from.frame.covariance.begin(), from.frame.covariance.end(), to.frame.covariance);
 }
 
-Word from_wire(const plumbline_wire_Word& from) {
-  Word to;
+HubStatus from_wire(const plumbline_wire_HubStatus& from) {
+  HubStatus to;
   to.protocol = from.protocol;
   to.store_format = from.store_format;
   to.program = get_text(from.program);
@@ -83,30 +86,30 @@ Word from_wire(const plumbline_wire_Word& from) {
   to.incarnation = from.incarnation;
   to.answer = static_cast<Answer>(from.answer);
   to.problem = get_text(from.problem);
-  to.map = number(from.map_held);
-  to.clouds = number(from.clouds_held);
-  to.number = number(from.number);
-  to.edition = from.edition;
-  to.pieces = from.pieces;
-  to.place.frame_of = get_text(from.place.frame_of);
-  std::copy(std::begin(from.place.frame_from_robot), std::end(from.place.frame_from_robot),
-            to.place.frame_from_robot.begin());
-  std::copy(std::begin(from.place.frame_from_camera), std::end(from.place.frame_from_camera),
-            to.place.frame_from_camera.begin());
-  std::copy(std::begin(from.place.covariance), std::end(from.place.covariance), to.place.covariance.begin());
+  to.map_held = number(from.map_held);
+  to.clouds_held = number(from.clouds_held);
+  to.incoming = number(from.incoming);
+  to.checksum = from.checksum;
+  to.chunks = from.chunks;
+  to.frame.frame_of = get_text(from.frame.frame_of);
+  std::copy(std::begin(from.frame.frame_from_robot), std::end(from.frame.frame_from_robot),
+            to.frame.frame_from_robot.begin());
+  std::copy(std::begin(from.frame.frame_from_camera), std::end(from.frame.frame_from_camera),
+            to.frame.frame_from_camera.begin());
+  std::copy(std::begin(from.frame.covariance), std::end(from.frame.covariance), to.frame.covariance.begin());
   return to;
 }
 
-void to_wire(const Piece& from, plumbline_wire_Piece& to) {
+void to_wire(const Chunk& from, plumbline_wire_Chunk& to) {
   to = {};
   to.protocol = from.protocol;
   put_text(from.name, to.name);
   put_text(from.run, to.run);
   to.incarnation = from.incarnation;
-  to.share = from.share;
+  to.stream = from.stream;
   to.after = number(from.after);
   to.number = number(from.number);
-  to.edition = from.edition;
+  to.checksum = from.checksum;
   to.index = from.index;
   to.count = from.count;
   to.hash = from.hash;
@@ -114,16 +117,16 @@ void to_wire(const Piece& from, plumbline_wire_Piece& to) {
   to.bytes._length = to.bytes._maximum = static_cast<std::uint32_t>(from.bytes.size());
 }
 
-Piece from_wire(const plumbline_wire_Piece& from) {
-  Piece to;
+Chunk from_wire(const plumbline_wire_Chunk& from) {
+  Chunk to;
   to.protocol = from.protocol;
   to.name = get_text(from.name);
   to.run = get_text(from.run);
   to.incarnation = from.incarnation;
-  to.share = from.share;
+  to.stream = from.stream;
   to.after = number(from.after);
   to.number = number(from.number);
-  to.edition = from.edition;
+  to.checksum = from.checksum;
   to.index = from.index;
   to.count = from.count;
   to.hash = from.hash;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Between messages and what idlc made of messages.idl.
+// Conversion between messages and the structs that idlc makes of messages.idl.
 #include <cstring>
 #include <string>
 
@@ -17,7 +17,7 @@ void put_text(const std::string& from, char (&to)[kSize]) {
   std::memset(to + size, 0, kSize - size);
 }
 
-/// Texts come from strangers and go to terminals and logs: what cannot be printed becomes '?'.
+/// Texts come from strangers and go to terminals and logs: characters that cannot be printed become '?'.
 template <std::size_t kSize>
 std::string get_text(const char (&from)[kSize]) {
   std::string text(from, strnlen(from, kSize));
@@ -27,12 +27,12 @@ std::string get_text(const char (&from)[kSize]) {
   return text;
 }
 
-/// `to` borrows from `from`.
-void to_wire(const Hello& from, plumbline_wire_Hello& to);
-void to_wire(const Word& from, plumbline_wire_Word& to);
-void to_wire(const Piece& from, plumbline_wire_Piece& to);
-Hello from_wire(const plumbline_wire_Hello& from);
-Word from_wire(const plumbline_wire_Word& from);
-Piece from_wire(const plumbline_wire_Piece& from);
+/// `to` refers to memory of `from`.
+void to_wire(const RobotStatus& from, plumbline_wire_RobotStatus& to);
+void to_wire(const HubStatus& from, plumbline_wire_HubStatus& to);
+void to_wire(const Chunk& from, plumbline_wire_Chunk& to);
+RobotStatus from_wire(const plumbline_wire_RobotStatus& from);
+HubStatus from_wire(const plumbline_wire_HubStatus& from);
+Chunk from_wire(const plumbline_wire_Chunk& from);
 
 }  // namespace plumbline::net

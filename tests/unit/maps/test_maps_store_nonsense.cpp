@@ -12,8 +12,8 @@
 #include "plumbline/maps/store.hpp"
 #include "plumbline/maps/store_replica.hpp"
 #include "store/store_codec.hpp"
-#include "store_folder.hpp"
 #include "store/store_row.hpp"
+#include "store_folder.hpp"
 #include "store_world.hpp"
 
 namespace plumbline::maps {
@@ -32,11 +32,11 @@ struct Reported {
 std::vector<Reported> reported_by(const std::filesystem::path& file) {
   std::vector<Reported> all;
   std::int64_t after = 0;
-  while (const auto next = next_transaction(file, StoreShare::kMap, after).value()) {
+  while (const auto next = next_transaction(file, StoreStream::kMap, after).value()) {
     after = next->number;
     Reported told{next->number, {}};
     Bytes rows = next->rows;
-    take_rows(rows, [&](const StoreRow& row, std::size_t) { told.rows.push_back(row); });
+    consume_rows(rows, [&](const StoreRow& row, std::size_t) { told.rows.push_back(row); });
     all.push_back(std::move(told));
   }
   return all;
@@ -45,8 +45,8 @@ std::vector<Reported> reported_by(const std::filesystem::path& file) {
 core::Result<void> tell(StoreReplica& copy, const Reported& told) {
   ByteWriter bytes;
   for (const StoreRow& row : told.rows) append(row, bytes);
-  if (auto begun = copy.begin(StoreShare::kMap, told.number); !begun) return begun;
-  if (auto taken = copy.take(bytes.bytes().data(), bytes.bytes().size()); !taken) return taken;
+  if (auto begun = copy.begin(StoreStream::kMap, told.number); !begun) return begun;
+  if (auto taken = copy.append(bytes.bytes().data(), bytes.bytes().size()); !taken) return taken;
   return copy.commit();
 }
 
@@ -67,7 +67,7 @@ class Nonsense : public testing::Test {
     bool changed = false;
     for (Reported told : all_) {
       for (StoreRow& row : told.rows) {
-        if (changed || kRowTables[row.name.place].name != table) continue;
+        if (changed || kRowTables[row.name.table].name != table) continue;
         if (table == "header" && row.name.key != "robots") continue;
         change(row);
         changed = true;
@@ -100,7 +100,7 @@ TEST_F(Nonsense, IsNamed) {
                      robots.front().camera.color.fx = nan;
                      put(row, [&](ByteWriter& to) { encode(robots, to); });
                    }),
-           "header robots: a camera's focal length is none");
+           "header robots: a camera's focal length is not positive");
   contains(refusal("state",
                    [&](StoreRow& row) {
                      KeyframeState state = decode<KeyframeState>(unpacked(row));

@@ -35,12 +35,12 @@ std::vector<std::uint8_t> small_cloud(int points) {
   return cloud::encode_cloud(cloud);
 }
 
-core::Result<void> take_one(StoreReplica& copy, StoreShare share, const StoreTransaction& one,
+core::Result<void> take_one(StoreReplica& copy, StoreStream stream, const StoreTransaction& one,
                             std::size_t piece) {
-  if (auto begun = copy.begin(share, one.number); !begun) return begun;
+  if (auto begun = copy.begin(stream, one.number); !begun) return begun;
   for (std::size_t at = 0; at < one.rows.size(); at += piece) {
     const std::size_t size = std::min(piece, one.rows.size() - at);
-    if (auto taken = copy.take(one.rows.data() + at, size); !taken) return taken;
+    if (auto taken = copy.append(one.rows.data() + at, size); !taken) return taken;
   }
   return copy.commit();
 }
@@ -48,14 +48,14 @@ core::Result<void> take_one(StoreReplica& copy, StoreShare share, const StoreTra
 /// Tells the copy what it lacks; how many transactions that were.
 int follow(const std::filesystem::path& store, StoreReplica& copy, std::size_t piece = 1000) {
   int count = 0;
-  for (const StoreShare share : kStoreShares) {
+  for (const StoreStream stream : kStoreStreams) {
     while (true) {
-      const auto next = next_transaction(store, share, copy.heads()[share]);
+      const auto next = next_transaction(store, stream, copy.heads()[stream]);
       if (!next || !*next) {
         EXPECT_TRUE(next) << next.error().message;
         break;
       }
-      const auto taken = take_one(copy, share, **next, piece);
+      const auto taken = take_one(copy, stream, **next, piece);
       EXPECT_TRUE(taken) << taken.error().message;
       if (!taken) break;
       ++count;
@@ -116,8 +116,8 @@ TEST(MapFollower, HasTheMapOfTheStoreAtEachMomentAndKeepsWhatItDecoded) {
   for (int i = 0; i < 24; ++i) {
     ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(i), world.frames));
     if (i % 5 == 1) continue;  // several at once
-    while (const auto next = next_transaction(folder.file(), StoreShare::kMap, follower.head()).value()) {
-      ASSERT_TRUE(follower.take(*next));
+    while (const auto next = next_transaction(folder.file(), StoreStream::kMap, follower.head()).value()) {
+      ASSERT_TRUE(follower.apply(*next));
     }
     const auto map = follower.map();
     ASSERT_TRUE(map) << map.error().message;
@@ -132,10 +132,10 @@ TEST(MapFollower, HasTheMapOfTheStoreAtEachMomentAndKeepsWhatItDecoded) {
   }
   EXPECT_GT(kept, 10) << "keyframes are decoded again";
   MapFollower late;
-  const auto last = next_transaction(folder.file(), StoreShare::kMap, 3).value();
+  const auto last = next_transaction(folder.file(), StoreStream::kMap, 3).value();
   ASSERT_TRUE(last);
-  EXPECT_EQ(late.take(*last).error().kind, core::ErrorKind::kInput) << "the camera came before it";
-  EXPECT_EQ(late.take({9, {1, 2, 3}}).error().kind, core::ErrorKind::kInput);
+  EXPECT_EQ(late.apply(*last).error().kind, core::ErrorKind::kInput) << "the camera came before it";
+  EXPECT_EQ(late.apply({9, {1, 2, 3}}).error().kind, core::ErrorKind::kInput);
 }
 
 TEST(StoreReplica, OneThatComesLateIsToldLess) {
@@ -168,20 +168,20 @@ TEST(StoreReplica, GoesOnWhereItWasCommitted) {
   {
     auto copy = StoreReplica::open(copied);
     ASSERT_TRUE(copy);
-    const auto first = next_transaction(folder.file(), StoreShare::kMap, 0);
+    const auto first = next_transaction(folder.file(), StoreStream::kMap, 0);
     ASSERT_TRUE(first && *first);
-    ASSERT_TRUE(take_one(*copy, StoreShare::kMap, **first, 500));
+    ASSERT_TRUE(take_one(*copy, StoreStream::kMap, **first, 500));
     before = copy->heads();
-    const auto second = next_transaction(folder.file(), StoreShare::kMap, before.map);
+    const auto second = next_transaction(folder.file(), StoreStream::kMap, before.map);
     ASSERT_TRUE(second && *second);
-    ASSERT_TRUE(copy->begin(StoreShare::kMap, (*second)->number));
-    ASSERT_TRUE(copy->take((*second)->rows.data(), (*second)->rows.size() / 2));
+    ASSERT_TRUE(copy->begin(StoreStream::kMap, (*second)->number));
+    ASSERT_TRUE(copy->append((*second)->rows.data(), (*second)->rows.size() / 2));
     EXPECT_EQ(copy->commit().error().kind, core::ErrorKind::kInput) << "half a row";
   }
   auto copy = StoreReplica::open(copied);
   ASSERT_TRUE(copy);
   EXPECT_EQ(copy->heads().map, before.map);
-  EXPECT_EQ(copy->begin(StoreShare::kMap, before.map).error().kind, core::ErrorKind::kInput);
+  EXPECT_EQ(copy->begin(StoreStream::kMap, before.map).error().kind, core::ErrorKind::kInput);
   follow(folder.file(), *copy);
   EXPECT_EQ(dump(copied), dump(folder.file()));
   ASSERT_TRUE(copy->clear());
@@ -198,12 +198,12 @@ TEST(StoreReplica, MutatedRowsAreRefusedAndDoNoHarm) {
   for (int i = 0; i < 8; ++i) {
     ASSERT_TRUE(writer->add_keyframe(world.map, world.step(), small_cloud(30), world.frames));
   }
-  std::vector<std::pair<StoreShare, StoreTransaction>> all;
-  for (const StoreShare share : kStoreShares) {
+  std::vector<std::pair<StoreStream, StoreTransaction>> all;
+  for (const StoreStream stream : kStoreStreams) {
     std::int64_t after = 0;
-    while (auto next = next_transaction(folder.file(), share, after).value()) {
+    while (auto next = next_transaction(folder.file(), stream, after).value()) {
       after = next->number;
-      all.emplace_back(share, *next);
+      all.emplace_back(stream, *next);
     }
   }
   std::mt19937 random(5);
@@ -213,7 +213,7 @@ TEST(StoreReplica, MutatedRowsAreRefusedAndDoNoHarm) {
     std::filesystem::remove(copied);
     auto copy = StoreReplica::open(copied);
     ASSERT_TRUE(copy);
-    for (auto [share, one] : all) {
+    for (auto [stream, one] : all) {
       for (auto k = random() % 3; k > 0; --k) {
         const std::size_t at = random() % one.rows.size();
         if (random() % 2 == 0) {
@@ -222,7 +222,7 @@ TEST(StoreReplica, MutatedRowsAreRefusedAndDoNoHarm) {
           one.rows.erase(one.rows.begin() + static_cast<std::ptrdiff_t>(at));
         }
       }
-      const auto taken = take_one(*copy, share, one, 5000);
+      const auto taken = take_one(*copy, stream, one, 5000);
       if (taken) continue;
       ++refused;
       EXPECT_EQ(taken.error().kind, core::ErrorKind::kInput) << taken.error().message;

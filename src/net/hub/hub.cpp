@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "hub_desk.hpp"
+#include "hub/hub_server.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Everything that is reported, into hub.log as well, with the time of day.
+/// Writes every message to hub.log as well, with the time of day.
 class LogFile : public core::Log {
  public:
   LogFile(const fs::path& file, core::Log& next) : file_(file, std::ios::app), next_(next) {}
@@ -41,12 +41,13 @@ class LogFile : public core::Log {
   core::Log& next_;
 };
 
-core::Result<void> move_up(const fs::path& from, const fs::path& to) {
+/// Moves all files of a folder into another, replacing those of the same name.
+core::Result<void> move_all(const fs::path& from, const fs::path& to) {
   std::error_code ec;
   for (const auto& entry : fs::directory_iterator(from, ec)) {
     const fs::path target = to / entry.path().filename();
     if (fs::is_directory(entry.path(), ec) && fs::is_directory(target, ec)) {
-      if (auto moved = move_up(entry.path(), target); !moved) return moved;
+      if (auto moved = move_all(entry.path(), target); !moved) return moved;
       continue;
     }
     fs::remove_all(target, ec);
@@ -71,7 +72,7 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
   return robots;
 }
 
-/// The summary of the fusion, with what the network did.
+/// Adds the network's traffic, the meetings and the reason to the summary of the fusion.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
                                const std::vector<pipeline::RunSummary::Meeting>& meetings,
                                const std::string& reason) {
@@ -88,7 +89,7 @@ core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraf
   return core::write_file(file, summary.dump(2) + "\n");
 }
 
-/// Maps that can be fused; what cannot is named in `reason`.
+/// Folders of the maps that can be fused; `reason` names the others.
 std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<RobotTraffic>& traffic,
                                   std::size_t expected, const core::Executor& executor, core::Log& log,
                                   std::string& reason) {
@@ -98,14 +99,14 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
     const fs::path file = folder / "robots" / t.name / "map.db";
     if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
     if (t.keyframes == 0) continue;
-    // One that is damaged must not keep the others from being fused.
+    // A damaged map must not keep the others from being fused.
     const auto stored = maps::StoredMaps::open({file.parent_path()}, executor);
     if (stored) {
       maps.push_back(file.parent_path());
       continue;
     }
     const std::string why = stored.error().message;
-    log.warning(fmt::format("{}: is left out: {}", t.name, why));
+    log.warning(fmt::format("{} is left out: {}", t.name, why));
     leave_out(t.name + " is left out: its map does not load");
   }
   if (traffic.size() < expected) {
@@ -114,7 +115,7 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
   return maps;
 }
 
-/// Why somebody with foreign keys gets nothing only the hub learns.
+/// Only the hub learns why somebody with foreign keys gets nothing: lines on certificates become warnings.
 core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& options, core::Log& log) {
   const bool secured = !options.security.empty();
   return open_hub_bus(options, [&log, secured, reported = 0](const std::string& line) mutable {
@@ -124,7 +125,7 @@ core::Result<std::unique_ptr<HubBus>> open_logged_bus(const NetworkOptions& opti
   });
 }
 
-/// The maps that came, fused into `folder`; what keeps the result from being trusted is its `reason`.
+/// Fuses the maps that came into `folder`; the summary's `reason` says why the result may not be trusted.
 core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, const fs::path& folder,
                                                   const std::vector<RobotTraffic>& traffic,
                                                   const HubMeetings& meetings, const core::Executor& executor,
@@ -135,16 +136,18 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (last.maps.empty()) {
     return core::failure(
         core::ErrorKind::kUntrustworthy,
-        fmt::format("no map came that could be fused{}; what came is in {}, --resume goes on",
+        fmt::format("no map came that could be fused{}; what came is in {}, --resume continues",
                     reason.empty() ? "" : " (" + reason + ")", folder.string()));
   }
+
   last.output = folder / "fused";
   last.replace = true;
   auto summary = pipeline::fuse_stored_maps(last, executor, log, core::StopToken(), progress);
   if (!summary) return tl::unexpected(summary.error());
+
   if (!summary->reason.empty()) reason = summary->reason + (reason.empty() ? "" : "; " + reason);
   summary->reason = reason;
-  if (auto moved = move_up(last.output, folder); !moved) return tl::unexpected(moved.error());
+  if (auto moved = move_all(last.output, folder); !moved) return tl::unexpected(moved.error());
   if (auto added = add_network(folder / "summary.json", traffic, meetings.meetings(), reason); !added) {
     return tl::unexpected(added.error());
   }
@@ -162,24 +165,29 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   if (!output) return tl::unexpected(output.error());
   output->keep();
   const fs::path folder = output->path();
+
   LogFile log(folder / "hub.log", console);
-  if (auto secure = warn_of_security(*options, "whoever is there can read maps and send some", log); !secure)
+  if (auto secure = warn_of_security(*options, "anybody on it can read maps and send some", log); !secure)
     return tl::unexpected(secure.error());
   auto bus = open_logged_bus(*options, log);
   if (!bus) return tl::unexpected(bus.error());
-  auto desk = HubDesk::open(folder, request, std::move(*bus), executor, log);
-  if (!desk) return tl::unexpected(desk.error());
-  if (auto alone = (*desk)->look_for_others(stop); !alone) return tl::unexpected(alone.error());
-  log.info(
-      fmt::format("waiting for {} on {}, domain {}",
-                  request.robots > 0 ? fmt::format("{} robots", request.robots) : "robots; Ctrl-C ends that",
-                  options->interface, options->domain));
-  (*desk)->serve(stop, status);
-  const HubDesk::Collected collected = (*desk)->close();
-  const SideThread goodbye(
-      [&](const core::StopToken& enough) { (*desk)->speaker().say_goodbye(collected.last_words, enough); });
+
+  auto server = HubServer::open(folder, request, std::move(*bus), executor, log);
+  if (!server) return tl::unexpected(server.error());
+  if (auto alone = (*server)->look_for_others(stop); !alone) return tl::unexpected(alone.error());
+  log.info(fmt::format("waiting for {} on {}, domain {}",
+                       request.robots > 0 ? fmt::format("{} robots", request.robots)
+                                          : "robots; press Ctrl-C to fuse what has come",
+                       options->interface, options->domain));
+
+  (*server)->serve(stop, status);
+  const HubServer::Collected collected = (*server)->close();
+
+  const SideThread farewell([&](const core::StopToken& enough) {
+    (*server)->publisher().publish_final(collected.final_statuses, enough);
+  });
   auto summary =
-      fuse_collected(request, folder, collected.traffic, (*desk)->meetings(), executor, log, progress);
+      fuse_collected(request, folder, collected.traffic, (*server)->meetings(), executor, log, progress);
   if (!summary) return summary;
   if (auto committed = output->commit(); !committed) return tl::unexpected(committed.error());
   return summary;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Maps of other robots as a robot hears of them: rows from the hub become maps, and those that lie in one
-// frame with its own are carried into its world.
+// Maps of other robots at a robot that asked for them: rows from the hub become maps, and those that share a
+// frame with its own are transformed into its world.
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "bus.hpp"
-#include "outbox.hpp"
 #include "plumbline/mapping/other_maps.hpp"
 #include "plumbline/maps/store_replica.hpp"
 
@@ -22,9 +21,9 @@ class OtherRobots {
   OtherRobots(std::string name, std::shared_ptr<mapping::OtherMapsInbox> inbox)
       : name_(std::move(name)), inbox_(std::move(inbox)) {}
 
-  /// The hub's words to all robots tell how their worlds lie to each other.
-  void take(const Word& word);
-  void take(const Piece& piece);
+  /// Learns from any status of the hub where its addressee is in the shared frame.
+  void apply(const HubStatus& hub);
+  void receive(const Chunk& chunk);
   /// Puts the maps into the inbox when they have changed, every few seconds at most, and so seldom that it
   /// takes a tenth of the time.
   void publish();
@@ -33,22 +32,22 @@ class OtherRobots {
   struct Other {
     std::int32_t number = 0;  ///< in the ids of its map
     maps::MapFollower follower;
-    maps::StoreTransaction coming;
-    std::uint64_t edition = 0;                      ///< of that
-    std::uint32_t pieces = 0;                       ///< that came of it
+    maps::StoreTransaction incoming;
+    std::uint64_t checksum = 0;                     ///< of the incoming transaction
+    std::uint32_t chunks = 0;                       ///< received of it
     bool changed = false;                           ///< since `map` was made
-    std::shared_ptr<const mapping::OtherMaps> map;  ///< in its own world, the last one that was whole
+    std::shared_ptr<const mapping::OtherMaps> map;  ///< the last complete one, in the other robot's world
   };
   static void update(Other& other);
 
   std::string name_;
   std::shared_ptr<mapping::OtherMapsInbox> inbox_;
-  std::map<std::string, Place> places_;
+  std::map<std::string, SharedFrame> frames_;
   std::map<std::string, Other> others_;
-  std::int32_t numbers_ = 0;  ///< given so far: a map that was begun anew is another one
+  std::int32_t numbers_ = 0;  ///< given so far: a map that starts again gets a new one
   bool changed_ = false;
-  Clock::time_point next_;  ///< time to publish
-  /// Maybe in use: taking maps apart takes a while, which is not the tracker's.
+  Clock::time_point next_;  ///< earliest time to publish
+  /// Kept while the tracker may use them: their destruction takes a while, and must not be the tracker's.
   std::vector<std::shared_ptr<const mapping::OtherMaps>> published_;
 };
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "plumbline/maps/output_folder.hpp"
-#include "robot_link.hpp"
+#include "robot/robot_link.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -25,12 +25,14 @@ core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request,
                                                    core::Log& log) {
   if (!is_robot_name(request.name)) {
     return core::usage_error(
-        "--name: letters, digits, '.', '_' and '-', the first a letter or digit, 64 at most");
+        "--name: use at most 64 letters, digits, '.', '_' and '-', the first a letter or digit");
   }
+
   const auto options = checked(request.network, false);
   if (!options) return tl::unexpected(options.error());
-  const std::string danger = "whoever is there can read the map and speak as " + request.name;
+  const std::string danger = "anybody on it can read the map and send data as " + request.name;
   if (auto secure = warn_of_security(*options, danger, log); !secure) return tl::unexpected(secure.error());
+
   auto bus =
       open_robot_bus(*options, request.name, [&log](const std::string& line) { log.debug("DDS: " + line); });
   if (!bus) return tl::unexpected(bus.error());
@@ -40,13 +42,13 @@ core::Result<std::unique_ptr<RobotLink>> open_link(const RobotRequest& request,
 
 std::string line_of(const LinkStatus& s, double kbytes_per_s) {
   if (!s.refused.empty()) return "refused by the hub";
-  if (!s.heard) return "no hub yet";
-  if (!s.hub_now) return fmt::format("hub lost, behind by {} transactions", s.behind);
+  if (!s.found) return "no hub yet";
+  if (!s.connected) return fmt::format("hub lost, behind by {} transactions", s.behind);
   return fmt::format("hub, behind by {} transactions, {:.0f} kB/s{}{}", s.behind, kbytes_per_s,
-                     s.place.empty() ? "" : ", ", s.place);
+                     s.location.empty() ? "" : ", ", s.location);
 }
 
-/// Rates over the last seconds.
+/// Bytes a second, over the last second or more.
 class Rate {
  public:
   double operator()(std::uint64_t bytes) {
@@ -65,7 +67,7 @@ class Rate {
   double value_ = 0.0;
 };
 
-/// Until the hub has everything, or it is given up.
+/// Waits until the hub has everything, or the robot gives up.
 core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& folder, const RobotLink& link,
                                    RobotOutcome outcome, const core::StopToken& stop, bool was_stopped,
                                    const Status& status) {
@@ -82,20 +84,21 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
       return core::usage_error(fmt::format("{}; the map is in {}", now.refused, folder.string()));
     }
     if (status) status(line_of(now, rate(now.sent_bytes)));
+
     const auto waited_s = [](Clock::time_point from) {
       return std::chrono::duration<double>(Clock::now() - from).count();
     };
     const bool stopped = stop.stop_requested() && !was_stopped;
-    if (!now.heard && (stopped || waited_s(since) > request.wait_s)) {
-      outcome.undelivered = fmt::format("no hub was heard; the map is in {}. To hand it in later: {}",
+    if (!now.found && (stopped || waited_s(since) > request.wait_s)) {
+      outcome.undelivered = fmt::format("no hub has answered; the map is in {}. To hand it in later: {}",
                                         folder.string(), command);
       return outcome;
     }
-    if (now.heard && (stopped || waited_s(std::max(now.progress, since)) > request.wait_lost_s)) {
+    if (now.found && (stopped || waited_s(std::max(now.progress, since)) > request.wait_lost_s)) {
       const std::string why = now.problem.empty() ? "" : " (" + now.problem + ")";
       return core::failure(
           core::ErrorKind::kUntrustworthy,
-          fmt::format("the hub has not got everything{}; the map is in {}. To hand in the rest: {}", why,
+          fmt::format("the hub has not received everything{}; the map is in {}. To hand in the rest: {}", why,
                       folder.string(), command));
     }
     std::this_thread::sleep_for(50ms);
@@ -119,7 +122,7 @@ core::Result<RobotOutcome> hand_in(const RobotRequest& request, const fs::path& 
   auto link = open_link(request, nullptr, log);
   if (!link) return tl::unexpected(link.error());
   if (auto followed = (*link)->follow(folder / kStore); !followed) return tl::unexpected(followed.error());
-  (*link)->over(folder / kStore);
+  (*link)->finish(folder / kStore);
   return deliver(request, folder, **link, {}, stop, false, status);
 }
 
@@ -135,6 +138,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
     if (auto followed = (*link)->follow(folder / kStore); !followed) log.error(followed.error().message);
     if (request.map.prepared) request.map.prepared(folder);
   };
+
   Rate rate;
   const auto frames = [&](std::size_t done, std::size_t total) {
     const LinkStatus now = (*link)->status();
@@ -143,13 +147,14 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
   };
   auto summary = pipeline::map_recording(map, executor, log, stop, frames);
   if (!summary) return tl::unexpected(summary.error());
+
   std::error_code ec;
   const fs::path store = request.map.output / kStore;
   if (!fs::exists(store, ec)) {
     return core::usage_error(
-        fmt::format("{}: the pipeline keeps no map.db that could be sent", request.map.pipeline));
+        fmt::format("{}: this pipeline writes no map.db, so there is nothing to send", request.map.pipeline));
   }
-  (*link)->over(store);
+  (*link)->finish(store);
   RobotOutcome outcome;
   outcome.summary = std::move(*summary);
   return deliver(request, request.map.output, **link, std::move(outcome), stop, stop.stop_requested(),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "other_robots.hpp"
+#include "robot/other_robots.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 using geometry::Rigid3;
 
-constexpr auto kPublishEvery = 2s;
+constexpr auto kPublishMapsEvery = 2s;
 constexpr std::size_t kMostNames = 64;
 constexpr std::size_t kMostRows = 64U << 20U;  // bytes: more than a transaction has without clouds
 
@@ -29,35 +29,37 @@ bool is_pose(const std::array<double, 7>& from) {
 
 }  // namespace
 
-void OtherRobots::take(const Word& word) {
-  if (word.robot.empty() || (places_.count(word.robot) == 0 && places_.size() >= kMostNames)) return;
-  Place& place = places_[word.robot];
-  if (place.frame_of == word.place.frame_of && place.frame_from_robot == word.place.frame_from_robot) return;
-  place = word.place;
-  if (!is_pose(place.frame_from_robot)) place.frame_of.clear();
+void OtherRobots::apply(const HubStatus& hub) {
+  if (hub.robot.empty() || (frames_.count(hub.robot) == 0 && frames_.size() >= kMostNames)) return;
+  SharedFrame& frame = frames_[hub.robot];
+  if (frame.frame_of == hub.frame.frame_of && frame.frame_from_robot == hub.frame.frame_from_robot) return;
+  frame = hub.frame;
+  if (!is_pose(frame.frame_from_robot)) frame.frame_of.clear();
   changed_ = true;
 }
 
-void OtherRobots::take(const Piece& piece) {
-  if (piece.index == 0 && piece.after == 0 && others_.size() < kMostNames) {
-    Other& anew = others_[piece.name] = {};
+void OtherRobots::receive(const Chunk& chunk) {
+  // The first chunk of the first transaction starts a map.
+  if (chunk.index == 0 && chunk.after == 0 && others_.size() < kMostNames) {
+    Other& anew = others_[chunk.name] = {};
     anew.number = ++numbers_;
   }
-  const auto found = others_.find(piece.name);
+  const auto found = others_.find(chunk.name);
   if (found == others_.end()) return;
   Other& other = found->second;
-  if (piece.index == 0) {
-    other.coming = {piece.number, {}};
-    other.edition = piece.edition;
-    other.pieces = 0;
+  if (chunk.index == 0) {
+    other.incoming = {chunk.number, {}};
+    other.checksum = chunk.checksum;
+    other.chunks = 0;
   }
-  std::vector<std::uint8_t>& rows = other.coming.rows;
-  if (piece.edition != other.edition || piece.index != other.pieces || rows.size() > kMostRows) return;
-  rows.insert(rows.end(), piece.bytes.begin(), piece.bytes.end());
-  if (++other.pieces == piece.count && other.follower.take(other.coming)) changed_ = other.changed = true;
+
+  std::vector<std::uint8_t>& rows = other.incoming.rows;
+  if (chunk.checksum != other.checksum || chunk.index != other.chunks || rows.size() > kMostRows) return;
+  rows.insert(rows.end(), chunk.bytes.begin(), chunk.bytes.end());
+  if (++other.chunks == chunk.count && other.follower.apply(other.incoming)) changed_ = other.changed = true;
 }
 
-/// Rows that belong together may have come in part: then the map before stays.
+/// Leaves the previous map in place while rows that belong together are incomplete.
 void OtherRobots::update(Other& other) {
   if (!other.changed) return;
   const auto stored = other.follower.map();
@@ -72,29 +74,31 @@ void OtherRobots::update(Other& other) {
 }
 
 void OtherRobots::publish() {
-  const auto began = Clock::now();
-  if (!changed_ || began < next_) return;
+  const auto first_transactions = Clock::now();
+  if (!changed_ || first_transactions < next_) return;
   changed_ = false;
   published_.erase(std::remove_if(published_.begin(), published_.end(),
                                   [](const auto& maps) { return maps.use_count() == 1; }),
                    published_.end());
-  const Place own = places_[name_];
+
+  const SharedFrame own = frames_[name_];
   auto all = std::make_shared<mapping::OtherMaps>();
   std::vector<const maps::Map*> maps;
   std::vector<Rigid3> own_from_other;
   for (auto& [name, other] : others_) {
-    const Place place = places_[name];
-    if (own.frame_of.empty() || place.frame_of != own.frame_of) continue;
+    const SharedFrame frame = frames_[name];
+    if (own.frame_of.empty() || frame.frame_of != own.frame_of) continue;
     update(other);
     if (other.map == nullptr) continue;
     maps.push_back(&other.map->map);
     all->cameras.insert(other.map->cameras.begin(), other.map->cameras.end());
-    own_from_other.push_back(pose_of(own.frame_from_robot).inverse() * pose_of(place.frame_from_robot));
+    own_from_other.push_back(pose_of(own.frame_from_robot).inverse() * pose_of(frame.frame_from_robot));
   }
+
   all->map = maps::joined(maps, own_from_other);
   inbox_->put(published_.emplace_back(std::move(all)));
   const auto now = Clock::now();
-  next_ = now + std::max<Clock::duration>(kPublishEvery, 9 * (now - began));
+  next_ = now + std::max<Clock::duration>(kPublishMapsEvery, 9 * (now - first_transactions));
 }
 
 }  // namespace plumbline::net

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "hub_meetings.hpp"
+#include "hub/hub_meetings.hpp"
 
 #include <fmt/format.h>
 
@@ -21,16 +21,16 @@ void put_pose(const geometry::Rigid3& pose, std::array<double, 7>& to) {
   to = {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()};
 }
 
-Place told_place(const mapping::RobotPlace& from, const std::string& frame_of) {
-  Place place;
-  place.frame_of = frame_of;
-  put_pose(from.anchor_from_robot, place.frame_from_robot);
-  put_pose(from.anchor_from_camera, place.frame_from_camera);
+SharedFrame shared_frame(const mapping::RobotPlace& from, const std::string& frame_of) {
+  SharedFrame frame;
+  frame.frame_of = frame_of;
+  put_pose(from.anchor_from_robot, frame.frame_from_robot);
+  put_pose(from.anchor_from_camera, frame.frame_from_camera);
   std::size_t next = 0;
   for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) place.covariance[next++] = from.covariance(row, column);
+    for (int column = row; column < 6; ++column) frame.covariance[next++] = from.covariance(row, column);
   }
-  return place;
+  return frame;
 }
 
 }  // namespace
@@ -40,27 +40,27 @@ HubMeetings::HubMeetings(std::filesystem::path folder, const core::Executor& exe
   std::error_code ignored;
   std::filesystem::remove_all(folder_ / "meetings", ignored);
   begin();
-  job_ = executor_->submit([this] { take_again(); });
+  job_ = executor_->submit([this] { replay(); });
 }
 
 void HubMeetings::begin() {
   server_ = std::make_unique<mapping::MergeServer>(mapping::MapFusionOptions{}, 0, *executor_);
-  known_.clear();
+  robots_.clear();
   names_.clear();
-  places_.clear();
-  done_ = {};
+  frames_.clear();
+  work_ = {};
 }
 
 void HubMeetings::restart() {
   job_.wait();
-  for (const auto& [robot, known] : known_) changed_.insert(robot);
+  for (const auto& [robot, known] : robots_) changed_.insert(robot);
   begin();
   std::error_code ignored;
   std::filesystem::remove(log_file(), ignored);
 }
 
-/// In the work. An entry that was not written to its end was not taken.
-void HubMeetings::take_again() {
+/// In the job. An entry that is incomplete in the log was not applied.
+void HubMeetings::replay() {
   std::uintmax_t whole = 0;
   {
     std::ifstream file(log_file(), std::ios::binary);
@@ -70,7 +70,7 @@ void HubMeetings::take_again() {
       if (!file.read(reinterpret_cast<char*>(packed.data()), static_cast<std::streamsize>(packed.size())))
         break;
       try {
-        take(core::decode<Entry>(core::unpack(packed.data(), packed.size())));
+        apply(core::decode<Entry>(core::unpack(packed.data(), packed.size())));
       } catch (const core::BadBytes&) {
         break;
       }
@@ -81,24 +81,24 @@ void HubMeetings::take_again() {
   if (std::filesystem::exists(log_file(), ignored)) std::filesystem::resize_file(log_file(), whole, ignored);
 }
 
-/// In the work: what is new in one robot's copy.
-void HubMeetings::look_at(const std::string& robot) {
+/// In the job: makes an entry of what is new in one robot's copy.
+void HubMeetings::read_new_rows(const std::string& robot) {
   const std::filesystem::path copy = folder_ / "robots" / robot / "map.db";
   Entry entry{robot, {}};
-  std::int64_t head = known_[robot].follower.head();
+  std::int64_t head = robots_[robot].follower.head();
   while (true) {
-    auto next = maps::next_transaction(copy, maps::StoreShare::kMap, head);
+    auto next = maps::next_transaction(copy, maps::StoreStream::kMap, head);
     if (!next || !*next) break;
     head = (*next)->number;
     entry.rows.push_back(std::move(**next));
   }
   if (entry.rows.empty()) return;
-  if (const auto kept = keep(entry); !kept) done_.lines.push_back(kept.error().message);
-  take(entry);
+  if (const auto appended = append_to_log(entry); !appended) work_.lines.push_back(appended.error().message);
+  apply(entry);
 }
 
-/// Before it is taken: what was told follows from what is kept.
-core::Result<void> HubMeetings::keep(const Entry& entry) const {
+/// Before it is applied: what was reported follows from the log.
+core::Result<void> HubMeetings::append_to_log(const Entry& entry) const {
   const core::Bytes packed = core::pack(core::encoded(entry));
   const core::Bytes head = core::encoded(static_cast<std::uint32_t>(packed.size()));
   std::ofstream file(log_file(), std::ios::binary | std::ios::app);
@@ -108,34 +108,34 @@ core::Result<void> HubMeetings::keep(const Entry& entry) const {
   file.flush();
   if (file) return {};
   return core::output_error(log_file().string() +
-                            ": cannot be written; a hub that goes on may tell other meetings");
+                            ": cannot be written; a hub that is resumed may report other meetings");
 }
 
-/// In the work: an entry of the log.
-void HubMeetings::take(const Entry& entry) {
-  Known& known = known_[entry.robot];
-  const std::string head = fmt::format("log {}: {}", ++done_.entry, entry.robot);
+/// In the job: applies an entry of the log.
+void HubMeetings::apply(const Entry& entry) {
+  Robot& known = robots_[entry.robot];
+  const std::string head = fmt::format("log {}: {}", ++work_.entry, entry.robot);
   for (const maps::StoreTransaction& rows : entry.rows) {
-    if (const auto taken = known.follower.take(rows); !taken)
-      done_.lines.push_back(head + ": " + taken.error().message);
+    if (const auto applied = known.follower.apply(rows); !applied)
+      work_.lines.push_back(head + ": " + applied.error().message);
   }
   const auto stored = known.follower.map();
-  if (!stored) {  // rows that belong together came in part; the next ones will tell
-    done_.lines.push_back(head + " is looked at when more of its rows are here");
+  if (!stored) {  // rows that belong together are incomplete; more will come
+    work_.lines.push_back(head + " waits for more of its rows");
     return;
   }
   const int added = add(entry.robot, *stored);
-  done_.lines.push_back(
+  work_.lines.push_back(
       fmt::format("{} up to transaction {}, {} new keyframes", head, known.follower.head(), added));
-  for (mapping::MeetingEvent& event : server_->finish()) done_.events.push_back(std::move(event));
+  for (mapping::MeetingEvent& event : server_->finish()) work_.events.push_back(std::move(event));
 }
 
-/// The keyframes of a robot's map that are new; how many.
+/// Adds the keyframes of a robot's map that are new. Returns how many.
 int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
-  Known& known = known_[robot];
+  Robot& known = robots_[robot];
   const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
   const auto of_others = [](core::KeyframeId id) { return id.robot != 0; };
-  if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return 0;  // of several robots already
+  if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return 0;  // a map of several robots
   if (!known.number) {
     const auto next = static_cast<std::int32_t>(names_.size());
     known.number = server_->join({{next, maps::camera_of(stored.header.robots, 0).color}});
@@ -146,7 +146,7 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
   int added = 0;
   for (const core::KeyframeId id : ids) {
     if (id.index < known.keyframes) continue;
-    server_->add(map, {number, id.index}, done_.entry);
+    server_->add(map, {number, id.index}, work_.entry);
     known.keyframes = id.index + 1;
     ++added;
   }
@@ -156,44 +156,44 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
 bool HubMeetings::step() {
   if (job_.valid()) {
     if (!job_.ready()) return false;
-    tell();
+    report();
     return true;
   }
   if (changed_.empty()) return false;
   job_ = executor_->submit([this, changed = std::exchange(changed_, {})] {
-    for (const std::string& robot : changed) look_at(robot);
+    for (const std::string& robot : changed) read_new_rows(robot);
   });
   return false;
 }
 
-void HubMeetings::tell() {
+void HubMeetings::report() {
   job_.wait();
-  for (const std::string& line : std::exchange(done_.lines, {})) log_->debug(line);
-  for (const mapping::MeetingEvent& event : std::exchange(done_.events, {})) {
+  for (const std::string& line : std::exchange(work_.lines, {})) log_->debug(line);
+  for (const mapping::MeetingEvent& event : std::exchange(work_.events, {})) {
     const auto noted = reported_.note(event, names_, fmt::format("(log {})", event.frame), -1.0);
     if (!noted) log_->warning(noted.error().message);
   }
-  places_.clear();
-  for (const auto& [robot, known] : known_) {
+  frames_.clear();
+  for (const auto& [robot, known] : robots_) {
     if (!known.number) continue;
     if (const auto place = server_->place(*known.number))
-      places_[robot] = told_place(*place, names_[place->anchor]);
+      frames_[robot] = shared_frame(*place, names_[place->anchor]);
   }
 }
 
 void HubMeetings::finish() {
   do {
     step();
-    if (job_.valid()) tell();
+    if (job_.valid()) report();
   } while (!changed_.empty());
   if (const auto drawn = reported_.draw(); !drawn) log_->warning(drawn.error().message);
   std::error_code ignored;
   std::filesystem::remove(log_file(), ignored);
 }
 
-Place HubMeetings::place(const std::string& robot) const {
-  const auto found = places_.find(robot);
-  return found == places_.end() ? Place{} : found->second;
+SharedFrame HubMeetings::frame(const std::string& robot) const {
+  const auto found = frames_.find(robot);
+  return found == frames_.end() ? SharedFrame{} : found->second;
 }
 
 }  // namespace plumbline::net

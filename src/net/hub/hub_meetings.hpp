@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Finds robots that meet while they map, from the copies of their stores. The work is a job beside the hub's
+// thread: a commit never waits for it. Entries are numbered and kept in a log beside the copies, from which
+// alone the previews follow, also in a hub that is resumed.
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bus.hpp"
+#include "plumbline/mapping/merge_server.hpp"
+#include "plumbline/maps/store_replica.hpp"
+#include "plumbline/pipeline/meeting_log.hpp"
+
+namespace plumbline::net {
+
+class HubMeetings {
+ public:
+  /// Applies what an earlier process left in the log, in the same order.
+  HubMeetings(std::filesystem::path folder, const core::Executor& executor, core::Log& log);
+
+  /// The copy of a robot's store, below the folder, has new rows of its map.
+  void mark_changed(const std::string& robot) { changed_.insert(robot); }
+  /// A copy was emptied: starts again with all of them.
+  void restart();
+  /// Reports what a job found and submits the next one; to be called often. True: shared frames have changed.
+  bool step();
+  /// When nothing more will come: reports all that is left, draws, and removes the log.
+  void finish();
+  /// Pose of a robot in the frame that it shares with others; empty: it met nobody.
+  [[nodiscard]] SharedFrame frame(const std::string& robot) const;
+  [[nodiscard]] const std::vector<pipeline::RunSummary::Meeting>& meetings() const {
+    return reported_.meetings();
+  }
+
+ private:
+  /// A robot with at least one entry.
+  struct Robot {
+    maps::MapFollower follower;
+    std::optional<std::size_t> number;  ///< in the merge server; none: it has no keyframes yet
+    std::int32_t keyframes = 0;         ///< number of those added
+  };
+  struct Entry {
+    std::string robot;
+    std::vector<maps::StoreTransaction> rows;
+    template <typename Io>
+    friend void fields(Io& io, Entry& entry) {
+      io(entry.robot, entry.rows);
+    }
+  };
+  [[nodiscard]] std::filesystem::path log_file() const { return folder_ / "meetings.log"; }
+  void begin();
+  void replay();
+  void read_new_rows(const std::string& robot);
+  core::Result<void> append_to_log(const Entry& entry) const;
+  void apply(const Entry& entry);
+  int add(const std::string& robot, const maps::StoredMap& stored);
+  void report();
+
+  std::filesystem::path folder_;
+  const core::Executor* executor_;
+  core::Log* log_;
+  pipeline::MeetingLog reported_;
+  std::unique_ptr<mapping::MergeServer> server_;
+  std::set<std::string> changed_;  ///< robots with new rows
+  std::map<std::string, Robot> robots_;
+  std::vector<std::string> names_;  ///< by number
+  std::map<std::string, SharedFrame> frames_;
+  /// What a job leaves for report().
+  struct Work {
+    std::int64_t entry = 0;  ///< number of the last one
+    std::vector<std::string> lines;
+    std::vector<mapping::MeetingEvent> events;
+  } work_;
+  core::Executor::Job job_;  ///< last member: it ends before the others are destroyed
+};
+
+}  // namespace plumbline::net
