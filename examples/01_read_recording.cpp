@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: 01_read_recording INPUT PIPELINES\n");
     return 2;
   }
+
   const std::filesystem::path pipelines = argv[2];
   const core::Executor executor;  // one thread per core
   const auto log = core::stderr_log(core::LogLevel::kWarning);
@@ -29,6 +30,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", source.error().message.c_str());
     return static_cast<int>(source.error().kind);
   }
+
   const sensor::Pinhole& camera = (*source)->camera().color;
   std::printf("%s: %d x %d pixels, fx %.1f\n", (*source)->name().c_str(), camera.width, camera.height,
               camera.fx);
@@ -40,11 +42,13 @@ int main(int argc, char** argv) {
       std::fprintf(stderr, "%s\n", frame.error().message.c_str());
       continue;
     }
+
     ++readable;
     const cv::Mat measured = frame->depth > 0.0;
     std::printf("%10.3f s  mean depth %.2f m, %.0f %% measured\n", frame->stamp,
                 cv::mean(frame->depth, measured)[0],
                 100.0 * cv::countNonZero(measured) / static_cast<double>(measured.total()));
   }
+
   std::printf("%zu frames, %zu readable\n", (*source)->size(), readable);
 }

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: 02_track_camera INPUT PIPELINES TRAJECTORY.txt\n");
     return 2;
   }
+
   const std::filesystem::path pipelines = argv[2];
   const core::Executor executor;
   const auto log = core::stderr_log(core::LogLevel::kWarning);
@@ -40,6 +41,7 @@ int main(int argc, char** argv) {
   const features::FeatureExtractor extractor({}, camera);  // every Options struct has usable defaults
   constexpr int kRobot = 0;
   mapping::Slam slam({}, camera, kRobot, executor, *log);
+
   for (std::size_t i = 0; i < (*source)->size(); ++i) {
     const auto frame = (*source)->read(i);
     if (!frame) continue;
@@ -48,6 +50,7 @@ int main(int argc, char** argv) {
     std::printf("%10.3f s  %-12s %3d points %3d lines%s\n", report.stamp, tracking::to_string(report.state),
                 report.points.inliers, report.lines.inliers, report.keyframe.valid() ? "  keyframe" : "");
   }
+
   slam.finish();
 
   const geometry::Trajectory trajectory = slam.trajectory();  // world_from_camera of the tracked frames

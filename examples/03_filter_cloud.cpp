@@ -31,14 +31,17 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: 03_filter_cloud INPUT PIPELINES CHAIN.yaml CLOUD.ply\n");
     return 2;
   }
+
   const std::filesystem::path pipelines = argv[2];
   const core::Executor executor;
   const auto log = core::stderr_log(core::LogLevel::kWarning);
   dataset::OpenOptions options;
   options.cameras_folder = pipelines / "cameras";
+
   // The chain first: a wrong key is told at once, with file, line and column.
   const auto chain = cloud::FilterChain::load(argv[3], cloud::builtin_filters());
   if (!chain) return fail(chain.error());
+
   const auto source = pipeline::open_input(argv[1], options, pipelines / "scenes", executor, *log);
   if (!source) return fail(source.error());
   const auto frame = (*source)->read(0);
@@ -47,11 +50,13 @@ int main(int argc, char** argv) {
   const cloud::CloudPtr cloud = cloud::organised_cloud(*frame, (*source)->camera().color);
   cloud::FilterContext context;
   context.viewpoint = Eigen::Vector3f::Zero();  // the cloud is in the camera's frame
+
   std::vector<cloud::FilterReport> reports;
   const auto filtered = chain->apply(cloud, context, &reports);
   if (!filtered) return fail(filtered.error());
   std::printf("%s", cloud::to_table(reports).c_str());
   if (auto written = cloud::write_cloud(argv[4], **filtered); !written) return fail(written.error());
+
   const auto back = cloud::read_cloud(argv[4]);
   if (!back) return fail(back.error());
   std::printf("%zu points in %s\n", back->cloud->size(), argv[4]);

@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: 04_evaluate_trajectory TRAJECTORY.txt INPUT PIPELINES\n");
     return 2;
   }
+
   const std::filesystem::path pipelines = argv[3];
   const core::Executor executor;
   const auto log = core::stderr_log(core::LogLevel::kWarning);
@@ -31,8 +32,10 @@ int main(int argc, char** argv) {
   options.cameras_folder = pipelines / "cameras";
   const auto estimate = dataset::read_trajectory(argv[1]);
   if (!estimate) return fail(estimate.error());
+
   const auto source = pipeline::open_input(argv[2], options, pipelines / "scenes", executor, *log);
   if (!source) return fail(source.error());
+
   const auto truth = (*source)->truth();
   if (!truth) {
     std::fprintf(stderr, "%s: comes without truth (groundtruth.txt)\n", argv[2]);

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: 05_fuse_and_draw INPUT PIPELINES PICTURE.png\n");
     return 2;
   }
+
   const std::filesystem::path pipelines = argv[2];
   const core::Executor executor;
   const auto log = core::stderr_log(core::LogLevel::kWarning);
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
   open.cameras_folder = pipelines / "cameras";
   const auto source = pipeline::open_input(argv[1], open, pipelines / "scenes", executor, *log);
   if (!source) return fail(source.error());
+
   const auto truth = (*source)->truth();
   if (!truth || truth->empty()) {
     std::fprintf(stderr, "%s: comes without truth (groundtruth.txt)\n", argv[1]);
@@ -45,6 +47,7 @@ int main(int argc, char** argv) {
   voxels.voxel_m = 0.02;
   cloud::VoxelMap map(voxels);
   viz::CameraPath path;
+
   constexpr std::size_t kEvery = 5;
   for (std::size_t i = 0; i < (*source)->size(); i += kEvery) {
     const auto frame = (*source)->read(i);

@@ -56,6 +56,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: 06_register_clouds INPUT PIPELINES FRAME\n");
     return 2;
   }
+
   const std::filesystem::path pipelines = argv[2];
   const auto other = static_cast<std::size_t>(std::atoi(argv[3]));
   const core::Executor executor;
@@ -64,10 +65,13 @@ int main(int argc, char** argv) {
   options.cameras_folder = pipelines / "cameras";
   const auto source = pipeline::open_input(argv[1], options, pipelines / "scenes", executor, *log);
   if (!source) return fail(source.error());
+
   const auto first = (*source)->read(0);
   if (!first) return fail(first.error());
+
   const auto second = (*source)->read(other);
   if (!second) return fail(second.error());
+
   const auto truth = (*source)->truth();
   const auto at_first = truth ? geometry::pose_at(*truth, first->stamp, 0.05) : std::nullopt;
   const auto at_second = truth ? geometry::pose_at(*truth, second->stamp, 0.05) : std::nullopt;
@@ -85,6 +89,7 @@ int main(int argc, char** argv) {
   const auto correspondences = std::make_shared<cloud::TwoWayCorrespondences>(a, b, 0.8F);
   correspondences->setSamples(every(a, 4), every(b, 4));
   const auto estimation = std::make_shared<cloud::ConstrainedPointToPlane>(0.02);
+
   pcl::IterativeClosestPointWithNormals<cloud::SurfacePoint, cloud::SurfacePoint, double> icp;
   icp.setInputSource(a.cloud());
   icp.setInputTarget(b.cloud());
@@ -93,6 +98,7 @@ int main(int argc, char** argv) {
   icp.setTransformationEstimation(estimation);
   icp.setMaximumIterations(30);
   icp.setTransformationEpsilon(1e-8);
+
   geometry::Rigid3 b_from_a = start;
   cloud::SurfaceCloud aligned;
   for (const bool narrow : {false, true}) {
@@ -102,9 +108,11 @@ int main(int argc, char** argv) {
     const Eigen::Matrix4d found = icp.getFinalTransformation();
     b_from_a = geometry::Rigid3(found.topLeftCorner<3, 3>(), found.topRightCorner<3, 1>());
   }
+
   pcl::Correspondences pairs;
   correspondences->setInputSource(std::make_shared<cloud::SurfaceCloud>(aligned));
   correspondences->determineCorrespondences(pairs, 0.05);
+
   const auto held = estimation->step(aligned, *b.cloud(), pairs).held;
   const Eigen::Vector3d in_view(0.0, 0.0, 2.0);
   std::printf(

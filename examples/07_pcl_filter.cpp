@@ -36,6 +36,7 @@ Points::Ptr picture() {
         depth = 1.0F / ray.y();
         normal = Eigen::Vector3f(0.0F, -1.0F, 0.0F);
       }
+
       const bool box = u >= 100 && u < 200 && v >= 60 && v < 160;
       const bool border = box && (u == 100 || u == 199 || v == 60 || v == 159);
       if (box) depth = border ? 2.1F : 1.5F;
@@ -45,6 +46,7 @@ Points::Ptr picture() {
       if (u % 20 == 10 && v % 20 == 10) p.getNormalVector3fMap() = Eigen::Vector3f::UnitX();  // gone wrong
     }
   }
+
   return points;
 }
 

@@ -32,11 +32,13 @@ bool beyond_noise(double off_m, double off_rad, double sigma_m) {
 PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
   PathCheck check;
   std::map<std::int32_t, const FramePose*> last;  // by robot
+
   for (const FramePose& frame : frames) {
     if (!frame.reference.valid()) continue;
     const FramePose* before = std::exchange(last[frame.reference.robot], &frame);
     if (before == nullptr || !before->tracked || !frame.tracked || !frame.camera_from_previous) continue;
     if (before->reference == frame.reference) continue;
+
     const geometry::Rigid3 step =
         frame.camera_from_reference * map.camera_from_world(frame.reference) *
         (before->camera_from_reference * map.camera_from_world(before->reference)).inverse();
@@ -47,6 +49,7 @@ PathCheck check_path(const std::vector<FramePose>& frames, const Map& map) {
     check.largest_rad = std::max(check.largest_rad, seen.off_rad);
     if (beyond_noise(seen.off_m, seen.off_rad, frame.step_sigma_m)) check.tears.push_back(seen);
   }
+
   return check;
 }
 

@@ -243,6 +243,7 @@ std::vector<SurfaceEdge> Map::edges_of(KeyframeId keyframe) const {
 void Map::refresh_point(PointId id) {
   MapPoint& p = points_.at(id);
   if (p.observations.empty()) return;
+
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   std::vector<const features::Descriptor256*> descriptors;  // by observation
   for (const Observation& o : p.observations) {
@@ -250,13 +251,16 @@ void Map::refresh_point(PointId id) {
     direction += (p.position - entry.pose.inverse().translation).normalized();
     descriptors.push_back(&entry.data->features->descriptors[static_cast<std::size_t>(o.feature)]);
   }
+
   if (direction.norm() > 1e-9) p.view_direction = direction.normalized();
   // The descriptor with the least sum of distances to the others.
   int best_sum = -1;
+
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     const auto* candidate = descriptors[i];
     int sum = 0;
     for (const auto* other : descriptors) sum += features::hamming_distance(*candidate, *other);
+
     if (best_sum < 0 || sum < best_sum) {
       best_sum = sum;
       p.descriptor = *candidate;

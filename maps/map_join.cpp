@@ -38,6 +38,7 @@ class PartsCollector {
     const Rigid3 map_from_world = world_from_map.inverse();
     // A map that stays where it is keeps every bit.
     const bool stays = world_from_map.rotation.isIdentity(0.0) && world_from_map.translation.isZero(0.0);
+
     for (const KeyframeId id : map.keyframe_ids()) {
       auto data = std::make_shared<Keyframe>(map.keyframe(id));
       data->id = renamed(id, to);
@@ -46,6 +47,7 @@ class PartsCollector {
           {data, stays ? map.camera_from_world(id) : map.camera_from_world(id) * map_from_world,
            renamed(map.parent(id), to)});
     }
+
     for (const core::PointId id : map.point_ids()) {
       MapPoint point = map.point(id);
       point.id = renamed(id, to);
@@ -56,6 +58,7 @@ class PartsCollector {
       point.observations = renamed(std::move(point.observations), to);
       parts_.points.push_back(std::move(point));
     }
+
     for (const core::LineId id : map.line_ids()) {
       MapLine line = map.line(id);
       line.id = renamed(id, to);
@@ -64,13 +67,16 @@ class PartsCollector {
       line.observations = renamed(std::move(line.observations), to);
       parts_.lines.push_back(std::move(line));
     }
+
     const std::uint64_t first_edge = parts_.next.edge;
     for (const auto& [order, edge] : map.edges()) {
       parts_.edges.emplace_back(first_edge + order, renamed(edge, to));
     }
+
     for (const LoopEdge& loop : map.loops()) parts_.loops.push_back(renamed(loop, to));
     const NextIds next = map.next_ids();
     for (const KeyframeId id : next.keyframes) parts_.next.keyframes.push_back(renamed(id, to));
+
     for (const core::PointId id : next.points) parts_.next.points.push_back(renamed(id, to));
     for (const core::LineId id : next.lines) parts_.next.lines.push_back(renamed(id, to));
     parts_.next.edge = first_edge + next.edge;
@@ -116,17 +122,20 @@ std::uint64_t content_hash(const Map& map) {
     hash.bytes(pose.rotation.data(), 9 * sizeof(double));
     hash.bytes(pose.translation.data(), 3 * sizeof(double));
     if (keyframe.features == nullptr) continue;
+
     for (const features::PointFeature& f : keyframe.features->points) {
       hash.number(f.pixel.x());
       hash.number(f.pixel.y());
       hash.number(f.depth);
     }
+
     for (const features::Descriptor256& d : keyframe.features->descriptors) hash.bytes(&d, sizeof d);
     for (const features::LineFeature& f : keyframe.features->lines) {
       hash.number(f.segment.start.x());
       hash.number(f.segment.end.y());
     }
   }
+
   return hash.value();
 }
 

@@ -90,17 +90,21 @@ Map::Map(MapParts parts) {
               "a keyframe's id is invalid or there twice");
       add_keyframe(part.data, part.camera_from_world);
     }
+
     restore_landmarks(*this, points_, parts.points);
     restore_landmarks(*this, lines_, parts.lines);
     restore_tree(parts);
+
     for (const auto& [number, edge] : parts.edges) {
       require(number >= next_edge_, "edges are out of order");
       next_edge_ = number;
       add_edge(edge);
     }
+
     require(parts.next.edge >= next_edge_, "an edge's number is too large");
     next_edge_ = parts.next.edge;
     set_loops(std::move(parts.loops));
+
     for (const KeyframeId next : parts.next.keyframes) keyframes_.reserve(next);
     for (const PointId next : parts.next.points) points_.reserve(next);
     for (const LineId next : parts.next.lines) lines_.reserve(next);

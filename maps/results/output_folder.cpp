@@ -41,6 +41,7 @@ core::Result<void> check_target(const fs::path& target, bool replace, OutputFold
     return core::usage_error(
         fmt::format("{}: is a file; name a folder that does not exist yet", target.string()));
   }
+
   if (fs::is_empty(target, ec)) return {};
   if (!is_earlier(target)) {
     return core::usage_error(
@@ -48,10 +49,12 @@ core::Result<void> check_target(const fs::path& target, bool replace, OutputFold
                     "yet (only earlier results are ever replaced)",
                     target.string()));
   }
+
   if (!replace) {
     return core::usage_error(fmt::format(
         "{}: holds an earlier result; name another folder or add --force to replace it", target.string()));
   }
+
   return {};
 }
 
@@ -121,14 +124,17 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
   const fs::path target = normal(out);
   if (auto checked = check_target(target, replace, is_earlier); !checked)
     return tl::unexpected(checked.error());
+
   const fs::path partial = with_ending(target, ".partial");
   if (auto cleared = clear_leftover(partial, takes_over); !cleared) return tl::unexpected(cleared.error());
+
   std::error_code ec;
   fs::create_directories(partial, ec);
   if (ec) {
     return core::output_error(fmt::format("{}: cannot be created ({}); name a folder where you may write",
                                           target.string(), ec.message()));
   }
+
   const int lock = lock_marker(partial, O_CREAT | O_WRONLY);
   if (lock < 0) {
     std::error_code gone;
@@ -137,12 +143,14 @@ core::Result<OutputFolder> OutputFolder::prepare(const fs::path& out, bool repla
     return core::output_error(
         fmt::format("{}: cannot be written; name a folder where you may write", target.string()));
   }
+
   OutputFolder folder(target, partial, lock, is_earlier);
   const fs::space_info space = fs::space(partial, ec);
   if (!ec && space.available < kLeastFreeMb * kMegabyte) {
     return core::output_error(fmt::format("{}: only {} MB are free there; at least {} MB are needed",
                                           target.string(), space.available / kMegabyte, kLeastFreeMb));
   }
+
   folder.kept_ = takes_over;
   return folder;
 }
@@ -151,6 +159,7 @@ core::Result<void> OutputFolder::commit() {
   std::error_code ec;
   fs::remove(partial_ / kMarker, ec);
   const fs::path old = with_ending(target_, ".replaced");
+
   const bool replaces = fs::exists(target_, ec) && !fs::is_empty(target_, ec);
   if (replaces) {
     if (is_earlier_(old)) fs::remove_all(old, ec);
@@ -158,12 +167,14 @@ core::Result<void> OutputFolder::commit() {
     if (ec)
       return core::output_error(fmt::format("{}: cannot be replaced ({})", target_.string(), ec.message()));
   }
+
   fs::rename(partial_, target_, ec);
   if (ec) {
     std::error_code ignored;
     if (replaces) fs::rename(old, target_, ignored);
     return core::output_error(fmt::format("{}: cannot be created ({})", target_.string(), ec.message()));
   }
+
   partial_.clear();
   if (replaces) fs::remove_all(old, ec);
   return {};

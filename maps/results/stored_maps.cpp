@@ -69,14 +69,17 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
     return core::input_error(
         fmt::format("{}: no such map; give result folders of plumbline map", file.string()));
   }
+
   auto reader = StoreReader::open(file);
   if (!reader) return tl::unexpected(reader.error());
   reader->read_ahead();
+
   auto stored = reader->load();
   if (!stored) return tl::unexpected(stored.error());
   if (stored->map.keyframe_count() == 0) {
     return core::input_error(fmt::format("{}: the map has no keyframes; leave it out", file.string()));
   }
+
   StoredPart part;
   part.name = name_of(file);
   part.file = file;
@@ -92,6 +95,7 @@ core::Result<StoredPart> StoredMaps::read_part(const fs::path& map) {
 core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
   std::vector<std::uint64_t> hashes(parts_.size());
   executor.parallel_for(parts_.size(), [&](std::size_t p) { hashes[p] = content_hash(parts_[p].map); });
+
   std::set<std::string> files;
   for (const StoredPart& part : parts_) {
     std::error_code ec;
@@ -99,22 +103,27 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
       return core::usage_error(fmt::format("{}: is given twice", part.file.string()));
     }
   }
+
   std::vector<std::size_t> order(parts_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) {
     return std::make_tuple(parts_[y].map.keyframe_count(), hashes[x], parts_[x].name) <
            std::make_tuple(parts_[x].map.keyframe_count(), hashes[y], parts_[y].name);
   });
+
   std::vector<StoredPart> sorted;
   for (const std::size_t i : order) sorted.push_back(std::move(parts_[i]));
   parts_ = std::move(sorted);
+
   for (StoredPart& part : parts_) {
     part.cameras = CameraHistory(part.robots);
     for (RobotInfo& robot : part.robots) robot.versions.clear();
   }
+
   std::set<std::string> part_names;
   std::set<std::string> robot_names;
   std::int32_t number = 0;
+
   for (StoredPart& part : parts_) {
     std::map<std::int32_t, std::int32_t>& to = part.numbers;
     part.name = free_name(part.name, part_names);
@@ -124,6 +133,7 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
       robot.name = free_name(robot.name, robot_names);
       robots_.push_back(robot);
     }
+
     for (const KeyframeId id : part.map.keyframe_ids()) {
       if (to.count(id.robot) == 0) {
         return core::input_error(fmt::format("{}: robot {} is not in its list of robots; map it again",
@@ -131,14 +141,17 @@ core::Result<void> StoredMaps::arrange(const core::Executor& executor) {
       }
     }
   }
+
   constexpr std::int32_t kMostRobots = 255;  // a cloud file has a byte for it
   if (number > kMostRobots) {
     return core::usage_error(fmt::format("{} robots are too many; {} can be fused", number, kMostRobots));
   }
+
   executor.parallel_for(parts_.size(), [&](std::size_t p) {
     renumber(parts_[p]);
     parts_[p].paths = by_robot(poses_of(parts_[p].map, parts_[p].frames));
   });
+
   return {};
 }
 
@@ -146,16 +159,19 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
   const StoredPart& part = parts_[p];
   const auto ids = part.reader->cloud_ids();
   if (!ids) return tl::unexpected(ids.error());
+
   for (const KeyframeId stored : *ids) {
     const auto found = part.numbers.find(stored.robot);
     if (found == part.numbers.end()) continue;
     const KeyframeId id{found->second, stored.index};
     if (part.map.has_keyframe(id)) clouds_.push_back({p, stored.robot, id, {}, part.map.keyframe(id).stamp});
   }
+
   const auto frames = part.reader->frame_cloud_ids();
   if (!frames) return tl::unexpected(frames.error());
   std::map<std::int32_t, std::vector<double>> stamps;  // of frames, by robot
   for (const FramePose& frame : part.frames) stamps[frame.reference.robot].push_back(frame.stamp);
+
   for (const FrameId stored : *frames) {
     const auto found = part.numbers.find(stored.robot);
     if (found == part.numbers.end()) continue;
@@ -165,6 +181,7 @@ core::Result<void> StoredMaps::list_clouds(std::size_t p) {
       clouds_.push_back({p, stored.robot, {}, {found->second, stored.index}, own[place]});
     }
   }
+
   return {};
 }
 

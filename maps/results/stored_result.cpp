@@ -41,6 +41,7 @@ core::Result<MapPlace> find_map(const fs::path& input) {
     place.store = input;
     return place;
   }
+
   if (!fs::exists(input, ec)) {
     const fs::path left = OutputFolder::partial_of(input) / kStoreFile;
     if (!input.empty() && fs::is_regular_file(left, ec)) {
@@ -48,10 +49,12 @@ core::Result<MapPlace> find_map(const fs::path& input) {
       return place;
     }
   }
+
   if (fs::is_regular_file(input / kStoreFile, ec)) place.store = input / kStoreFile;
   auto result = open_result(input);
   if (result) place.result = std::move(*result);
   if (!result && place.store.empty()) return tl::unexpected(result.error());
+
   return place;
 }
 
@@ -122,19 +125,23 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   if (stored->size() == 0) {
     return core::input_error(fmt::format("{}: holds no clouds; map the recording again", file_.string()));
   }
+
   FusionState state;
   const auto kept = reader_->attachment(kFusionAttachment);
   if (!kept) return tl::unexpected(kept.error());
+
   if (*kept) {
     auto read = fusion_state_of(**kept);
     if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
     state = std::move(*read);
   }
+
   cloud::FusionViews all;
   all.world_from_camera = stored->world_from_camera;
   for (const std::int32_t robot : stored->robots) {
     all.cameras.push_back(camera_of(map_.header.robots, robot).color);
   }
+
   all.read = [&](std::size_t i) { return stored->read(i); };
   all.covariances = state.covariances_of(stored->robots, stored->stamps);
   auto fused = cloud::fuse_views(all, options, executor);

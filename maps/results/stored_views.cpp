@@ -32,15 +32,18 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
   if (!keyframes) return tl::unexpected(keyframes.error());
   auto frames = reader.frame_cloud_ids();
   if (!frames) return tl::unexpected(frames.error());
+
   const auto arrival = [&](FrameId frame) {
     const auto found = arrivals.find(frame);
     return found == arrivals.end() ? 0 : found->second;
   };
+
   std::stable_sort(frames->begin(), frames->end(),
                    [&](FrameId a, FrameId b) { return arrival(a) < arrival(b); });
   StoredViews views;
   views.reader = &reader;
   views.cameras = CameraHistory(robots);
+
   const std::map<std::int32_t, geometry::Trajectory> paths = by_robot(map);
   const auto add = [&](core::KeyframeId keyframe, FrameId frame, double stamp,
                        const geometry::Rigid3& world_from_camera) {
@@ -53,6 +56,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     views.velocities.push_back(path == paths.end() ? geometry::Vector6d(geometry::Vector6d::Zero())
                                                    : geometry::velocity_at(path->second, stamp));
   };
+
   const std::set<core::KeyframeId> there(keyframes->begin(), keyframes->end());
   std::set<std::pair<std::int32_t, double>> seen;  // a run that went on may make a keyframe of what was none
   for (const KeyframePose& keyframe : map.keyframes) {
@@ -60,6 +64,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     add(keyframe.id, {}, keyframe.stamp, keyframe.world_from_camera);
     seen.emplace(keyframe.id.robot, keyframe.stamp);
   }
+
   std::map<FrameId, std::size_t> places;
   for (std::size_t i = 0; i < map.trajectory_ids.size(); ++i) places[map.trajectory_ids[i]] = i;
   for (const FrameId frame : *frames) {
@@ -68,6 +73,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
     const geometry::StampedPose& pose = map.trajectory[found->second];
     if (seen.count({frame.robot, pose.stamp}) == 0) add({}, frame, pose.stamp, pose.world_from_camera);
   }
+
   return views;
 }
 

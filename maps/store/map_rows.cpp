@@ -56,14 +56,17 @@ void MapRows::put(const std::string& table, const Key& key, const Bytes& plain,
     expect_own(keyframe->id.robot == key.first && keyframe->id.index == key.second);
     keyframes_[key] = std::move(keyframe);
   }
+
   if (table == "state") states_[key] = decode<KeyframeState>(plain);
   if (table == "point") points_[key] = landmarks_of<MapPoint>(plain, key);
   if (table == "line") lines_[key] = landmarks_of<MapLine>(plain, key);
+
   if (table == "edge") {
     const auto row = decode<EdgeRow>(plain);
     expect_own(row.number == static_cast<std::uint64_t>(key.second));
     edges_[key] = row.edge;
   }
+
   if (table == "frame") frames_[key] = decode_page<FramePose>(plain);
   if (table == "log") log_[key] = decode_page<std::string>(plain);
 }
@@ -112,21 +115,25 @@ void MapRows::check_owners() const {
 StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
   MapParts parts;
   if (keyframes_.size() != states_.size()) throw BadBytes("a keyframe has no pose, or a pose no keyframe");
+
   for (const auto& [key, keyframe] : keyframes_) {
     if (!is_of(key, robot)) continue;
     const auto state = states_.find(key);
     if (state == states_.end()) throw BadBytes("a keyframe has no pose");
     parts.keyframes.push_back({keyframe, state->second.camera_from_world, state->second.parent});
   }
+
   parts.points = gathered(points_, robot);
   parts.lines = gathered(lines_, robot);
   for (const auto& [key, edge] : edges_) {
     if (is_of(key, robot)) parts.edges.emplace_back(key.second, edge);
   }
+
   std::sort(parts.edges.begin(), parts.edges.end(),  // the table is by robot first
             [](const auto& a, const auto& b) { return a.first < b.first; });
   parts.next = row.next;
   parts.loops = row.loops;
+
   StoredMap stored;
   stored.frames = gathered(frames_, robot);
   stored.log = gathered(log_, robot);
@@ -136,6 +143,7 @@ StoredMap MapRows::map(std::int64_t robot, const MapRow& row) const {
   } catch (const std::invalid_argument& contradiction) {
     throw BadBytes(contradiction.what());
   }
+
   check_frames(stored.frames, stored.map);
   return stored;
 }

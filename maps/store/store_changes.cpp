@@ -59,6 +59,7 @@ void read_rows(Database& database, std::size_t index, std::int64_t number, ByteW
       database,
       ("SELECT data, " + key + " FROM " + table.name + " WHERE changed = ? ORDER BY " + key).c_str());
   rows.bind(1, number);
+
   while (rows.step()) {
     StoreRow row;
     row.name.table = index;
@@ -68,6 +69,7 @@ void read_rows(Database& database, std::size_t index, std::int64_t number, ByteW
       row.name.robot = rows.integer(1);
       row.name.number = rows.integer(2);
     }
+
     row.type = rows.getColumn(0).getType();
     row.data = row.type == SQLITE_BLOB ? rows.blob(0) : Bytes();
     if (row.type == SQLITE_INTEGER) row.integer = rows.integer(0);

@@ -124,6 +124,7 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
   if (key == "robots") {
     robots = decode<std::vector<RobotInfo>>(plain(kMostSmall));
     demand(!robots.empty(), "there is no robot");
+
     for (const RobotInfo& robot : robots) {
       demand(robot.number >= 0 && robot.number <= kMostRobots, "an id is out of range");
       check(robot.camera);
@@ -139,6 +140,7 @@ void check_header(const std::string& key, const Bytes& bytes, std::vector<RobotI
     check(decode<ResultFrame>(plain(kMostSmall)).output_from_map);
   } else {
     const bool known = key == "input" || key == "program" || key == "configuration" || key == "complete";
+
     demand(known, "nothing has this name");
   }
 }
@@ -171,11 +173,13 @@ void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& 
   if (table == "header") return check_header(name.key, bytes, robots);
   if (table == "map") return check_map(plain(kMostPlain));
   if (table == "keyframe") return check_keyframe(plain(kMostPlain), name, robots);
+
   if (table == "state") {
     const KeyframeState state = decode<KeyframeState>(plain(kMostSmall));
     check(state.camera_from_world);
     return check_id(state.parent);
   }
+
   if (table == "point") return check_landmarks<MapPoint>(plain(kMostPage), name);
   if (table == "line") return check_landmarks<MapLine>(plain(kMostPage), name);
   if (table == "edge") {
@@ -183,6 +187,7 @@ void check_row(const RowName& name, const Bytes& bytes, std::vector<RobotInfo>& 
     demand(row.number == static_cast<std::uint64_t>(name.number), "it holds what belongs to another row");
     return check_edge(row.edge);
   }
+
   if (table == "frame") return check_frame_page(plain(kMostPage));
   if (table == "log") return void(decode_page<std::string>(plain(kMostPage)));
   if (table == "attachment") return void(plain(kMostPlain));

@@ -67,6 +67,7 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
   put([](auto& l) -> auto& { return l.segment.end.x(); });
   put([](auto& l) -> auto& { return l.segment.end.y(); });
   put([](auto& l) -> auto& { return l.segment.response; });
+
   for (LineFeature& l : lines) io(l.descriptor);
   std::vector<Line3> in_space;
   for (LineFeature& l : lines) {
@@ -77,6 +78,7 @@ void line_columns(Io& io, std::vector<LineFeature>& lines) {
     }
     if (there) in_space.push_back(*l.line3);
   }
+
   line3_columns(io, in_space);
   if constexpr (Io::kReads) {
     auto next = in_space.begin();
@@ -90,12 +92,14 @@ template <typename Io>
 void thumbnail(Io& io, cv::Mat& image) {
   if (!image.empty() && image.type() != CV_32FC1)
     throw std::invalid_argument("store: thumbnail is no CV_32FC1");
+
   std::int32_t rows = image.rows;
   std::int32_t columns = image.cols;
   io(rows, columns);
   io.check(rows >= 0 && columns >= 0 && rows <= 1 << 14 && columns <= 1 << 14, "an image's size is wrong");
   const auto width = static_cast<std::size_t>(columns);
   std::vector<float> values;
+
   if constexpr (!Io::kReads) {
     for (int y = 0; y < rows; ++y)
       values.insert(values.end(), image.ptr<float>(y), image.ptr<float>(y) + width);
@@ -155,6 +159,7 @@ template <typename Io, typename Get>
 void rounded_column(Io& io, std::vector<SurfaceSample>& samples, double step, double most, const Get& get) {
   std::vector<std::uint32_t> codes(samples.size());
   std::uint32_t before = 0;
+
   if constexpr (!Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
       const double value = static_cast<double>(get(samples[i]));
@@ -166,6 +171,7 @@ void rounded_column(Io& io, std::vector<SurfaceSample>& samples, double step, do
       before = now;
     }
   }
+
   io.planes(codes.data(), codes.size());
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
@@ -184,14 +190,17 @@ void fields(Io& io, StoredSurface& surface) {
   std::vector<SurfaceSample>& samples = surface.samples;
   io(surface.voxel_m);
   io.column_size(samples, 7 * sizeof(std::uint32_t));
+
   for (int k = 0; k < 3; ++k) {
     rounded_column(
         io, samples, kPoint_m, kMost_m, [k](auto& s) -> auto& { return s.point(k); });
   }
+
   for (int k = 0; k < 3; ++k) {
     rounded_column(
         io, samples, kNormal, 1.0, [k](auto& s) -> auto& { return s.normal(k); });
   }
+
   rounded_column(
       io, samples, kSigma_m, 1.0, [](auto& s) -> auto& { return s.sigma; });
   if constexpr (Io::kReads) {

@@ -213,6 +213,7 @@ core::Result<StoreContents> StoreReader::contents() const {
     const auto count = [&](const char* sql) { return static_cast<std::size_t>(database.number(sql)); };
     StoreContents contents;
     contents.complete = is_complete(database);
+
     read_table(database, "map", [&](std::int64_t, std::int64_t, const Bytes& plain) {
       const auto row = maps::decode<MapRow>(plain);
       contents.keyframes += row.keyframes;
@@ -222,6 +223,7 @@ core::Result<StoreContents> StoreReader::contents() const {
       contents.loops += row.loops.size();
       contents.frames += row.frames;
     });
+
     contents.keyframe_clouds = count("SELECT count(*) FROM cloud");
     contents.frame_clouds = count("SELECT count(*) FROM frame_cloud");
     contents.cloud_bytes = count(

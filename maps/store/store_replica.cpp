@@ -123,6 +123,7 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
   const std::string where =
       std::string(table.name) + " " +
       (table.named ? row.name.key : std::to_string(row.name.robot) + "/" + std::to_string(row.name.number));
+
   try {
     if (table.stream != stream) throw BadBytes("it belongs to the other stream");
     if (row.removed) {
@@ -132,21 +133,25 @@ void StoreReplica::Impl::apply_row(const StoreRow& row) {
       if (row.type != type_of(table, row.name.key)) throw BadBytes("its content has the wrong type");
       check_row(row.name, row.data, robots);
     }
+
   } catch (const BadBytes& bad) {
     throw BadBytes(where + ": " + bad.what());
   }
   if (table.named) return put(table, row);
+
   const auto by_key = [&](const char* sql, const std::string& name) {
     Statement(*database, (sql + name + " AND robot = ? AND number = ?").c_str())
         .bind(1, row.name.robot)
         .bind(2, row.name.number)
         .run();
   };
+
   const std::string index = std::to_string(row.name.table);
   if (!row.removed) {
     by_key("DELETE FROM removed WHERE place = ", index);
     return put(table, row);
   }
+
   by_key("DELETE FROM ", std::string(table.name) + " WHERE 1");
   Statement(*database, "REPLACE INTO removed VALUES (?, ?, ?, ?)")
       .bind(1, static_cast<std::int64_t>(row.name.table))

@@ -11,10 +11,12 @@ void row_fields(Io& io, StoreRow& row) {
   constexpr std::uint8_t kRemoved = 0x80;
   auto head = static_cast<std::uint8_t>(row.name.table | (row.removed ? kRemoved : 0));
   io(head);
+
   if constexpr (Io::kReads) {
     row.removed = (head & kRemoved) != 0;
     row.name.table = head & ~std::size_t{kRemoved};
   }
+
   io.check(row.name.table < std::size(kRowTables), "there is no such table");
   if (kRowTables[row.name.table].named) {
     io(row.name.key);
@@ -22,9 +24,11 @@ void row_fields(Io& io, StoreRow& row) {
     io(row.name.robot, row.name.number);
   }
   if (row.removed) return;
+
   auto type = static_cast<std::uint8_t>(row.type);
   io(type);
   row.type = type;
+
   if (type == SQLITE_INTEGER) {
     io(row.integer);
   } else if (type == SQLITE_TEXT) {

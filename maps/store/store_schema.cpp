@@ -102,16 +102,19 @@ void check_store(Database& database) {
     throw StoreFailure(core::ErrorKind::kInput,
                        "holds nothing: the run that made it ended before it began; map the recording again");
   }
+
   if (application != kStoreApplication) {
     throw StoreFailure(core::ErrorKind::kInput,
                        "is an SQLite file, but no map store; give the map.db of a result folder");
   }
+
   const std::int64_t format = database.number("PRAGMA user_version");
   if (format > kStoreFormat) {
     throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +
                                                     ", this program reads up to " +
                                                     std::to_string(kStoreFormat) + "; use a newer Plumbline");
   }
+
   if (format < 1) throw BadBytes("its format number is wrong");
   if (format < kStoreFormat) {
     throw StoreFailure(core::ErrorKind::kInput, "is a map store of format " + std::to_string(format) +

@@ -77,6 +77,7 @@ auto guarded(const std::filesystem::path& file, core::ErrorKind kind, const Acti
   const auto fail = [&](core::ErrorKind what, const std::string& text) {
     return core::failure(what, file.string() + ": " + text);
   };
+
   try {
     if constexpr (std::is_void_v<decltype(action())>) {
       action();
@@ -84,6 +85,7 @@ auto guarded(const std::filesystem::path& file, core::ErrorKind kind, const Acti
     } else {
       return action();
     }
+
   } catch (const StoreFailure& failure) {
     return fail(failure.kind, failure.what());
   } catch (const SQLite::Exception& error) {

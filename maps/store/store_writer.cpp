@@ -264,6 +264,7 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
     whole.commit();
   });
   if (done) return done;
+
   const core::Result<void> reloaded = guarded(file, ErrorKind::kOutput, [&] {
     for (Mirror* mirror : {&maps, &keyframes, &states, &points, &lines, &edges, &frames, &log}) {
       mirror->reload();
@@ -273,6 +274,7 @@ core::Result<void> StoreWriter::Impl::transact(const Change& change) {
     frame_lists = read_lists<FramePose>(*database, "frame");
     log_lines = read_lists<std::string>(*database, "log");
   });
+
   return reloaded ? done : reloaded;
 }
 
@@ -288,6 +290,7 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
   if (std::filesystem::exists(file, ignored)) {
     return core::output_error(file.string() + ": is there already; remove it or write to another folder");
   }
+
   core::Result<StoreWriter> made = guarded(file, ErrorKind::kOutput, [&] {
     auto database = std::make_unique<Database>(file, Database::Access::kCreate);
     database->run("PRAGMA page_size = 8192");
@@ -298,8 +301,10 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
       put_header(*database, header);
       transaction.commit();
     }
+
     return StoreWriter(std::make_unique<Impl>(file, std::move(database)));
   });
+
   if (!made) std::filesystem::remove(file, ignored);
   return made;
 }

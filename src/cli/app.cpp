@@ -142,19 +142,23 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(kFooter);
+
   Session session;
   for (const auto add : {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_info, add_render,
                          add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines}) {
     add(app, session);
   }
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : static_cast<int>(core::ErrorKind::kUsage);
   }
+
   ignore_write_signals();
   cv::setNumThreads(1);                                     // threads come from the executor alone
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what fails is told by the step that called PCL
+
   try {
     return session.command();
   } catch (const std::bad_alloc&) {
@@ -163,6 +167,7 @@ int run(int argc, char** argv) {
     session.console().error(
         fmt::format("internal error: {}; please report it with the command you gave", e.what()));
   }
+
   return static_cast<int>(core::ErrorKind::kInternal);
 }
 

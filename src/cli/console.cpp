@@ -54,10 +54,12 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
     started_ = true;
     start_ = last_ = now;
   }
+
   const double since_last_s = std::chrono::duration<double>(now - last_).count();
   if (done < total && since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
   last_ = now;
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
+
   if (terminal_) {
     clear_bar();
     draw_bar(done, total, what, elapsed_s);

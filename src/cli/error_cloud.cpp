@@ -44,8 +44,10 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
       ply.add(names[static_cast<std::size_t>(axis)], std::move(column));
     }
   };
+
   add_vectors(cloud.points, {"x", "y", "z"});
   if (!cloud.normals.empty()) add_vectors(cloud.normals, {"nx", "ny", "nz"});
+
   std::array<std::vector<std::uint8_t>, 3> rgb;
   for (const float e : error_m) {
     const viz::Rgb c = viz::sequential_color(static_cast<double>(e) / end_m);
@@ -53,6 +55,7 @@ cloud::PlyData as_ply(const evaluate::SurfaceSamples& cloud, const std::vector<f
     rgb[1].push_back(c.g);
     rgb[2].push_back(c.b);
   }
+
   ply.add("red", std::move(rgb[0]));
   ply.add("green", std::move(rgb[1]));
   ply.add("blue", std::move(rgb[2]));

@@ -17,12 +17,14 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
       .add_option("--interface", options.interface,
                   "Network interface (default: that of the default route; lo: this machine only)")
       ->type_name("IF");
+
   command
       .add_option("--peers", options.peers,
                   "Addresses of the others, for networks without multicast (default: find them by multicast)")
       ->type_name("HOST[:PORT],...")
       ->delimiter(',')
       ->allow_extra_args(false);
+
   command
       .add_option_function<std::string>(
           "--transport",
@@ -31,6 +33,7 @@ void add_network_options(CLI::App& command, net::NetworkOptions& options) {
           },
           "udp or tcp (default: udp)")
       ->check(CLI::IsMember({"udp", "tcp"}));
+
   command
       .add_option("--port", options.port,
                   "TCP: port of the hub (default: 7500); UDP: first port (default: 7400)")

@@ -97,15 +97,18 @@ std::string to_string(const ConfigProblems& problems) {
   for (const ConfigProblem& p : problems) {
     if (std::find(files.begin(), files.end(), p.mark.file) == files.end()) files.push_back(p.mark.file);
   }
+
   std::string text;
   for (const std::string& file : files) {
     std::vector<const ConfigProblem*> here;
     for (const ConfigProblem& p : problems) {
       if (p.mark.file == file) here.push_back(&p);
     }
+
     std::stable_sort(here.begin(), here.end(), [](const ConfigProblem* a, const ConfigProblem* b) {
       return std::pair(a->mark.line, a->mark.column) < std::pair(b->mark.line, b->mark.column);
     });
+
     for (const ConfigProblem* p : here) {
       if (!text.empty()) text += '\n';
       text += file;
@@ -117,6 +120,7 @@ std::string to_string(const ConfigProblems& problems) {
       text += p->what;
     }
   }
+
   return text;
 }
 

@@ -70,6 +70,7 @@ Json type_schema(const OptionSpec& spec) {
     case OptionType::kText:
       return {{"type", Json::array({"string", "number",
                                     "boolean"})}};  // an unquoted 12 is a text here, but not to JSON
+
     case OptionType::kChoice:
       return {{"enum", words(spec.choices)}};
     case OptionType::kNumbers:
@@ -78,6 +79,7 @@ Json type_schema(const OptionSpec& spec) {
       return {{"anyOf",
                Json::array({Json{{"type", "string"}}, Json{{"$ref", "#/definitions/" + spec.list_of}}})}};
   }
+
   return Json::object();
 }
 

@@ -145,20 +145,24 @@ OptionTable& OptionTable::numbers(std::string key, std::vector<double>& value, s
   OptionSpec spec =
       number_spec(std::move(key), OptionType::kNumbers, range.min, range.max, unit, std::move(help));
   spec.length = length;
+
   const auto parse = [&value, length, range, unit](const ConfigNode& node) -> std::string {
     if (node.kind != Kind::kSequence) return describe(node) + " is not a list of numbers, like [1, 2, 3]";
     if (length != 0 && node.items.size() != length) {
       return fmt::format("has {} numbers (allowed: {})", node.items.size(), length);
     }
+
     std::vector<double> read;
     for (std::size_t i = 0; i < node.items.size(); ++i) {
       const ParsedNumber parsed = parse_in_range(node.items[i], range.min, range.max, unit);
       if (!parsed.wrong.empty()) return fmt::format("number {}: {}", i + 1, parsed.wrong);
       read.push_back(parsed.value);
     }
+
     value = std::move(read);
     return "";
   };
+
   const auto print = [&value, unit]() {
     std::vector<std::string> texts;
     for (const double v : value) texts.push_back(with_unit(v, unit));

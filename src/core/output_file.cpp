@@ -25,10 +25,12 @@ OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)
     auto resolved = std::filesystem::weakly_canonical(target_, error);
     if (!error) real = std::move(resolved);
   }
+
   if (std::filesystem::is_directory(real, error)) {
     fail("is a folder");
     return;
   }
+
   const bool device = std::filesystem::exists(real, error) && !std::filesystem::is_regular_file(real, error);
   if (device) {
     written_ = real;
@@ -38,10 +40,12 @@ OutputFile::OutputFile(std::filesystem::path target) : target_(std::move(target)
         real.parent_path() / ("." + real.filename().string() + "." + std::to_string(::getpid()) + ".part");
     descriptor_ = ::open(written_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   }
+
   if (descriptor_ < 0) {
     fail("cannot be opened for writing (" + reason() + ")");
     return;
   }
+
   target_ = real;
   buffer_.reserve(kBuffer);
 }

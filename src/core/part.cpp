@@ -41,6 +41,7 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
   const std::string file = fmt::format("plumbline_{}.so", name);
   const std::vector<fs::path> folders = library_folders();
   std::error_code ec;
+
   const auto folder = std::find_if(folders.begin(), folders.end(),
                                    [&](const fs::path& f) { return fs::exists(f / file, ec); });
   if (folder == folders.end()) {
@@ -49,19 +50,23 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
         fmt::format("{}: this part of Plumbline is missing; install it anew, it belongs into {}", file,
                     folders.empty() ? "lib/plumbline" : folders.front().lexically_normal().string()));
   }
+
   const std::string path = (*folder / file).lexically_normal().string();
   const auto unfit = [&path](const std::string& why) {
     return failure(ErrorKind::kInternal,
                    fmt::format("{}: this part of Plumbline {}; install Plumbline anew", path, why));
   };
+
   void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
   if (handle == nullptr) {
     const char* why = dlerror();
     return unfit(fmt::format("cannot be loaded ({})", why == nullptr ? "unknown reason" : why));
   }
+
   using Entry = PartEntry (*)();
   const auto entry = reinterpret_cast<Entry>(dlsym(handle, "plumbline_part"));
   if (entry == nullptr) return unfit("has no functions");
+
   const PartEntry found = entry();
   if (found.layout != layout) return unfit("was not built together with this program");
   return found.functions;

@@ -59,20 +59,24 @@ ParsedNumber parse_number(const ConfigNode& node, const std::string& unit) {
   };
   if (node.kind != ConfigNode::Kind::kScalar) return no_number();
   if (node.quoted) return wrong(describe(node) + " is text; write the number without quotes");
+
   std::string_view text = node.scalar;
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   ParsedNumber parsed;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), parsed.value);
   if (code != std::errc() || !std::isfinite(parsed.value)) return no_number();
+
   text.remove_prefix(static_cast<std::size_t>(end - text.data()));
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
   if (text.empty() || text == unit) return parsed;
+
   const Unit* from = find_unit(text);
   const Unit* to = find_unit(unit);
   if (from == nullptr || to == nullptr || from->quantity != to->quantity) {
     return wrong(fmt::format("{}: the unit '{}' does not fit (allowed: {})", describe(node), text,
                              unit.empty() ? "a number without unit" : allowed_units(unit)));
   }
+
   parsed.value = parsed.value * (from->numerator * to->denominator) / (from->denominator * to->numerator);
   return parsed;
 }

@@ -214,6 +214,7 @@ void check_characters(const std::string& text, const std::string& file) {
   int line = 1;
   int column = 1;
   int open = 0;  // brackets, those in comments and quotes as well
+
   for (const char c : text) {
     open += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
     if (column > kMaxColumns || open > kMaxOpenBrackets) {
@@ -222,17 +223,20 @@ void check_characters(const std::string& text, const std::string& file) {
                      column > kMaxColumns ? fmt::format("the line is over {} characters long", kMaxColumns)
                                           : fmt::format("over {} brackets are open here", kMaxOpenBrackets)}};
     }
+
     const auto byte = static_cast<unsigned char>(c);
     if (c == '\n') {
       ++line;
       column = 1;
       continue;
     }
+
     if (byte < 0x20 && c != '\t' && c != '\r') {
       throw Refused{{{file, line, column},
                      "",
                      fmt::format("control character 0x{:02x}; this is not a text file", byte)}};
     }
+
     ++column;
   }
 }
@@ -257,12 +261,14 @@ std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string&
     if (text.size() > kMaxBytes) {
       throw Refused{{{file_name, 0, 0}, "", "the file is over 1 MB; this is no configuration file"}};
     }
+
     check_characters(text, file_name);
     std::istringstream stream(text);
     YAML::Parser parser(stream);
     TreeBuilder builder(file_name, problems);
     while (parser.HandleNextDocument(builder)) {
     }
+
     ConfigNode root = builder.take_root();
     if (root.mark.file.empty()) root.mark.file = file_name;  // an empty document has no place of its own
     return root;
@@ -273,6 +279,7 @@ std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string&
     if (!e.mark.is_null()) mark = {file_name, e.mark.line + 1, e.mark.column + 1};
     problems.push_back({mark, "", "not valid YAML: " + e.msg});
   }
+
   return std::nullopt;
 }
 

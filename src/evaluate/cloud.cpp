@@ -61,18 +61,21 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
       report.warnings.push_back(fmt::format("{}: so large that it is sampled every {:.1f} mm only",
                                             reference.name, 1000.0 * coarsest));
     }
+
     truth.counted = sample_mesh(reference.mesh, std::max(options.mesh_spacing_m, coarsest));
     if (truth.counted.points.empty()) {
       return core::input_error(fmt::format("{}: the mesh has no area", reference.name));
     }
   } else {
     truth.index = std::make_unique<PointIndex>(reference.samples.points);
+
     const Density density = evaluate::density(*truth.index, executor);
     Points normals = known_normals(reference.samples.normals, *truth.index, executor);
     truth.surface =
         std::make_unique<SampledSurface>(*truth.index, normals, density.cell_m(), options.distance);
     truth.counted = {reference.samples.points, std::move(normals), reference.samples.visible};
   }
+
   if (options.visible_only && !truth.counted.visible.empty()) {
     truth.counted = visible_of(std::move(truth.counted), truth.hidden);
     report.visibility_used = true;
@@ -81,6 +84,7 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
           "{}: no point is marked visible; switch visible_only off to count all", reference.name));
     }
   }
+
   report.reference_points = truth.counted.points.size();
   report.reference_hidden = truth.hidden;
   return truth;
@@ -90,6 +94,7 @@ core::Result<Truth> make_truth(const Reference& reference, const CloudOptions& o
 core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& pairs, CloudReport& report) {
   std::vector<Eigen::Vector3d> source;
   std::vector<Eigen::Vector3d> target;
+
   for (const TrajectoryPair& pair : pairs) {
     TrajectoryOptions options;
     options.align = TrajectoryAlignment::kNone;
@@ -100,11 +105,13 @@ core::Result<Rigid3> start_from_trajectories(const std::vector<TrajectoryPair>& 
       target.push_back(pose.truth.translation);
     }
   }
+
   if (source.empty()) return Rigid3{};
   if (source.size() < 3) {
     return core::input_error(fmt::format(
         "only {} poses match the truth in time; 3 are needed to start the alignment", source.size()));
   }
+
   const Rigid3 start = geometry::align_points(source, target);
   double squares = 0.0;
   for (std::size_t i = 0; i < source.size(); ++i) squares += (start * source[i] - target[i]).squaredNorm();
@@ -120,6 +127,7 @@ core::Result<void> align(SurfaceSamples& cloud, const MeasuredSurface& surface, 
   if (options.align == CloudAlignment::kNone) return {};
   const auto start = start_from_trajectories(trajectories, report);
   if (!start) return tl::unexpected(start.error());
+
   const IcpResult icp =
       align_icp(cloud.points, surface, *start, {options.icp_max_distance_m, options.icp_trim}, executor);
   report.alignment.reference_from_cloud = icp.reference_from_cloud;
@@ -127,6 +135,7 @@ core::Result<void> align(SurfaceSamples& cloud, const MeasuredSurface& surface, 
   report.alignment.icp_rmse_mm = 1000.0 * icp.rmse_m;
   report.alignment.icp_overlap = icp.overlap;
   report.alignment.icp_converged = icp.converged;
+
   if (icp.overlap < 0.3) {
     report.warnings.push_back(fmt::format(
         "alignment: only {:.0f} % of the cloud found a partner within reach; the numbers are not to be "
@@ -139,6 +148,7 @@ core::Result<void> align(SurfaceSamples& cloud, const MeasuredSurface& surface, 
   } else if (!icp.converged) {
     report.warnings.push_back("alignment: ICP was still moving when it reached its last iteration");
   }
+
   move(icp.reference_from_cloud, cloud);
   return {};
 }
@@ -156,6 +166,7 @@ Distances measure(const Points& from, const Points& normals, const std::vector<s
   Distances out;
   out.error_m.resize(from.size());
   out.mm.resize(from.size());
+
   std::vector<float> cosines(normals.empty() ? 0 : from.size(), kNone);
   for_chunks(executor, order.size(), kPointsAtOnce, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
@@ -168,11 +179,13 @@ Distances measure(const Points& from, const Points& normals, const std::vector<s
       cosines[i] = static_cast<float>(std::min(1.0, std::abs(normals[i].cast<double>().dot(foot.normal))));
     }
   });
+
   for (const float c : cosines) {
     if (std::isnan(c)) continue;
     out.cosines += static_cast<double>(c);
     ++out.cosine_count;
   }
+
   return out;
 }
 
@@ -214,15 +227,18 @@ void compare(const PreparedCloud& cloud, const Truth& truth, const CloudOptions&
 
   const Distances accuracy =
       measure(cloud.samples->points, cloud.samples->normals, index.order(), *truth.surface, executor);
+
   // Both directions count towards consistency, if the cloud has normals of its own.
   const auto order = order_in_space(truth);
   const Distances completeness = measure(truth.counted.points, own_normals ? truth.counted.normals : Points{},
                                          order, cloud_surface, executor);
   add_scores(accuracy.mm, completeness.mm, report);
+
   if (own_normals && accuracy.cosine_count > 0 && completeness.cosine_count > 0) {
     report.normal_consistency = 0.5 * (accuracy.cosines / static_cast<double>(accuracy.cosine_count) +
                                        completeness.cosines / static_cast<double>(completeness.cosine_count));
   }
+
   for (std::size_t i = 0; i < cloud.source.size(); ++i) report.error_m[cloud.source[i]] = accuracy.error_m[i];
   report.reference_samples = truth.counted.points;
   report.reference_normals = truth.counted.normals;
@@ -280,13 +296,16 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
     if (!made) return tl::unexpected(made.error());
     truth = std::move(*made);
   }
+
   std::vector<WallPatch> patches =
       wall_patches(*prepared->samples, prepared->density.spacing_m, options.wall, executor);
   report.wall = thickness_of(patches);
   report.planes = wall_planes(*prepared->samples, std::move(patches), options.wall.patch_m, options.planes);
+
   if (report.wall.patches == 0) {
     report.warnings.push_back("no flat patch was found that is dense enough: wall thickness is not known");
   }
+
   if (!truth) return report;
 
   report.has_reference = true;
@@ -295,6 +314,7 @@ core::Result<CloudReport> evaluate_cloud(const SurfaceSamples& cloud, const Refe
       !ok) {
     return tl::unexpected(ok.error());
   }
+
   if (options.align != CloudAlignment::kNone)
     prepared->index = std::make_unique<PointIndex>(prepared->samples->points);
   compare(*prepared, *truth, options, executor, report);

@@ -82,18 +82,21 @@ std::string to_json(const CloudReport& r) {
     }
     out["normal_consistency"] = r.normal_consistency ? Json(*r.normal_consistency) : Json(nullptr);
   }
+
   out["wall_thickness_mm"] = json_of(r.wall);
   out["planes"] = Json::array();
   for (const WallPlane& plane : r.planes) out["planes"].push_back(json_of(plane));
   out["density"] = {{"points_per_m2", r.density_per_m2}, {"spacing_mm", r.spacing_mm}};
   out["points"] = r.points;
   out["points_not_finite"] = r.not_finite;
+
   if (r.has_reference) {
     out["reference_points"] = r.reference_points;
     out["reference_hidden"] = r.reference_hidden;
     out["visible_only"] = r.visibility_used;
     out["alignment"] = json_of(r.alignment);
   }
+
   out["warnings"] = r.warnings;
   return out.dump(2) + "\n";
 }
@@ -106,27 +109,33 @@ std::string to_text(const CloudReport& r) {
                        r.visibility_used
                            ? fmt::format(" that cameras could see, {} others left out", r.reference_hidden)
                            : "");
+
     if (r.alignment.align == CloudAlignment::kSe3) {
       out +=
           fmt::format("aligned by {}ICP: {} iterations, {:.3f} mm RMS, overlap {:.1f} %\n",
                       r.alignment.trajectory_poses > 0 ? "trajectory and " : "", r.alignment.icp_iterations,
                       r.alignment.icp_rmse_mm, 100.0 * r.alignment.icp_overlap);
     }
+
     out += fmt::format("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "", "mean", "median", "rmse", "p90", "max");
     out += row("accuracy", r.accuracy_mm);
     out += row("completeness", r.completeness_mm);
     out += fmt::format("{:<14} {:>9} {:>9} {:>9}\n", "", "precision", "recall", "F");
+
     for (const ThresholdScore& s : r.at) {
       out += fmt::format("{:<14} {:>9.4f} {:>9.4f} {:>9.4f}\n", fmt::format("at {:g} mm", s.threshold_mm),
                          s.precision, s.recall, s.f);
     }
+
     if (r.normal_consistency) out += fmt::format("normal consistency {:.4f}\n", *r.normal_consistency);
   }
+
   if (r.wall.patches > 0) {
     out += fmt::format(
         "wall thickness {:.2f} mm RMS, median {:.2f}, p90 {:.2f} over {} patches, {:.1f} % doubled\n",
         r.wall.rms_mm, r.wall.median_mm, r.wall.p90_mm, r.wall.patches, r.wall.layered_percent);
   }
+
   out += table_of(r.planes);
   for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
   return out;

@@ -80,12 +80,14 @@ Step solve(const std::vector<Pair>& pairs) {
     hessian += j * j.transpose();
     gradient += j * p.residual;
   }
+
   hessian /= static_cast<double>(pairs.size());
   gradient /= static_cast<double>(pairs.size());
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(hessian);
   Vector6d x = Vector6d::Zero();
   Step step;
   step.determined = true;
+
   for (Eigen::Index k = 0; k < 6; ++k) {
     if (solver.eigenvalues()(k) < kLeastStiffness) {
       step.determined = false;
@@ -94,6 +96,7 @@ Step solve(const std::vector<Pair>& pairs) {
     const Vector6d direction = solver.eigenvectors().col(k);
     x -= direction * (direction.dot(gradient) / solver.eigenvalues()(k));
   }
+
   const Eigen::Matrix3d rotation = geometry::exp_so3(x.tail<3>() / radius);
   step.motion = Rigid3(rotation, center - rotation * center + x.head<3>());
   step.length_m = x.norm();
@@ -116,22 +119,26 @@ IcpResult align_icp(const std::vector<Eigen::Vector3f>& cloud, const MeasuredSur
 
   IcpResult result;
   result.reference_from_cloud = start;
+
   double reach = options.max_distance_m;
   for (; result.iterations < kMostIterations; ++result.iterations) {
     std::vector<Pair> pairs = find_pairs(some, surface, result.reference_from_cloud, reach, executor);
     result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(some.size());
     if (pairs.size() < 6) return result;
+
     keep_nearest(pairs, options.trim);
     result.rmse_m = rms_residual(pairs);
     const Step step = solve(pairs);
     result.reference_from_cloud = step.motion * result.reference_from_cloud;
     result.determined = step.determined;
+
     const double tighter =
         std::clamp(4.0 * pairs[pairs.size() / 2].distance, std::min(kLeastReach, reach), reach);
     result.converged = step.length_m < kStill;
     if (result.converged && tighter > 0.99 * reach) return result;
     reach = tighter;
   }
+
   return result;
 }
 

@@ -34,10 +34,12 @@ Layers split_layers(std::vector<double>& heights) {
   double low_sum = 0.0;
   double best_between = -1.0;
   double best_separation = 0.0;
+
   std::size_t best_split = 0;
   for (std::size_t k = 1; k < heights.size(); ++k) {
     low_sum += heights[k - 1] - mean;
     if (k < least || heights.size() - k < least) continue;
+
     const auto low = static_cast<double>(k);
     const double separation = -low_sum / (n - low) - low_sum / low;
     const double between = low * (n - low) / n * separation * separation;
@@ -47,6 +49,7 @@ Layers split_layers(std::vector<double>& heights) {
       best_split = k;
     }
   }
+
   if (best_split == 0) return {false, std::sqrt(total / n), 0.0, 0.0};  // too few for two
   const double within = std::max(0.0, total - best_between) / n;        // mean square about the layers' means
   const auto split = heights.begin() + static_cast<std::ptrdiff_t>(best_split);
@@ -54,6 +57,7 @@ Layers split_layers(std::vector<double>& heights) {
   if (best_separation > kLeastSeparation && best_separation >= 4.0 * widest) {
     return {true, std::sqrt(within), best_separation, *split};
   }
+
   return {false, std::sqrt(total / n), 0.0, 0.0};
 }
 

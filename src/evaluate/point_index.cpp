@@ -52,10 +52,12 @@ Density density(const PointIndex& index, const core::Executor& executor) {
   constexpr std::size_t kMost = 100000;
   constexpr double kPi = 3.14159265358979323846;
   if (index.size() <= kNeighbors) return {};
+
   const std::size_t stride = (index.size() + kMost - 1) / kMost;
   const std::size_t count = (index.size() + stride - 1) / stride;
   std::vector<double> nearest(count, 0.0);
   std::vector<double> sixteenth(count, 0.0);
+
   for_chunks(executor, count, kChunk, [&](std::size_t first, std::size_t last) {
     std::vector<Neighbor> found;
     for (std::size_t i = first; i < last; ++i) {
@@ -66,6 +68,7 @@ Density density(const PointIndex& index, const core::Executor& executor) {
       sixteenth[i] = found.back().squared_distance;
     }
   });
+
   const auto median_of_positive = [](std::vector<double>& values) {
     values.erase(std::remove(values.begin(), values.end(), 0.0), values.end());
     return summarize(values).median;

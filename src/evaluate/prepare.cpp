@@ -58,21 +58,25 @@ core::Result<void> check(const Reference& reference) {
   const Points& points = mesh.triangles.empty() ? reference.samples.points : mesh.vertices;
   const std::string name = reference.name.empty() ? "the reference" : reference.name;
   if (points.empty()) return core::input_error(fmt::format("{}: no points to measure against", name));
+
   const auto bad = std::count_if(points.begin(), points.end(), [](const auto& p) { return !p.allFinite(); });
   if (bad > 0) {
     return core::input_error(
         fmt::format("{}: {} of {} points have a coordinate that is not finite", name, bad, points.size()));
   }
+
   for (const auto& triangle : mesh.triangles) {
     if (*std::max_element(triangle.begin(), triangle.end()) >= mesh.vertices.size()) {
       return core::input_error(fmt::format("{}: a face has a vertex out of range", name));
     }
   }
+
   const SurfaceSamples& s = reference.samples;
   const bool fits = (s.normals.empty() || s.normals.size() == s.points.size()) &&
                     (s.visible.empty() || s.visible.size() == s.points.size()) &&
                     (mesh.visible.empty() || mesh.visible.size() == mesh.vertices.size());
   if (!fits) return core::input_error(fmt::format("{}: normals or visibility do not match its points", name));
+
   return {};
 }
 
@@ -82,6 +86,7 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
   if (normals && cloud.normals.size() != cloud.points.size()) {
     return core::input_error("the cloud has not as many normals as points");
   }
+
   PreparedCloud out;
   out.samples = std::make_unique<SurfaceSamples>();
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
@@ -90,6 +95,7 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
     if (normals) out.samples->normals.push_back(unit_or_zero(cloud.normals[i]));
     out.source.push_back(static_cast<std::uint32_t>(i));
   }
+
   report.points = out.samples->points.size();
   report.not_finite = cloud.points.size() - report.points;
   if (report.points == 0) {
@@ -97,20 +103,24 @@ core::Result<PreparedCloud> prepare(const SurfaceSamples& cloud, const core::Exe
         cloud.points.empty() ? std::string("the cloud has no points")
                              : fmt::format("none of the cloud's {} points is finite", cloud.points.size()));
   }
+
   if (report.not_finite > 0) {
     report.warnings.push_back(fmt::format("{} of {} points of the cloud are not finite and were left out",
                                           report.not_finite, cloud.points.size()));
   }
+
   out.index = std::make_unique<PointIndex>(out.samples->points);
   out.density = density(*out.index, executor);
   report.density_per_m2 = out.density.points_per_m2;
   report.spacing_mm = 1000.0 * out.density.spacing_m;
+
   auto& own = out.samples->normals;
   const bool any = std::any_of(own.begin(), own.end(), [](const Eigen::Vector3f& n) { return !n.isZero(); });
   if (any && !plausible(own, *out.index)) {
     report.warnings.push_back("the cloud's normals do not fit its points and were not used");
     own.clear();
   }
+
   if (!any) own.clear();
   return out;
 }

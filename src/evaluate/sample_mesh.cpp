@@ -13,6 +13,7 @@ SurfaceSamples sample_mesh(const TriangleMesh& mesh, double spacing_m) {
   SurfaceSamples samples;
   double due = 0.5;  // samples owed by the area passed so far, so that small triangles get their share
   double u = 0.5;
+
   double v = 0.5;
   for (const auto& triangle : mesh.triangles) {
     const Eigen::Vector3d a = mesh.vertices[triangle[0]].cast<double>();
@@ -20,6 +21,7 @@ SurfaceSamples sample_mesh(const TriangleMesh& mesh, double spacing_m) {
     const Eigen::Vector3d ac = mesh.vertices[triangle[2]].cast<double>() - a;
     const Eigen::Vector3d cross = ab.cross(ac);
     due += 0.5 * cross.norm() / (spacing_m * spacing_m);
+
     for (; due >= 1.0; due -= 1.0) {
       u = u + kStepU - std::floor(u + kStepU);
       v = v + kStepV - std::floor(v + kStepV);
@@ -29,10 +31,12 @@ SurfaceSamples sample_mesh(const TriangleMesh& mesh, double spacing_m) {
       samples.points.emplace_back((a + s * ab + t * ac).cast<float>());
       samples.normals.emplace_back(cross.normalized().cast<float>());
       if (mesh.visible.empty()) continue;
+
       const std::size_t corner = 1.0 - s - t >= std::max(s, t) ? 0 : (s >= t ? 1 : 2);
       samples.visible.push_back(mesh.visible[triangle[corner]]);
     }
   }
+
   return samples;
 }
 

@@ -10,12 +10,14 @@ Statistics summarize(const std::vector<double>& values) {
   Statistics s;
   s.count = values.size();
   if (values.empty()) return s;
+
   const auto n = static_cast<double>(values.size());
   double sum = 0.0;
   for (const double e : values) {
     sum += e;
     s.sse += e * e;
   }
+
   s.mean = sum / n;
   s.rmse = std::sqrt(s.sse / n);
   double squares = 0.0;  // two passes: exact zero for equal values
@@ -27,6 +29,7 @@ Statistics summarize(const std::vector<double>& values) {
     std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(rank), order.end());
     return order[rank];
   };
+
   s.median = at(order.size() / 2);
   s.p90 = at((9 * order.size() + 9) / 10 - 1);
   const auto [least, most] = std::minmax_element(values.begin(), values.end());

@@ -73,6 +73,7 @@ bool is_ply(const std::filesystem::path& file) {
 core::Result<Reference> load_reference(const std::filesystem::path& file) {
   Reference reference;
   reference.name = file.string();
+
   if (!is_ply(file)) {
     auto samples = load_cloud(file);
     if (!samples) return tl::unexpected(samples.error());
@@ -80,18 +81,22 @@ core::Result<Reference> load_reference(const std::filesystem::path& file) {
     reference.samples = std::move(*samples);
     return reference;
   }
+
   const auto ply = cloud::read_ply(file);
   if (!ply) return tl::unexpected(ply.error());
   if (ply->vertex_count == 0)
     return core::input_error(fmt::format("{}: the reference has no points", file.string()));
+
   Points points = vectors(*ply, "x", "y", "z");
   if (points.empty())
     return core::input_error(fmt::format("{}: has no properties x, y and z", file.string()));
   if (const auto ok = check_reference(file, points); !ok) return tl::unexpected(ok.error());
+
   if (!ply->triangles.empty()) {
     reference.mesh = {std::move(points), ply->triangles, visibility(*ply)};
     return reference;
   }
+
   reference.samples = {std::move(points), vectors(*ply, "nx", "ny", "nz"), visibility(*ply)};
   tidy_normals(reference.samples.normals);
   return reference;

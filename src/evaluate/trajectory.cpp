@@ -81,6 +81,7 @@ Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt
     std::size_t end = i + 1;
     while (end < estimate.size() && estimate[end].stamp == estimate[i].stamp) ++end;
     const auto [first, there] = truth_at(truth, estimate[i].stamp);
+
     if (end - i > 1 || there > 1) {
       if (there != end - i) matches.ambiguous += end - i;
       for (std::size_t k = i; k < end && there == end - i; ++k) {
@@ -91,8 +92,10 @@ Matches match(const Trajectory& estimate, const Trajectory& truth, double max_dt
     } else if (const auto at = geometry::pose_at(truth, estimate[i].stamp, max_dt_s)) {
       matches.pairs.push_back({estimate[i].stamp, estimate[i].world_from_camera, *at});
     }
+
     i = end;
   }
+
   return matches;
 }
 
@@ -263,16 +266,19 @@ void add_warnings(const std::vector<Match>& matches, TrajectoryReport& report) {
         "the matched positions lie on one line or at one place: the alignment's rotation is not determined, "
         "and ATE says little");
   }
+
   if (2 * report.matched < report.estimated) {
     report.warnings.push_back(
         fmt::format("only {} of {} poses have truth at their stamp", report.matched, report.estimated));
   }
+
   if (report.tracked_percent && *report.tracked_percent < 90.0) {
     report.warnings.push_back(
         fmt::format("only {:.1f} % of the frames have a pose: the errors are those of the "
                     "frames that were tracked",
                     *report.tracked_percent));
   }
+
   if (report.rpe_second.pairs == 0) {
     report.warnings.push_back(
         fmt::format("no two matched poses are {} s apart: RPE over time is left out", report.rpe_seconds));
@@ -324,14 +330,17 @@ core::Result<TrajectoryReport> evaluate_trajectory(const Trajectory& estimate, c
   report.matched = matches.size();
   report.truth = std::move(*sorted_truth);
   report.truth_from_estimate = alignment(matches, options.align);
+
   for (const Match& m : matches) report.poses.push_back(pose_error(m, report.truth_from_estimate));
   for (std::size_t i = 0; i + 1 < matches.size(); ++i) {
     report.path_m += (matches[i + 1].truth.translation - matches[i].truth.translation).norm();
   }
+
   report.duration_s = matches.back().stamp - matches.front().stamp;
   add_absolute_errors(report);
   const std::vector<long long> frame_keys = sorted_keys(frame_stamps);
   add_tracked_share(*sorted_estimate, frame_keys, report);
+
   report.rpe_frame = relative_error(
       report.poses, frame_pairs(report.poses, frame_keys, static_cast<std::size_t>(options.rpe_frames)));
   report.rpe_second =

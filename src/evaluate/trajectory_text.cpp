@@ -50,10 +50,12 @@ Json json_of(const TrajectoryReport& r) {
     per_axis[names[k]] = json_of(r.axis_m[k]);
     per_axis[names[k]]["bias"] = r.axis_bias_m[k];
   }
+
   Json per_frame = json_of(r.rpe_frame);
   per_frame["frames"] = r.rpe_frames;
   Json per_second = json_of(r.rpe_second);
   per_second["seconds"] = r.rpe_seconds;
+
   Json out;
   out["ate_m"] = json_of(r.ate_m);
   out["rotation_deg"] = json_of(r.rotation_deg);
@@ -61,6 +63,7 @@ Json json_of(const TrajectoryReport& r) {
   out["rpe"] = {{"per_frame", per_frame}, {"per_second", per_second}};
   out["poses"] = r.estimated;
   out["matched"] = r.matched;
+
   if (r.frames) out["frames"] = *r.frames;
   out["tracked_percent"] = r.tracked_percent ? Json(*r.tracked_percent) : Json(nullptr);
   out["first_pose_s"] = r.first_pose_s ? Json(*r.first_pose_s) : Json(nullptr);
@@ -79,6 +82,7 @@ core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path&
   if (!in) return core::input_error(fmt::format("{}: cannot be read", list.string()));
   std::vector<double> stamps;
   std::string line;
+
   for (int number = 1; std::getline(in, line); ++number) {
     std::istringstream fields(line);
     std::string first;
@@ -90,6 +94,7 @@ core::Result<std::vector<double>> read_frame_stamps(const std::filesystem::path&
     }
     stamps.push_back(*stamp);
   }
+
   if (stamps.empty()) return core::input_error(fmt::format("{}: lists no frames", list.string()));
   std::sort(stamps.begin(), stamps.end());
   return stamps;
@@ -130,6 +135,7 @@ std::string to_text(const TrajectoryReport& r) {
                                 r.matched, r.estimated, name_of(r.align), r.path_m, r.duration_s);
   if (r.tracked_percent) out += fmt::format("tracked {:.2f} % of {} frames\n", *r.tracked_percent, *r.frames);
   if (r.first_pose_s) out += fmt::format("first pose after {:.3f} s\n", *r.first_pose_s);
+
   out += fmt::format("{:<22} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}\n", "", "rmse", "mean", "median",
                      "min", "max", "std");
   out += row("ATE", r.ate_m, "m");
@@ -137,16 +143,19 @@ std::string to_text(const TrajectoryReport& r) {
   out += row("  along y", r.axis_m[1], "m");
   out += row("  along z", r.axis_m[2], "m");
   out += row("orientation", r.rotation_deg, "deg");
+
   const std::string frames = r.rpe_frames == 1 ? "frame" : fmt::format("{} frames", r.rpe_frames);
   const std::string seconds = r.rpe_seconds == 1.0 ? "second" : fmt::format("{} s", r.rpe_seconds);
   if (r.rpe_frame.pairs > 0) {
     out += row("RPE per " + frames, r.rpe_frame.translation_m, "m");
     out += row("", r.rpe_frame.rotation_deg, "deg");
   }
+
   if (r.rpe_second.pairs > 0) {
     out += row("RPE per " + seconds, r.rpe_second.translation_m, "m");
     out += row("", r.rpe_second.rotation_deg, "deg");
   }
+
   out += fmt::format("SSE {:.6f} m^2\n", r.ate_m.sse);
   for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
   return out;

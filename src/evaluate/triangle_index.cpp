@@ -76,6 +76,7 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
     MeshPoint best;
   } search{*this, q, 1e-6 * (1.0 + q.cwiseAbs().maxCoeff()), {}};
   search.best.squared_distance = std::numeric_limits<double>::infinity();
+
   const auto visit = [](RTCPointQueryFunctionArguments* found) {
     auto& s = *static_cast<Search*>(found->userPtr);
     const MeshPoint p = s.index.on(found->primID, s.q);
@@ -86,6 +87,7 @@ MeshPoint TriangleIndex::nearest(const Eigen::Vector3d& q) const {
     found->query->radius = static_cast<float>(std::sqrt(p.squared_distance) + s.slack);
     return true;
   };
+
   RTCPointQuery query{static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()), 0.0F,
                       std::numeric_limits<float>::infinity()};
   RTCPointQueryContext context;

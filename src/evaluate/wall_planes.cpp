@@ -54,20 +54,24 @@ SharedPlane fitted(const Patches& patches, const PatchIndices& own, const Shared
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const std::size_t i : own) mean += patches[i].center;
   mean /= static_cast<double>(own.size());
+
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::size_t i : own) {
     const Eigen::Vector3d d = patches[i].center - mean;
     scatter += d * d.transpose();
   }
+
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
   // Patches in a row say nothing about the rotation around it: their own normals do.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+
   if (solver.eigenvalues()[1] > 1e-2 * solver.eigenvalues()[2]) {
     normal = solver.eigenvectors().col(0);
   } else {
     for (const std::size_t i : own) normal += patches[i].normal;
     normal.normalize();
   }
+
   if (normal.dot(before.normal) < 0.0) normal = -normal;
   return {normal, normal.dot(mean)};
 }
@@ -78,6 +82,7 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
   result.normal = plane.normal;
   result.offset_m = plane.offset_m;
   result.thickness = thickness_of(own);
+
   // A grid of voxels cuts a plane into more pieces when it lies askew.
   result.area_m2 = static_cast<double>(own.size()) * patch_m * patch_m / plane.normal.lpNorm<1>();
   double sum = 0.0;
@@ -85,8 +90,10 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
     const double h = plane.normal.dot(patch.center) - plane.offset_m;
     sum += h * h;
   }
+
   result.straightness_mm = 1000.0 * std::sqrt(sum / static_cast<double>(own.size()));
   sum = 0.0;
+
   const Eigen::Vector3f facing = plane.normal.cast<float>();
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     const double h = plane.normal.dot(cloud.points[i].cast<double>()) - plane.offset_m;
@@ -95,6 +102,7 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
     sum += h * h;
     ++result.points;
   }
+
   if (result.points > 0) result.slab_rms_mm = 1000.0 * std::sqrt(sum / static_cast<double>(result.points));
   return result;
 }
@@ -120,6 +128,7 @@ std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<Wall
       if (settled) break;
     }
     if (own.size() < kFewestPatches) break;
+
     Patches of_plane;
     Patches rest;
     std::size_t next = 0;
@@ -128,9 +137,11 @@ std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<Wall
       next += is_own ? 1 : 0;
       (is_own ? of_plane : rest).push_back(patches[i]);
     }
+
     planes.push_back(measured(cloud, of_plane, plane, patch_m, options.slab_m));
     patches = std::move(rest);
   }
+
   std::stable_sort(planes.begin(), planes.end(),
                    [](const WallPlane& a, const WallPlane& b) { return a.area_m2 > b.area_m2; });
   return planes;

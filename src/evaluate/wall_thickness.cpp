@@ -46,6 +46,7 @@ LocalPlane fitted(const Points& points, const PointIndices& some, const LocalPla
   for (const std::uint32_t i : some) heights.push_back(before.height(points[i]));
   const Layers layers = split_layers(heights);
   const double border = layers.two ? layers.border : std::numeric_limits<double>::infinity();
+
   std::array<Eigen::Vector3d, 2> mean = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   std::array<double, 2> count = {0.0, 0.0};
   const auto layer = [&](std::uint32_t i) { return before.height(points[i]) < border ? std::size_t{0} : 1; };
@@ -53,12 +54,14 @@ LocalPlane fitted(const Points& points, const PointIndices& some, const LocalPla
     mean[layer(i)] += points[i].cast<double>();
     count[layer(i)] += 1.0;
   }
+
   for (std::size_t k = 0; k < 2; ++k) mean[k] /= std::max(count[k], 1.0);
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::uint32_t i : some) {
     const Eigen::Vector3d d = points[i].cast<double>() - mean[layer(i)];
     scatter += d * d.transpose();
   }
+
   Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0);
   if (normal.dot(before.normal) < 0.0) normal = -normal;
   return {normal, count[0] > count[1] ? mean[0] : mean[1]};
@@ -79,6 +82,7 @@ std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& v
   PointIndices some;
   const std::size_t stride = (voxel.size() + 399) / 400;
   for (std::size_t i = 0; i < voxel.size(); i += stride) some.push_back(voxel[i]);
+
   double best_cost = static_cast<double>(some.size()) * flatness_m * flatness_m;
   std::optional<LocalPlane> best;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -88,17 +92,20 @@ std::optional<LocalPlane> main_plane(const Points& points, const PointIndices& v
     const Eigen::Vector3d normal = (b - a).cross(c - a);
     const double area = normal.norm();
     if (area < flatness_m * flatness_m) continue;  // too small a triangle to hold a plane
+
     const LocalPlane plane{normal / area, a};
     double cost = 0.0;
     for (const std::uint32_t i : some) {
       const double h = plane.height(points[i]);
       cost += std::min(h * h, flatness_m * flatness_m);
     }
+
     if (cost < best_cost) {
       best_cost = cost;
       best = plane;
     }
   }
+
   return best;
 }
 

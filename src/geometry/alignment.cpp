@@ -10,6 +10,7 @@ namespace plumbline::geometry {
 Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vector<Eigen::Vector3d>& target) {
   if (source.size() != target.size()) throw std::invalid_argument("align_points: sizes differ");
   if (source.empty()) return {};
+
   const auto n = static_cast<Eigen::Index>(source.size());
   Eigen::Matrix3Xd a(3, n);
   Eigen::Matrix3Xd b(3, n);
@@ -17,9 +18,11 @@ Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vecto
     a.col(i) = source[static_cast<std::size_t>(i)];
     b.col(i) = target[static_cast<std::size_t>(i)];
   }
+
   if (n < 3) return {Eigen::Matrix3d::Identity(), (b.rowwise().mean() - a.rowwise().mean()).eval()};
   const Eigen::Vector3d a_mean = a.rowwise().mean();
   const Eigen::Vector3d b_mean = b.rowwise().mean();
+
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd((b.colwise() - b_mean) * (a.colwise() - a_mean).transpose(),
                                               Eigen::ComputeFullU | Eigen::ComputeFullV);
   if (svd.singularValues()(1) <= 1e-9 * svd.singularValues()(0)) {
@@ -30,6 +33,7 @@ Rigid3 align_points(const std::vector<Eigen::Vector3d>& source, const std::vecto
     }
     return {r, b_mean - r * a_mean};
   }
+
   const Eigen::Matrix4d t = Eigen::umeyama(a, b, false);
   return {t.topLeftCorner<3, 3>(), t.topRightCorner<3, 1>()};
 }

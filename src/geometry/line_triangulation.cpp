@@ -68,11 +68,13 @@ bool residuals_of(const LineView& view, const OrthonormalLine& line, Eigen::Vect
   const Eigen::Vector3d l = r * n + tr * v;
   const double norm_sq = l.head<2>().squaredNorm();
   if (!(norm_sq > 1e-16)) return false;
+
   Eigen::Matrix<double, 3, 6> dl;
   dl << r, tr;
   const Eigen::Matrix<double, 3, 4> dl_dp = dl * orthonormal_jacobian(line);
   const double w = 1.0 / (std::sqrt(norm_sq) * view.sigma);
   const Eigen::Vector3d ends[2] = {view.start.homogeneous(), view.end.homogeneous()};
+
   for (int i = 0; i < 2; ++i) {
     const double dot = ends[i].dot(l);
     residual(i) = w * dot;
@@ -80,6 +82,7 @@ bool residuals_of(const LineView& view, const OrthonormalLine& line, Eigen::Vect
     by_l.head<2>() -= (w * dot / norm_sq) * l.head<2>().transpose();
     jacobian.row(i) = by_l * dl_dp;
   }
+
   return true;
 }
 
@@ -190,6 +193,7 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
     result.status = status;
     return result;
   };
+
   const auto planes = interpretation_planes(views);
   if (!planes) return refused(Status::kDegenerate);
   result.angle_rad = largest_angle(*planes);
@@ -208,20 +212,24 @@ TriangulatedLine triangulate_local(const std::vector<LineView>& views,
   for (const double z : {start_depth, end_depth}) {
     if (!(z >= options.min_depth_m && z <= options.max_depth_m)) return refused(Status::kOutOfRange);
   }
+
   result.start = on_line(result.line, first, first.start);
   result.end = on_line(result.line, first, first.end);
   result.start_sigma = depth_sigma(fit, first, first.start);
   result.end_sigma = depth_sigma(fit, first, first.end);
+
   if (!(result.start_sigma <= options.max_relative_sigma * start_depth) ||
       !(result.end_sigma <= options.max_relative_sigma * end_depth)) {
     return refused(Status::kUncertain);
   }
+
   for (const LineView& view : views) {
     bool in_front = false;
     if (overlaps(view, result.start, result.end, options.min_depth_m, options.min_overlap, in_front))
       continue;
     return refused(in_front ? Status::kInconsistent : Status::kOutOfRange);
   }
+
   if (result.line.v.dot(result.end - result.start) < 0.0) result.line = {-result.line.n, -result.line.v};
   result.status = Status::kOk;
   return result;

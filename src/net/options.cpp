@@ -86,6 +86,7 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
                                          options.interface,
                                          there.empty() ? "none" : fmt::format("{}", fmt::join(there, ", "))));
   }
+
   if (!made_of(options.interface, "._-@")) {
     return core::usage_error(fmt::format("--interface: '{}' cannot be used", options.interface));
   }
@@ -98,9 +99,11 @@ core::Result<NetworkOptions> checked(NetworkOptions options, bool hub) {
     }
     if (tcp && peer.find(':') == std::string::npos) peer += fmt::format(":{}", options.port);
   }
+
   if (tcp && !hub && options.peers.empty()) {
     return core::usage_error("--transport tcp: name the hub with --peers HOST[:PORT]");
   }
+
   return options;
 }
 

@@ -139,11 +139,13 @@ BundleSummary adjust(BundleProblem& problem, const BundleOptions& options, const
     summary.message = "no pose is fixed: the solution would float";
     return summary;
   }
+
   BundleState state = state_of(problem);
   if (options.first_gate > 0.0) {
     const double gate = options.first_gate * options.first_gate;
     summary.before = mark_outliers(problem, state, options, gate, gate, kLeastFirstGate_px);
   }
+
   for (int round = 0; round < options.rounds; ++round) {
     const RoundSummary done = solve_round(problem, options, state);
     if (round == 0) summary.initial_cost = done.initial_cost;
@@ -153,6 +155,7 @@ BundleSummary adjust(BundleProblem& problem, const BundleOptions& options, const
     summary.iterations += done.iterations;
     summary.after = mark_outliers(problem, state, options, options.point_gate, options.line_gate, 0.0);
   }
+
   write_back(state, problem);
   summary.usable = true;
   for (const auto& o : problem.point_observations) summary.point_outliers += o.outlier ? 1 : 0;

@@ -21,6 +21,7 @@ double BundleRound::cost(const BundleState& state) {
       const int rows = point_residual(point_terms_[i], pose, problem_.camera, r, nullptr);
       sum += Huber{options_.point_loss}.cost(rows == 0 ? kBehind : r.squaredNorm());
     }
+
     for (std::size_t i = equations_.lines.slot_begin[slot]; i < equations_.lines.slot_begin[slot + 1]; ++i) {
       const Eigen::Vector4d r =
           line_rows(line_views_[i], projection_, pose,
@@ -28,11 +29,13 @@ double BundleRound::cost(const BundleState& state) {
       sum += Huber{options_.line_loss}.cost(r.squaredNorm());
     }
   }
+
   for (const RoundEdge& edge : equations_.edges) {
     const Rigid3 a = edge.a < 0 ? Rigid3() : state.poses[at(slots_.pose[at(edge.a)])];
     const double e = edge_rows(edge.view, a, state.poses[at(slots_.pose[at(edge.b)])], nullptr).squaredNorm();
     sum += edge.robust ? Huber{options_.edge_loss}.cost(e) : 0.5 * e;
   }
+
   return sum;
 }
 
@@ -41,6 +44,7 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
   Matrix6d normal = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   double sum = 0.0;
+
   for (std::size_t i = equations_.points.slot_begin[slot]; i < equations_.points.slot_begin[slot + 1]; ++i) {
     point_terms_[i].world = state.points[at(equations_.points.observations[i].landmark)];
     Eigen::Vector3d r;
@@ -52,11 +56,13 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
       equations_.points.gradients[i].setZero();
       continue;
     }
+
     const double squared = r.squaredNorm();
     const double weight = Huber{options_.point_loss}.weight(squared);
     sum += Huber{options_.point_loss}.cost(squared);
     Matrix6d h;
     h.noalias() = weight * (j.transpose() * j);
+
     Vector6d g;
     g.noalias() = weight * (j.transpose() * r);
     normal += h;
@@ -66,12 +72,14 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
         pose.rotation.transpose() * equations_.points.cross[i].topRows<3>();
     equations_.points.gradients[i].noalias() = pose.rotation.transpose() * g.head<3>();
   }
+
   LineDerivatives j;
   for (std::size_t i = equations_.lines.slot_begin[slot]; i < equations_.lines.slot_begin[slot + 1]; ++i) {
     const Eigen::Vector4d r = line_rows(line_views_[i], projection_, pose,
                                         state.lines[at(equations_.lines.observations[i].landmark)], &j);
     const double squared = r.squaredNorm();
     const double weight = Huber{options_.line_loss}.weight(squared);
+
     sum += Huber{options_.line_loss}.cost(squared);
     normal.noalias() += weight * (j.by_pose.transpose() * j.by_pose);
     gradient.noalias() += weight * (j.by_pose.transpose() * r);
@@ -79,10 +87,12 @@ double BundleRound::linearise_slot(std::size_t slot, const BundleState& state) {
     equations_.lines.square[i].noalias() = weight * (j.by_line.transpose() * j.by_line);
     equations_.lines.gradients[i].noalias() = weight * (j.by_line.transpose() * r);
   }
+
   if (slot < at(slots_.free)) {
     equations_.hessian[slot] = normal;
     equations_.gradient[slot] = gradient;
   }
+
   return sum;
 }
 

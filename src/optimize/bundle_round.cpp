@@ -66,11 +66,13 @@ void BundleRound::add_observations() {
     });
   };
   by_slot(used.points, problem_.point_observations);
+
   for (const int i : used.points) {
     const BundlePointObservation& o = problem_.point_observations[at(i)];
     equations_.points.observations.push_back({slots_.of_pose[at(o.pose)], o.point});
     point_terms_.push_back(to_term(o));
   }
+
   equations_.points.prepare(slots_.pose.size(), problem_.points.size());
   by_slot(used.lines, problem_.line_observations);
   for (const int i : used.lines) {
@@ -78,6 +80,7 @@ void BundleRound::add_observations() {
     equations_.lines.observations.push_back({slots_.of_pose[at(o.pose)], o.line});
     line_views_.emplace_back(o, problem_.camera);
   }
+
   equations_.lines.prepare(slots_.pose.size(), problem_.lines.size());
 }
 

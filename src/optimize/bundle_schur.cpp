@@ -59,6 +59,7 @@ void SchurComplement::assemble(NormalEquations& equations, double radius) {
   equations.points.invert(radius);
   equations.lines.invert(radius);
   matrix_.setZero();
+
   for (std::size_t slot = 0; slot < at(free_); ++slot) {
     const auto begin = static_cast<Eigen::Index>(6 * slot);
     matrix_.block<6, 6>(begin, begin) = equations.hessian[slot];
@@ -67,6 +68,7 @@ void SchurComplement::assemble(NormalEquations& equations, double radius) {
     eliminate(equations.points, slot);
     eliminate(equations.lines, slot);
   }
+
   for (const RoundEdge& edge : equations.edges) {
     if (edge.a < 0 || edge.a >= free_ || edge.b >= free_ || edge.a == edge.b) continue;
     const Matrix6d cross = edge.j.by_a.transpose() * edge.j.by_b;

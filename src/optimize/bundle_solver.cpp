@@ -89,6 +89,7 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
   constexpr double kLeastGain = 1e-3;  // share of what was promised that a step must bring
   if (equations_.largest_gradient() <= kGradientTolerance) return "the gradient is zero";
   if (region.exhausted()) return "no step lowers the cost";
+
   ++summary.iterations;
   const double now = summary.final_cost;
   const double promised = reduced_.solve(equations_, region.radius()) ? model_decrease(region.radius()) : 0.0;
@@ -98,6 +99,7 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
     then = cost(next);
     if (tiny_step(state)) return "the step is zero";
   }
+
   const bool settled = std::abs(now - then) <= options_.tolerance * now;
   const double gain = promised > 0.0 ? (now - then) / promised : -1.0;
   if (gain > kLeastGain) {
@@ -105,12 +107,14 @@ const char* BundleRound::iterate(TrustRegion& region, BundleState& state, Bundle
     summary.final_cost = settled ? then : linearise(state);
   }
   if (settled) return "the cost falls no more";
+
   if (gain > kLeastGain) {
     equations_.set_damping();
     region.accept(gain);
   } else {
     region.reject();
   }
+
   return nullptr;
 }
 

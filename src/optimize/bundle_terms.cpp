@@ -85,17 +85,21 @@ Eigen::Vector4d line_rows(const LineView& seen, const Eigen::Matrix3d& projectio
   const double norm_sq = l.x() * l.x() + l.y() * l.y();
   if (line.n.squaredNorm() > 1e-10 && norm_sq > 1e-6)
     image_rows(seen, projection, l, norm_sq, residual, by_line);
+
   if (seen.has_depth) {
     depth_row(seen, line, seen.start_camera, seen.start_weight, 2, residual, by_line);
     depth_row(seen, line, seen.end_camera, seen.end_weight, 3, residual, by_line);
   }
+
   if (derivatives == nullptr) return residual;
   const auto by_n = by_line.leftCols<3>();
   const auto by_v = by_line.rightCols<3>();
+
   // n_c and v_c by (rho, phi): [-[v]x, -[n]x; 0, -[v]x].
   const Eigen::Matrix3d v = geometry::skew(line.v);
   derivatives->by_pose.leftCols<3>().noalias() = -(by_n * v);
   derivatives->by_pose.rightCols<3>().noalias() = -(by_n * geometry::skew(line.n)) - by_v * v;
+
   Rows46 by_world;  // n_c = R n_w + [t]x R v_w, v_c = R v_w
   by_world.leftCols<3>().noalias() = by_n * camera_from_world.rotation;
   by_world.rightCols<3>().noalias() =

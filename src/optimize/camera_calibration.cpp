@@ -94,6 +94,7 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
     const double* change = parameters[0];
     const RowPoint row(*pose_, share_, change, parameters[1], parameters[2]);
     if (row.p.z() < 0.05) return false;
+
     const double x = row.p.x() / row.p.z();
     const double y = row.p.y() / row.p.z();
     const double r2 = x * x + y * y;
@@ -103,6 +104,7 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
     const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k[4]));
     const Eigen::Vector2d distorted(x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
                                     y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y);
+
     const sensor::Pinhole& c = camera_->color;
     const Eigen::Vector2d focal = Eigen::Vector2d(c.fx, c.fy) * (1.0 + change[kFocal]);
     const Eigen::Vector2d centre(c.cx + change[kCentreX], c.cy + change[kCentreY]);
@@ -119,6 +121,7 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
         radial + 2.0 * y * y * by_r2 + 6.0 * k[2] * y + 2.0 * k[3] * x;
     Eigen::Matrix<double, 2, 3> ray_by_p;
     ray_by_p << 1.0, 0.0, -x, 0.0, 1.0, -y;
+
     const Eigen::Matrix<double, 2, 3> by_p = -weight / row.p.z() * focal.asDiagonal() * by_ray * ray_by_p;
     Eigen::Matrix<double, 2, kCameraUnknowns> by_camera = Eigen::Matrix<double, 2, kCameraUnknowns>::Zero();
     by_camera.col(kFocal) = -weight * Eigen::Vector2d(c.fx, c.fy).cwiseProduct(distorted);
@@ -238,32 +241,38 @@ std::optional<CameraEvidence> eliminated(const CalibrationProblem& problem, Came
     if (!problem.poses[i].fixed && ceres_problem.HasParameterBlock(step))
       order.parameter_blocks.push_back(step);
   }
+
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     double* point = unknowns.point(static_cast<int>(i));
     if (ceres_problem.HasParameterBlock(point)) order.parameter_blocks.push_back(point);
   }
+
   CameraEvidence evidence;
   evidence.at = Eigen::Map<const CameraChange>(unknowns.change());
   std::vector<double> gradient;
   ceres::CRSMatrix crs;
   if (!ceres_problem.Evaluate(order, &evidence.cost, nullptr, &gradient, &crs)) return std::nullopt;
+
   const Eigen::SparseMatrix<double> jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(), crs.cols.data(),
       crs.values.data());
   constexpr int kCamera = kCameraUnknowns;
   const int others = crs.num_cols - kCamera;
   const Eigen::SparseMatrix<double> by_others = jacobian.rightCols(others);
+
   const Eigen::MatrixXd by_camera = jacobian.leftCols(kCamera);
   Eigen::SparseMatrix<double> normal = by_others.transpose() * by_others;
   normal.diagonal() *= 1.0 + 1e-9;  // a point may be seen along one ray only
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
   if (factor.info() != Eigen::Success) return std::nullopt;
+
   const Eigen::MatrixXd coupling = by_others.transpose() * by_camera;
   const Eigen::MatrixXd answered = factor.solve(coupling);
   const Eigen::Map<const Eigen::VectorXd> all(gradient.data(), crs.num_cols);
   evidence.information = by_camera.transpose() * by_camera - coupling.transpose() * answered;
   evidence.gradient = all.head<kCamera>() - answered.transpose() * all.tail(others);
   if (!evidence.information.allFinite() || !evidence.gradient.allFinite()) return std::nullopt;
+
   return evidence;
 }
 
@@ -294,17 +303,20 @@ std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const
   CameraUnknowns unknowns(problem, change);
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+
   ceres::HuberLoss pixel_loss(1.0);
   ceres::CauchyLoss depth_loss(1.5);  // corners at the rim of things have the depth of what is behind
   ceres::Problem ceres_problem(options);
   add_observations(problem, unknowns, &pixel_loss, &depth_loss, ceres_problem);
   if (!adjust(problem, unknowns, ceres_problem)) return std::nullopt;
+
   const auto evidence = eliminated(problem, unknowns, ceres_problem);
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     const Eigen::Map<const Eigen::Matrix<double, kStep, 1>> step(unknowns.step(static_cast<int>(i)));
     geometry::Rigid3& pose = problem.poses[i].camera_from_world;
     pose = {geometry::exp_so3(step.head<3>()) * pose.rotation, pose.translation + step.tail<3>()};
   }
+
   for (std::size_t i = 0; i < problem.points.size(); ++i)
     problem.points[i] = Eigen::Map<const Eigen::Vector3d>(unknowns.point(static_cast<int>(i)));
   return evidence;

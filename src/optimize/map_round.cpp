@@ -75,9 +75,11 @@ class MapRound {
     solver.initial_trust_region_radius = options_.first_radius;
     solver.function_tolerance = options_.tolerance;
     solver.parameter_tolerance = 1e-7;
+
     double cost = 0.0;
     if (!ceres_.Evaluate({}, &cost, nullptr, nullptr, nullptr))  // or Ceres would print that it cannot
       return {0.0, 0.0, 0, false, "the cost is not a number: an observation or a pose is none"};
+
     const ceres::Solver::Summary solved = optimize::solve(std::move(solver), ceres_);
     if (!solved.IsSolutionUsable()) return {0.0, 0.0, 0, false, solved.message};
     unknowns_.write_back(problem_, state_);

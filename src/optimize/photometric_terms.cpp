@@ -69,6 +69,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     at.y[i] = point[1];
     at.z[i] = point[2];
   }
+
   for (std::size_t i = count; i % kLanes != 0; ++i) at.x[i] = at.y[i] = at.z[i] = 0.0F;
 
   for (std::size_t i = 0; i < count; i += kLanes) {
@@ -76,6 +77,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     std::memcpy(&x, at.x + i, sizeof x);
     std::memcpy(&y, at.y + i, sizeof y);
     std::memcpy(&z, at.z + i, sizeof z);
+
     const Floats in_x = v.r[0][0] * x + (v.r[0][1] * y + v.r[0][2] * z) + v.t[0];
     const Floats in_y = v.r[1][0] * x + (v.r[1][1] * y + v.r[1][2] * z) + v.t[1];
     const Floats in_z = v.r[2][0] * x + (v.r[2][1] * y + v.r[2][2] * z) + v.t[2];
@@ -84,6 +86,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     const Integers inside = (in_z > kNearest_m) & (u >= 1.0F) & (w >= 1.0F) & (u < v.last_x) & (w < v.last_y);
     u = reinterpret_cast<Floats>(reinterpret_cast<Integers>(u) & inside);
     w = reinterpret_cast<Floats>(reinterpret_cast<Integers>(w) & inside);
+
     const Integers column = __builtin_convertvector(u, Integers), line = __builtin_convertvector(w, Integers);
     const Integers pixel = line * v.row + column, unseen = ~inside & kNan;
     u -= __builtin_convertvector(column, Floats);
@@ -93,6 +96,7 @@ PLUMBLINE_CLONES void look(const PhotometricTerm* terms, std::size_t count, cons
     std::memcpy(at.down + i, &w, sizeof w);
     std::memcpy(seen + i, &unseen, sizeof unseen);
   }
+
   for (std::size_t i = 0; i < count; ++i) {
     const float* top = v.pixels + at.pixel[i];
     const float* low = top + v.row;
@@ -131,21 +135,25 @@ PLUMBLINE_CLONES void sum_block(const PhotometricTerm* terms, const float* seen,
   const Floats in_jacobian{1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 0.0F, 0.0F};
   const Floats is_residual{0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F};
   Floats s0{}, s1{}, s2{}, s3{}, s4{}, s5{}, s6{};  // an array would not stay in registers
+
   float cost = 0.0F;
   for (std::size_t i = 0; i < count; ++i) {
     if (std::isnan(seen[i])) {
       cost += 0.5F;
       continue;
     }
+
     const PhotometricTerm& term = terms[i];
     const float e = (seen[i] - scale.gain * term.value) * term.weight * scale.per_sigma;
     const float size = std::abs(e);
     const bool near = size <= scale.threshold;
     const float w = near ? 1.0F : scale.threshold / size;
     cost += near ? 0.5F * e * e : scale.threshold * (size - 0.5F * scale.threshold);
+
     Floats row;
     std::memcpy(&row, reinterpret_cast<const char*>(&term), sizeof row);
     row = row * (in_jacobian * (scale.gain * term.weight * scale.per_sigma)) + is_residual * e;
+
     const Floats weighted = row * w;
     s0 += weighted[0] * row;
     s1 += weighted[1] * row;
@@ -155,6 +163,7 @@ PLUMBLINE_CLONES void sum_block(const PhotometricTerm* terms, const float* seen,
     s5 += weighted[5] * row;
     s6 += weighted[6] * row;
   }
+
   const Floats s[7] = {s0, s1, s2, s3, s4, s5, s6};
   std::memcpy(sums.s, s, sizeof s);
   sums.cost = cost;
@@ -179,6 +188,7 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
   const Scale scale{static_cast<float>(family.gain), static_cast<float>(1.0 / family.sigma),
                     static_cast<float>(loss)};
   PhotometricSums sums;
+
   for_blocks(family, camera_from_world, [&](std::size_t first, std::size_t count, const float* seen) {
     Sums block;
     sum_block(family.terms.data() + first, seen, count, scale, block);
@@ -188,6 +198,7 @@ PhotometricSums sum_photometric(const PhotometricFamily& family, const Rigid3& c
     }
     sums.cost += static_cast<double>(block.cost);
   });
+
   // T Exp(xi) = Exp(adjoint(T) xi) T: from the right of camera_from_reference to the left.
   const Rigid3 reference_from_camera = family.reference_from_world * camera_from_world.inverse();
   const geometry::Matrix6d carry = geometry::adjoint(reference_from_camera);

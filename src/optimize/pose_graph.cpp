@@ -188,12 +188,14 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
     summary.message = "no pose is fixed: the solution would float";
     return summary;
   }
+
   Solver solver(graph);
   summary.edges.resize(graph.edges.size());
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     summary.edges[i].dimensions = rank_of(graph.edges[i].information);
     summary.initial_cost += 0.5 * solver.chi2(i);
   }
+
   if (robust) {
     if (!Graduated(graph, solver, summary).run()) return summary;
   } else {
@@ -203,6 +205,7 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
     summary.message = solved.message;
     if (!solved.IsSolutionUsable()) return summary;
   }
+
   for (std::size_t i = 0; i < graph.edges.size(); ++i) {
     EdgeVerdict& verdict = summary.edges[i];
     verdict.chi2 = solver.chi2(i);
@@ -210,9 +213,11 @@ PoseGraphSummary solve_pose_graph(PoseGraph& graph, bool robust) {
     summary.rejected += verdict.rejected ? 1 : 0;
     if (!verdict.rejected) summary.final_cost += 0.5 * verdict.chi2;
   }
+
   for (std::size_t i = 0; i < graph.poses.size(); ++i) {
     if (!graph.poses[i].fixed) graph.poses[i].camera_from_world = solver.pose(i);
   }
+
   summary.usable = true;
   return summary;
 }

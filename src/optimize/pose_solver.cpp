@@ -80,13 +80,16 @@ void add_points(const PoseProblem& problem, const Rigid3& pose, const PoseSolver
       cost += options.point_weight * huber(kUnseen * kUnseen, options.point_loss).cost;
       continue;
     }
+
     const Robust pixel = huber(r.head<2>().squaredNorm(), options.point_loss);
     cost += options.point_weight * pixel.cost;
     sums.add(j.row(0), r(0), options.point_weight * pixel.weight);
     sums.add(j.row(1), r(1), options.point_weight * pixel.weight);
     if (rows < 3 || !options.depth_rows) continue;
+
     const Robust depth = huber(r(2) * r(2), options.plane_loss);
     cost += options.point_weight * depth.cost;
+
     // A corner whose image does not fit has no say about depth either.
     sums.add(j.row(2), r(2), options.point_weight * depth.weight * pixel.weight);
   }
@@ -201,16 +204,19 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
   add_prior(problem, pose, n);
   summary.initial_cost = n.cost;
   double lambda = 1e-5;
+
   for (; summary.iterations < options.max_iterations && !summary.converged; ++summary.iterations) {
     Matrix6d damped = n.h.selfadjointView<Eigen::Lower>();
     damped.diagonal() += damping(n.h, lambda);
     const Vector6d step = -damped.ldlt().solve(n.g);
     if (!step.allFinite()) break;
+
     const Rigid3 trial = geometry::exp_se3(step) * pose;
     NormalEquations at_trial = evaluate(problem, trial, options);
     const Matrix6d information = at_trial.h;
     add_prior(problem, trial, at_trial);
     summary.converged = step.cwiseAbs().maxCoeff() < options.min_step;
+
     if (at_trial.cost <= n.cost) {
       pose = trial;
       n = at_trial;
@@ -221,6 +227,7 @@ PoseSummary solve_pose(const PoseProblem& problem, const Rigid3& camera_from_wor
       summary.converged = summary.converged || lambda > 1e6;
     }
   }
+
   summary.information = summary.information.selfadjointView<Eigen::Lower>();
   summary.camera_from_world = pose;
   summary.final_cost = n.cost;

@@ -15,15 +15,18 @@ int point_residual(const PointTerm& term, const geometry::Rigid3& camera_from_wo
                    Eigen::Matrix<double, 3, 6>* jacobian) {
   const Eigen::Vector3d p = camera_from_world * term.world;
   if (p.z() < kMinDepth) return 0;
+
   const double iz = 1.0 / p.z();
   const double x = p.x() * iz;
   const double y = p.y() * iz;
   const double w = 1.0 / term.pixel_sigma;
   residual(0) = w * (term.pixel.x() - (camera.fx * x + camera.cx));
   residual(1) = w * (term.pixel.y() - (camera.fy * y + camera.cy));
+
   const bool has_depth = term.depth > 0.0;
   const double wz = has_depth ? 1.0 / term.depth_sigma : 0.0;
   residual(2) = has_depth ? wz * (term.depth - p.z()) : 0.0;
+
   if (jacobian != nullptr) {
     const double a = w * camera.fx;
     const double b = w * camera.fy;
@@ -31,6 +34,7 @@ int point_residual(const PointTerm& term, const geometry::Rigid3& camera_from_wo
         0.0, -b * iz, b * y * iz, b * (1.0 + y * y), -b * x * y, -b * x,          //
         0.0, 0.0, -wz, -wz * p.y(), wz * p.x(), 0.0;
   }
+
   return has_depth ? 3 : 2;
 }
 
@@ -41,11 +45,13 @@ bool line_residual(const LineTerm& term, const geometry::Rigid3& camera_from_wor
   const Eigen::Vector3d l = projection * line.n;
   const double norm_sq = l.x() * l.x() + l.y() * l.y();
   if (line.n.squaredNorm() < 1e-8 || norm_sq < 1e-6) return false;
+
   const double norm = std::sqrt(norm_sq);
   const double w = 1.0 / (norm * term.pixel_sigma);
   const Eigen::Vector3d s[2] = {term.start.homogeneous(), term.end.homogeneous()};
   Eigen::Matrix<double, 3, 6> dn;
   if (jacobian != nullptr) dn << -geometry::skew(line.v), -geometry::skew(line.n);
+
   for (int i = 0; i < 2; ++i) {
     const double dot = s[i].dot(l);
     residual(i) = w * dot;
@@ -55,6 +61,7 @@ bool line_residual(const LineTerm& term, const geometry::Rigid3& camera_from_wor
     dl.y() -= w * dot * l.y() / norm_sq;
     jacobian->row(i).noalias() = (dl * projection) * dn;
   }
+
   return true;
 }
 

@@ -78,12 +78,15 @@ void Database::divide(Word word) {
   const std::vector<Entry> entries = index_[at(word)];
   std::vector<features::Descriptor256> members;
   members.reserve(entries.size());
+
   for (const Entry& e : entries) members.push_back(descriptor(kind, e));
   const std::vector<Word> words = vocabulary_.divide(word, members);
   if (words.empty()) return;
+
   make_room();
   const double old_weight = weights_[at(word)];
   index_[at(word)] = {};
+
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const auto child = at(words[i]);
     if (index_[child].empty()) {
@@ -115,12 +118,14 @@ Database::Scores Database::query(const FrameFeatures& image) const {
   result.votes_ = result.scores_;
   std::vector<Word> words;
   words.reserve(image.descriptors.size() + image.lines.size());
+
   for (const auto& d : image.descriptors) words.push_back(vocabulary_.word(Kind::kPoint, d));
   for (const auto& l : image.lines) words.push_back(vocabulary_.word(Kind::kLine, l.descriptor));
   std::sort(words.begin(), words.end());
   double mass = 0.0;
   for (const Word w : words) mass += weights_[at(w)];
   if (!(mass > 0.0)) return result;
+
   // s = 1 - 1/2 |a - b|_1 of two vectors of norm 1 without negative entries is the sum of min(a_w, b_w).
   for (auto first = words.begin(); first != words.end();) {
     const auto last = std::upper_bound(first, words.end(), *first);
@@ -129,6 +134,7 @@ Database::Scores Database::query(const FrameFeatures& image) const {
     const std::vector<Entry>& entries = index_[at(*first)];
     first = last;
     if (!(weight > 0.0) || entries.size() > kCommon) continue;
+
     for (std::size_t i = 0; i < entries.size();) {
       const std::int32_t slot = entries[i].slot;
       const std::size_t begin = i;
@@ -138,6 +144,7 @@ Database::Scores Database::query(const FrameFeatures& image) const {
       result.votes_[at(slot)] += 1.0F;
     }
   }
+
   return result;
 }
 
@@ -153,12 +160,15 @@ std::vector<Hit> Database::Scores::best(std::size_t count, const std::function<b
   for (std::size_t i = 0; i < scores_.size(); ++i) {
     if (scores_[i] > 0.0F) slots.push_back(static_cast<std::int32_t>(i));
   }
+
   // `allowed` may be dear: it is asked for the best only, a block at a time.
   const auto better = [&](std::int32_t a, std::int32_t b) {
     return std::make_pair(-ranks[at(a)], a) < std::make_pair(-ranks[at(b)], b);
   };
+
   std::vector<Hit> hits;
   auto sorted = slots.begin();
+
   while (hits.size() < count && sorted != slots.end()) {
     const auto block =
         std::min<std::ptrdiff_t>(slots.end() - sorted, static_cast<std::ptrdiff_t>(2 * count + 16));
@@ -170,6 +180,7 @@ std::vector<Hit> Database::Scores::best(std::size_t count, const std::function<b
       }
     }
   }
+
   std::stable_sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.score > b.score; });
   return hits;
 }

@@ -34,6 +34,7 @@ std::vector<Descriptor256> first_centres(const std::vector<Descriptor256>& descr
     std::uint64_t total = 0;
     for (const int d : nearest) total += static_cast<std::uint64_t>(d) * static_cast<std::uint64_t>(d);
     if (total == 0) break;  // all descriptors are centres
+
     std::uint64_t draw = random.next() % total;
     std::size_t chosen = 0;
     for (; chosen < nearest.size(); ++chosen) {
@@ -41,10 +42,12 @@ std::vector<Descriptor256> first_centres(const std::vector<Descriptor256>& descr
       if (draw < d * d) break;
       draw -= d * d;
     }
+
     centres.push_back(descriptors[chosen]);
     const std::vector<int>& added = distances.from(centres.back());
     for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] = std::min(nearest[i], added[i]);
   }
+
   return centres;
 }
 
@@ -112,6 +115,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
   if (descriptors.empty() || k < 1) return clusters;
   Distances distances(descriptors);
   clusters.centres = first_centres(descriptors, k, seed, distances);
+
   for (int round = 0; round < iterations; ++round) {
     clusters.member_of = assign(clusters.centres, descriptors.size(), distances);
     std::vector<BitCounter> counters(clusters.centres.size());
@@ -123,6 +127,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
     drop_idle(clusters.centres, counters);
     if (clusters.centres == before) break;
   }
+
   // The last assignment may leave a moved centre idle: it goes, and what is left is assigned again.
   for (;;) {
     clusters.member_of = assign(clusters.centres, descriptors.size(), distances);

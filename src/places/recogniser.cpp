@@ -49,6 +49,7 @@ std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits
       known->candidate.group_score += hit.score;
       continue;
     }
+
     Island& island = result.emplace_back();
     island.candidate.keyframe = hit.keyframe;
     island.candidate.score = island.candidate.group_score = hit.score;
@@ -56,9 +57,11 @@ std::vector<Recogniser::Island> Recogniser::islands(const std::vector<Hit>& hits
     island.members.push_back(hit.keyframe);
     std::sort(island.members.begin(), island.members.end());
   }
+
   std::stable_sort(result.begin(), result.end(), [](const Island& a, const Island& b) {
     return a.candidate.group_score > b.candidate.group_score;
   });
+
   if (result.size() > static_cast<std::size_t>(options_.groups))
     result.resize(static_cast<std::size_t>(options_.groups));
   return result;

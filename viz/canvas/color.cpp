@@ -30,6 +30,7 @@ Rgb sequential_color(double s) {
                                               {92, 200, 99},
                                               {170, 220, 50},
                                               {253, 231, 37}}};
+
   if (!std::isfinite(s)) return {150, 150, 150};
   const double at = std::clamp(s, 0.0, 1.0) * static_cast<double>(kStops.size() - 1);
   const auto i = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
@@ -37,6 +38,7 @@ Rgb sequential_color(double s) {
   const auto mix = [t](std::uint8_t a, std::uint8_t b) {
     return static_cast<std::uint8_t>(std::lround((1.0 - t) * a + t * b));
   };
+
   const Rgb& a = kStops[i];
   const Rgb& b = kStops[i + 1];
   return {mix(a.r, b.r), mix(a.g, b.g), mix(a.b, b.b)};

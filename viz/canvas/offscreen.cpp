@@ -44,6 +44,7 @@ core::Result<std::unique_ptr<OffscreenWindow>> OffscreenWindow::open(int width_p
                             OSMESA_CONTEXT_MINOR_VERSION,
                             2,
                             0};
+
   std::unique_ptr<OffscreenWindow> result(new OffscreenWindow);
   result->context_ = std::make_unique<Context>();
   Context& context = *result->context_;
@@ -51,6 +52,7 @@ core::Result<std::unique_ptr<OffscreenWindow>> OffscreenWindow::open(int width_p
   context.height = height_px;
   context.color_buffer.resize(4 * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px));
   context.osmesa = OSMesaCreateContextAttribs(attributes, nullptr);
+
   if (context.osmesa == nullptr || !context.make_current()) {
     return core::failure(core::ErrorKind::kInternal,
                          "no OpenGL context from OSMesa (is Debian's libosmesa6 installed?)");
@@ -72,6 +74,7 @@ core::Result<std::unique_ptr<OffscreenWindow>> OffscreenWindow::open(int width_p
     return core::failure(core::ErrorKind::kInternal, "VTK cannot use the OpenGL context of OSMesa");
   }
   return result;
+
 }
 
 OffscreenWindow::~OffscreenWindow() {

@@ -62,6 +62,7 @@ Bytes filter(const cv::Mat3b& picture) {
   result.reserve((1 + size) * static_cast<std::size_t>(picture.rows));
   std::array<Bytes, 5> filtered;
   filtered.fill(Bytes(size));
+
   for (int y = picture.rows - 1; y >= 0; --y) {
     std::copy_n(picture.ptr(y), size, row.begin() + kPixel);
     filter_row(row.data() + kPixel, above.data() + kPixel, size, filtered);
@@ -71,10 +72,12 @@ Bytes filter(const cv::Mat3b& picture) {
       for (const std::uint8_t value : filtered[f]) sums[f] += std::abs(static_cast<std::int8_t>(value));
       if (sums[f] < sums[best]) best = f;
     }
+
     result.push_back(static_cast<std::uint8_t>(best));
     result.insert(result.end(), filtered[best].begin(), filtered[best].end());
     std::swap(row, above);
   }
+
   return result;
 }
 

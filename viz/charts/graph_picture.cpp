@@ -35,18 +35,22 @@ core::Result<void> draw_graph(const std::string& dot, const std::filesystem::pat
   if (ending != ".png" && ending != ".svg" && ending != ".pdf") {
     return core::usage_error(fmt::format("{}: graphs are drawn as .png, .svg or .pdf", file.string()));
   }
+
   agseterrf(keep_quiet);  // libraries do not print
   Context context;
   context.graph = agmemread(dot.c_str());
   if (context.graph == nullptr) return core::usage_error("the graph is not in the DOT language");
+
   context.laid_out = gvLayout(context.gvc, context.graph, "dot") == 0;
   char* bytes = nullptr;
   unsigned int length = 0;
+
   if (!context.laid_out ||
       gvRenderData(context.gvc, context.graph, ending.c_str() + 1, &bytes, &length) != 0 ||
       bytes == nullptr) {
     return core::failure(core::ErrorKind::kInternal, "Graphviz could not draw the graph");
   }
+
   const std::unique_ptr<char, void (*)(char*)> owner(bytes, gvFreeRenderData);
   return core::write_file(file, {bytes, length});
 }

@@ -59,16 +59,20 @@ void find_ranges(const SvgChart& chart, Plot& plot) {
     x.include(line.x);
     y.include(line.y);
   }
+
   for (const SvgDots& dots : chart.dots) {
     x.include(dots.x);
     y.include(dots.y);
   }
+
   if (chart.equal_aspect && chart.background) {
     x.include({chart.background->x.first, chart.background->x.second});
     y.include({chart.background->y.first, chart.background->y.second});
   }
+
   plot.x = x.padded(chart.equal_aspect ? 0.03 : 0.0);
   plot.y = y.padded(chart.equal_aspect ? 0.03 : 0.06);
+
   // Quantities that start near zero are read from zero.
   if (!chart.equal_aspect && y.low >= 0.0 && y.low < 0.5 * y.high) plot.y.first = 0.0;
   plot.x = chart.x_range.value_or(plot.x);
@@ -147,25 +151,30 @@ std::string axes(const SvgChart& chart, const Plot& plot) {
   const auto say = [&words](double x, double y, const char* anchor, const std::string& text) {
     words += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>", x, y, anchor, text);
   };
+
   for (const Tick& tick : nice_ticks(plot.x.first, plot.x.second, x_wish)) {
     const double x = kLeft + plot.px(tick.value);
     grid += fmt::format("M{:.1f},{:.1f}v{:.1f}", x, kTop, plot.height);
     say(x, kTop + plot.height + 16.0, "middle", tick.label);
   }
+
   for (const Tick& tick :
        chart.y_ticks ? nice_ticks(plot.y.first, plot.y.second, y_wish) : std::vector<Tick>{}) {
     const double y = kTop + plot.py(tick.value);
     grid += fmt::format("M{:.1f},{:.1f}h{:.1f}", kLeft, y, plot.width);
     say(kLeft - 6.0, y + 4.0, "end", tick.label);
   }
+
   if (!chart.y_label.empty()) {
     words +=
         fmt::format("<text transform=\"translate(13,{:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
                     kTop + 0.5 * plot.height, markup_text(chart.y_label));
   }
+
   if (!chart.x_label.empty()) {
     say(kLeft + 0.5 * plot.width, kTop + plot.height + kBelow + 11.0, "middle", markup_text(chart.x_label));
   }
+
   return (grid.empty() ? "" : "<path class=\"grid\" d=\"" + grid + "\"/>") + words;
 }
 
@@ -179,11 +188,13 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
         plot.px(b.x.first), plot.py(b.y.second), plot.px(b.x.second) - plot.px(b.x.first),
         plot.py(b.y.first) - plot.py(b.y.second), b.data_uri);
   }
+
   for (const SvgBand& band : chart.bands) {
     out += fmt::format("<rect class=\"band-{}\" x=\"{:.1f}\" y=\"0\" width=\"{:.1f}\" height=\"{:.1f}\"/>",
                        band.kind, plot.px(band.from), std::max(1.0, plot.px(band.to) - plot.px(band.from)),
                        plot.height);
   }
+
   for (const SvgLine& line : chart.lines) {
     Pen pen;
     for (std::size_t i = 0; i < std::min(line.x.size(), line.y.size()); ++i) {
@@ -191,6 +202,7 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
     }
     out += fmt::format("<path class=\"line {}\" d=\"{}\"/>", line.kind, pen.path());
   }
+
   for (const SvgDots& dots : chart.dots) {
     for (std::size_t i = 0; i < std::min(dots.x.size(), dots.y.size()); ++i) {
       if (!std::isfinite(dots.x[i]) || !std::isfinite(dots.y[i])) continue;
@@ -199,6 +211,7 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
                          dots.radius_px);
     }
   }
+
   return out;
 }
 
@@ -301,12 +314,14 @@ std::string svg_document(const std::vector<SvgChart>& charts, std::size_t column
   constexpr double kTitle = 26.0;
   std::string body;
   double width = 0.0, x = 0.0, y = 0.0, row = 0.0;
+
   for (std::size_t i = 0; i < charts.size(); ++i) {
     if (i % columns == 0) {
       x = 0.0;
       y += row;
       row = 0.0;
     }
+
     const SvgDrawing words = legend_words(charts[i]);
     const SvgDrawing drawing = draw(charts[i]);
     body += fmt::format(
@@ -317,6 +332,7 @@ std::string svg_document(const std::vector<SvgChart>& charts, std::size_t column
     width = std::max(width, x);
     row = std::max(row, kTitle + words.height + drawing.height);
   }
+
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "
       "{1:.0f}\"><style>{2}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
@@ -337,6 +353,7 @@ std::string svg_chart_style() {
       "font-size:.85em;color:var(--muted)}.legend li{display:flex;align-items:center;gap:.45em}"
       ".truth{--k:#868c94;stroke-dasharray:5 4}.lost{--k:#d92d20;stroke-dasharray:3 4}"
       ".loop{--k:#aa4499;stroke-width:1}.plain{--k:#6b7280}\n";
+
   std::string dark;
   for (std::size_t i = 0; i < 8; ++i) {
     const Rgb c = category_color(i);
@@ -344,6 +361,7 @@ std::string svg_chart_style() {
     const auto lighter = [](std::uint8_t v) { return static_cast<std::uint8_t>((6 * v + 4 * 255) / 10); };
     dark += fmt::format(".k{}{{--k:{}}}", i, hex({lighter(c.r), lighter(c.g), lighter(c.b)}));
   }
+
   return css + "\n@media screen and (prefers-color-scheme:dark){.loop{--k:#d48fc8}" + dark + "}\n";
 }
 

@@ -205,11 +205,13 @@ void add_colored_path(const TrajectoryComparison& comparison, const std::vector<
     const double place = step > 0.0 ? errors[i] / step : 0.0;
     return std::min(kErrorClasses - 1, static_cast<std::size_t>(place));
   };
+
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t k = 0; k < kErrorClasses; ++k) {
     const double most = static_cast<double>(k + 1) * step;
     SvgLine line{
         fmt::format("up to {:.1f} {}", unit.per_metre * most, unit.name), fmt::format("e{}", k), {}, {}};
+
     for (std::size_t i = 0; i < x.size(); ++i) {
       // A class goes on to the first point of the next one.
       const bool goes_on = i > 0 && !gaps[i] && class_of(i - 1) == k;
@@ -221,6 +223,7 @@ void add_colored_path(const TrajectoryComparison& comparison, const std::vector<
       line.x.push_back(x[i]);
       line.y.push_back(y[i]);
     }
+
     lines.push_back(std::move(line));
   }
 }
@@ -234,9 +237,11 @@ SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& un
   chart.equal_aspect = true;
   chart.x_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(first)]);
   chart.y_label = fmt::format("{} (m)", kAxisNames[static_cast<std::size_t>(second)]);
+
   if (!truth.empty()) {
     chart.lines.push_back({"truth", "truth", coordinate(truth, first), coordinate(truth, second)});
   }
+
   const std::vector<double> x = coordinate(comparison.estimate, first);
   const std::vector<double> y = coordinate(comparison.estimate, second);
   if (!x.empty() && errors_of(comparison).size() == x.size()) {
@@ -245,6 +250,7 @@ SvgChart path_chart(const TrajectoryComparison& comparison, const LengthUnit& un
     const std::vector<bool> gaps = gaps_in(comparison.estimate);
     chart.lines.push_back({"estimate", "k0", with_breaks(x, gaps), with_breaks(y, gaps)});
   }
+
   if (!x.empty()) chart.dots.push_back({"start", "plain", {x.front()}, {y.front()}, 4.0, false});
   return chart;
 }
@@ -267,16 +273,19 @@ SvgChart error_chart(const std::vector<TrajectoryComparison>& comparisons) {
   chart.height_px = 400;
   chart.x_label = "time (s)";
   chart.y_label = fmt::format("position error ({})", unit.name);
+
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const std::vector<double> errors = in_unit(errors_of(comparisons[i]), unit);
     const std::vector<bool> gaps = gaps_in(comparisons[i].estimate);
     std::vector<double> t = seconds(comparisons[i].estimate, start);
     t.resize(errors.size());
+
     const std::vector<double> known = finite(errors);
     const std::string label =
         single ? "error" : fmt::format("{}: RMS {:.1f} {}", comparisons[i].name, rms(known), unit.name);
     chart.lines.push_back({label, estimate_kind(i), with_breaks(t, gaps), with_breaks(errors, gaps)});
     if (!single || known.empty()) continue;
+
     const auto level = [&](const char* name, double value, const char* kind) {
       const std::string text = fmt::format("{} {:.1f} {}", name, value, unit.name);
       chart.lines.push_back({text, kind, {t.front(), t.back()}, {value, value}});
@@ -284,6 +293,7 @@ SvgChart error_chart(const std::vector<TrajectoryComparison>& comparisons) {
     level("RMS", rms(known), "k1");
     level("median", median(known), "k2");
   }
+
   return chart;
 }
 
@@ -293,21 +303,25 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
   const double start = start_of(comparisons);
   const Trajectory truth = shared_truth(comparisons);
   const auto truth_angles = angles_of(truth);
+
   for (std::size_t k = 0; k < 3; ++k) {
     charts[2 * k].y_label = fmt::format("{} (m)", kAxisNames[k]);
     charts[2 * k + 1].y_label = fmt::format("{} (deg)", kAngleNames[k]);
   }
+
   charts[0].title = titled("Pose", comparisons);
   charts[4].x_label = charts[5].x_label = "time (s)";
   for (SvgChart& chart : charts) {
     chart.width_px = 800;
     chart.height_px = 300;
   }
+
   for (std::size_t i = 0; i < comparisons.size(); ++i) {
     const TrajectoryComparison& c = comparisons[i];
     const std::vector<bool> gaps = gaps_in(c.estimate);
     const std::vector<double> t = with_breaks(seconds(c.estimate, start), gaps);
     auto angles = angles_of(c.estimate);
+
     const auto own_truth = angles_of(c.truth);
     for (std::size_t k = 0; k < 3; ++k) {
       // The truth at the first estimated pose, within the turns that the whole truth has made by then.
@@ -317,18 +331,21 @@ std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& compa
         const auto index = static_cast<std::size_t>(std::min(at, std::prev(truth.end())) - truth.begin());
         start_beside(angles[k], truth_angles[k][index]);
       }
+
       const std::string name = comparisons.size() == 1 ? "estimate" : c.name;
       charts[2 * k].lines.push_back({k == 0 ? name : "", estimate_kind(i), t,
                                      with_breaks(coordinate(c.estimate, static_cast<int>(k)), gaps)});
       charts[2 * k + 1].lines.push_back({"", estimate_kind(i), t, with_breaks(angles[k], gaps)});
     }
   }
+
   const std::vector<double> t_truth = seconds(truth, start);
   for (std::size_t k = 0; k < 3 && !truth.empty(); ++k) {
     charts[2 * k].lines.push_back(
         {k == 0 ? "truth" : "", "truth", t_truth, coordinate(truth, static_cast<int>(k))});
     charts[2 * k + 1].lines.push_back({"", "truth", t_truth, truth_angles[k]});
   }
+
   return charts;
 }
 

@@ -49,14 +49,17 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
   if (!data) return tl::unexpected<core::Error>(data.error());
   if (auto free = check_output(file, request.replace); !free)
     return tl::unexpected<core::Error>(free.error());
+
   if (!request.truth.empty()) {
     if (auto added = add_truth(request.truth, *data); !added)
       return tl::unexpected<core::Error>(added.error());
   }
+
   fs::path scratch = file;
   scratch.replace_filename(fmt::format(".{}.{}.png", file.filename().string(), getpid()));
   auto pictures = pictures_html(*data, scratch);  // first: damaged ones are told in the head
   if (!pictures) return tl::unexpected<core::Error>(pictures.error());
+
   const std::string page = page_html(
       "Plumbline report: " + data->name, head_html(*data),
       {{"pictures", "The map", std::move(*pictures)},
@@ -73,6 +76,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
       fmt::format("Written by plumbline {} from the result folder {}.", core::version(), data->name));
   if (auto written = core::write_file(file, page); !written)
     return tl::unexpected<core::Error>(written.error());
+
   return ReportSummary{file, page.size(), std::move(data->missing)};
 }
 

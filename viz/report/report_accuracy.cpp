@@ -27,16 +27,19 @@ Truths truths_of(const fs::path& truth, const ReportData& data) {
     for (std::size_t i = 0; i < data.paths.size(); ++i) truths.emplace_back(i, file);
     return truths;
   }
+
   for (const auto& pair : evaluate::find_trajectories(data.folder / "map.ply", truth / "reference.ply")) {
     for (std::size_t i = 0; i < data.paths.size(); ++i) {
       if (pair.robot == data.paths[i].robot || pair.robot.empty()) truths.emplace_back(i, pair.truth);
     }
   }
+
   for (std::size_t i = 0; i < data.paths.size() && truths.empty();
        ++i) {  // one robot's map, of several recordings
     const fs::path own = truth / data.paths[i].robot / "groundtruth.txt";
     if (fs::is_regular_file(own, ec)) truths.emplace_back(i, own);
   }
+
   return truths;
 }
 
@@ -79,6 +82,7 @@ std::string errors_table(const ReportData& data) {
     table.robot(path.robot);
     table.value("Poses with truth", count_text(static_cast<double>(r.matched)) + " of " +
                                         count_text(static_cast<double>(r.estimated)));
+
     table.value("ATE, rmse", distances(r.ate_m));
     table.value("Of the path's length",
                 number_text(r.path_m > 0.0 ? 100.0 * r.ate_m.rmse / r.path_m : NAN, 3, "%"));
@@ -87,10 +91,12 @@ std::string errors_table(const ReportData& data) {
     table.value("RPE over a second, rmse", relative(r.rpe_second));
     table.value("Path, true", number_text(r.path_m, 2, "m"));
   }
+
   if (data.joint_m) {
     table.robot("all, one alignment");
     table.value("ATE, rmse", distances(*data.joint_m));
   }
+
   return table.html();
 }
 
@@ -130,6 +136,7 @@ std::string saved_html(const ReportData& data) {
     const std::string name = it->path().filename().string();
     if (name.rfind("evaluation", 0) == 0 && it->path().extension() == ".json") names.push_back(name);
   }
+
   std::sort(names.begin(), names.end());
   HtmlTable paths(
       "evaluation of a path|>ATE rmse (mm)|>median (mm)|>max (mm)|>orientation rmse (deg)"
@@ -138,12 +145,14 @@ std::string saved_html(const ReportData& data) {
       "evaluation of a cloud|>accuracy median (mm)|>rmse (mm)|>completeness median (mm)|>rmse (mm)"
       "|>F at 10 mm|>walls' thickness, rms (mm)");
   std::string out;
+
   for (const std::string& name : names) {
     std::ifstream stream(data.folder / name, std::ios::binary);
     const Json json = Json::parse(stream, nullptr, false);
     const auto number = [&](const char* place, int decimals) {
       return number_text(number_at(json, place), decimals);
     };
+
     if (json.is_object() && json.contains("ate_m")) {
       add_saved_path(name, json, paths);
     } else if (json.is_object() && json.contains("estimates")) {
@@ -156,6 +165,7 @@ std::string saved_html(const ReportData& data) {
       out += note(name + " is no output of plumbline evaluate --json.");
     }
   }
+
   return paths.html() + clouds.html() + out;
 }
 
@@ -168,19 +178,23 @@ core::Result<void> add_truth(const fs::path& truth, ReportData& data) {
     if (path.poses.empty()) continue;
     auto poses = dataset::read_trajectory(file);
     if (!poses) return tl::unexpected<core::Error>(poses.error());
+
     auto report = evaluate::evaluate_trajectory(path.poses, *poses);
     if (!report) {
       return core::input_error(fmt::format("--truth {}: {}", file.string(), report.error().message));
     }
+
     path.accuracy = std::move(*report);
     pairs.emplace_back(path.poses, std::move(*poses));
   }
+
   if (pairs.empty()) {
     return core::input_error(
         fmt::format("--truth {}: there is no groundtruth.txt that fits; name a recording with truth, a "
                     "folder with one for each robot, or a file in TUM format",
                     truth.string()));
   }
+
   if (pairs.size() > 1) data.joint_m = joint_error(pairs);
   return {};
 }

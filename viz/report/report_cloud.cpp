@@ -104,10 +104,12 @@ std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud) {
     values[1].push_back(p.y);
     values[2].push_back(p.z);
   }
+
   const std::size_t count = values[0].size();
   if (count == 0) return std::nullopt;
   CloudExtent extent;
   const auto outer = static_cast<std::ptrdiff_t>(kOuter * static_cast<double>(count));
+
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<float>& v = values[static_cast<std::size_t>(axis)];
     const auto [low, high] = std::minmax_element(v.begin(), v.end());
@@ -118,6 +120,7 @@ std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud) {
     std::nth_element(v.begin(), v.end() - 1 - outer, v.end());
     extent.central_high[axis] = *(v.end() - 1 - outer);
   }
+
   return extent;
 }
 
@@ -132,6 +135,7 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
       std::max({longest / kPlanPixels, 1.5 * number_at(data.summary, "/cloud/voxel_m"), 1e-3});
   const cv::Mat counts = counted(data, low, high, cell_m);
   const double most = std::log1p(darkest(counts));
+
   cv::Mat picture(counts.size(), CV_8UC4);
   for (int row = 0; row < counts.rows; ++row) {
     for (int column = 0; column < counts.cols; ++column) {
@@ -139,9 +143,11 @@ std::optional<viz::SvgBackground> plan_of(const ReportData& data) {
       picture.at<cv::Vec4b>(row, column) = {130, 122, 115, static_cast<unsigned char>(215.0 * share * share)};
     }
   }
+
   constexpr int kSmall = 9;
   const auto png = dataset::encode_png(picture, kSmall);
   if (!png) return std::nullopt;
+
   viz::SvgBackground plan;
   plan.data_uri =
       "data:image/png;base64," + base64({reinterpret_cast<const char*>(png->data()), png->size()});
@@ -157,18 +163,21 @@ std::string cloud_html(const ReportData& data) {
       {"Voxel size", voxel_m > 0.0 ? number_text(1e3 * voxel_m, 1, "mm") : "no cloud was to be made"}};
   add_left_out(data, "/cloud/left_out", "Left out of what keyframes measured, points", facts);
   add_left_out(data, "/cloud/left_out_of_map", "Left out of the merged cloud, points", facts);
+
   std::string out;
   if (const std::optional<CloudExtent>& extent = data.extent) {
     facts.emplace_back("File", data.cloud_file);
     facts.emplace_back("Bounding box", box_text(extent->size()));
     facts.emplace_back("Bounding box without the outer 0.5 % of each side", box_text(extent->central_size()));
     facts.emplace_back("Coordinates", range_text(extent->low, extent->high));
+
     if (const double sigma_m = number_at(data.summary, "/cloud/sigma_m/median"); sigma_m > 0.0) {
       facts.emplace_back(
           "Standard deviation along the normal, of poses and depth",
           fmt::format("{} in the middle, below {} for 90 % of the points",
                       number_text(1e3 * sigma_m, 1, "mm"), mm_at(data.summary, "/cloud/sigma_m/p90")));
     }
+
     add_robots(data, facts);
     const double counted = number_at(data.summary, "/cloud/points");
     const auto found = static_cast<double>(data.cloud->cloud->size());
@@ -177,6 +186,7 @@ std::string cloud_html(const ReportData& data) {
                              data.cloud_file, count_text(found), count_text(counted)));
     }
   }
+
   return facts_html(facts) + out;
 }
 

@@ -53,21 +53,25 @@ std::string time_charts(const ReportData& data) {
   std::vector<double> time_s = values_of(table, table.column("stamp"));
   const double start_s = core::quantile(time_s, 0.0);
   for (double& t : time_s) t -= start_s;
+
   viz::SvgChart chart;
   chart.title = "Milliseconds of each stage per frame";
   chart.y_label = "a frame (ms)";
   chart.height_px = 180;
+
   double usual = 0.0, most = 0.0;
   for (TimedColumn& column : slowest_stages(table)) {
     usual = std::max(usual, core::quantile(column.values, 0.98));
     most = std::max(most, core::quantile(column.values, 1.0));
     chart.lines.push_back({column.name, robot_kind(chart.lines.size()), time_s, std::move(column.values)});
   }
+
   std::string out;
   if (most > 3.0 * usual) chart.y_range = viz::AxisRange{0.0, 2.0 * usual};
   if (!chart.lines.empty()) out += svg_chart(chart);
   if (chart.y_range)
     out += note(fmt::format("Peaks are cut off; the highest is {}.", number_text(most, 0, "ms")));
+
   viz::SvgChart memory;
   memory.title = "Memory over time";
   memory.x_label = "time (s)";
@@ -98,6 +102,7 @@ std::string what_is(const std::string& name) {
     const char* name;
     const char* what;
   };
+
   static constexpr std::array<Known, 14> kKnown{
       {{"map.ply", "merged cloud: position, normal, colour, confidence, observations, sigma"},
        {"map.pcd", "the same for PCL"},
@@ -113,11 +118,13 @@ std::string what_is(const std::string& name) {
        {".png", "picture"},
        {".ply", "cloud"},
        {".pcd", "cloud"}}};
+
   for (const Known& known : kKnown) {
     const std::string end = known.name;
     if (name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
       return known.what;
   }
+
   return {};
 }
 
@@ -131,11 +138,13 @@ std::string cost_html(const ReportData& data) {
                                     seconds("/timing/wall_s"), number_text(number_at(s, "/timing/fps"), 1))},
       {"Mapping, first frame read to last change of the map", seconds("/timing/map_s")},
       {"Clouds, pictures and tables", seconds("/timing/export_s")}};
+
   if (number_at(s, "/timing/pace_hz") > 0.0) {
     facts.emplace_back("Played at", fmt::format("{} a second; {} behind at most",
                                                 number_text(number_at(s, "/timing/pace_hz"), 1),
                                                 seconds("/timing/behind_s")));
   }
+
   facts.emplace_back("Threads", count_at(s, "/timing/threads"));
   facts.emplace_back("Memory at most", number_text(number_at(s, "/memory/peak_rss_mb"), 0, "MB"));
   if (number_at(s, "/frames/resumed") > 0.0) {
@@ -143,6 +152,7 @@ std::string cost_html(const ReportData& data) {
                        fmt::format("{} frames that an earlier run had mapped before it was interrupted",
                                    count_at(s, "/frames/resumed")));
   }
+
   return facts_html(facts) + stages_table(s) + time_charts(data);
 }
 
@@ -157,6 +167,7 @@ std::string files_html(const ReportData& data, const fs::path& left_out) {
   constexpr std::size_t kMost = 400;
   std::vector<std::pair<std::string, double>> files;
   std::error_code ec;
+
   double all = 0.0;
   for (fs::recursive_directory_iterator it(data.folder, ec), end; !ec && it != end; it.increment(ec)) {
     std::error_code problem;
@@ -166,12 +177,14 @@ std::string files_html(const ReportData& data, const fs::path& left_out) {
     files.emplace_back(name, static_cast<double>(it->file_size(problem)));
     all += files.back().second;
   }
+
   std::sort(files.begin(), files.end());
   HtmlTable table("file|>size|>bytes|what it is");
   for (std::size_t i = 0; i < std::min(kMost, files.size()); ++i) {
     table.row(
         {files[i].first, bytes_text(files[i].second), count_text(files[i].second), what_is(files[i].first)});
   }
+
   return table.html() +
          note(fmt::format("{} files, {} in all{}.", files.size(), bytes_text(all),
                           files.size() > kMost ? fmt::format("; the first {} are listed", kMost) : ""));

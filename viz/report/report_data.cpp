@@ -77,11 +77,13 @@ void add_store(ReportData& data) {
     if (loops) data.missing.emplace_back("map.db is not there: loops are not drawn");
     return;
   }
+
   const auto stored = maps::StoredResult::open(file);
   if (!stored) {
     data.missing.emplace_back("map.db is damaged: loops are not drawn");
     return;
   }
+
   std::map<std::int32_t, sensor::Pinhole> cameras;
   const std::vector<maps::RobotInfo>& robots = stored->stored().header.robots;
   for (const maps::RobotInfo& robot : robots) {
@@ -91,6 +93,7 @@ void add_store(ReportData& data) {
       if (path.robot == robot.name && robot.number >= 0) path.number = static_cast<std::size_t>(robot.number);
     }
   }
+
   add_loops(*stored, data);
   data.fit = fit_of(stored->stored().map, maps::camera_of(robots, 0).color, cameras);
 }
@@ -163,16 +166,19 @@ core::Result<ReportData> read_report_data(const fs::path& folder) {
     return core::input_error(fmt::format(
         "{}: the run was interrupted; finish it with plumbline map --resume, then report", folder.string()));
   }
+
   const auto result = maps::open_result(folder);
   if (!result) return tl::unexpected<core::Error>(result.error());
   auto summary = read_summary(result->summary());
   if (!summary) return tl::unexpected<core::Error>(summary.error());
+
   ReportData data;
   data.folder = folder;
   const fs::path normal = fs::absolute(folder).lexically_normal();
   data.name = (normal.has_filename() ? normal : normal.parent_path()).filename().string();
   data.summary = std::move(*summary);
   data.z_up = text_at(data.summary, "/frame/up") != "none";
+
   add_paths(data);
   data.fused_afterwards = fused_afterwards(folder);
   add_frames(data);

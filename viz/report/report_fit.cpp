@@ -24,16 +24,19 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
     const auto own = cameras.find(id.robot);
     return own == cameras.end() ? camera : own->second;
   };
+
   std::vector<double> points, depths, lines;
   for (const core::PointId id : map.point_ids()) {
     const maps::MapPoint& point = map.point(id);
     if (point.observations.size() < 2) continue;  // lies where the only one saw it
+
     for (const maps::Observation& o : point.observations) {
       const auto& corner = map.keyframe(o.keyframe).features->points[static_cast<std::size_t>(o.feature)];
       optimize::PointTerm term;  // sigmas of 1: residuals in pixels and metres
       term.world = point.position;
       term.pixel = corner.pixel.cast<double>();
       term.depth = static_cast<double>(corner.depth);
+
       Eigen::Vector3d r;
       const int rows = optimize::point_residual(term, map.camera_from_world(o.keyframe),
                                                 camera_of(o.keyframe), r, nullptr);
@@ -41,9 +44,11 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
       if (rows == 3) depths.push_back(1e3 * std::abs(r.z()));
     }
   }
+
   for (const core::LineId id : map.line_ids()) {
     const maps::MapLine& line = map.line(id);
     if (line.observations.size() < 2) continue;
+
     for (const maps::Observation& o : line.observations) {
       const auto& segment =
           map.keyframe(o.keyframe).features->lines[static_cast<std::size_t>(o.feature)].segment;
@@ -52,6 +57,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
       term.world = geometry::line_through(line.start, line.end);
       term.start = segment.start.cast<double>();
       term.end = segment.end.cast<double>();
+
       Eigen::Vector2d r;
       const auto projection = geometry::line_projection(c.fx, c.fy, c.cx, c.cy);
       if (!optimize::line_residual(term, map.camera_from_world(o.keyframe), projection, r, nullptr)) continue;
@@ -59,6 +65,7 @@ MapFit fit_of(const maps::Map& map, const sensor::Pinhole& camera,
       lines.push_back(std::abs(r.y()));
     }
   }
+
   return {summarise(points), summarise(depths), summarise(lines)};
 }
 

@@ -39,6 +39,7 @@ void sort_by_robot(ReportData& data) {
   data.end_s = *std::max_element(stamps.begin(), stamps.end());
   const std::size_t robot_column = table.column("robot");
   const bool several = robot_column < table.columns().size();
+
   std::map<std::string, ReportFrames> robots;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string robot(table.text(row, robot_column));
@@ -48,10 +49,13 @@ void sort_by_robot(ReportData& data) {
     frames.rows.push_back(row);
     frames.time_s.push_back(stamps[row] - data.start_s);
   }
+
   for (auto& [robot, frames] : robots) data.frames.push_back(std::move(frames));
   if (!several || data.paths.size() != 1) return;
+
   // Of robots that did not meet, one is in the result: the one that has its stamps.
   std::size_t most = 0;
+
   for (const ReportFrames& frames : data.frames) {
     std::size_t own = 0;
     for (const std::size_t row : frames.rows) {
@@ -94,15 +98,18 @@ void add_lost(const ReportFrames& frames, ReportData& data) {
     now.robot = frames.robot;
     now.to_s = to_s;
     now.gap_m = kNaN;
+
     for (const ReportPath& path : data.paths) {
       if (path.robot == frames.robot) {
         now.gap_m = gap_m(path.poses, data.start_s + now.from_s - 1e-5, data.start_s + last_s + 1e-5);
       }
     }
+
     data.lost.push_back(now);
     now = {};
   };
   double last_s = 0.0;
+
   for (std::size_t i = 0; i < frames.rows.size(); ++i) {
     const std::string_view what = table.text(frames.rows[i], state);
     if (what == "tracked") {
@@ -113,6 +120,7 @@ void add_lost(const ReportFrames& frames, ReportData& data) {
     ++(what == "unreadable" ? now.unreadable : now.lost);
     last_s = frames.time_s[i];
   }
+
   end(last_s, last_s);
 }
 

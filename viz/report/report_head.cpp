@@ -25,6 +25,7 @@ std::string verdict_html(const ReportData& data) {
   const auto& s = data.summary;
   const double without = number_at(s, "/frames/lost") + number_at(s, "/frames/unreadable");
   std::string out;
+
   if (!flag_at(s, "/trustworthy")) {
     const std::string reason = text_at(s, "/reason");
     out += banner("bad", "Not trustworthy (exit code 4)",
@@ -38,17 +39,20 @@ std::string verdict_html(const ReportData& data) {
   } else {
     out += banner("good", "Trustworthy (exit code 0)", "Nothing the run found speaks against this result.");
   }
+
   if (flag_at(s, "/stopped")) {
     out += banner("warn", "Stopped early",
                   fmt::format("The run was ended after {} of {} frames; this is what was mapped by then.",
                               count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
                               count_at(s, "/frames/available")));
   }
+
   if (!data.missing.empty()) {
     std::string list;
     for (const std::string& line : data.missing) list += "<li>" + viz::markup_text(line) + "</li>";
     out += "<div class=\"verdict warn\"><b>Missing in this report</b><ul>" + list + "</ul></div>\n";
   }
+
   return out;
 }
 
@@ -130,10 +134,12 @@ std::string lost_html(const ReportData& data) {
   const auto longer = [](const LostStretch& a, const LostStretch& b) {
     return a.lost + a.unreadable > b.lost + b.unreadable;
   };
+
   std::stable_sort(stretches.begin(), stretches.end(), longer);
   std::string columns = ">from (s)|>to (s)|>frames|>lost|>unreadable|>between the poses around (m)";
   const bool several = data.frames.size() > 1;
   if (several) columns += "|robot";
+
   HtmlTable table(columns);
   for (std::size_t i = 0; i < std::min(kMost, stretches.size()); ++i) {
     const LostStretch& l = stretches[i];
@@ -141,6 +147,7 @@ std::string lost_html(const ReportData& data) {
     table.row({number_text(l.from_s, 2), number_text(l.to_s, 2), number(l.lost + l.unreadable),
                number(l.lost), number(l.unreadable), number_text(l.gap_m, 3), l.robot});
   }
+
   std::string out = table.html();
   if (stretches.size() > kMost)
     out += note(fmt::format("The {} longest of {} stretches.", kMost, stretches.size()));

@@ -53,6 +53,7 @@ std::string merge_evidence(const Json& m) {
                        count_at(m, at + "/expected"), count_at(m, at + "/matched"),
                        count_at(m, at + "/chance"), count_at(m, at + "/seen_through"));
   };
+
   Facts facts{
       {"Decision", flag_at(m, "/accepted") ? "merged" : "not merged: " + text_at(m, "/reason")},
       {"Keyframes that look alike",
@@ -71,13 +72,16 @@ std::string merge_evidence(const Json& m) {
                    number_text(kDegrees * number_at(m, "/span_rad"), 0, "deg"), mm_at(m, "/spread_m"))},
       {"Pairs of the pose graph",
        fmt::format("{}, of which {} were taken for wrong", count_at(m, "/pairs"), count_at(m, "/rejected"))}};
+
   if (number_at(m, "/alternative_m") > 0.0) {
     facts.emplace_back("Best other answer", number_text(number_at(m, "/alternative_m"), 2, "m") + " off; " +
                                                 overlay("/alternative_overlay"));
   }
+
   if (number_at(m, "/time_s") >= 0.0) {
     facts.emplace_back("Certain after", number_text(number_at(m, "/time_s"), 1, "s of the recordings"));
   }
+
   if (!list_at(m, "/sigma").empty()) {
     facts.emplace_back("Standard deviation of the placement",
                        fmt::format("{}, {}, {} along x, y, z; {}, {}, {} about them", mm_at(m, "/sigma/0"),
@@ -86,6 +90,7 @@ std::string merge_evidence(const Json& m) {
                                    number_text(kDegrees * number_at(m, "/sigma/4"), 2, "deg"),
                                    number_text(kDegrees * number_at(m, "/sigma/5"), 2, "deg")));
   }
+
   return facts_html(facts);
 }
 
@@ -143,6 +148,7 @@ std::string closings_html(const ReportData& data) {
   if (number_at(data.summary, "/loops/candidates") == 0.0 && list.empty()) {
     return paragraph("No keyframe looked like a place seen before: there was no loop to close.");
   }
+
   HtmlTable closed = trials_table(true), refused = trials_table(false);
   std::map<std::string, std::size_t> reasons;
   for (const Json& trial : list) {
@@ -153,17 +159,20 @@ std::string closings_html(const ReportData& data) {
     ++reasons[kind_of_reason(text_at(trial, "/reason"))];
     if (refused.rows() < kMostRows) add_trial(trial, refused);
   }
+
   std::string out = paragraph(fmt::format(
       "{} candidates, {} verified; loops moved the map {} times; the pose graph took {} for wrong.",
       count_at(data.summary, "/loops/candidates"), count_at(data.summary, "/loops/verified"),
       count_at(data.summary, "/loops/accepted"), count_at(data.summary, "/loops/rejected")));
   if (closed.rows() > 0) out += "<h3>Closed</h3>\n" + closed.html();
+
   HtmlTable why("why candidates were refused|>times");
   for (const auto& [reason, times] : reasons) why.row({reason, count_text(static_cast<double>(times))});
   out += why.html();
   if (refused.rows() > 0)
     out += folded(fmt::format("Each refused candidate ({})", refused.rows()), refused.html());
   if (list.empty()) return out;
+
   return out +
          note(
              "Found: landmarks of the match that are where they should be. Overlap and contradiction: of the "
@@ -228,6 +237,7 @@ std::string refinement_html(const ReportData& data) {
                "The map was not refined as a whole: there was nothing to align, or the stage was off.") +
            cameras_html(s) + fit_html(data);
   }
+
   std::string out = facts_html(
       {{"Local maps", count_at(s, "/refine/local_maps")},
        {"Alignments of their surfaces",
@@ -239,6 +249,7 @@ std::string refinement_html(const ReportData& data) {
        {"Keyframes moved", fmt::format("{} on average, {} at most", mm_at(s, "/refine/mean_shift_m"),
                                        mm_at(s, "/refine/max_shift_m"))},
        {"Standard deviation of keyframes beside the first", sigma_text(s)}});
+
   out += adjustment_html(s);
   return out + cameras_html(s) + fit_html(data);
 }

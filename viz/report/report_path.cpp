@@ -64,6 +64,7 @@ class PathChart {
     if (path.poses.empty()) return;
     viz::SvgLine line{path.robot.empty() ? "path" : path.robot, robot_kind(path.number), {}, {}};
     const double most_s = longest_step(path.poses);
+
     for (std::size_t i = 0; i < path.poses.size(); ++i) {
       const Eigen::Vector3d& here = path.poses[i].world_from_camera.translation;
       if (i > 0 && path.poses[i].stamp - path.poses[i - 1].stamp > most_s) {
@@ -74,6 +75,7 @@ class PathChart {
       }
       put(line, here);
     }
+
     chart_.lines.push_back(std::move(line));
     viz::SvgDots keyframes{path.robot.empty() ? "keyframes" : "", robot_kind(path.number), {}, {}, 2.0};
     for (const geometry::StampedPose& pose : path.keyframes)
@@ -149,6 +151,7 @@ std::string numbers(const ReportData& data) {
     const geometry::StampedPose& last = path.poses.back();
     const double apart_m = (last.world_from_camera.translation - first.world_from_camera.translation).norm();
     const double time_s = last.stamp - first.stamp;
+
     table.robot(path.robot);
     table.value("Poses", count_text(static_cast<double>(path.poses.size())));
     table.value("Keyframes", count_text(static_cast<double>(path.keyframes.size())));
@@ -160,6 +163,7 @@ std::string numbers(const ReportData& data) {
                                                    reach(path.poses, 1), reach(path.poses, 2)));
     table.value("End from start", number_text(apart_m, 3, "m"));
   }
+
   return table.html();
 }
 

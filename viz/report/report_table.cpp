@@ -17,13 +17,16 @@ core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   CsvTable table;
   table.text_ = read_bytes(file);
+
   if (table.text_.empty()) {
     return core::input_error(fmt::format("{} is not there or cannot be read", name));
   }
+
   std::size_t line = 0;
   for (std::size_t begin = 0; begin < table.text_.size(); ++line) {
     const std::size_t end = std::min(table.text_.find('\n', begin), table.text_.size());
     std::size_t cells = 0;
+
     for (std::size_t from = begin; from <= end; ++cells) {
       const std::size_t to = std::min(table.text_.find(',', from), end);
       if (line == 0) {
@@ -33,13 +36,16 @@ core::Result<CsvTable> CsvTable::read(const std::filesystem::path& file) {
       }
       from = to + 1;
     }
+
     if (cells != table.columns_.size()) {
       return core::input_error(fmt::format("{} is damaged: line {} has {} columns of {}", name, line + 1,
                                            cells, table.columns_.size()));
     }
+
     begin = end + 1;
   }
   if (table.rows() == 0) return core::input_error(fmt::format("{} is empty", name));
+
   return table;
 }
 

@@ -35,6 +35,7 @@ class RobotCharts {
     std::size_t tracked = 0, weak = 0, found_again = 0, keyframes = 0;
     const std::vector<double> weak_directions = column("weak_directions");
     const std::vector<double> relocalised = column("relocalised");
+
     const std::vector<double> keyframe = column("keyframe");
     for (std::size_t i = 0; i < frames_.rows.size(); ++i) {
       tracked += is_tracked(i) ? 1U : 0U;
@@ -42,20 +43,24 @@ class RobotCharts {
       found_again += relocalised[i] > 0.0 ? 1U : 0U;
       keyframes += keyframe[i] >= 0.0 ? 1U : 0U;
     }
+
     const auto count = [](std::size_t n) { return count_text(static_cast<double>(n)); };
     const auto share = [&](std::size_t n) {
       return fmt::format(
           "{} ({})", count(n),
           number_text(100.0 * static_cast<double>(n) / static_cast<double>(frames_.rows.size()), 1, "%"));
     };
+
     const auto family = [&](const char* name) {
       return fmt::format("{}; rms {}", number_text(core::quantile(column(name), 0.5), 0),
                          number_text(core::quantile(column(std::string(name) + "_rms"), 0.5), 2, "σ"));
     };
+
     table.robot(frames_.robot);
     table.value("Frames", count(frames_.rows.size()));
     table.value("Tracked", share(tracked));
     table.value("Made keyframes", count(keyframes));
+
     table.value("Found again by what the picture looks like", count(found_again));
     table.value("Held to no better than 2 cm in some direction", share(weak));
     table.value("Points that fit, median", family("points"));
@@ -116,8 +121,10 @@ class RobotCharts {
     chart.y_range = viz::AxisRange{0.0, 1.0};
     chart.x_range = viz::AxisRange{0.0, end_s_};
     chart.bands = bands_;
+
     viz::SvgDots keyframes{"keyframes", "plain", {}, {}, 2.5, false};
     viz::SvgDots found{"found again by its looks", "k1", {}, {}, 4.5, true};
+
     for (std::size_t i = 0; i < frames_.rows.size(); ++i) {
       const auto is = [&](const char* name, double least) {
         return table_.number(frames_.rows[i], table_.column(name)) >= least;
@@ -129,6 +136,7 @@ class RobotCharts {
         dots->y.push_back(0.5);
       }
     }
+
     if (!found.x.empty()) chart.dots.push_back(found);
     chart.dots.push_back(keyframes);
     return svg_chart(chart);

@@ -44,10 +44,12 @@ void draw_path(Painter& painter, const Projection& projection, const CameraPath&
       pieces.emplace_back();
     }
   }
+
   for (const auto& piece : pieces) cased_line(painter, piece, path.color, 3.0);
   pieces.erase(std::remove_if(pieces.begin(), pieces.end(), [](const auto& piece) { return piece.empty(); }),
                pieces.end());
   if (pieces.empty()) return;
+
   painter.disc(pieces.back().back(), 8.5, kWhite);
   painter.disc(pieces.back().back(), 7.0, path.color);
   painter.disc(pieces.front().front(), 9.5, kWhite);
@@ -83,13 +85,16 @@ void draw_title_and_legend(Painter& painter, const OverlayContent& content) {
     painter.text({x, y}, content.scene->title, 30.0, kInk, Anchor::kLeft, true);
     y -= 46.0 * s;
   }
+
   const auto entries = legend_entries(content);
   double widest = 0.0;
   for (const auto& entry : entries) widest = std::max(widest, painter.text_width(entry.text, kTextSize));
   if (entries.empty()) return;
+
   const double line_height = 32.0 * s;
   const double height = line_height * static_cast<double>(entries.size()) + 12.0 * s;
   painter.rectangle({x - 8.0 * s, y + 22.0 * s - height}, {widest + 66.0 * s, height}, kGround, 0.8);
+
   for (const auto& entry : entries) {
     if (entry.line) {
       painter.polyline({{x, y}, {x + 36.0 * s, y}}, entry.color, 4.0);
@@ -125,22 +130,26 @@ void draw_axes(Painter& painter, const OverlayContent& content) {
   const Eigen::Vector2d origin(projection.width_px - 90.0 * s, 90.0 * s);
   constexpr double kLength = 48.0;
   painter.rectangle(origin - Eigen::Vector2d(72.0 * s, 72.0 * s), {144.0 * s, 144.0 * s}, kGround, 0.6);
+
   const std::array<Rgb, 3> colors{{{200, 50, 50}, {40, 150, 60}, {45, 90, 200}}};
   const std::array<const char*, 3> names{"x", "y", "z"};
   std::array<int, 3> order{0, 1, 2};  // the axis that points away from the viewer first
   std::sort(order.begin(), order.end(),
             [&projection](int a, int b) { return projection.forward[a] > projection.forward[b]; });
+
   for (const int axis : order) {
     const Eigen::Vector2d direction(projection.right[axis], projection.up[axis]);
     const Eigen::Vector2d tip = origin + kLength * s * direction;
     const auto i = static_cast<std::size_t>(axis);
     cased_line(painter, {origin, tip}, colors[i], 3.5);
+
     if (direction.norm() < 0.25) {
       painter.disc(tip, 5.0, colors[i]);
       painter.text(origin + Eigen::Vector2d(-18.0 * s, -18.0 * s), names[i], kTextSize, colors[i],
                    Anchor::kCentre);
       continue;
     }
+
     painter.text(tip + 17.0 * s * direction.normalized(), names[i], kTextSize, colors[i], Anchor::kCentre);
   }
 }

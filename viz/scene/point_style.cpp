@@ -84,6 +84,7 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
                         const SnapshotOptions& options, const SceneAxes& axes) {
   const auto& cloud = *scene.cloud;
   PointColors result;
+
   switch (options.color) {
     case ColorMode::kRgb:
       for (const auto i : points) result.colors.push_back({cloud[i].r, cloud[i].g, cloud[i].b});
@@ -94,6 +95,7 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
     case ColorMode::kRobot:
       for (const auto i : points) result.colors.push_back(robot_color(scene.scalars[i]));
       return result;
+
     case ColorMode::kHeight: {
       std::vector<double> heights;
       heights.reserve(points.size());
@@ -103,6 +105,7 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
       const double top = std::max(0.1, core::quantile(heights, 0.98, 0.0));
       return color_by_value(heights, options.scalar_range.value_or(std::make_pair(0.0, top)), "height (m)");
     }
+
     case ColorMode::kError:
     case ColorMode::kSigma:
     case ColorMode::kConfidence: {
@@ -115,6 +118,7 @@ PointColors base_colors(const Scene& scene, const std::vector<std::uint32_t>& po
                             scene.scalar_label.empty() ? fallback : scene.scalar_label);
     }
   }
+
   return result;
 }
 
@@ -149,15 +153,18 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
   std::vector<std::uint32_t> all;
   std::vector<std::uint32_t> facing;
   if (scene.cloud == nullptr) return all;
+
   const auto& cloud = *scene.cloud;
   all.reserve(cloud.size() / step + 1);
   std::optional<Surroundings> surroundings;
   if (cull) surroundings.emplace(scene, step);
+
   for (std::size_t i = 0; i < cloud.size(); i += step) {
     const Point& p = cloud[i];
     if (!pcl::isXYZFinite(p)) continue;
     all.push_back(static_cast<std::uint32_t>(i));
     if (!cull) continue;
+
     const Eigen::Vector3d to_viewer = projection.to_viewer(position(p));
     const bool away = normal(p).dot(to_viewer) < kFacesAway;  // false for NaN normals
     // Of a ceiling that is left out no dust must stay: points whose normals are noise go with their
@@ -165,6 +172,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
     if (away || surroundings->direction(p).dot(to_viewer) < kSurroundedAway) continue;
     facing.push_back(static_cast<std::uint32_t>(i));
   }
+
   const bool enough = facing.size() * 50 > all.size();
   return cull && enough ? facing : all;
 }
@@ -177,6 +185,7 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
   const double rows = std::ceil(projection.height_px / cell_px) + 2.0 * kBorderCells;
   const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   std::vector<std::uint32_t> nearest(cells, kNone);
+
   std::vector<float> depth(cells, std::numeric_limits<float>::infinity());
   for (const auto i : points) {
     const Eigen::Vector3d at = projection.project(position((*scene.cloud)[i]));
@@ -185,11 +194,13 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
     const bool inside = column >= 0.0 && column < columns && row >= 0.0 && row < rows &&
                         at.z() > projection.near_m && at.z() < projection.far_m;
     if (!inside) continue;
+
     const auto cell = static_cast<std::size_t>(row * columns + column);
     if (static_cast<float>(at.z()) >= depth[cell]) continue;
     depth[cell] = static_cast<float>(at.z());
     nearest[cell] = i;
   }
+
   nearest.erase(std::remove(nearest.begin(), nearest.end(), kNone), nearest.end());
   std::sort(nearest.begin(), nearest.end());
   return nearest;
@@ -197,9 +208,11 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
 
 double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points) {
   if (points.size() < 2) return 0.0;
+
   // Count points in cubes; a surface through a cube of side h covers about 1.2 h^2 of it.
   constexpr int kCells = 128;
   Eigen::Vector3d low, high;
+
   const std::size_t step = std::max<std::size_t>(1, points.size() / 20000);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
@@ -209,6 +222,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
     low[axis] = core::quantile(values, 0.01, 0.0);
     high[axis] = core::quantile(values, 0.99, 0.0);
   }
+
   const double side = std::max((high - low).maxCoeff() / kCells, 1e-4);
   std::vector<std::uint32_t> count(static_cast<std::size_t>(kCells) * kCells * kCells, 0);
   for (const auto i : points) {
@@ -217,6 +231,7 @@ double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& point
     const auto index = [&cell](int axis) { return static_cast<std::size_t>(cell[axis]); };
     ++count[(index(2) * kCells + index(1)) * kCells + index(0)];
   }
+
   count.erase(std::remove(count.begin(), count.end(), 0U), count.end());
   if (count.empty()) return side;
   return side * std::sqrt(1.2 / static_cast<double>(core::median(std::move(count))));

@@ -56,12 +56,15 @@ void Raster::draw_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, d
   const Eigen::Vector2d along = (to - from).head<2>();
   const double length = along.norm();
   if (!(length > 0.0 && length < 1e6)) return;
+
   const double half = 0.5 * width_px;
   const Eigen::Vector2d unit = along / length;
   const int top = std::min(first_from(std::max(from.y(), to.y()) + half), first_row_ + depth_.rows);
+
   for (int row = std::max(first_from(std::min(from.y(), to.y()) - half), first_row_); row < top; ++row) {
     // Where the row crosses the rectangle: between both sides, and between both ends.
     const double up = row + 0.5 - from.y();
+
     double first = std::min(from.x(), to.x()) - half, last = std::max(from.x(), to.x()) + half;
     const auto limit = [&](double slope, double offset, double low, double high) {
       if (std::abs(slope) < 1e-9) return;  // the bounding box limits it
@@ -70,6 +73,7 @@ void Raster::draw_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, d
       first = std::max(first, from.x() + a);
       last = std::min(last, from.x() + b);
     };
+
     limit(unit.y(), -up * unit.x(), -half, half);
     limit(unit.x(), up * unit.y(), 0.0, length);
     for (int x = std::max(first_from(first), 0); x < std::min(first_from(last), depth_.cols); ++x) {

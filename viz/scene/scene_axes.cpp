@@ -62,6 +62,7 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
   const Eigen::Vector3d right = forward.cross(up);
   std::array<double, 90> count{};
   double total = 0.0;
+
   std::vector<double> angles;
   for (const Eigen::Vector3d& n : normals) {
     if (std::abs(n.dot(up)) > 0.25) continue;
@@ -71,6 +72,7 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
     count[std::min<std::size_t>(89, static_cast<std::size_t>(angle))] += 1.0;
     total += 1.0;
   }
+
   std::size_t peak = 0;
   double best = -1.0;
   for (std::size_t i = 0; i < 90; ++i) {
@@ -81,6 +83,7 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
       peak = i;
     }
   }
+
   if (total < 100.0 || best < 1.6 * total * 9.0 / 90.0) return forward;
   double offset_sum = 0.0;
   double used = 0.0;
@@ -90,6 +93,7 @@ Eigen::Vector3d along_walls(const std::vector<Eigen::Vector3d>& normals, const E
     offset_sum += offset;
     used += 1.0;
   }
+
   const double turn =
       std::remainder(static_cast<double>(peak) + 0.5 + offset_sum / std::max(1.0, used), 90.0) * kDegree;
   return (std::cos(turn) * forward + std::sin(turn) * right).normalized();

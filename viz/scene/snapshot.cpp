@@ -75,6 +75,7 @@ core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
     return core::usage_error(fmt::format("picture size {}x{}: each side must be 64 to 8192 pixels",
                                          options.width_px, options.height_px));
   }
+
   const bool by_scalar = options.color == ColorMode::kRobot || options.color == ColorMode::kError ||
                          options.color == ColorMode::kConfidence;
   const std::size_t points = scene.cloud == nullptr ? 0 : scene.cloud->size();
@@ -83,9 +84,11 @@ core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
         fmt::format("color {}: the map holds {} such values for {} points; use rgb, height or normal",
                     color_mode_name(options.color), scene.scalars.size(), points));
   }
+
   if (options.scalar_range && !(options.scalar_range->first < options.scalar_range->second)) {
     return core::usage_error("colour range: the lower end must be below the upper end");
   }
+
   if (options.view == View::kExplicit) {
     const Eigen::Vector3d forward = options.viewpoint.target - options.viewpoint.eye;
     const double angle = options.viewpoint.field_of_view_deg;
@@ -96,6 +99,7 @@ core::Result<void> check(const Scene& scene, const SnapshotOptions& options) {
           "view must be between 1 and 170 degrees");
     }
   }
+
   return {};
 }
 
@@ -151,6 +155,7 @@ std::vector<int> point_sizes(const Scene& scene, const std::vector<std::uint32_t
   constexpr double kLonely = 6.0 * kSupersampling;  // a single point
   std::vector<int> sizes;
   sizes.reserve(points.size());
+
   for (const std::uint32_t k : points) {
     double size = options.point_size_px * kSupersampling;
     if (size <= 0.0) {
@@ -161,8 +166,10 @@ std::vector<int> point_sizes(const Scene& scene, const std::vector<std::uint32_t
              : spacing_m > 0.0         ? std::clamp(wanted, kSmallest, kLargest)
                                        : kLonely;
     }
+
     sizes.push_back(size > 0.0 ? std::max(1, static_cast<int>(std::lround(size))) : 0);
   }
+
   return sizes;
 }
 
@@ -180,17 +187,20 @@ Drawn choose_what_to_draw(const Scene& scene, const SnapshotOptions& options) {
   SnapshotOptions large = options;
   large.width_px *= kSupersampling;
   large.height_px *= kSupersampling;
+
   const SceneAxes axes = scene_axes(scene, large);
   Drawn drawn;
   drawn.content.scene = &scene;
   drawn.content.options = &options;
   drawn.content.projection = choose_projection(scene, large, axes);
+
   const Projection& projection = drawn.content.projection;
   const auto facing = visible_points(scene, projection, options.cull_back_faces);
   drawn.spacing_m = point_spacing(scene, facing);
   drawn.points = nearest_per_cell(scene, facing, projection, kSupersampling);
   drawn.styled = color_points(scene, drawn.points, options, axes, projection);
   drawn.sizes = point_sizes(scene, drawn.points, options, projection, drawn.spacing_m);
+
   for (const Eigen::Vector3d& p : positions(scene, drawn.points))
     drawn.places.push_back(projection.project(p));
   drawn.content.color_scale = drawn.styled.scale;
@@ -255,6 +265,7 @@ class Renderer {
     renderer->SetBackground(0.0, 0.0, 0.0);
     renderer->SetBackgroundAlpha(0.0);
     window_->window()->AddRenderer(renderer);
+
     vtkNew<Overlay> overlay;
     overlay->content = &drawn.content;
     overlay->band = &band;
@@ -264,6 +275,7 @@ class Renderer {
 
     Raster raster(kSupersampling * options.width_px, band.height);
     cv::Mat3b picture(options.height_px, options.width_px);
+
     for (int first_px = 0; first_px < picture.rows; first_px += kBand_px) {
       band.first = kSupersampling * first_px - kMargin;
       raster.clear(band.first, kBackground);
@@ -273,6 +285,7 @@ class Renderer {
                                   .rowRange(kMargin, kMargin + kSupersampling * part.rows);
       cv::resize(large, part, part.size(), 0.0, 0.0, cv::INTER_AREA);
     }
+
     window_->window()->RemoveRenderer(renderer);
     return picture;
   }
@@ -300,17 +313,21 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
   for (const Snapshot& snapshot : snapshots) {
     if (auto checked = check(scene, snapshot.options); !checked) return checked;
   }
+
   std::vector<Drawn> drawn(snapshots.size());
   std::vector<core::Result<void>> written(snapshots.size());
   std::vector<core::Executor::Job> choosing, writing;
+
   const auto choose_next = [&] {
     const std::size_t i = choosing.size();
     if (i == snapshots.size()) return;
     choosing.push_back(
         executor.submit([&, i] { drawn[i] = choose_what_to_draw(scene, snapshots[i].options); }));
   };
+
   Renderer renderer;
   choose_next();
+
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
     choosing[i].wait();
     choose_next();
@@ -320,10 +337,12 @@ core::Result<void> render_snapshots(const Scene& scene, const std::vector<Snapsh
     writing.push_back(
         executor.submit([&, i, picture = *picture] { written[i] = write_png(picture, snapshots[i].file); }));
   }
+
   for (std::size_t i = 0; i < snapshots.size(); ++i) {
     writing[i].wait();
     if (!written[i]) return written[i];
   }
+
   return {};
 }
 

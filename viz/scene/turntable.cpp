@@ -36,17 +36,21 @@ SceneExtent extent_of(const Scene& scene) {
     }
     points = evened(points);
   }
+
   for (const CameraPath& path : scene.paths) {
     for (const auto& pose : path.trajectory) points.push_back(pose.world_from_camera.translation);
   }
+
   SceneExtent extent;
   if (points.empty()) return extent;
+
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     values.reserve(points.size());
     for (const auto& p : points) values.push_back(p[axis]);
     extent.centre[axis] = 0.5 * (core::quantile(values, 0.01, 0.0) + core::quantile(values, 0.99, 0.0));
   }
+
   std::vector<double> distances;
   distances.reserve(points.size());
   for (const auto& p : points) distances.push_back((p - extent.centre).norm());
@@ -61,6 +65,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
                                     const std::function<void(std::size_t, std::size_t)>& progress) {
   if (pictures < 2) return core::usage_error("turntable: at least 2 pictures make one turn");
   if (auto made = core::make_folder(folder); !made) return made;
+
   SnapshotOptions view = options;
   const SceneAxes axes = scene_axes(scene, options);
   const SceneExtent extent = extent_of(scene);
@@ -69,6 +74,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
   view.viewpoint.up = axes.up;
   view.viewpoint.target = extent.centre;
   view.viewpoint.field_of_view_deg = kFieldOfView_deg;
+
   const double distance = 1.02 * extent.radius_m / std::sin(0.5 * kFieldOfView_deg * M_PI / 180.0);
   for (int k = 0; k < pictures; ++k) {
     const double turn = 2.0 * M_PI * k / pictures;
@@ -77,6 +83,7 @@ core::Result<void> render_turntable(const Scene& scene, const SnapshotOptions& o
     if (auto drawn = render_snapshot(scene, view, folder / fmt::format("{:04}.png", k)); !drawn) return drawn;
     if (progress) progress(static_cast<std::size_t>(k) + 1, static_cast<std::size_t>(pictures));
   }
+
   return {};
 }
 

@@ -124,6 +124,7 @@ static Eigen::Vector3d forward_of(const SnapshotOptions& options, const SceneAxe
       return axes.up;
     case View::kFront:
       return axes.forward;
+
     case View::kBack:
       return -axes.forward;
     case View::kLeft:
@@ -133,6 +134,7 @@ static Eigen::Vector3d forward_of(const SnapshotOptions& options, const SceneAxe
     case View::kExplicit:
       break;
   }
+
   return (options.viewpoint.target - options.viewpoint.eye).normalized();
 }
 
@@ -162,6 +164,7 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
   const Eigen::Vector3d centre =
       0.5 * ((x.low + x.high) * projection.right + (y.low + y.high) * projection.up +
              (z.low + z.high) * projection.forward);
+
   double distance = 2.0 * depth + 1.0;
   if (projection.orthographic) {
     fit_orthographic(projection, x, y);
@@ -169,6 +172,7 @@ void fit(Projection& projection, const std::vector<Eigen::Vector3d>& points,
     distance = fit_distance(projection, centre, points, must_see);
   }
   projection.eye = centre - distance * projection.forward;
+
   // Points left out by that may stick out; half the depth again holds them without wasting depth precision.
   projection.near_m = std::max(distance - 1.0 * depth, 0.05 * distance);
   projection.far_m = distance + 1.5 * depth;

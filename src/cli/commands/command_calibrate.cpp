@@ -42,11 +42,13 @@ class Mapped {
   core::Result<void> add(const std::string& input, const CalibrateRequest& request, Session& session) {
     const auto pipelines = session.pipelines_folder();
     if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+
     dataset::OpenOptions open = request.open;
     open.cameras_folder = *pipelines / "cameras";
     Console& console = session.console();
     auto source = pipeline::open_input(input, open, *pipelines / "scenes", session.executor(), console);
     if (!source) return tl::unexpected<core::Error>(source.error());
+
     const sensor::Camera& camera = (*source)->camera();
     if (runs_.empty()) {
       camera_ = camera;
@@ -56,6 +58,7 @@ class Mapped {
           "the camera of all with --camera",
           input));
     }
+
     runs_.push_back(
         std::make_unique<mapping::Slam>(slam_options(), camera.color, 0, session.executor(), console));
     runs_.back()->set_camera(camera);
@@ -83,6 +86,7 @@ class Mapped {
       std::shared_ptr<const sensor::RgbdFrame> frame;
       std::shared_ptr<const features::FrameFeatures> features;
     };
+
     const features::FeatureExtractor extractor({}, source.camera().color);
     constexpr std::size_t kChunk = 16;  // frames in memory
     for (std::size_t begin = 0; begin < source.size(); begin += kChunk) {
@@ -93,11 +97,14 @@ class Mapped {
         chunk[i].features = std::make_shared<features::FrameFeatures>(extractor.extract(*frame));
         chunk[i].frame = std::make_shared<sensor::RgbdFrame>(std::move(*frame));
       });
+
       for (const Read& read : chunk) {
         if (read.frame != nullptr) runs_.back()->process(*read.frame, read.features);
       }
+
       session.console().progress(begin + chunk.size(), source.size(), "frames");
     }
+
     session.console().end_progress();
     runs_.back()->finish();
   }

@@ -73,6 +73,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
   const fs::path truth_file = file_in(request.files.back(), "groundtruth.txt");
   const auto truth = dataset::read_trajectory_file(truth_file);
   if (!truth) return tl::unexpected<core::Error>(truth.error());
+
   for (const std::string& note : truth->notes)
     console.warning(fmt::format("{}: {}", truth_file.string(), note));
   std::vector<double> stamps;
@@ -81,15 +82,18 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
     if (!read) return tl::unexpected<core::Error>(read.error());
     stamps = std::move(*read);
   }
+
   const std::vector<std::string> names = estimate_names(estimates);
   std::vector<evaluate::NamedReport> reports;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const fs::path file = file_in(estimates[i], "trajectory.txt");
     auto estimate = dataset::read_trajectory_file(file);
     if (!estimate) return tl::unexpected<core::Error>(estimate.error());
+
     dataset::TrajectoryReading fitting_truth = *truth;
     if (auto paired = dataset::pair_by_number(*estimate, fitting_truth); !paired)
       return about(file, paired.error());
+
     for (const std::string& note : estimate->notes)
       console.warning(fmt::format("{}: {}", file.string(), note));
     auto report =
@@ -97,6 +101,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
     if (!report) return about(file, report.error());
     reports.push_back({names[i], std::move(*report)});
   }
+
   return reports;
 }
 
@@ -104,6 +109,7 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
   if (auto applied = request.flags.apply(); !applied) return applied;
   const auto reports = measure_paths(request, console);
   if (!reports) return tl::unexpected<core::Error>(reports.error());
+
   const bool single = reports->size() == 1;
   for (const evaluate::NamedReport& named : *reports) {
     if (request.json) {  // the table for people tells them itself
@@ -114,11 +120,13 @@ core::Result<void> evaluate_paths(TrajectoryRequest& request, Console& console) 
     }
     fmt::print("{}{}\n", single ? "" : "== " + named.name + "\n", evaluate::to_text(named.report));
   }
+
   if (request.json) {
     fmt::print("{}", single ? evaluate::to_json(reports->front().report) : evaluate::to_json(*reports));
   } else if (!single) {
     fmt::print("{}", evaluate::to_text(*reports));
   }
+
   return request.plots.empty() ? core::Result<void>{} : write_plots(*reports, request.plots);
 }
 
@@ -127,6 +135,7 @@ void add_trajectory(CLI::App& group, Session& session) {
   CLI::App* command =
       add_command(group, session, "trajectory", "Absolute and relative pose error against truth",
                   [&session, request] { return evaluate_paths(*request, session.console()); });
+
   command
       ->add_option(
           "EST... GT", request->files,
@@ -134,6 +143,7 @@ void add_trajectory(CLI::App& group, Session& session) {
           "poses (the same formats, or a recording with groundtruth.txt)")
       ->required()
       ->expected(2, 100);
+
   command->add_option("--frames", request->frames, "The recording's rgb.txt, for the share of frames tracked")
       ->type_name("LIST");
   command->add_flag("--json", request->json, "Print JSON");

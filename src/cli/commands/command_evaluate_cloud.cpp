@@ -37,9 +37,11 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
   if (request.trajectories.size() != request.truths.size()) {
     return core::usage_error("--trajectory and --truth belong together: give as many of one as of the other");
   }
+
   for (std::size_t i = 0; i < request.trajectories.size(); ++i) {
     files.push_back({"", request.trajectories[i], request.truths[i]});
   }
+
   if (files.empty()) files = evaluate::find_trajectories(cloud, file_in(request.reference, "reference.ply"));
   std::vector<evaluate::TrajectoryPair> pairs;
   for (const evaluate::TrajectoryFiles& pair : files) {
@@ -49,6 +51,7 @@ core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudReques
     if (!truth) return tl::unexpected<core::Error>(truth.error());
     pairs.push_back({std::move(*estimate), std::move(*truth)});
   }
+
   return pairs;
 }
 
@@ -76,17 +79,21 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
   if (!request.trajectories.empty() && request.command->count("--align") == 0) {
     request.options.align = evaluate::CloudAlignment::kSe3;  // who names a start wants to be aligned
   }
+
   if (!request.output.empty() && request.reference.empty()) {
     return core::usage_error("-o: colours by error need a REFERENCE to measure against");
   }
+
   const fs::path cloud_file = file_in(request.cloud, "map.ply");
   const auto cloud = evaluate::load_cloud(cloud_file);
   if (!cloud) return tl::unexpected<core::Error>(cloud.error());
+
   core::Result<evaluate::Reference> reference;
   if (!request.reference.empty()) {
     reference = evaluate::load_reference(file_in(request.reference, "reference.ply"));
     if (!reference) return tl::unexpected<core::Error>(reference.error());
   }
+
   std::vector<evaluate::TrajectoryPair> pairs;
   const bool aligns = request.options.align != evaluate::CloudAlignment::kNone;
   if (!request.reference.empty() &&
@@ -95,6 +102,7 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     if (!read) return tl::unexpected<core::Error>(read.error());
     pairs = std::move(*read);
   }
+
   const auto report = evaluate::evaluate_cloud(*cloud, request.reference.empty() ? nullptr : &*reference,
                                                request.options, pairs, session.executor());
   if (!report) {  // not about the reference, which has been read
@@ -102,9 +110,11 @@ core::Result<void> evaluate_surfaces(CloudRequest& request, Session& session) {
     error.message = fmt::format("{}: {}", cloud_file.string(), error.message);
     return tl::unexpected<core::Error>(std::move(error));
   }
+
   if (request.json) {  // the table for people tells them itself
     for (const std::string& warning : report->warnings) session.console().warning(warning);
   }
+
   fmt::print("{}", request.json ? evaluate::to_json(*report) : evaluate::to_text(*report));
   if (request.output.empty()) return {};
   return write_error_clouds(*cloud, *report, pairs, request.output);
@@ -121,6 +131,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
   command->add_option(
       "REFERENCE", request->reference,
       "The true surface (PLY, mesh or samples); without it only what the cloud tells of itself");
+
   command
       ->add_option("--trajectory", request->trajectories,
                    "Estimated path to start the alignment from; --align is se3 then, if it is not given")
@@ -129,6 +140,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
   command->add_option("--truth", request->truths, "Its truth, in the reference's frame")
       ->type_name("GT")
       ->allow_extra_args(false);
+
   command
       ->add_option("-o,--output", request->output,
                    "Write clouds coloured by error and pictures of them into this folder: "

@@ -91,16 +91,19 @@ core::Result<void> something_left(const cloud::FilterChain& chain,
 core::Result<void> filter(const FilterRequest& request, Session& session) {
   const auto chain = load_chain(request.chain, session);
   if (!chain) return tl::unexpected<core::Error>(chain.error());
+
   const fs::path& output = request.files.back();
   cloud::FilterContext context;
   context.executor = &session.executor();
   if (auto fit = check_output(output, *chain); !fit) return fit;
   if (auto fit = chain->ready(context); !fit) return fit;
+
   cloud::CloudColumns columns;
   auto input = read_inputs(request, columns, context.shift);
   if (!input) return tl::unexpected<core::Error>(input.error());
   context.columns = &columns;
   context.made_columns = &columns;
+
   Console& console = session.console();
   std::vector<cloud::FilterReport> reports;
   const auto filtered =
@@ -108,11 +111,13 @@ core::Result<void> filter(const FilterRequest& request, Session& session) {
                    [&console](std::size_t done, std::size_t total, const std::string& type) {
                      console.progress(done, total, type.empty() ? "filters" : type.c_str());
                    });
+
   console.end_progress();
   if (!filtered) return tl::unexpected<core::Error>(filtered.error());
   if (!session.quiet) fmt::print("{}", cloud::to_table(reports));
   if (!session.quiet && !context.shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(context.shift));
   if (auto written = cloud::write_cloud(output, **filtered, columns, context.shift); !written) return written;
+
   return something_left(*chain, reports);
 }
 
@@ -151,6 +156,7 @@ void add_filter(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "filter", "Run a filter chain on a cloud file",
                                   [&session, request] { return filter(*request, session); });
   command->add_option("CHAIN", request->chain, "Filter chain: a file or a shipped name")->required();
+
   command
       ->add_option(
           "FILES", request->files,
@@ -164,11 +170,13 @@ void add_filter(CLI::App& app, Session& session) {
   add_plugin_option(
       *add_command(*group, session, "list", "All filters", [&session] { return list_filters(session); }),
       session);
+
   const auto name = std::make_shared<std::string>();
   CLI::App* describe = add_command(*group, session, "describe", "One filter: options and an example",
                                    [&session, name] { return describe_filter(*name, session); });
   describe->add_option("NAME", *name, "Type of the filter")->required();
   add_plugin_option(*describe, session);
+
   CLI::App* check =
       add_command(*group, session, "check", "Check a filter chain without running it", [&session, name] {
         const auto chain = load_chain(*name, session);
@@ -176,6 +184,7 @@ void add_filter(CLI::App& app, Session& session) {
         fmt::print("{}: {} filters, nothing wrong\n", *name, chain->size());
         return 0;
       });
+
   check->add_option("CHAIN", *name, "Filter chain: a file or a shipped name")->required();
   add_plugin_option(*check, session);
 }

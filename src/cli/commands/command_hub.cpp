@@ -41,6 +41,7 @@ void add_hub(CLI::App& app, Session& session) {
       add_command(app, session, "hub", "Collect the maps of robots over a network and fuse them",
                   [&session, request, quota_gb] { return hub(session, *request, *quota_gb); });
   command->footer(kTwoTerminals);
+
   command->add_option("-o,--output", request->fuse.output, "Folder for the result")
       ->required()
       ->type_name("OUT");
@@ -48,6 +49,7 @@ void add_hub(CLI::App& app, Session& session) {
       ->type_name("N")
       ->check(CLI::Range(1, 64));
   add_network_options(*command, request->network);
+
   command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")
       ->check(CLI::PositiveNumber);

@@ -44,11 +44,13 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
   if (!reader) return tl::unexpected<core::Error>(reader.error());
   const auto contents = reader->contents();
   if (!contents) return tl::unexpected<core::Error>(contents.error());
+
   const maps::StoreHeader& header = reader->header();
   std::string robots;
   for (const maps::RobotInfo& robot : header.robots) robots += (robots.empty() ? "" : ", ") + robot.name;
   std::error_code ec;
   const double file_mb = static_cast<double>(std::filesystem::file_size(file, ec)) / 1e6;
+
   fmt::print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
              header.format, header.program_version, robots);
   fmt::print("store.complete: {}\n",
@@ -59,6 +61,7 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
              contents->frames);
   fmt::print("store.clouds: {} of keyframes, {} of frames between\n", contents->keyframe_clouds,
              contents->frame_clouds);
+
   for (const std::string& name : contents->attachments) fmt::print("store.attachment: {}\n", name);
   fmt::print("store.size_mb: {:.1f}\nstore.clouds_mb: {:.1f}\n", file_mb,
              static_cast<double>(contents->cloud_bytes) / 1e6);
@@ -79,6 +82,7 @@ core::Result<void> describe_result(const std::filesystem::path& folder) {
 core::Result<void> describe_cloud(const std::filesystem::path& file) {
   const auto read = cloud::read_cloud(file, cloud::LargeCoordinates::kShifted);
   if (!read) return tl::unexpected<core::Error>(read.error());
+
   Eigen::Array3f low = Eigen::Array3f::Constant(INFINITY);
   Eigen::Array3f high = Eigen::Array3f::Constant(-INFINITY);
   for (const cloud::Point& p : *read->cloud) {
@@ -87,11 +91,13 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
     low = low.min(position);
     high = high.max(position);
   }
+
   fmt::print("points: {}\nwithout position: {}\n", read->cloud->size(), read->nan_points);
   if (read->cloud->isOrganized()) fmt::print("organised: {} x {}\n", read->cloud->width, read->cloud->height);
   fmt::print("colour: {}\nnormals: {}\n", read->has_color ? "yes" : "no", read->has_normals ? "yes" : "no");
   if (read->has_normals) fmt::print("without normal: {}\n", read->nan_normals);
   if (!read->shift.isZero(0.0)) fmt::print("shift: {}\n", shift_text(read->shift));
+
   if ((low <= high).all()) {
     const Eigen::Array3d from = low.cast<double>() + read->shift.array();
     const Eigen::Array3d to = high.cast<double>() + read->shift.array();
@@ -100,6 +106,7 @@ core::Result<void> describe_cloud(const std::filesystem::path& file) {
     const Eigen::Array3f size = high - low;
     fmt::print("size: {:.3f} x {:.3f} x {:.3f} m\n", size.x(), size.y(), size.z());
   }
+
   return {};
 }
 

@@ -38,6 +38,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
   command.add_option("--every", request.open.every, "Use every N-th frame")
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
+
   command
       .add_option(
           "--pace", request.pace_hz,
@@ -45,6 +46,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
           "as that goes)")
       ->type_name("HZ")
       ->check(CLI::Range(0.0, 1000.0));
+
   command.add_flag("--resume", request.resume,
                    "Go on from what a run that was interrupted left in OUT.partial; input and settings must "
                    "be those of that run");

@@ -81,21 +81,25 @@ int describe(Session& session, const PipelinesRequest& request, const pipeline::
     fmt::print("{}", pipeline::stages_reference(registry, request.all));
     return 0;
   }
+
   const auto type = find_stage(request.name, registry);
   if (!type) return session.fail(type.error());
   if (request.markdown) {
     fmt::print("{}", pipeline::stage_reference(**type, request.all));
     return 0;
   }
+
   fmt::print("{}: {}\n", (*type)->name, (*type)->help);
   describe_ports((*type)->inputs, "inputs");
   describe_ports((*type)->outputs, "outputs");
   const std::vector<core::OptionSpec> options = pipeline::shown_options(**type, request.all);
   if (!options.empty()) fmt::print("\noptions:\n");
+
   for (const core::OptionSpec& spec : options) {
     fmt::print("  {:<22} {} (allowed: {}; default: {})\n", spec.key, spec.help, core::allowed_text(spec),
                spec.default_value);
   }
+
   return 0;
 }
 
@@ -162,14 +166,17 @@ void add_pipelines(CLI::App& app, Session& session) {
       return registry ? run(session, *request, *registry) : session.fail(registry.error());
     });
   };
+
   CLI::App* listed =
       command("list", "The shipped pipelines, and the stages that pipelines are made of", list);
   add_plugin_option(*listed, session);
+
   CLI::App* described =
       command("describe", "A stage: ports and options; without STAGE the whole reference", describe);
   described->add_option("STAGE", request->name, "Type of a stage");
   described->add_flag("--markdown", request->markdown, "As a section of the reference page");
   described->add_flag("--all", request->all, "Options for those who know what they do, too");
+
   CLI::App* checked = command("check", "Check a pipeline without running it", check);
   add_pipeline_arguments(*checked, request);
   add_plugin_option(*checked, session);
@@ -177,6 +184,7 @@ void add_pipelines(CLI::App& app, Session& session) {
       command("schema", "JSON Schema of pipeline files, or of one stage, for editors", schema);
   schemed->add_option("STAGE", request->name, "Type of a stage");
   add_plugin_option(*schemed, session);
+
   CLI::App* drawn = command("graph", "Draw a pipeline; without -o print it in Graphviz's language", graph);
   add_pipeline_arguments(*drawn, request);
   add_plugin_option(*drawn, session);

@@ -73,6 +73,7 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     if (!trajectory) return tl::unexpected<core::Error>(trajectory.error());
     scene.paths.emplace_back().trajectory = std::move(*trajectory);
   }
+
   std::error_code ec;
   const bool has_lines = place.result && (fs::exists(place.result->lines(), ec) || place.store.empty());
   if (lines && has_lines) {
@@ -80,12 +81,14 @@ core::Result<void> add_paths(const maps::MapPlace& place, bool lines, viz::Scene
     if (!read) return tl::unexpected<core::Error>(read.error());
     segments = std::move(*read);
   }
+
   if (!place.result || (lines && !has_lines)) {
     const auto stored = maps::StoredResult::open(place);
     if (!stored) return tl::unexpected<core::Error>(stored.error());
     if (!place.result) scene.paths.emplace_back().trajectory = stored->trajectory();
     if (lines) segments = stored->lines();
   }
+
   for (const auto& [a, b] : segments) scene.segments.push_back({a, b});
   return {};
 }
@@ -98,6 +101,7 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
         fmt::format("--color {}: {} has no {} of its points; choose rgb, height or normal",
                     viz::color_mode_name(mode), input.string(), what));
   };
+
   if (mode == viz::ColorMode::kConfidence) {
     if (file.columns.confidence.empty()) return missing("confidence");
     scene.scalars = file.columns.confidence;
@@ -106,6 +110,7 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
     for (const auto& column : file.columns.others) {
       if (column.name == cloud::kSigmaColumn) scene.scalars = column.values;
     }
+
     if (scene.scalars.empty()) return missing("sigma");
     scene.scalar_label = "standard deviation (m)";
   } else if (mode == viz::ColorMode::kRobot) {
@@ -113,11 +118,13 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
     scene.scalars.assign(file.columns.robot.begin(), file.columns.robot.end());
   } else if (mode == viz::ColorMode::kError) {
     const auto data = input.extension() == ".ply" ? cloud::read_ply(input) : core::Result<cloud::PlyData>();
+
     const std::vector<float>* errors = data ? data->floats("error") : nullptr;
     if (errors == nullptr || errors->size() != file.cloud->size()) return missing("error");
     scene.scalars = *errors;
     scene.scalar_label = "error (m)";
   }
+
   return {};
 }
 
@@ -156,26 +163,32 @@ core::Result<void> render(RenderRequest& request, Session& session) {
     if (auto parsed = parse_size(request.size, request.options); !parsed) return parsed;
   }
   if (auto checked = check_output(request); !checked) return checked;
+
   const auto found = map_of(request.input, request.robot);
   if (!found) return tl::unexpected<core::Error>(found.error());
+
   const std::optional<maps::MapPlace>& place = *found;
   std::error_code ec;
   const bool cloud_file = fs::is_regular_file(request.input, ec) && request.input.extension() != ".db";
   const auto file = cloud_file ? cloud::read_cloud(request.input, cloud::LargeCoordinates::kShifted)
                                : maps::read_map_cloud(*place, session.executor());
   if (!file) return tl::unexpected<core::Error>(file.error());
+
   if (!file->shift.isZero(0.0)) session.console().info("shift: " + shift_text(file->shift));
   viz::Scene scene;
   scene.cloud = file->cloud;
   scene.title = display_name(place && place->result ? place->result->folder : request.input);
+
   if (place) {
     if (auto added = add_paths(*place, request.lines, scene); !added) return added;
   } else if (request.lines) {
     return core::usage_error("--lines: only a result folder has lines");
   }
+
   const fs::path colours = cloud_file || !place->result ? request.input : place->result->ply();
   if (auto added = add_scalars(*file, colours, request.options.color, scene); !added) return added;
   if (request.turntable > 0) return turn(request, scene, session.console());
+
   return viz::render_snapshot(scene, request.options, request.output);
 }
 
@@ -187,12 +200,14 @@ void add_render(CLI::App& app, Session& session) {
                                   [&session, request] { return render(*request, session); });
   command->add_option("INPUT", request->input, "A result folder, map.db, or a PLY, PCD or XYZ file")
       ->required();
+
   command->add_option("-o,--output", request->output, "Picture to write")
       ->required()
       ->type_name("FILE.png|DIR|.gif|.mp4");
   command->add_option("--robot", request->robot, "Whose map, of an interrupted run of several robots")
       ->type_name("NAME");
   command->add_option("--size", request->size, "Size of the picture, like 1600x1200")->type_name("WxH");
+
   command
       ->add_option("--turntable", request->turntable,
                    "So many pictures from all sides: into a folder, or as .gif or .mp4 with ffmpeg")

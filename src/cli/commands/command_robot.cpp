@@ -30,6 +30,7 @@ int robot(Session& session, net::RobotRequest request) {
   request.fresh_id = fresh_id();
   request.hand_in = fmt::format("--name {}{}", request.name, network_arguments(request.network));
   if (request.map.output.empty()) request.map.output = request.name;
+
   const core::StopToken& stop = stop_on_signals();
   Console& console = session.console();
   const auto status = [&](const std::string& line) { console.status(line); };
@@ -37,11 +38,13 @@ int robot(Session& session, net::RobotRequest request) {
   if (earlier.empty() && request.map.resume && pipeline::is_finished(request.map.output)) {
     earlier = request.map.output;
   }
+
   if (!earlier.empty()) {
     const auto outcome = net::hand_in(request, earlier, console, stop, status);
     console.end_progress();
     return finish(session, outcome, earlier);
   }
+
   const auto outcome =
       net::run_robot(request, session.executor(), console, stop, status, console.counting("frames"));
   console.end_progress();
@@ -53,6 +56,7 @@ int robot(Session& session, net::RobotRequest request) {
 void add_robot(CLI::App& app, Session& session) {
   const auto request = std::make_shared<net::RobotRequest>();
   request->map.pipeline = "robot";
+
   CLI::App* command =
       add_command(app, session, "robot", "Map a recording and send the map to a hub meanwhile",
                   [&session, request] { return robot(session, *request); });
@@ -61,6 +65,7 @@ void add_robot(CLI::App& app, Session& session) {
       "and a robot:        plumbline robot 'synth:room?frames=300&seed=1' --name r0 --interface lo\n"
       "or once more:       plumbline robot r0 --name r0 --interface lo   (sends the map in folder r0)\n"
       "Exit code 4: a hub has answered, but not received everything. More: docs/guide/network.md");
+
   command
       ->add_option("INPUT", request->map.input,
                    "Recording, as for plumbline map; or the result folder of an earlier run, to send its map")
@@ -70,6 +75,7 @@ void add_robot(CLI::App& app, Session& session) {
       ->type_name("NAME");
   command->add_option("-o,--output", request->map.output, "Folder for the result (default: NAME)")
       ->type_name("OUT");
+
   add_network_options(*command, request->network);
   command
       ->add_option_function<std::string>(
@@ -77,11 +83,13 @@ void add_robot(CLI::App& app, Session& session) {
           "on: use maps of other robots for relocalisation and loops; the map then depends on the network "
           "(default: off)")
       ->check(CLI::IsMember({"off", "on"}));
+
   command
       ->add_option("--wait", request->wait_s,
                    "Seconds to wait after the last frame for a hub to answer at all (default: 30)")
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
+
   command
       ->add_option("--wait-lost", request->wait_lost_s,
                    "Seconds to wait since the hub's last acknowledgement (default: 600)")

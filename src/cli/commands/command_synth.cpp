@@ -24,25 +24,30 @@ struct SynthRequest {
 core::Result<void> film(SynthRequest& request, Session& session) {
   if (auto applied = request.flags.apply(); !applied) return applied;
   if (auto checked = synth::check(request.options); !checked) return checked;
+
   const auto pipelines = session.pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   const auto scene = synth::load_scene(request.scene, *pipelines / "scenes");
   if (!scene) return tl::unexpected<core::Error>(scene.error());
+
   std::error_code ec;
   if (std::filesystem::exists(request.output, ec) && !std::filesystem::is_empty(request.output, ec)) {
     return core::usage_error(
         fmt::format("{}: is there already and not empty; name a new folder", request.output.string()));
   }
+
   Console& console = session.console();
   const auto summary = synth::write_recordings(*scene, request.options, request.output, session.executor(),
                                                stop_on_signals(), console, console.counting("frames"));
   console.end_progress();
   if (!summary) return tl::unexpected<core::Error>(summary.error());
+
   if (!session.quiet) {
     fmt::print("{}{} robots, {} frames, {:.1f} m of path, {} reference points in {}\n",
                summary->stopped ? "stopped early: " : "", summary->robots, summary->frames, summary->path_m,
                summary->reference_samples, request.output.string());
   }
+
   return {};
 }
 

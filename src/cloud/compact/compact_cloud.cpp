@@ -45,6 +45,7 @@ std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
   Rays rays{std::vector<float>(cloud.width, kNan), std::vector<float>(cloud.height, kNan)};
   const auto most = static_cast<float>(0.125 * step_m);
   std::size_t i = 0;
+
   for (std::uint32_t row = 0; row < cloud.height; ++row) {
     for (std::uint32_t column = 0; column < cloud.width; ++column, ++i) {
       const Point& p = cloud[i];
@@ -57,6 +58,7 @@ std::optional<Rays> rays_of(const Cloud& cloud, double step_m) {
       }
     }
   }
+
   for (float& v : rays.x) v = std::isnan(v) ? 0.0F : v;
   for (float& v : rays.y) v = std::isnan(v) ? 0.0F : v;
   return rays;
@@ -80,6 +82,7 @@ void differences(Io& io, std::vector<std::int32_t>& values) {
       before = now;
     }
   }
+
   io.template planes<kPlanes>(codes.data(), codes.size());
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < codes.size(); ++i) {
@@ -96,6 +99,7 @@ void columns(Io& io, const std::vector<Point*>& points) {
   const std::size_t count = points.size();
   Bytes bytes(5 * count);
   std::array<std::uint8_t, 5> before{};
+
   if constexpr (!Io::kReads) {
     for (std::size_t i = 0; i < count; ++i) {
       const Point& p = *points[i];
@@ -108,6 +112,7 @@ void columns(Io& io, const std::vector<Point*>& points) {
       before = now;
     }
   }
+
   io.planes(bytes.data(), bytes.size());
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -134,16 +139,20 @@ void grid(Io& io, Rays& rays, double step_m, Cloud& cloud) {
       if (finite(cloud[i])) mask[i / 8] = static_cast<std::uint8_t>(mask[i / 8] | 1U << (i % 8));
     }
   }
+
   io.planes(mask.data(), mask.size());
   std::vector<Point*> points;
   points.reserve(cloud.size());
+
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if ((mask[i / 8] >> (i % 8) & 1U) != 0) points.push_back(&cloud[i]);
   }
+
   std::vector<std::int32_t> depths(points.size());
   if constexpr (!Io::kReads) {
     for (std::size_t k = 0; k < points.size(); ++k) depths[k] = steps_of(points[k]->z, step_m);
   }
+
   differences<3>(io, depths);
   if constexpr (Io::kReads) {
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -154,6 +163,7 @@ void grid(Io& io, Rays& rays, double step_m, Cloud& cloud) {
     }
     cloud.is_dense = points.size() == cloud.size();
   }
+
   columns(io, points);
 }
 
@@ -209,22 +219,26 @@ CloudPtr decoded(const Bytes& content) {
   CompactHead head;
   head_fields(from, head);
   const std::uint64_t cells = std::uint64_t{head.width} * std::max(head.height, 1U);
+
   // A cell takes a bit at least.
   from.check(
       cells <= kMostPoints && cells / 8 <= content.size() && head.step_m > 0.0 && std::isfinite(head.step_m),
       "its head is damaged");
+
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   auto cloud = std::make_shared<Cloud>();
   cloud->points.assign(static_cast<std::size_t>(cells), none);
   cloud->width = head.width;
   cloud->height = std::max(1U, head.height);
+
   if (head.height > 0) {
     Rays rays{std::vector<float>(head.width), std::vector<float>(head.height)};
     grid(from, rays, head.step_m, *cloud);
   } else {
     list(from, head.step_m, *cloud);
   }
+
   if (!from.at_end()) sensor_pose_fields(from, *cloud);
   from.expect_end();
   return cloud;

@@ -60,6 +60,7 @@ bool same_places(const Cloud& before, const Cloud& after) {
 std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
   std::vector<std::size_t> found;
   found.reserve(after.size());
+
   // Most filters keep the order: try that first.
   std::size_t next = 0;
   for (const Point& p : after.points) {
@@ -68,10 +69,12 @@ std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
     found.push_back(next++);
   }
   if (found.size() == after.size()) return found;
+
   std::vector<std::size_t> order = finite_indices(before);  // NaN has no order
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return before_in_order(before[a], before[b]); });
   found.clear();
+
   for (const Point& p : after.points) {
     const auto at = std::lower_bound(order.begin(), order.end(), p, [&](std::size_t i, const Point& q) {
       return before_in_order(before[i], q);
@@ -79,6 +82,7 @@ std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
     if (at == order.end() || !same_place(before[*at], p)) return {};
     found.push_back(*at);
   }
+
   return found;
 }
 

@@ -49,11 +49,13 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
     problems.push_back({entry.mark, path, "is not a filter (a map that begins with type: NAME)"});
     return nullptr;
   }
+
   const ConfigNode* type = entry.find("type");
   if (type == nullptr) {
     problems.push_back({entry.mark, path, "has no type" + core::hint("", registry.types())});
     return nullptr;
   }
+
   const FilterInfo* info = registry.find(type->scalar);
   if (info == nullptr || type->kind != ConfigNode::Kind::kScalar) {
     problems.push_back({type->mark, path + ".type",
@@ -63,6 +65,7 @@ const FilterInfo* find_type(const ConfigNode& entry, const std::string& path, co
                                           core::hint(type->scalar, registry.types()))});
     return nullptr;
   }
+
   return info;
 }
 
@@ -75,9 +78,11 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
     problems.push_back({node.mark, path, "is not a filter chain (a map with the keys chain and filters)"});
     return chain;
   }
+
   refuse_unknown_keys(node, path, {"chain", "description", "filters"}, problems);
   const std::string prefix = path.empty() ? "" : path + ".";
   const ConfigNode* name = node.find("chain");
+
   if (name == nullptr || name->kind != ConfigNode::Kind::kScalar || name->scalar.empty()) {
     problems.push_back(
         {name == nullptr ? node.mark : name->mark, prefix + "chain", "the chain needs a name"});
@@ -86,12 +91,14 @@ FilterChain FilterChain::parse(const ConfigNode& node, const std::string& path,
   } else {
     chain.name_ = name->scalar;
   }
+
   const ConfigNode* filters = node.find("filters");
   if (filters == nullptr || filters->kind != ConfigNode::Kind::kSequence) {
     problems.push_back(
         {filters == nullptr ? node.mark : filters->mark, prefix + "filters", "must be a list of filters"});
     return chain;
   }
+
   chain.filters_ = parse_list(*filters, path, registry, problems).filters_;
   return chain;
 }
@@ -100,21 +107,25 @@ FilterChain FilterChain::parse_list(const ConfigNode& list, const std::string& p
                                     const FilterRegistry& registry, ConfigProblems& problems) {
   FilterChain chain;
   chain.name_ = path.substr(path.rfind('.') + 1);
+
   std::vector<std::filesystem::path> written;
   for (std::size_t i = 0; i < list.items.size(); ++i) {
     const ConfigNode& entry = list.items[i];
     const std::string place = fmt::format("{}{}filters[{}]", path, path.empty() ? "" : ".", i);
     const FilterInfo* info = find_type(entry, place, registry, problems);
     if (info == nullptr) continue;
+
     const std::shared_ptr<Filter> filter = info->make();
     core::OptionTable table;
     filter->declare(table);
     const std::size_t before = problems.size();
     table.set_all(entry, place, problems, {"type"});
+
     if (problems.size() == before) {
       const std::string wrong = filter->check();
       if (!wrong.empty()) problems.push_back({entry.mark, place, wrong});
     }
+
     chain.filters_.push_back({info->type, filter, entry_yaml(info->type, table)});
     if (const std::string file = filter->writes(); !file.empty()) {
       const bool taken = std::find(written.begin(), written.end(), normal(file)) != written.end();
@@ -122,6 +133,7 @@ FilterChain FilterChain::parse_list(const ConfigNode& list, const std::string& p
       written.push_back(normal(file));
     }
   }
+
   return chain;
 }
 
@@ -179,11 +191,13 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
   FilterContext mine = context;
   CloudConstPtr current = std::move(input);
   CloudPtr output;
+
   std::size_t points = count_finite(*current);
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     const Step& step = filters_[i];
     if (progress) progress(i, filters_.size(), step.type);
     output.reset();  // `current` alone holds the input
+
     CloudColumns made;
     mine.columns = &columns;
     mine.made_columns = &made;
@@ -191,6 +205,7 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
     auto result = step.filter->apply(current, mine);
     const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
     if (!result) return tl::unexpected<core::Error>(at(i, result.error()));
+
     output = std::move(*result);
     columns = made.empty() ? carry_columns(*current, columns, *output) : std::move(made);
     current = output;
@@ -198,9 +213,11 @@ core::Result<CloudPtr> FilterChain::apply(CloudConstPtr input, const FilterConte
     if (reports != nullptr) reports->push_back({step.type, points, left, elapsed.count()});
     points = left;
   }
+
   if (progress) progress(filters_.size(), filters_.size(), "");
   if (columned) *context.made_columns = std::move(columns);
   if (output == nullptr) return std::make_shared<Cloud>(*current);  // an empty chain
+
   return output;
 }
 

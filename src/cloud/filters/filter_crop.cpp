@@ -83,15 +83,18 @@ class PassThroughFilter : public Filter {
       names.push_back(name);
       if (name == column_) value = [&values](std::size_t i) { return static_cast<double>(values[i]); };
     };
+
     offer("confidence", columns.confidence);
     offer("observations", columns.observations);
     offer("robot", columns.robot);
+
     for (const auto& other : columns.others) offer(other.name, other.values);
     if (!value && !input.empty()) {
       return core::usage_error(
           fmt::format("column: the cloud has no '{}' (it has: {})", column_,
                       names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
     }
+
     return select(input, [&](std::size_t i, const Point&) {
       const double v = value(i);
       return std::isfinite(v) && (v >= min_ && v <= max_) == inside_;

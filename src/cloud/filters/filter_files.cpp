@@ -32,6 +32,7 @@ class MergeFilter : public Filter {
     output->points.reserve(input->size() + other->cloud->size());
     std::vector<std::size_t> chosen[2];
     const Cloud* parts[2] = {input.get(), other->cloud.get()};
+
     for (std::size_t side = 0; side < 2; ++side) {
       for (std::size_t i = 0; i < parts[side]->size(); ++i) {
         if (!finite((*parts[side])[i])) continue;
@@ -39,12 +40,14 @@ class MergeFilter : public Filter {
         chosen[side].push_back(i);
       }
     }
+
     make_list(*output);
     if (context.columns != nullptr && context.made_columns != nullptr) {
       *context.made_columns = pick_columns(*context.columns, chosen[0]);
       append_columns(*context.made_columns, chosen[0].size(), pick_columns(other->columns, chosen[1]),
                      chosen[1].size());
     }
+
     return output;
   }
 

@@ -28,14 +28,17 @@ std::string check_extent(const Cloud& cloud, double leaf) {
     min = min.cwiseMin(p.getVector3fMap().cast<double>());
     max = max.cwiseMax(p.getVector3fMap().cast<double>());
   }
+
   constexpr double kMost = 2147483647.0;
   const Eigen::Array3d cells = ((max - min) / leaf).array().floor() + 2.0;
   const double furthest = std::max(max.cwiseAbs().maxCoeff(), min.cwiseAbs().maxCoeff()) / leaf;
   if (cells.prod() <= kMost && furthest < kMost / 4.0) return "";
+
   double needed = leaf;
   const auto fits = [&](double l) {
     return (((max - min) / l).array().floor() + 2.0).prod() <= kMost && furthest * leaf / l < kMost / 4.0;
   };
+
   while (!fits(needed)) needed *= 1.1;
   const Eigen::Vector3d size = max - min;
   return fmt::format(
@@ -76,6 +79,7 @@ std::vector<std::int64_t> cells_of(const Cloud& points, float leaf) {
   const float inverse = 1.0F / leaf;
   const auto cell = [inverse](float v) { return static_cast<std::int64_t>(std::floor(v * inverse)); };
   std::array<std::int64_t, 3> least{};
+
   std::array<std::int64_t, 3> most{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto [min, max] =
@@ -84,13 +88,16 @@ std::vector<std::int64_t> cells_of(const Cloud& points, float leaf) {
     least[axis] = cell(min->data[axis]);
     most[axis] = cell(max->data[axis]);
   }
+
   const std::int64_t across = most[0] - least[0] + 1;
   const std::int64_t layer = across * (most[1] - least[1] + 1);
   std::vector<std::int64_t> cells;
   cells.reserve(points.size());
+
   for (const Point& p : points.points) {
     cells.push_back(cell(p.x) - least[0] + (cell(p.y) - least[1]) * across + (cell(p.z) - least[2]) * layer);
   }
+
   return cells;
 }
 
@@ -102,6 +109,7 @@ CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::in
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return cells[a] < cells[b]; });
+
   std::vector<std::size_t> firsts;
   std::vector<std::pair<std::size_t, std::size_t>> runs;  // of `order`
   for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
@@ -110,6 +118,7 @@ CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::in
     firsts.push_back(order[begin]);
     runs.emplace_back(begin, end);
   }
+
   CloudColumns result = pick_columns(columns, firsts);
   const auto mean = [&](const std::vector<float>& from, std::vector<float>& to) {
     for (std::size_t r = 0; r < to.size(); ++r) {
@@ -118,14 +127,17 @@ CloudColumns mean_columns(const CloudColumns& columns, const std::vector<std::in
       to[r] = static_cast<float>(sum / static_cast<double>(runs[r].second - runs[r].first));
     }
   };
+
   mean(columns.confidence, result.confidence);
   for (std::size_t o = 0; o < result.others.size(); ++o)
     mean(columns.others[o].values, result.others[o].values);
+
   for (std::size_t r = 0; r < result.observations.size(); ++r) {
     for (std::size_t k = runs[r].first; k < runs[r].second; ++k) {
       result.observations[r] = std::max(result.observations[r], columns.observations[order[k]]);
     }
   }
+
   return result;
 }
 

@@ -18,6 +18,7 @@ class MlsFilter : public Filter {
     if (points->size() < 3) return like(*input);
     const auto& pcl = pcl_functions();
     if (!pcl) return tl::unexpected<core::Error>(pcl.error());
+
     pcl::Indices indices;
     const CloudPtr output = (*pcl)->moving_least_squares(points, radius_m_, order_, indices);
     const Eigen::Vector3f viewpoint = viewpoint_of(*input, context);
@@ -27,9 +28,11 @@ class MlsFilter : public Filter {
       turn((*output)[i], (*points)[source], viewpoint);
       if (finite((*output)[i])) sources.push_back(source);
     }
+
     if (context.columns != nullptr && context.made_columns != nullptr) {
       *context.made_columns = pick_columns(carry_columns(*input, *context.columns, *points), sources);
     }
+
     output->header = input->header;
     output->sensor_origin_ = input->sensor_origin_;
     output->sensor_orientation_ = input->sensor_orientation_;

@@ -31,6 +31,7 @@ Json filter_definitions(const FilterRegistry& registry) {
   entry["required"] = Json::array({"type"});
   entry["properties"]["type"]["enum"] = registry.types();
   Json definitions;
+
   Json cases = Json::array();
   for (const FilterInfo& info : registry.filters()) {
     const std::string name = "filter." + info.type;
@@ -41,6 +42,7 @@ Json filter_definitions(const FilterRegistry& registry) {
     rule["then"] = {{"$ref", "#/definitions/" + name}};
     cases.push_back(std::move(rule));
   }
+
   entry["allOf"] = std::move(cases);
   definitions["filters"] = {{"type", "array"}, {"items", std::move(entry)}};
   return definitions;

@@ -32,6 +32,7 @@ CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode m
       return (segments[next++] != kNoSegment) == (mode == Mode::kKeep);
     });
   }
+
   CloudPtr output = select(input, [](std::size_t, const Point&) { return true; });
   for (Point& p : output->points) {
     if (!finite(p)) continue;
@@ -43,6 +44,7 @@ CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode m
     p.g = rgb.g;
     p.b = rgb.b;
   }
+
   return output;
 }
 
@@ -107,6 +109,7 @@ class PlaneFilter : public Filter {
       ransac.getInliers(inliers.indices);
       return inliers.indices;
     }
+
     pcl::SACSegmentation<Point> segmentation;  // always the same random numbers
     segmentation.setModelType(pcl::SACMODEL_PLANE);
     segmentation.setMethodType(pcl::SAC_RANSAC);
@@ -115,6 +118,7 @@ class PlaneFilter : public Filter {
     segmentation.setOptimizeCoefficients(refine_ == PlaneFit::kOnce);
     segmentation.setInputCloud(points);
     segmentation.setIndices(among);
+
     pcl::ModelCoefficients coefficients;
     segmentation.segment(inliers, coefficients);
     return inliers.indices;
@@ -149,9 +153,11 @@ class ClustersFilter : public Filter {
     const CloudConstPtr points = finite_list(input);
     std::vector<int> segments(points->size(), kNoSegment);
     if (points->empty()) return by_segment(*input, segments, mode_);
+
     const double distance = std::max(distance_m_, 2.0 * context.spacing_m);
     const int fewest =
         std::min(min_points_, static_cast<int>(std::ceil(min_share_ * static_cast<double>(points->size()))));
+
     std::vector<pcl::Indices> clusters;
     if (leaf_m_ > 0.0) {
       constexpr double kMostCells = 1e9;  // from the origin: pcl::VoxelGrid numbers them with 31 bits
@@ -162,18 +168,22 @@ class ClustersFilter : public Filter {
                         "first (crop_box) or use a leaf of {:.2g} m or more",
                         furthest, leaf_m_, 1.01 * furthest / kMostCells));
       }
+
       clusters = clusters_of_cells(points, distance, fewest);
     } else {
       clusters = clusters_of(points, distance, fewest);
     }
+
     // Largest first; of equals the one that comes first in the cloud.
     std::sort(clusters.begin(), clusters.end(), [](const pcl::Indices& a, const pcl::Indices& b) {
       return a.size() != b.size() ? a.size() > b.size() : a.front() < b.front();
     });
+
     if (count_ > 0) clusters.resize(std::min(clusters.size(), static_cast<std::size_t>(count_)));
     for (std::size_t c = 0; c < clusters.size(); ++c) {
       for (const auto i : clusters[c]) segments[static_cast<std::size_t>(i)] = static_cast<int>(c);
     }
+
     return by_segment(*input, segments, mode_);
   }
 
@@ -201,6 +211,7 @@ class ClustersFilter : public Filter {
     constexpr float kBlock = 64.0F;  // cells along each side
     const auto leaf = static_cast<float>(leaf_m_);
     const auto block = [&](float x) { return static_cast<int>(std::floor(x / (kBlock * leaf))); };
+
     std::map<std::array<int, 3>, pcl::IndicesPtr> blocks;
     for (std::size_t i = 0; i < points->size(); ++i) {
       const Point& p = (*points)[i];
@@ -208,6 +219,7 @@ class ClustersFilter : public Filter {
       if (indices == nullptr) indices = std::make_shared<pcl::Indices>();
       indices->push_back(static_cast<pcl::index_t>(i));
     }
+
     pcl::VoxelGrid<Point> grid;
     grid.setInputCloud(points);
     grid.setLeafSize(leaf, leaf, leaf);
@@ -215,6 +227,7 @@ class ClustersFilter : public Filter {
     grid.setSaveLeafLayout(true);
     const auto means = std::make_shared<Cloud>();
     std::vector<std::size_t> mean_of(points->size());
+
     for (const auto& [place, indices] : blocks) {
       Cloud part;
       grid.setIndices(indices);
@@ -231,10 +244,12 @@ class ClustersFilter : public Filter {
     for (std::size_t g = 0; g < groups.size(); ++g) {
       for (const auto mean : groups[g]) group_of[static_cast<std::size_t>(mean)] = g;
     }
+
     std::vector<pcl::Indices> clusters(groups.size());
     for (std::size_t i = 0; i < points->size(); ++i) {
       clusters[group_of[mean_of[i]]].push_back(static_cast<pcl::index_t>(i));
     }
+
     const auto few = [&](const pcl::Indices& c) { return c.size() < static_cast<std::size_t>(min_points); };
     clusters.erase(std::remove_if(clusters.begin(), clusters.end(), few), clusters.end());
     return clusters;

@@ -77,10 +77,12 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
     }
     return output;
   }
+
   output->points.reserve(input.size());
   for (std::size_t i = 0; i < input.size(); ++i) {
     if (finite(input[i]) && keep(i, input[i])) output->points.push_back(input[i]);
   }
+
   make_list(*output);
   return output;
 }

@@ -59,6 +59,7 @@ class Fusion {
     FusedCloud all{std::make_shared<Cloud>(), {}};
     if (!views_.covariances.empty()) all.columns.others.push_back({kSigmaColumn, {}});
     add({}, all);
+
     const std::size_t most_cells = cells_at_a_time(options_);
     for (std::size_t first = 0, count = 0; first < tiles_.size(); first += count) {
       std::size_t cells = 0;
@@ -66,13 +67,16 @@ class Fusion {
         cells += tiles_[first + count].occupied;
         if (count > 0 && cells > most_cells) break;
       }
+
       std::vector<VoxelMap> voxels(count, VoxelMap(options_.voxels));
       if (auto filled = fill(first, voxels); !filled) return tl::unexpected<core::Error>(filled.error());
+
       std::vector<std::vector<FusedPoint>> parts(count);
       std::vector<FusionReport> reports(count);
       executor_.parallel_for(count, [&](std::size_t k) {
         parts[k] = finished(tiles_[first + k], std::move(voxels[k]), reports[k]);
       });
+
       for (std::size_t k = 0; k < count; ++k) {
         add(parts[k], all);
         parts[k] = {};
@@ -80,6 +84,7 @@ class Fusion {
         report.seen_through += reports[k].seen_through;
       }
     }
+
     return all;
   }
 
@@ -93,6 +98,7 @@ class Fusion {
     std::vector<core::Result<void>> done(count);
     rasters_.resize(count);
     is_depth_view_.assign(count, 0);
+
     executor_.parallel_for(count, [&](std::size_t v) {
       const auto cloud = views_.read(v);
       if (!cloud) {
@@ -104,16 +110,19 @@ class Fusion {
       if (is_depth_view_[v] == 0) cells[v] = color_cells(**cloud, world_from_cloud_[v], kCell_m);
       if (options_.free_space) rasters_[v] = depth_raster(**cloud, views_.cameras[v]);
     });
+
     if (auto failed = first_error(done); !failed) return failed;
     if (!views_.covariances.empty()) find_pose_noise(cells);
     tiles_ = plan_tiles(cells, cells_per_tile(options_));
     report.tiles = tiles_.size();
     if (!options_.exposure) return {};
+
     gains_ = color_gains(cells);
     for (const Eigen::Vector3f& gain : gains_) {
       report.least_gain = std::min(report.least_gain, static_cast<double>(gain.minCoeff()));
       report.most_gain = std::max(report.most_gain, static_cast<double>(gain.maxCoeff()));
     }
+
     return {};
   }
 
@@ -126,6 +135,7 @@ class Fusion {
     for (std::size_t k = 0; k < voxels.size(); ++k) {
       views.insert(views.end(), tiles_[first + k].views.begin(), tiles_[first + k].views.end());
     }
+
     std::sort(views.begin(), views.end());
     views.erase(std::unique(views.begin(), views.end()), views.end());
     std::vector<std::vector<VoxelSample>> measured;  // of the views from `at` on
@@ -133,6 +143,7 @@ class Fusion {
       const std::size_t next = at + measured.size();
       std::vector<std::vector<VoxelSample>> samples(std::min(kViewsAtATime, views.size() - next));
       std::vector<core::Result<void>> done(samples.size());
+
       executor_.parallel_for(samples.size() + voxels.size(), [&](std::size_t i) {
         if (i < samples.size()) {
           done[i] = measure(views[next + i], samples[i]);
@@ -141,10 +152,12 @@ class Fusion {
           insert(tiles_[first + k], views.data() + at, measured, voxels[k]);
         }
       });
+
       if (auto failed = first_error(done); !failed) return failed;
       at = next;
       measured = std::move(samples);
     }
+
     return {};
   }
 
@@ -194,6 +207,7 @@ class Fusion {
     if (options_.plane_projection) surfels.project(points);
     const auto least = static_cast<std::uint32_t>(options_.min_support);
     std::size_t kept = 0;
+
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::uint32_t s = surfels.of(i);
       if (s != Surfels::kNone && goes[s] != 0) {
@@ -204,6 +218,7 @@ class Fusion {
         points[kept++] = points[i];
       }
     }
+
     points.resize(kept);
   }
 

@@ -62,15 +62,18 @@ std::vector<ColorCell> color_cells(const Cloud& camera_cloud, const geometry::Ri
   for (const Point& p : camera_cloud.points) {
     const Eigen::Vector3f at = turn * p.getVector3fMap() + shift;
     if (!(at.cwiseAbs().maxCoeff() < 1e6F)) continue;
+
     // Neighbours in an image mostly share their cell.
     const std::uint64_t key = pack_cell(at.array().floor().cast<int>());
     if (last == nullptr || last->cell != key) last = &sums[key];
     last->cell = key;
+
     const auto [least, most] = std::minmax({p.r, p.g, p.b});
     if (least < kDark || most > kBright) continue;
     last->color += Eigen::Vector3f(p.r, p.g, p.b);
     last->points += 1.0F;
   }
+
   std::vector<ColorCell> cells;
   cells.reserve(sums.size());
   for (const auto& [key, sum] : sums)
@@ -87,12 +90,14 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
     Eigen::Array3f wanted = Eigen::Array3f::Zero();
     Eigen::Array3f weight = Eigen::Array3f::Zero();
   };
+
   std::vector<Sum> of_views(views.size());
   for (int round = 0; round < kExposureRounds; ++round) {
     for (Sum& view : of_views) {
       view.wanted.setZero();
       view.weight.setConstant(kPrior);
     }
+
     for (std::size_t first = 0, end = 0; first < colors.size(); first = end) {
       Eigen::Array3f sum = Eigen::Array3f::Zero();
       Eigen::Array3f weight = Eigen::Array3f::Zero();
@@ -101,6 +106,7 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
         sum += s.weight * (s.log_color + of_views[s.view].log_gain);
         weight += s.weight;
       }
+
       const Eigen::Array3f mean = sum / weight;
       for (std::size_t i = first; i < end; ++i) {
         CellColor& s = colors[i];
@@ -111,14 +117,17 @@ std::vector<Eigen::Vector3f> color_gains(const std::vector<std::vector<ColorCell
         view.weight += s.weight;
       }
     }
+
     Eigen::Array3f drift = Eigen::Array3f::Zero();
     for (Sum& view : of_views) {
       view.log_gain = (view.wanted / view.weight).max(-kMostLog).min(kMostLog);
       drift += view.log_gain;
     }
+
     if (!views.empty()) drift /= static_cast<float>(views.size());
     for (Sum& view : of_views) view.log_gain -= drift;
   }
+
   std::vector<Eigen::Vector3f> factors(views.size(), Eigen::Vector3f::Ones());
   for (const CellColor& s : colors)
     factors[s.view] = of_views[s.view].log_gain.max(-kMostLog).min(kMostLog).exp();

@@ -49,13 +49,16 @@ pcl::Indices level_plane(const CloudConstPtr& points, const pcl::IndicesPtr& amo
   segmentation.setMaxIterations(1000);
   segmentation.setInputCloud(points);
   segmentation.setIndices(among);
+
   pcl::PointIndices inliers;
   pcl::ModelCoefficients coefficients;
   segmentation.segment(inliers, coefficients);
   std::sort(inliers.indices.begin(), inliers.indices.end());
+
   for (std::size_t i = 0; i < 4 && !inliers.indices.empty(); ++i) {
     plane[static_cast<Eigen::Index>(i)] = static_cast<double>(coefficients.values[i]);
   }
+
   return inliers.indices;
 }
 
@@ -66,11 +69,13 @@ std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d&
   std::vector<Found> planes;
   auto left = std::make_shared<pcl::Indices>(points->size());
   std::iota(left->begin(), left->end(), 0);
+
   std::size_t enough = kFewest;
   while (planes.size() < kMost && left->size() >= enough) {
     Eigen::Vector4d plane;
     const pcl::Indices inliers = level_plane(points, left, up, plane);
     if (inliers.size() < enough) break;
+
     const double sign = plane.head<3>().dot(up) < 0.0 ? -1.0 : 1.0;
     planes.push_back({{sign * plane.head<3>(), -sign * plane[3]}, inliers.size()});
     enough = std::max(enough, static_cast<std::size_t>(kLargeShare * static_cast<double>(inliers.size())));
@@ -79,6 +84,7 @@ std::vector<Found> planes_of(const CloudConstPtr& points, const Eigen::Vector3d&
                         std::back_inserter(*rest));
     left = rest;
   }
+
   return planes;
 }
 

@@ -144,6 +144,7 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
   raster.width = (camera.width + kCell - 1) / kCell;
   raster.height = (camera.height + kCell - 1) / kCell;
   raster.nearest.assign(static_cast<std::size_t>(raster.width) * static_cast<std::size_t>(raster.height), 0);
+
   for (const Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F && p.z < 65.0F)) continue;
     const Eigen::Vector2d pixel = camera.project(p.getVector3fMap().cast<double>());
@@ -155,6 +156,7 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
     if (cell == 0 || mm < cell) cell = mm;
     raster.furthest_m = std::max(raster.furthest_m, p.z);
   }
+
   return raster;
 }
 
@@ -163,6 +165,7 @@ DepthLimits::DepthLimits(const DepthRaster& raster)
   constexpr int kFewestCells = 7;  // of 3 x 3
   const auto width = static_cast<std::size_t>(raster.width);
   std::vector<std::uint16_t> least(width), most(width), measured(width);  // of three cells one above another
+
   for (int row = 1; row + 1 < raster.height; ++row) {
     const std::size_t begin = static_cast<std::size_t>(row) * width;
     const std::uint16_t* at = raster.nearest.data() + begin;
@@ -174,6 +177,7 @@ DepthLimits::DepthLimits(const DepthRaster& raster)
       most[i] = std::max({above, here, below});
       measured[i] = static_cast<std::uint16_t>((above != 0) + (here != 0) + (below != 0));
     }
+
     for (std::size_t i = 1; i + 1 < width; ++i) {
       if (measured[i - 1] + measured[i] + measured[i + 1] < kFewestCells) continue;
       nearest_[begin + i] = static_cast<std::uint16_t>(std::min({least[i - 1], least[i], least[i + 1]}) + 1);
@@ -188,6 +192,7 @@ Evidence DepthLimits::evidence(const Eigen::Vector3f& point) const {
   constexpr double kPose_m = 0.03;  // poses are not exact
   const float z = point.z();
   if (!(z > 0.05F && z <= raster_.furthest_m + 0.5F)) return Evidence::kNone;
+
   const sensor::Pinhole& camera = raster_.camera;
   const float column =
       (static_cast<float>(camera.fx) * point.x() / z + static_cast<float>(camera.cx)) / kCell;
@@ -196,13 +201,16 @@ Evidence DepthLimits::evidence(const Eigen::Vector3f& point) const {
         row < static_cast<float>(raster_.height - 1))) {
     return Evidence::kNone;
   }
+
   const auto cell =
       static_cast<std::size_t>(static_cast<int>(row) * raster_.width + static_cast<int>(column));
   if (furthest_[cell] == 0) return Evidence::kNone;
+
   const auto margin = [](double depth) { return kSigmas * sensor::depth_sigma(depth) + kPose_m; };
   const double near_m = 0.001 * nearest_[cell];
   const double far_m = 0.001 * furthest_[cell];
   if (static_cast<double>(z) < near_m - margin(near_m)) return Evidence::kFree;
+
   return static_cast<double>(z) > far_m + margin(far_m) ? Evidence::kHidden : Evidence::kSurface;
 }
 
@@ -214,6 +222,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   Point none;
   none.x = none.y = none.z = none.normal_x = none.normal_y = none.normal_z = kNan;
   none.r = none.g = none.b = 0;
+
   auto view = std::make_shared<Cloud>();
   view->points.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), none);
   view->width = static_cast<std::uint32_t>(columns);
@@ -221,6 +230,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
   view->is_dense = false;
   const int height = std::min(frame.depth.rows, rows * kCell),
             width = std::min(frame.depth.cols, columns * kCell);
+
   for (int v = 0; v < height; ++v) {
     const float* depth = frame.depth.ptr<float>(v);
     Point* cells = view->points.data() + static_cast<std::ptrdiff_t>(v / kCell) * columns;
@@ -231,6 +241,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
       if (!(nearest <= z)) nearest = z;
     }
   }
+
   const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
   const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
   constexpr float kMiddle = 0.5F * static_cast<float>(kCell) - 0.5F;
@@ -241,6 +252,7 @@ CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camer
     p.x = (static_cast<float>(kCell) * column + kMiddle - cx) / fx * p.z;
     p.y = (static_cast<float>(kCell) * row + kMiddle - cy) / fy * p.z;
   }
+
   return view;
 }
 
@@ -260,17 +272,21 @@ std::vector<std::uint8_t> seen_through(const Surfels& surfels, const std::vector
                                        const std::vector<geometry::Rigid3>& world_from_camera) {
   std::vector<std::uint8_t> goes(surfels.all().size(), 0);
   if (goes.empty()) return goes;
+
   Eigen::AlignedBox3d box;
   std::vector<Eigen::Vector3f> positions;
   positions.reserve(goes.size());
+
   for (const Surfel& surfel : surfels.all()) {
     const Eigen::Vector3d position = surfels.position(surfel);
     box.extend(position);
     positions.push_back(position.cast<float>());
   }
+
   std::vector<Verdict> verdicts =
       judge(positions, views_near(box, rasters, is_depth_view, world_from_camera));
   const Surroundings around(surfels.all(), positions, std::max(kAround_m, surfels.block_m()));
+
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<Verdict> before = verdicts;
     for (std::uint32_t s = 0; s < goes.size(); ++s) {
@@ -279,6 +295,7 @@ std::vector<std::uint8_t> seen_through(const Surfels& surfels, const std::vector
       if (asked && around.go(s, before)) verdicts[s] = Verdict::kGoes;
     }
   }
+
   for (std::size_t s = 0; s < goes.size(); ++s) goes[s] = verdicts[s] == Verdict::kGoes ? 1 : 0;
   return goes;
 }

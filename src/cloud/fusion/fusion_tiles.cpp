@@ -22,23 +22,28 @@ void cut(const Cells::iterator& begin, const Cells::iterator& end, const Eigen::
   int axis = 0;
   const Eigen::Vector3i size = box.sizes();
   size.maxCoeff(&axis);
+
   if (count <= most_cells || size[axis] == 0) {
     const Eigen::AlignedBox3i around(box.min() - Eigen::Vector3i::Ones(),
                                      box.max() + Eigen::Vector3i::Ones());
     tiles.push_back({around.intersection(space), count, {}});
     return;
   }
+
   const auto by_axis = [axis](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
     return a[axis] < b[axis];
   };
+
   const auto middle = begin + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(begin, middle, end, by_axis);
+
   // Both sides must get something: the cut lies below the median, unless that is the lowest plane.
   const int at = std::max((*middle)[axis], box.min()[axis] + 1);
   const auto border =
       std::partition(begin, end, [axis, at](const Eigen::Vector3i& cell) { return cell[axis] < at; });
   Eigen::AlignedBox3i low = space;
   Eigen::AlignedBox3i high = space;
+
   low.max()[axis] = at - 1;
   high.min()[axis] = at;
   cut(begin, border, low, most_cells, tiles);
@@ -52,18 +57,22 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
   for (const auto& view : views) {
     for (const ColorCell& cell : view) keys.push_back(cell.cell);
   }
+
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   std::vector<FusionTile> tiles;
   if (keys.empty()) return tiles;
+
   Cells cells;
   cells.reserve(keys.size());
   for (const std::uint64_t key : keys) cells.push_back(unpack_cell(key));
+
   // Several tiles even where one would do: they are worked on side by side.
   const std::size_t share = std::max(kFewestCells, cells.size() / kTiles + 1);
   const Eigen::Vector3i most = Eigen::Vector3i::Constant(1 << 21);
   const Eigen::AlignedBox3i space(-most, most);
   cut(cells.begin(), cells.end(), space, std::max<std::size_t>(1, std::min(most_cells, share)), tiles);
+
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (FusionTile& tile : tiles) {
       const Eigen::AlignedBox3i with_margin(tile.cells.min() - Eigen::Vector3i::Ones(),
@@ -74,6 +83,7 @@ std::vector<FusionTile> plan_tiles(const std::vector<std::vector<ColorCell>>& vi
       if (reaches) tile.views.push_back(static_cast<std::uint32_t>(v));
     }
   }
+
   return tiles;
 }
 

@@ -69,9 +69,11 @@ Grid smooth_along_rows(const cv::Mat& depth, int stride, int half, float min_dep
   Grid smoothed{cells, depth.rows,
                 std::vector<float>(static_cast<std::size_t>(cells) * static_cast<std::size_t>(depth.rows))};
   std::vector<float> inverse(static_cast<std::size_t>(cells * stride), 0.0F);
+
   // phases[k] holds pixels k, k + stride, ... so that neighbours of neighbouring cells lie side by side.
   const auto padded = static_cast<std::size_t>(cells + 2 * pad);
   std::vector<std::vector<float>> phases(static_cast<std::size_t>(stride), std::vector<float>(padded, 0.0F));
+
   Pass pass(cells);
   for (int v = 0; v < depth.rows; ++v) {
     invert(depth.ptr<float>(v), depth.cols, min_depth, max_depth, inverse.data());
@@ -79,17 +81,21 @@ Grid smooth_along_rows(const cv::Mat& depth, int stride, int half, float min_dep
       float* phase = phases[static_cast<std::size_t>(k)].data() + pad;
       for (int i = 0; i < cells; ++i) phase[i] = inverse[static_cast<std::size_t>(i * stride + k)];
     }
+
     const float* reference = phases[0].data() + pad;
     pass.start(reference);
     const auto neighbour = [&](int d) {
       const int shift = (d >= 0 ? d : d - stride + 1) / stride;
       return phases[static_cast<std::size_t>(d - shift * stride)].data() + pad + shift;
     };
+
     for (int d = 1; d <= half; ++d) {
       pass.add(neighbour(-d), neighbour(d), reference, static_cast<float>(d) * kSmoothTangent / focal);
     }
+
     pass.finish(smoothed.row(v));
   }
+
   return smoothed;
 }
 
@@ -121,6 +127,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
     const std::vector<float> before_pass = grid.values;
     for (int j = 0; j < grid.height; ++j) {
       if (!rows && (j < step || j >= grid.height - step)) continue;
+
       const float* from = before_pass.data() + static_cast<std::ptrdiff_t>(j) * grid.width;
       float* to = grid.row(j);
       for (int i = rows ? step : 0; i < grid.width - (rows ? step : 0); ++i) {
@@ -133,6 +140,7 @@ void widen_means(Grid& grid, int step, float noise, float wanted_m) {
       }
     }
   };
+
   along(step, true);
   along(static_cast<std::ptrdiff_t>(step) * grid.width, false);
 }
@@ -146,9 +154,11 @@ Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
     const float nearer = std::max(a, b);
     return std::min(a, b) > 0.0F && std::abs(a - b) < 2.0F * inverse_depth_sigma(nearer) + tangent * nearer;
   };
+
   const auto next = [longest](std::uint8_t n) { return static_cast<std::uint8_t>(std::min(longest, n + 1)); };
   const auto width = static_cast<std::size_t>(grid.width);
   const float* w = grid.values.data();
+
   for (std::size_t row = 0; row < count; row += width) {
     for (std::size_t i = row + 1; i < row + width; ++i) {
       reach.left[i] = linked(w[i], w[i - 1]) ? next(reach.left[i - 1]) : std::uint8_t{0};
@@ -157,12 +167,15 @@ Reach surface_reach(const Grid& grid, int stride, float focal, int longest) {
       reach.right[i - 1] = linked(w[i], w[i - 1]) ? next(reach.right[i]) : std::uint8_t{0};
     }
   }
+
   for (std::size_t i = width; i < count; ++i) {
     reach.up[i] = linked(w[i], w[i - width]) ? next(reach.up[i - width]) : std::uint8_t{0};
   }
+
   for (std::size_t i = count; i-- > width;) {
     reach.down[i - width] = linked(w[i], w[i - width]) ? next(reach.down[i]) : std::uint8_t{0};
   }
+
   return reach;
 }
 
@@ -171,6 +184,7 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   after = std::min(after, base);
   Slope slope;
   if (before + after < std::max(2, base / 2)) return slope;
+
   slope.known = true;
   const float first = centre[-before * step];
   const float last = centre[after * step];
@@ -183,12 +197,14 @@ Slope slope_along(const float* centre, std::ptrdiff_t step, int before, int afte
   slope.bend = slope_after - slope_before;
   const float noise = sigma * (1.0F / static_cast<float>(before) + 1.0F / static_cast<float>(after));
   if (std::abs(slope.bend) < kCreaseSigmas * noise) return slope;
+
   // A crease within the base: the side without it is straight.
   const auto deviation = [&](float end, int reach, std::ptrdiff_t direction) {
     const int middle = reach / 2;
     const float expected = *centre + (end - *centre) * static_cast<float>(middle) / static_cast<float>(reach);
     return std::abs(centre[direction * middle] - expected);
   };
+
   slope.value = deviation(first, before, -step) <= deviation(last, after, step) ? slope_before : slope_after;
   return slope;
 }

@@ -32,6 +32,7 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
   constexpr float kMedianOfNormal = 0.6745F;
   constexpr std::size_t kFew = 200;
   std::vector<float> bends;
+
   for (int v = 0; v < depth.rows; v += kStep) {
     const float* row = depth.ptr<float>(v);
     for (int u = kStep; u + kStep < depth.cols; u += kStep) {
@@ -43,6 +44,7 @@ float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
       bends.push_back(bend / (2.45F * inverse_depth_sigma(w)));
     }
   }
+
   if (bends.size() < kFew) return 1.0F;
   const float share = core::median(std::move(bends)) / (0.5F * kMedianOfNormal);
   return std::min(1.0F, share * share);
@@ -77,6 +79,7 @@ class PointMaker {
     const int v = j * stride_;
     const float* depth = frame_.depth.ptr<float>(v);
     const cv::Vec3b* color = frame_.color.empty() ? nullptr : frame_.color.ptr<cv::Vec3b>(v);
+
     const float y = (static_cast<float>(v) - cy_) / fy_;
     for (int i = 0; i < grid_.width; ++i) {
       Point& p = out[i];
@@ -87,10 +90,12 @@ class PointMaker {
       p.r = bgr[2];
       p.a = 255;
       p.normal_x = p.normal_y = p.normal_z = kNan;
+
       if (w[i] == 0.0F) {
         p.x = p.y = p.z = kNan;
         continue;
       }
+
       const float x = (static_cast<float>(u) - cx_) / fx_;
       p.z = position_.values.empty() ? depth[u] : 1.0F / position_.row(j)[i];
       p.x = x * p.z;
@@ -110,6 +115,7 @@ class PointMaker {
     widen_means(means, 2 * step, noise_ * 0.7F, kWanted_m);
     const float most = 3.0F * smoothing_share(frame_.depth, static_cast<float>(options.min_depth_m),
                                               static_cast<float>(options.max_depth_m));
+
     for (int j = 0; j < means.height; ++j) {
       const float* depth = frame_.depth.ptr<float>(j * stride_);
       float* row = means.row(j);
@@ -120,6 +126,7 @@ class PointMaker {
         row[i] = std::clamp(row[i], raw - limit, raw + limit);
       }
     }
+
     return means;
   }
   void set_normal(const float* w, int j, int i, float x, float y, Point& p) const {
@@ -129,14 +136,17 @@ class PointMaker {
     const int base = base_cells(*w, sigma, base_, stride_, longest_);
     const Slope along_x = slope_along(w, 1, reach_.left[cell], reach_.right[cell], base, noise_ * sigma);
     if (!along_x.known) return;
+
     const Slope along_y =
         slope_along(w, grid_.width, reach_.up[cell], reach_.down[cell], base, noise_ * sigma);
     if (!along_y.known) return;
+
     const float per_x = fx_ / static_cast<float>(stride_);
     const float per_y = fy_ / static_cast<float>(stride_);
     const float a = along_x.value * per_x;
     const float b = along_y.value * per_y;
     const float c = *w - a * x - b * y;
+
     // (a, b, c) . p = 1 on the plane, so it points away from the camera.
     const float scale = -1.0F / std::sqrt(a * a + b * b + c * c);
     p.normal_x = a * scale;

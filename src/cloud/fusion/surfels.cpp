@@ -40,6 +40,7 @@ Surfels::Surfels(const std::vector<FusedPoint>& points, double block_m) : block_
 void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
   const Eigen::Vector3f normal = point.point.getNormalVector3fMap();
   if (!normal.allFinite()) return;
+
   const Eigen::Vector3d position = point.point.getVector3fMap().cast<double>();
   const Eigen::Vector3i block = cell_of(position / block_m_);
   std::uint32_t& first = first_.try_emplace(pack_cell(block), kNone).first.value();
@@ -49,6 +50,7 @@ void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
     const Eigen::Vector3f& sum = surfels_[at].normal_sum;
     if (sum.dot(normal) > kSameSurfel * sum.norm()) break;
   }
+
   if (at == kNone) {
     at = static_cast<std::uint32_t>(surfels_.size());
     surfels_.emplace_back();
@@ -56,6 +58,7 @@ void Surfels::add(const FusedPoint& point, std::uint32_t& surfel_of_point) {
     next_.push_back(kNone);
     (last == kNone ? first : next_[last]) = at;
   }
+
   Surfel& surfel = surfels_[at];
   const Eigen::Vector3f offset = (position - centre(block)).cast<float>();
   surfel.normal_sum += point.weight * normal;
@@ -149,21 +152,26 @@ void Surfels::project(std::vector<FusedPoint>& points) const {
     const Surfel& own = surfels_[surfel_of_[i]];
     Point& p = points[i].point;
     const Eigen::Vector3d position = p.getVector3fMap().cast<double>();
+
     // The eight blocks whose centres surround the point, trilinear.
     const Eigen::Vector3d corner = (position / block_m_).array() - 0.5;
     const Eigen::Vector3i low = cell_of(corner);
     const Eigen::Vector3f part = (corner - low.cast<double>()).cast<float>();
+
     if (low != around) {
       around = low;
       for (int k = 0; k < 8; ++k) first[static_cast<std::size_t>(k)] = first_of(low + step_of(k));
     }
+
     float total = 0.0F;
     float shift = 0.0F;
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+
     for (int k = 0; k < 8; ++k) {
       const Eigen::Vector3i step = step_of(k);
       float share = 1.0F;
       for (int axis = 0; axis < 3; ++axis) share *= step[axis] == 1 ? part[axis] : 1.0F - part[axis];
+
       const Eigen::Vector3f from_centre = (position - centre(low + step)).cast<float>();
       visit_alike(first[static_cast<std::size_t>(k)], own.normal, [&](const Surfel& surfel) {
         if (!surfel.flat) return;
@@ -174,6 +182,7 @@ void Surfels::project(std::vector<FusedPoint>& points) const {
         total += weight;
       });
     }
+
     if (!(total > 0.0F)) continue;
     const float most = kMostSigmas * noise_share_ * own.noise_m;
     p.getVector3fMap() += std::clamp(shift / total, -most, most) * own.normal;

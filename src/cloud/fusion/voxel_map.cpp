@@ -70,6 +70,7 @@ std::vector<VoxelSample> VoxelMap::measured(const Cloud& camera_cloud,
   samples.reserve(camera_cloud.size());
   VoxelSample sample;
   sample.side.robot = robot;
+
   VoxelSide& side = sample.side;
   for (const Point& p : camera_cloud.points) {
     if (!(p.z > 0.0F) || !std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) continue;
@@ -78,9 +79,11 @@ std::vector<VoxelSample> VoxelMap::measured(const Cloud& camera_cloud,
     const float squared = normal.squaredNorm();
     const bool known = squared > 0.25F && std::isfinite(squared);
     normal = known ? (normal / std::sqrt(squared)).eval() : (-position.normalized()).eval();
+
     const float cosine = known ? std::abs(normal.dot(position)) / position.norm() : 0.5F;
     if (known && cosine < least_cosine) continue;
     if (!locate(world_from_cloud * position.cast<double>(), options.voxel_m, sample)) continue;
+
     const double sigma = sensor::depth_sigma(static_cast<double>(p.z));
     const double ratio = unit / sigma;
     side.weight = std::max(cosine, 1e-3F) * static_cast<float>(ratio * ratio);
@@ -90,6 +93,7 @@ std::vector<VoxelSample> VoxelMap::measured(const Cloud& camera_cloud,
     side.color = Eigen::Vector3f(p.r, p.g, p.b);
     samples.push_back(sample);
   }
+
   return samples;
 }
 
@@ -113,16 +117,19 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
   std::vector<std::pair<std::uint64_t, std::size_t>> order;  // voxel and place among the samples
   samples.reserve(points.size());
   order.reserve(points.size());
+
   for (const FusedPoint& fused : points) {
     const Point& p = fused.point;
     VoxelSample sample;
     if (!locate(p.getVector3fMap().cast<double>(), options.voxel_m, sample)) continue;
+
     VoxelSide& side = sample.side;
     const Eigen::Vector3f normal = p.getNormalVector3fMap();
     if (normal.allFinite()) {
       side.normal_known = 1;
       side.normal = fused.weight * normal;
     }
+
     side.color = Eigen::Vector3f(p.r, p.g, p.b);
     side.weight = fused.weight;
     side.scatter = fused.weight * fused.spread_m * fused.spread_m;
@@ -133,9 +140,11 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
     order.emplace_back(pack_cell(sample.voxel) << 1U, samples.size());
     samples.push_back(side);
   }
+
   std::sort(order.begin(), order.end());
   std::vector<FusedPoint> result;
   result.reserve(samples.size());
+
   for (std::size_t i = 0; i < order.size();) {
     const std::uint64_t key = order[i].first;
     std::array<VoxelSide, 2> sides;
@@ -147,6 +156,7 @@ std::vector<FusedPoint> VoxelMap::merged(const std::vector<FusedPoint>& points,
       if (sides[k].weight > 0.0F) result.push_back(point_of(key | k, sides[k], options.voxel_m));
     }
   }
+
   return result;
 }
 
@@ -169,29 +179,35 @@ void VoxelMap::combine(const VoxelSide& sample, std::uint32_t view, VoxelSide& s
   const float total = side.weight + sample.weight;
   const float share = sample.weight / total;
   const Eigen::Vector3f apart = sample.mean - side.mean;
+
   if (side.weight > 0.0F) {
     // West's weighted update of the scatter along the normal known so far.
     const float squared = side.normal.squaredNorm();
     const float distance = apart.dot(side.normal);
     if (squared > 0.0F) side.scatter += distance * distance / squared * side.weight * share;
   }
+
   if (side.weight == 0.0F || (sample.normal_known != 0 && side.normal_known == 0)) {
     side.normal = sample.normal;
     side.normal_known = sample.normal_known;
   } else if (sample.normal_known != 0) {
     side.normal += sample.normal;
   }
+
   side.scatter += sample.scatter;
   side.variance += sample.variance;
   side.mean += share * apart;
   side.color += share * (sample.color - side.color);
+
   // Several samples of one view are one observation; of fused points, those of the most seen one.
   if (side.weight == 0.0F) side.observations = 0;
   if (side.last_view != view) side.last_observations = 0;
+
   if (sample.observations > side.last_observations) {
     side.observations += sample.observations - side.last_observations;
     side.last_observations = sample.observations;
   }
+
   side.last_view = view;
   side.weight = total;
 }
@@ -201,6 +217,7 @@ FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double v
   FusedPoint fused;
   Point& p = fused.point;
   p.getVector3fMap() = (centre + side.mean.cast<double>()).cast<float>();
+
   const bool known = side.normal_known != 0 && side.normal.squaredNorm() > 0.0F;
   p.getNormalVector3fMap() = known
                                  ? side.normal.normalized().eval()
@@ -209,6 +226,7 @@ FusedPoint VoxelMap::point_of(std::uint64_t key, const VoxelSide& side, double v
   p.g = to_byte(static_cast<double>(side.color.y()));
   p.b = to_byte(static_cast<double>(side.color.z()));
   p.a = 255;
+
   fused.weight = side.weight;
   fused.spread_m = std::sqrt(side.scatter / side.weight);
   fused.noise_m = std::sqrt(side.variance / side.weight);

@@ -13,19 +13,23 @@ namespace plumbline::cloud {
 core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeCoordinates large) {
   auto ply = read_ply(file, large == LargeCoordinates::kShifted);
   if (!ply) return tl::unexpected<core::Error>(ply.error());
+
   std::vector<Meaning> meanings;
   std::vector<std::string> names;
   for (const auto& column : ply->columns) {
     meanings.push_back(meaning_of(column.name));
     names.push_back(column.name);
   }
+
   CloudBuilder builder(meanings, names, ply->vertex_count);
   if (!builder.has_position())
     return core::input_error(file.string() + ": has no x, y and z; it is not a point cloud");
+
   for (std::size_t c = 0; c < meanings.size(); ++c) {
     if (meanings[c] == Meaning::kNone || meanings[c] == Meaning::kPackedColor) continue;
     const bool color =
         meanings[c] == Meaning::kRed || meanings[c] == Meaning::kGreen || meanings[c] == Meaning::kBlue;
+
     auto& values = ply->columns[c].values;
     if (auto* bytes = std::get_if<std::vector<std::uint8_t>>(&values)) {
       for (std::size_t i = 0; i < bytes->size(); ++i) builder.set(i, meanings[c], c, (*bytes)[i]);
@@ -37,8 +41,10 @@ core::Result<CloudFile> read_ply_cloud(const std::filesystem::path& file, LargeC
         builder.set(i, meanings[c], c, static_cast<double>((*floats)[i]) * (share ? 255.0 : 1.0));
       }
     }
+
     values = std::vector<float>();  // the column is in the cloud now
   }
+
   CloudFile result = builder.finish();
   result.shift = Eigen::Map<const Eigen::Vector3d>(ply->shift.data());
   return result;

@@ -69,12 +69,15 @@ Meaning meaning_of(const std::string& name) {
       {"observations", Meaning::kObservations},
       {"robot", Meaning::kRobot},
   }};
+
   std::string lower = name;
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+
   for (const auto& [known, meaning] : kNames) {
     if (lower == known) return meaning;
   }
+
   const bool writable = !lower.empty() && lower.size() <= 64 && lower != "_" && lower != "alpha" &&
                         lower != "a" && std::all_of(lower.begin(), lower.end(), [](unsigned char c) {
                           return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
@@ -91,10 +94,12 @@ CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, const std::vect
                     holds(meanings, {Meaning::kRed, Meaning::kGreen, Meaning::kBlue});
   file_.cloud = std::make_shared<Cloud>();
   if (!position_) return;
+
   file_.cloud->points.assign(points, blank_point(file_.has_color));
   if (holds(meanings, {Meaning::kConfidence})) file_.columns.confidence.resize(points);
   if (holds(meanings, {Meaning::kObservations})) file_.columns.observations.resize(points);
   if (holds(meanings, {Meaning::kRobot})) file_.columns.robot.resize(points);
+
   for (std::size_t c = 0; c < meanings.size(); ++c) {
     if (meanings[c] != Meaning::kOther) continue;
     auto& others = file_.columns.others;
@@ -104,12 +109,14 @@ CloudBuilder::CloudBuilder(const std::vector<Meaning>& meanings, const std::vect
     others.push_back({names[c], std::vector<float>(points)});
     others_[c] = others.back().values.data();  // moving the vector leaves its memory in place
   }
+
   shape(static_cast<std::uint32_t>(points), 1);
 }
 
 void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, double value) {
   Point& p = file_.cloud->points[row];
   const auto number = static_cast<float>(value);
+
   switch (meaning) {
     case Meaning::kX:
     case Meaning::kY:
@@ -120,6 +127,7 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, dou
         p.data[axis_of(meaning, Meaning::kX)] = number;
       }
       break;
+
     case Meaning::kNormalX:
     case Meaning::kNormalY:
     case Meaning::kNormalZ:
@@ -130,6 +138,7 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, dou
     case Meaning::kBlue:
       (meaning == Meaning::kRed ? p.r : meaning == Meaning::kGreen ? p.g : p.b) = to_byte(value);
       break;
+
     case Meaning::kCurvature:
       p.curvature = number;
       break;
@@ -140,6 +149,7 @@ void CloudBuilder::set(std::size_t row, Meaning meaning, std::size_t column, dou
       file_.columns.observations[row] =
           value > 0.0 ? static_cast<std::uint32_t>(std::min(value, 4294967295.0)) : 0U;
       break;
+
     case Meaning::kRobot:
       file_.columns.robot[row] = to_byte(value);
       break;

@@ -53,16 +53,19 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
   out.write(
       fmt::format("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\nelement vertex {}\n",
                   count_finite(cloud)));
+
   const char* type = shift.isZero(0.0) ? "float" : "double";
   out.write(fmt::format("property {0} x\nproperty {0} y\nproperty {0} z\n", type));
   out.write(
       "property float nx\nproperty float ny\nproperty float nz\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+
   if (!columns.confidence.empty()) out.write("property float confidence\n");
   if (!columns.observations.empty()) out.write("property int observations\n");
   if (!columns.robot.empty()) out.write("property uchar robot\n");
   for (const auto& other : columns.others) out.write("property float " + other.name + "\n");
   out.write("end_header\n");
+
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!finite(p)) continue;
@@ -72,6 +75,7 @@ core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& clo
     out.put(std::array<std::uint8_t, 3>{p.r, p.g, p.b});
     put_columns(columns, i, out);
   }
+
   return out.commit();
 }
 
@@ -83,6 +87,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   std::string fields = "x y z rgb normal_x normal_y normal_z curvature";
   std::string sizes = shift.isZero(0.0) ? "4 4 4 4 4 4 4 4" : "8 8 8 4 4 4 4 4";
   std::string types = "F F F F F F F F";
+
   std::string counts = "1 1 1 1 1 1 1 1";
   const auto field = [&](bool present, const std::string& name, const char* size, const char* type) {
     if (!present) return;
@@ -91,6 +96,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
     types += std::string(" ") + type;
     counts += " 1";
   };
+
   field(!columns.confidence.empty(), "confidence", "4", "F");
   field(!columns.observations.empty(), "observations", "4", "U");
   field(!columns.robot.empty(), "robot", "1", "U");
@@ -102,11 +108,13 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
   const auto origin = [&](int k) {  // a float is printed with fewer digits
     return shift[k] == 0.0 ? fmt::format("{}", t[k]) : fmt::format("{}", with_shift(t[k], shift[k]));
   };
+
   out.write(fmt::format(
       "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\n"
       "COUNT {}\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\nPOINTS {}\nDATA binary\n",
       fields, sizes, types, counts, organised ? cloud.width : points, organised ? cloud.height : 1, origin(0),
       origin(1), origin(2), q.w(), q.x(), q.y(), q.z(), points));
+
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Point& p = cloud[i];
     if (!organised && !finite(p)) continue;
@@ -116,6 +124,7 @@ core::Result<void> write_pcd(const std::filesystem::path& file, const Cloud& clo
     out.put(std::array<float, 4>{p.normal_x, p.normal_y, p.normal_z, p.curvature});
     put_columns(columns, i, out);
   }
+
   return out.commit();
 }
 

@@ -83,12 +83,14 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
   std::array<std::vector<float>, 6> xyz_normal;
   std::array<std::vector<std::uint8_t>, 3> rgb;
   pcl::Indices near;
+
   std::vector<float> squared;
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     Point at;
     at.getVector3fMap() = vertices[v];
     const int found = tree.nearestKSearch(at, kNeighbours, near, squared);
     if (found == 0 || !(squared[0] <= static_cast<float>(reach_m * reach_m))) continue;
+
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     Eigen::Vector3f color = Eigen::Vector3f::Zero();
     for (const int i : near) {
@@ -96,6 +98,7 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
       normal += p.getNormalVector3fMap();
       color += Eigen::Vector3f(p.r, p.g, p.b) / static_cast<float>(found);
     }
+
     normal.normalize();
     number[v] = static_cast<std::uint32_t>(rgb[0].size());
     for (std::size_t k = 0; k < 3; ++k) {
@@ -105,6 +108,7 @@ PlyData dressed(const std::vector<Eigen::Vector3f>& vertices, const pcl::Polygon
       rgb[k].push_back(static_cast<std::uint8_t>(std::lround(std::clamp(color[axis], 0.0F, 255.0F))));
     }
   }
+
   PlyData result;
   const std::array<const char*, 6> names{"x", "y", "z", "nx", "ny", "nz"};
   for (std::size_t k = 0; k < 6; ++k) result.add(names[k], std::move(xyz_normal[k]));
@@ -121,6 +125,7 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
   const auto *red = mesh.bytes("red"), *green = mesh.bytes("green"), *blue = mesh.bytes("blue");
   core::OutputFile out(file);
   out.write("# metres; x y z red green blue\n");
+
   for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
     const auto at = [&](std::size_t k) {
       const float value = (*columns[k])[v];
@@ -131,9 +136,11 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
     out.write(fmt::format("v {:.5f} {:.5f} {:.5f} {:.4f} {:.4f} {:.4f}\nvn {:.4f} {:.4f} {:.4f}\n", at(0),
                           at(1), at(2), channel(*red), channel(*green), channel(*blue), at(3), at(4), at(5)));
   }
+
   for (const auto& [a, b, c] : mesh.triangles) {
     out.write(fmt::format("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1));
   }
+
   return out.commit();
 }
 

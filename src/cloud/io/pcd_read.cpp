@@ -48,6 +48,7 @@ std::string finish_fields(PcdHeader& header) {
       case 2:
         field.scalar = t == 'U' ? ScalarType::kUint16 : ScalarType::kInt16;
         break;
+
       case 4:
         field.scalar = t == 'F' ? ScalarType::kFloat32 : t == 'U' ? ScalarType::kUint32 : ScalarType::kInt32;
         break;
@@ -57,23 +58,27 @@ std::string finish_fields(PcdHeader& header) {
       default:
         return fmt::format("field '{}' has SIZE {}, allowed are 1, 2, 4 and 8", field.name, field.size);
     }
+
     if (t != 'F' && t != 'U' && t != 'I')
       return fmt::format("field '{}' has TYPE {}, not F, U or I", field.name, t);
     if (t == 'F' && field.size < 4)
       return fmt::format("field '{}' is a float of {} bytes", field.name, field.size);
     if (field.count == 0 || field.count > 65536)
       return fmt::format("field '{}' has COUNT {}", field.name, field.count);
+
     field.offset = header.record;
     header.record += field.size * field.count;
     header.elements += field.count;
     field.meaning = field.count == 1 ? meaning_of(field.name) : Meaning::kNone;
     if (field.meaning == Meaning::kPackedColor && field.size != 4) field.meaning = Meaning::kNone;
   }
+
   if (header.points == 0) header.points = header.width * header.height;
   if (header.width != 0 && header.width * header.height != header.points) {
     return fmt::format("WIDTH {} x HEIGHT {} is not POINTS {}", header.width, header.height, header.points);
   }
   if (header.points > 0xFFFFFFFFU) return fmt::format("POINTS {} is more than 2^32", header.points);
+
   return "";
 }
 
@@ -105,17 +110,20 @@ std::string parse_line(const std::string& key, std::istringstream& words, PcdHea
     }
     return header.fields.size() > 1000 ? "more than 1000 fields" : "";
   }
+
   if (key == "SIZE" || key == "TYPE" || key == "COUNT") return parse_per_field(key, words, header);
   if (key == "VIEWPOINT") {
     while (words >> word) header.viewpoint.push_back(parse_number(word).value_or(0.0));
     return header.viewpoint.size() == 7 ? "" : "VIEWPOINT needs 7 numbers";
   }
+
   words >> word;
   if (key == "DATA") {
     header.data = word;
     const bool known = word == "ascii" || word == "binary" || word == "binary_compressed";
     return known ? "" : "DATA '" + word + "' is not ascii, binary or binary_compressed";
   }
+
   const auto number = parse_count(word);
   if (key != "WIDTH" && key != "HEIGHT" && key != "POINTS")
     return "'" + key.substr(0, 40) + "' is not a PCD header word";
@@ -182,6 +190,7 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
         if (!reader.word(word) && word.empty()) return truncated(row, header.points);
         const auto value = parse_number(word);
         if (!value) return fmt::format("point {}: '{}' is not a number", row + 1, word);
+
         if (field.meaning != Meaning::kPackedColor) {
           builder.set(row, field.meaning, f, *value);
         } else if (field.scalar == ScalarType::kFloat32) {
@@ -195,6 +204,7 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
       }
     }
   }
+
   return "";
 }
 
@@ -202,23 +212,28 @@ std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder
 std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBuilder& builder) {
   const std::uint8_t* sizes = reader.take(8);
   if (sizes == nullptr) return "the file ends before its compressed data; it is truncated";
+
   std::uint32_t packed_size = 0;
   std::uint32_t size = 0;
   std::memcpy(&packed_size, sizes, 4);
   std::memcpy(&size, sizes + 4, 4);
+
   if (size != header.points * header.record) {
     return fmt::format("compressed data hold {} bytes, {} points need {}", size, header.points,
                        header.points * header.record);
   }
+
   const std::uint8_t* packed = reader.take(packed_size);
   if (packed == nullptr)
     return fmt::format("header promises {} compressed bytes; the file is truncated", packed_size);
+
   std::vector<std::uint8_t> bytes(size);
   const auto& pcl = pcl_functions();
   if (!pcl) return pcl.error().message;
   if (size > 0 && (*pcl)->lzf_decompress(packed, packed_size, bytes.data(), size) != size) {
     return "compressed data are damaged";
   }
+
   for (std::size_t f = 0; f < header.fields.size(); ++f) {
     const PcdField& field = header.fields[f];
     const std::uint8_t* column = bytes.data() + field.offset * header.points;
@@ -226,6 +241,7 @@ std::string read_compressed(ByteReader& reader, const PcdHeader& header, CloudBu
       set_binary(builder, row, header, f, column + row * field.size * field.count);
     }
   }
+
   return "";
 }
 
@@ -251,8 +267,10 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
   const auto error = [&file](const std::string& what) {
     return core::input_error(file.string() + ": " + what);
   };
+
   ByteReader reader(file);
   if (!reader.open()) return error("cannot be read");
+
   const auto header = read_header(reader);
   if (!header) return error(header.error().message);
   std::string problem = check_size(*header, reader.remaining());
@@ -264,12 +282,15 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
     meanings.push_back(field.meaning);
     names.push_back(field.name);
   }
+
   CloudBuilder builder(meanings, names, static_cast<std::size_t>(header->points));
   if (!builder.has_position()) return error("has no x, y and z; it is not a point cloud");
+
   for (const PcdField& field : header->fields) {
     const bool digits = header->data == "ascii" || exceeds_float(field.scalar);
     if (digits && large == LargeCoordinates::kShifted) builder.keep_digits(field.meaning);
   }
+
   if (header->data == "ascii") {
     problem = read_ascii(reader, *header, builder);
   } else if (header->data == "binary") {
@@ -278,9 +299,11 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
     problem = read_compressed(reader, *header, builder);
   }
   if (!problem.empty()) return error(problem);
+
   const bool organised = header->width != 0 && header->height > 1;
   builder.shape(static_cast<std::uint32_t>(organised ? header->width : header->points),
                 static_cast<std::uint32_t>(organised ? header->height : 1));
+
   CloudFile result = builder.finish();
   if (const auto& v = header->viewpoint; v.size() == 7) {
     result.cloud->sensor_origin_ =
@@ -289,6 +312,7 @@ core::Result<CloudFile> read_pcd_cloud(const std::filesystem::path& file, LargeC
             .cast<float>();
     result.cloud->sensor_orientation_ = Eigen::Quaterniond(v[3], v[4], v[5], v[6]).cast<float>();
   }
+
   return result;
 }
 

@@ -100,6 +100,7 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
   data.vertex_count = count;
   std::vector<Sink> sinks;
   std::size_t offset = 0;
+
   for (const auto& property : element.properties) {
     if (property.list) continue;
     if (property.type == ScalarType::kUint8) {
@@ -110,11 +111,13 @@ std::vector<Sink> make_columns(const PlyElement& element, PlyData& data) {
     sinks.push_back({property.type, offset, nullptr, nullptr});
     offset += size_of(property.type);
   }
+
   for (std::size_t i = 0; i < sinks.size(); ++i) {
     auto& values = data.columns[i].values;
     if (auto* floats = std::get_if<std::vector<float>>(&values)) sinks[i].floats = floats->data();
     if (auto* bytes = std::get_if<std::vector<std::uint8_t>>(&values)) sinks[i].bytes = bytes->data();
   }
+
   return sinks;
 }
 
@@ -170,6 +173,7 @@ std::uint64_t fill_columns(Body& body, const PlyElement& element, const std::vec
     for (std::size_t row = 0; row < data.vertex_count; ++row) {
       const std::uint8_t* record = body.reader().take(size);
       if (record == nullptr) return row;
+
       for (const Sink& sink : sinks) {
         if (sink.type == ScalarType::kFloat32 && !body.swap()) {
           std::memcpy(sink.floats + row, record + sink.offset, 4);
@@ -180,8 +184,10 @@ std::uint64_t fill_columns(Body& body, const PlyElement& element, const std::vec
         }
       }
     }
+
     return data.vertex_count;
   }
+
   std::size_t column = 0;
   return read_records(body, element, [&](std::uint64_t row, const PlyProperty& property, double value) {
     if (!property.list) store(sinks[column++ % sinks.size()], static_cast<std::size_t>(row), value);
@@ -250,11 +256,13 @@ std::string read_element(Body& body, const PlyElement& element, bool take_shift,
   // The last word of an ascii file needs no blank after it.
   const std::uint64_t room = body.reader().remaining() + (body.ascii() ? 1 : 0);
   if (element.count > 0 && least == 0) return fmt::format("element '{}' has no properties", element.name);
+
   if (element.count > 0 && element.count > room / least) {
     return fmt::format(
         "header promises {} of '{}' (at least {} bytes each) but {} bytes are left; the file is truncated",
         element.count, element.name, least, body.reader().remaining());
   }
+
   std::uint64_t rows = 0;
   if (element.name == "vertex") {
     rows = read_vertices(body, element, take_shift, data);
@@ -265,6 +273,7 @@ std::string read_element(Body& body, const PlyElement& element, bool take_shift,
   } else {
     rows = read_records(body, element, [](auto&&...) { return true; });
   }
+
   if (rows == element.count) return "";
   const std::string place = fmt::format("'{}' {} of {}: ", element.name, rows + 1, element.count);
   return place + (body.problem().empty() ? "the file ends here; it is truncated" : body.problem());
@@ -325,25 +334,30 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
   out.write("ply\nformat binary_little_endian 1.0\n");
   for (const auto& comment : data.comments) out.write("comment " + comment + "\n");
   out.write(fmt::format("element vertex {}\n", data.vertex_count));
+
   const auto shift_of = [&data](const PlyColumn& column) {
     const bool position = column.name == "x" || column.name == "y" || column.name == "z";
     return position ? data.shift[static_cast<std::size_t>(column.name[0] - 'x')] : 0.0;
   };
+
   for (const auto& column : data.columns) {
     const bool floats = std::holds_alternative<std::vector<float>>(column.values);
     const char* type = !floats ? "uchar" : shift_of(column) != 0.0 ? "double" : "float";
     out.write(fmt::format("property {} {}\n", type, column.name));
   }
+
   if (!data.triangles.empty()) {
     out.write(
         fmt::format("element face {}\nproperty list uchar int vertex_indices\n", data.triangles.size()));
   }
+
   if (!data.edges.empty()) {
     out.write(
         fmt::format("element edge {}\nproperty int vertex1\nproperty int vertex2\n", data.edges.size()));
     if (colored) out.write("property uchar red\nproperty uchar green\nproperty uchar blue\n");
   }
   out.write("end_header\n");
+
   for (std::size_t row = 0; row < data.vertex_count; ++row) {
     for (const auto& column : data.columns) {
       const auto* floats = std::get_if<std::vector<float>>(&column.values);
@@ -355,14 +369,17 @@ core::Result<void> write_ply(const std::filesystem::path& file, const PlyData& d
       }
     }
   }
+
   for (const auto& triangle : data.triangles) {
     out.put(std::uint8_t{3});
     out.put(triangle);
   }
+
   for (std::size_t i = 0; i < data.edges.size(); ++i) {
     out.put(data.edges[i]);
     if (colored) out.put(data.edge_colors[i]);
   }
+
   return out.commit();
 }
 

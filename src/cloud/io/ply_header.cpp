@@ -60,6 +60,7 @@ std::string parse_property(std::istringstream& words, PlyHeader& header) {
   PlyProperty property;
   std::string type;
   words >> type;
+
   if (type == "list") {
     property.list = true;
     std::string count_type;
@@ -70,15 +71,18 @@ std::string parse_property(std::istringstream& words, PlyHeader& header) {
     }
     property.count_type = *counts;
   }
+
   const auto items = scalar_type(type);
   words >> property.name;
   if (!items) return "property type '" + type + "' is not known";
   if (property.name.empty()) return "property without a name";
+
   property.type = *items;
   auto& properties = header.elements.back().properties;
   for (const auto& other : properties) {
     if (other.name == property.name) return "property '" + property.name + "' is there twice";
   }
+
   properties.push_back(std::move(property));
   return "";
 }
@@ -91,6 +95,7 @@ core::Result<PlyHeader> read_ply_header(ByteReader& reader) {
   const bool begun = reader.line(line, kLongestLine);
   line.erase(line.find_last_not_of(" \t\r") + 1);  // some programs end their lines with blanks
   if (!begun || line != "ply") return core::input_error("is not a PLY file (no 'ply' at its start)");
+
   bool format = false;
   for (int number = 2; number <= kMostLines; ++number) {
     if (!reader.line(line, kLongestLine)) break;
@@ -98,15 +103,18 @@ core::Result<PlyHeader> read_ply_header(ByteReader& reader) {
     std::string keyword;
     words >> keyword;
     std::string problem;
+
     if (keyword == "end_header") {
       if (!format) return core::input_error("PLY header has no format line");
       return header;
     }
+
     if (keyword == "format") {
       problem = parse_format(words, header);
       format = true;
     } else if (keyword == "comment" || keyword == "obj_info") {
       const auto text = line.find_first_not_of(' ', line.find(keyword) + keyword.size());
+
       if (keyword == "comment") header.comments.push_back(text == std::string::npos ? "" : line.substr(text));
     } else if (keyword == "element") {
       problem = parse_element(words, header);
@@ -115,8 +123,10 @@ core::Result<PlyHeader> read_ply_header(ByteReader& reader) {
     } else if (!keyword.empty()) {
       problem = "'" + keyword.substr(0, 40) + "' is not a PLY header word";
     }
+
     if (!problem.empty()) return core::input_error(fmt::format("line {}: {}", number, problem));
   }
+
   return core::input_error("PLY header has no end_header; the file is truncated or not PLY");
 }
 

@@ -40,6 +40,7 @@ auto with_type(ScalarType type, const Body& body) {
       return body(std::uint16_t());
     case ScalarType::kInt32:
       return body(std::int32_t());
+
     case ScalarType::kUint32:
       return body(std::uint32_t());
     case ScalarType::kInt64:
@@ -51,6 +52,7 @@ auto with_type(ScalarType type, const Body& body) {
     case ScalarType::kFloat64:
       break;
   }
+
   return body(double());
 }
 

@@ -42,25 +42,30 @@ std::string read_table(ByteReader& reader, TextTable& table) {
     if (words.empty() || words[0][0] == '#') continue;
     if (core::has_decimal_comma(split(line, " \t;")))
       return fmt::format("line {}: decimal comma; write numbers with a point", number);
+
     const bool first = table.columns == 0;
     if (first && !parse_number(words[0])) {
       if (!table.names.empty()) return fmt::format("line {}: '{}' is not a number", number, words[0]);
       table.names = words;
       continue;
     }
+
     if (first && table.names.empty() && words.size() == 1)
       continue;  // .pts files begin with the number of points
     if (first) table.columns = words.size();
+
     if (words.size() != table.columns) {
       return fmt::format("line {}: {} columns, the lines before have {}", number, words.size(),
                          table.columns);
     }
+
     for (const auto& word : words) {
       const auto value = parse_number(word);
       if (!value) return fmt::format("line {}: '{}' is not a number", number, word);
       table.values.push_back(*value);
     }
   }
+
   if (reader.remaining() > 0) return fmt::format("line {}: longer than 4096 characters", number + 1);
   return table.columns == 0 ? "holds no points" : "";
 }
@@ -81,18 +86,23 @@ std::vector<Meaning> meanings_of(const TextTable& table) {
     for (std::size_t c = 0; c < table.columns; ++c) meanings[c] = meaning_of(table.names[c]);
     return meanings;
   }
+
   const auto name = [&meanings](std::size_t from, std::initializer_list<Meaning> what) {
     std::copy(what.begin(), what.end(), meanings.begin() + static_cast<std::ptrdiff_t>(from));
   };
+
   if (table.columns < 3) return meanings;
   name(0, {Meaning::kX, Meaning::kY, Meaning::kZ});
+
   // x y z intensity r g b is what laser scanners write (.pts).
   std::size_t next = table.columns == 7 ? 4 : 3;
   if (table.columns < next + 3) return meanings;
+
   if (looks_like_color(table, next)) {
     name(next, {Meaning::kRed, Meaning::kGreen, Meaning::kBlue});
     next += 3;
   }
+
   if (table.columns >= next + 3) name(next, {Meaning::kNormalX, Meaning::kNormalY, Meaning::kNormalZ});
   return meanings;
 }
@@ -103,22 +113,28 @@ core::Result<CloudFile> read_text_cloud(const std::filesystem::path& file, Large
   const auto error = [&file](const std::string& what) {
     return core::input_error(file.string() + ": " + what);
   };
+
   ByteReader reader(file);
   if (!reader.open()) return error("cannot be read");
+
   TextTable table;
   const std::string problem = read_table(reader, table);
   if (!problem.empty()) return error(problem);
+
   const auto meanings = meanings_of(table);
   table.names.resize(table.columns);
   CloudBuilder builder(meanings, table.names, table.values.size() / table.columns);
   if (!builder.has_position()) return error("has no x, y and z; three columns at least are needed");
+
   if (large == LargeCoordinates::kShifted) {
     for (const Meaning meaning : meanings) builder.keep_digits(meaning);
   }
+
   for (std::size_t i = 0; i < table.values.size(); ++i) {
     const std::size_t c = i % table.columns;
     builder.set(i / table.columns, meanings[c], c, table.values[i]);
   }
+
   return builder.finish();
 }
 

@@ -83,16 +83,19 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
   PlaneStep found;
   const std::vector<Match> matches = matches_of(source, target, correspondences);
   if (matches.empty()) return found;
+
   found.centre = middle_of(matches);
   found.lever = std::max(0.1, spread_of(matches, found.centre));
   const double scale = scale_of(matches);
   Matrix6d h = Matrix6d::Zero();
   Vector6d g = Vector6d::Zero();
+
   double weights = 0.0, squares = 0.0;
   for (const Match& m : matches) {
     const double ratio = std::abs(m.distance) / scale;
     const double loss = narrow_ ? tukey(ratio) : huber(ratio);
     if (loss <= 0.0) continue;
+
     Vector6d jacobian;  // of the distance in metres
     jacobian << m.normal, ((m.point - found.centre) / found.lever).cross(m.normal);
     const double weight = loss * m.inverse_sigma * m.inverse_sigma;
@@ -102,16 +105,19 @@ PlaneStep ConstrainedPointToPlane::step(const SurfaceCloud& source, const Surfac
     squares += m.distance * m.distance;
     ++found.inliers;
   }
+
   found.rms = found.inliers > 0 ? std::sqrt(squares / found.inliers) : 0.0;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(h);
   found.eigenvalues = eigen.eigenvalues();
   found.directions = eigen.eigenvectors();
+
   Vector6d step = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
     found.held[static_cast<std::size_t>(i)] = found.eigenvalues(i) > min_information_ * weights;
     if (!found.held[static_cast<std::size_t>(i)]) continue;
     step -= found.directions.col(i) * (found.directions.col(i).dot(g) / found.eigenvalues(i));
   }
+
   step.tail<3>() /= found.lever;
   step.head<3>() -= step.tail<3>().cross(found.centre);
   found.transformation = geometry::exp_se3(step).isometry().matrix();

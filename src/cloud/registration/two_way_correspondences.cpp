@@ -42,11 +42,13 @@ void TwoWayCorrespondences::determineCorrespondences(pcl::Correspondences& corre
                               .squaredNorm();
     correspondences.emplace_back(query, match, squared);
   };
+
   for (const int i : of_source_) {
     const int match =
         nearest_facing(*target_search_.tree(), (*input_)[static_cast<std::size_t>(i)], reach, min_cosine_);
     if (match >= 0) add(i, match);
   }
+
   const Eigen::Matrix4f back = source_from_moved();
   for (const int i : of_target_) {
     const SurfacePoint sample = moved((*target_search_.cloud())[static_cast<std::size_t>(i)], back);

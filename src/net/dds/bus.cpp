@@ -102,11 +102,13 @@ class Participant {
       others_ = dds_create_reader(participant_.handle, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr);
       return {};
     }
+
     const std::string error = first_error_->text();
     if (!options.security.empty() && !error.empty()) {
       return core::usage_error(
           fmt::format("--security: the keys in {} cannot be used: {}", options.security.string(), error));
     }
+
     const dds_return_t code = domain_.handle <= 0 ? domain_.handle : participant_.handle;
     return core::usage_error(
         fmt::format("the network cannot be used on interface {}, domain {} ({}); another program may have "

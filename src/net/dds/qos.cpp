@@ -57,11 +57,13 @@ Qos chunk_qos(int most_ms) {
 core::Result<Qos> participant_qos(const NetworkOptions& options) {
   Qos qos = new_qos();
   if (options.security.empty()) return qos;
+
   std::error_code ec;
   const std::filesystem::path folder = std::filesystem::absolute(options.security);
   const auto set = [&](const char* name, const std::string& value) {
     dds_qset_prop(qos.get(), name, value.c_str());
   };
+
   for (const auto& [name, file] : {std::pair{"dds.sec.auth.identity_ca", kAuthorityFile},
                                    {"dds.sec.auth.identity_certificate", kCertificateFile},
                                    {"dds.sec.auth.private_key", kKeyFile},
@@ -76,6 +78,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     }
     set(name, "file:" + (folder / file).string());
   }
+
   for (const auto& [plugin, library, function] : {std::tuple{"auth", "auth", "authentication"},
                                                   {"access", "ac", "access_control"},
                                                   {"crypto", "crypto", "crypto"}}) {
@@ -84,6 +87,7 @@ core::Result<Qos> participant_qos(const NetworkOptions& options) {
     set((head + "init").c_str(), fmt::format("init_{}", function));
     set((head + "finalize").c_str(), fmt::format("finalize_{}", function));
   }
+
   return qos;
 }
 
@@ -92,8 +96,10 @@ std::string domain_configuration(const NetworkOptions& options, bool hub) {
   const bool local = options.interface == "lo";
   std::string peers;
   for (const std::string& peer : options.peers) peers += fmt::format("<Peer Address=\"{}\"/>", peer);
+
   // lo may lack multicast: there every possible port is asked.
   if (local && !tcp && options.peers.empty()) peers = "<Peer Address=\"127.0.0.1\"/>";
+
   // Multicast of data floods a WiFi: it is used for discovery only.
   const bool multicast = !tcp && peers.empty();
   std::string xml = "<CycloneDDS><Domain Id=\"any\"><General>";
@@ -101,18 +107,23 @@ std::string domain_configuration(const NetworkOptions& options, bool hub) {
   xml += fmt::format("<AllowMulticast>{}</AllowMulticast>", multicast ? "spdp" : "false");
   xml += fmt::format("<Transport>{}</Transport>", tcp ? "tcp" : "udp");
   xml += "</General><Discovery>";
+
   // Number of ports asked at a peer without a port; the default of 9 is too small.
   if (!tcp)
     xml += "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>63</MaxAutoParticipantIndex>";
+
   // A cable that is plugged in again is noticed at once, not after 30 s.
   xml += "<SPDPInterval>1 s</SPDPInterval>";
+
   // A participant silent for this long is gone: data queued for it is dropped.
   xml += "<LeaseDuration>10 s</LeaseDuration>";
   if (!peers.empty()) xml += "<Peers>" + peers + "</Peers>";
   if (!tcp && options.port > 0) xml += fmt::format("<Ports><Base>{}</Base></Ports>", options.port);
   xml += "</Discovery>";
+
   // The hub listens, robots connect.
   if (tcp) xml += fmt::format("<TCP><Port>{}</Port></TCP>", hub ? options.port : -1);
+
   // No memory for samples larger than any message.
   xml += "<Internal><MaxSampleSize>16 MB</MaxSampleSize></Internal>";
   return xml + "</Domain></CycloneDDS>";

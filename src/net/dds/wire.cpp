@@ -58,6 +58,7 @@ void to_wire(const HubStatus& from, plumbline_wire_HubStatus& to) {
   to.up_s = from.up_s;
   put_text(from.robot, to.robot);
   put_text(from.run, to.run);
+
   to.incarnation = from.incarnation;
   to.answer = static_cast<std::uint8_t>(from.answer);
   put_text(from.problem, to.problem);
@@ -66,6 +67,7 @@ void to_wire(const HubStatus& from, plumbline_wire_HubStatus& to) {
   to.incoming = number(from.incoming);
   to.checksum = from.checksum;
   to.chunks = from.chunks;
+
   put_text(from.frame.frame_of, to.frame.frame_of);
   std::copy(from.frame.frame_from_robot.begin(), from.frame.frame_from_robot.end(),
             to.frame.frame_from_robot);
@@ -82,6 +84,7 @@ HubStatus from_wire(const plumbline_wire_HubStatus& from) {
   to.hub = get_text(from.hub);
   to.up_s = from.up_s;
   to.robot = get_text(from.robot);
+
   to.run = get_text(from.run);
   to.incarnation = from.incarnation;
   to.answer = static_cast<Answer>(from.answer);
@@ -92,6 +95,7 @@ HubStatus from_wire(const plumbline_wire_HubStatus& from) {
   to.checksum = from.checksum;
   to.chunks = from.chunks;
   to.frame.frame_of = get_text(from.frame.frame_of);
+
   std::copy(std::begin(from.frame.frame_from_robot), std::end(from.frame.frame_from_robot),
             to.frame.frame_from_robot.begin());
   std::copy(std::begin(from.frame.frame_from_camera), std::end(from.frame.frame_from_camera),

@@ -99,19 +99,23 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
     const fs::path file = folder / "robots" / t.name / "map.db";
     if (!t.done) leave_out(fmt::format("{} has not sent everything", t.name));
     if (t.keyframes == 0) continue;
+
     // A damaged map must not keep the others from being fused.
     const auto stored = maps::StoredMaps::open({file.parent_path()}, executor);
     if (stored) {
       maps.push_back(file.parent_path());
       continue;
     }
+
     const std::string why = stored.error().message;
     log.warning(fmt::format("{} is left out: {}", t.name, why));
     leave_out(t.name + " is left out: its map does not load");
   }
+
   if (traffic.size() < expected) {
     leave_out(fmt::format("{} of {} robots never came", expected - traffic.size(), expected));
   }
+
   return maps;
 }
 

@@ -65,6 +65,7 @@ void HubMeetings::replay() {
   {
     std::ifstream file(log_file(), std::ios::binary);
     core::Bytes bytes(kEntryHead);
+
     while (file.read(reinterpret_cast<char*>(bytes.data()), kEntryHead)) {
       core::Bytes packed(core::decode<std::uint32_t>(bytes));
       if (!file.read(reinterpret_cast<char*>(packed.data()), static_cast<std::streamsize>(packed.size())))
@@ -77,6 +78,7 @@ void HubMeetings::replay() {
       whole += kEntryHead + packed.size();
     }
   }
+
   std::error_code ignored;
   if (std::filesystem::exists(log_file(), ignored)) std::filesystem::resize_file(log_file(), whole, ignored);
 }
@@ -136,11 +138,13 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
   const std::vector<core::KeyframeId> ids = stored.map.keyframe_ids();
   const auto of_others = [](core::KeyframeId id) { return id.robot != 0; };
   if (ids.empty() || std::any_of(ids.begin(), ids.end(), of_others)) return 0;  // a map of several robots
+
   if (!known.number) {
     const auto next = static_cast<std::int32_t>(names_.size());
     known.number = server_->join({{next, maps::camera_of(stored.header.robots, 0).color}});
     names_.push_back(robot);
   }
+
   const auto number = static_cast<std::int32_t>(*known.number);
   const auto map = std::make_shared<maps::Map>(maps::renumbered(stored.map, {{0, number}}));
   int added = 0;
@@ -150,6 +154,7 @@ int HubMeetings::add(const std::string& robot, const maps::StoredMap& stored) {
     known.keyframes = id.index + 1;
     ++added;
   }
+
   return added;
 }
 

@@ -115,12 +115,14 @@ std::string HubServer::refusal(const RobotStatus& robot) const {
     return fmt::format("{}: the hub accepts {} robots, and has {}; start the hub with a larger --robots",
                        robot.name, most, names);
   }
+
   if (known->second.robot.run != robot.run) {
     return fmt::format(
         "{}: the hub has another run of that name; give this one another --name, or start the hub without "
         "--resume in another folder",
         robot.name);
   }
+
   return {};
 }
 

@@ -44,8 +44,10 @@ void OtherRobots::receive(const Chunk& chunk) {
     Other& anew = others_[chunk.name] = {};
     anew.number = ++numbers_;
   }
+
   const auto found = others_.find(chunk.name);
   if (found == others_.end()) return;
+
   Other& other = found->second;
   if (chunk.index == 0) {
     other.incoming = {chunk.number, {}};
@@ -84,6 +86,7 @@ void OtherRobots::publish() {
   const SharedFrame own = frames_[name_];
   auto all = std::make_shared<mapping::OtherMaps>();
   std::vector<const maps::Map*> maps;
+
   std::vector<Rigid3> own_from_other;
   for (auto& [name, other] : others_) {
     const SharedFrame frame = frames_[name];

@@ -74,6 +74,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
   const std::string command = fmt::format("plumbline robot '{}' {}", folder.string(), request.hand_in);
   const auto since = Clock::now();
   Rate rate;
+
   while (true) {
     const LinkStatus now = link.status();
     if (now.done) {
@@ -102,6 +103,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
                       folder.string(), command));
     }
     std::this_thread::sleep_for(50ms);
+
   }
 }
 
@@ -132,6 +134,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
   const auto others = request.feedback ? std::make_shared<mapping::OtherMapsInbox>() : nullptr;
   auto link = open_link(request, others, log);
   if (!link) return tl::unexpected(link.error());
+
   pipeline::MapRequest map = request.map;
   map.feedback = others;
   map.prepared = [&](const fs::path& folder) {
@@ -154,6 +157,7 @@ core::Result<RobotOutcome> run_robot(const RobotRequest& request, const core::Ex
     return core::usage_error(
         fmt::format("{}: this pipeline writes no map.db, so there is nothing to send", request.map.pipeline));
   }
+
   (*link)->finish(store);
   RobotOutcome outcome;
   outcome.summary = std::move(*summary);

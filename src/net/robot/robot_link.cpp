@@ -65,6 +65,7 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
   if (!texts["run"].empty()) next.run = texts["run"];
   if (!anew) next.heads_at_start = parse_numbers(texts["began"]);
   next.heads_at_start.push_back(heads ? static_cast<std::uint64_t>(heads->last()) : 0);
+
   const std::vector<std::uint64_t> incarnation = parse_numbers(texts["incarnation"]);
   if (!anew) next.incarnation = incarnation.empty() ? 0 : incarnation.front();
   ++next.incarnation;
@@ -75,6 +76,7 @@ core::Result<void> RobotLink::follow(const fs::path& store) {
                                {"began", fmt::format("{}", fmt::join(next.heads_at_start, " "))},
                                {"incarnation", std::to_string(next.incarnation)}});
   if (!put) return put;
+
   next.map_head = next.clouds_head = 0;
   robot_ = std::move(next);
   store_.follow(store);

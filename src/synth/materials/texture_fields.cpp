@@ -19,17 +19,20 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
   for (int o = 0; o < octaves; ++o) {
     const int px = cx << o, py = cy << o;
     if (px > size.width && py > size.height) break;
+
     const std::uint64_t key = mix(seed + static_cast<std::uint64_t>(o));
     lattice.resize(static_cast<std::size_t>(px) * static_cast<std::size_t>(py));
     for (std::size_t i = 0; i < lattice.size(); ++i) {
       lattice[i] = gain * (static_cast<float>(mix(key ^ i) >> 40U) * 0x1.0p-23F - 1.0F);
     }
+
     const auto smooth = [](float t) { return t * t * (3.0F - 2.0F * t); };
     for (int x = 0; x < size.width; ++x) {
       const float u = static_cast<float>(x) * static_cast<float>(px) / static_cast<float>(size.width);
       cell[static_cast<std::size_t>(x)] = std::min(px - 1, static_cast<int>(u));
       ease[static_cast<std::size_t>(x)] = smooth(u - std::floor(u));
     }
+
     for (int y = 0; y < size.height; ++y) {
       const float v = static_cast<float>(y) * static_cast<float>(py) / static_cast<float>(size.height);
       const int iy = std::min(py - 1, static_cast<int>(v));
@@ -37,6 +40,7 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
       const float* top = lattice.data() + static_cast<std::size_t>(iy) * static_cast<std::size_t>(px);
       const float* low =
           lattice.data() + static_cast<std::size_t>((iy + 1) % py) * static_cast<std::size_t>(px);
+
       float* row = out[y];
       for (int x = 0; x < size.width; ++x) {
         const int i = cell[static_cast<std::size_t>(x)], k = i + 1 == px ? 0 : i + 1;
@@ -45,9 +49,11 @@ cv::Mat1f fractal(cv::Size size, int cx, int cy, int octaves, float falloff, std
         row[x] += a + sy * (b - a);
       }
     }
+
     sum += gain * gain;
     gain *= falloff;
   }
+
   out *= static_cast<double>(1.6F / std::sqrt(sum));
   return out;
 }

@@ -38,6 +38,7 @@ static void photograph(Canvas part, std::uint64_t seed) {
   Rng rng(seed, 10);
   const cv::Size size = part.size();
   const cv::Mat1f sky = fractal(size, 3, 2, 5, 0.6F, seed), ground = fractal(size, 6, 6, 6, 0.75F, seed + 70);
+
   const cv::Vec3f high(0.75F, 0.50F, 0.25F), low(0.20F, 0.38F, 0.28F);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -46,6 +47,7 @@ static void photograph(Canvas part, std::uint64_t seed) {
       part(y, x) = above ? high * (0.9F + 0.4F * sky(y, x)) : low * (0.9F + 0.5F * ground(y, x));
     }
   }
+
   for (int i = 0; i < 7; ++i) {
     const int w = static_cast<int>(rng.uniform(0.06, 0.2) * size.width),
               h = static_cast<int>(rng.uniform(0.1, 0.4) * size.height);
@@ -64,17 +66,21 @@ Canvas draw_poster(const Material&, cv::Size size, std::uint64_t seed) {
   const bool pale = rng.uniform() < 0.6;
   Canvas canvas(size, cv::Vec3f(0, 0, 0));
   canvas.setTo(random_color(rng, pale ? 0.6 : 0.08, pale ? 0.9 : 0.5));
+
   const cv::Scalar ink = pale ? cv::Scalar::all(0.04) : cv::Scalar::all(0.85);
   const int w = size.width, h = size.height, margin = w / 14;
   const double unit = w / 512.0;
   text_line(canvas, {margin, h / 9}, w - 2 * margin, 2.2 * unit, random_color(rng, 0.0, pale ? 0.4 : 0.9),
             std::max(2, static_cast<int>(5 * unit)), rng);
+
   const int top = h / 7, photo = static_cast<int>(h * rng.uniform(0.25, 0.42));
   photograph(canvas(cv::Rect(margin, top, w - 2 * margin, photo)), seed + 5);
   const int lines_from = top + photo + h / 18, columns = rng.uniform() < 0.5 ? 2 : 1;
+
   for (int c = 0; c < columns; ++c) {
     const int x = margin + c * (w - 2 * margin) / columns, width = (w - 2 * margin) / columns - margin / 2;
     int y = lines_from;
+
     while (y < h - margin) {
       if (rng.uniform() < 0.12 && y + h / 7 < h - margin) {
         const cv::Scalar color = random_color(rng, 0.05, 0.9);
@@ -88,6 +94,7 @@ Canvas draw_poster(const Material&, cv::Size size, std::uint64_t seed) {
       }
     }
   }
+
   return canvas;
 }
 
@@ -102,6 +109,7 @@ Canvas draw_whiteboard(const Material& m, cv::Size size, std::uint64_t seed) {
   Canvas canvas(size, tone(m));
   modulate(canvas, fractal(size, 4, 3, 4, 0.6F, seed), 0.02F);
   Rng rng(seed, 12);
+
   const std::array<cv::Scalar, 3> pens = {cv::Scalar(0.35, 0.08, 0.05), cv::Scalar(0.06, 0.06, 0.5),
                                           cv::Scalar(0.05, 0.05, 0.05)};
   for (int i = 0; i < 9; ++i) {
@@ -109,6 +117,7 @@ Canvas draw_whiteboard(const Material& m, cv::Size size, std::uint64_t seed) {
     const cv::Point at(static_cast<int>(rng.uniform(0.04, 0.75) * size.width),
                        static_cast<int>(rng.uniform(0.1, 0.8) * size.height));
     const int s = size.width / 9;
+
     if (i % 3 == 0) {
       cv::rectangle(canvas, at, at + cv::Point(s, s / 2), pen, 3, cv::LINE_AA);
       cv::arrowedLine(canvas, at + cv::Point(s, s / 4), at + cv::Point(2 * s, s / 4), pen, 3, cv::LINE_AA);
@@ -116,12 +125,14 @@ Canvas draw_whiteboard(const Material& m, cv::Size size, std::uint64_t seed) {
       for (int k = 0; k < 3; ++k) text_line(canvas, at + cv::Point(0, 34 * k), 2 * s, 0.9, pen, 2, rng);
     } else {
       std::vector<cv::Point> curve;
+
       const double f = rng.uniform(0.02, 0.07), a = rng.uniform(10, 40);
       for (int x = 0; x < 2 * s; x += 4)
         curve.emplace_back(at.x + x, at.y + static_cast<int>(a * std::sin(f * x)));
       cv::polylines(canvas, curve, false, pen, 3, cv::LINE_AA);
     }
   }
+
   return canvas;
 }
 
@@ -149,15 +160,19 @@ Canvas draw_books(const Material&, cv::Size size, std::uint64_t seed) {
     const cv::Scalar color = random_color(rng, 0.04, 0.7);
     cv::rectangle(canvas, {x + 1, top}, {x + w - 2, size.height}, color, -1);
     cv::line(canvas, {x, 0}, {x, size.height}, cv::Scalar::all(0.01), 2);
+
     const cv::Scalar ink = color * 0.2 + cv::Scalar::all(rng.uniform() < 0.5 ? 0.7 : 0.02);
     const int band = static_cast<int>(rng.uniform(0.15, 0.3) * size.height);
     cv::rectangle(canvas, {x + 2, band}, {x + w - 3, band + size.height / 30}, ink, -1);
+
     for (int k = 0; k < 9; ++k) {  // title, set upright
       const int y = static_cast<int>((0.4 + 0.045 * k) * size.height);
       cv::line(canvas, {x + w / 3, y}, {x + w / 3 + static_cast<int>(rng.uniform(0.1, 0.4) * w), y}, ink, 2);
     }
+
     x += w;
   }
+
   return canvas;
 }
 

@@ -175,17 +175,20 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
   struct Fold {
     float at, width, depth;
   };
+
   std::vector<Fold> folds;
   for (int i = 0; i < 16; ++i) {  // spread evenly, as above
     folds.push_back({static_cast<float>((i + rng.uniform()) / 16.0),
                      static_cast<float>(rng.uniform(0.004, 0.018)),
                      static_cast<float>(rng.uniform(0.015, 0.085) * (rng.uniform() < 0.6 ? 1.0 : -0.6))});
   }
+
   for (int i = 0; i < 18; ++i) {  // narrow, nearly sharp ones
     folds.push_back({static_cast<float>((i + rng.uniform()) / 18.0),
                      static_cast<float>(rng.uniform(0.0012, 0.0028)),
                      static_cast<float>(rng.uniform(0.095, 0.16) * (rng.uniform() < 0.6 ? 1.0 : -1.0))});
   }
+
   cv::Mat1f field(size, 0.0F);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -200,15 +203,18 @@ Canvas draw_cloth(const Material& m, cv::Size size, std::uint64_t seed) {
       field(y, x) = sum;
     }
   }
+
   add_creases(field, rng);
   modulate(canvas, field, 1.0F);
   modulate(canvas, fractal(size, 128, 128, 3, 0.8F, seed + 40), 0.012F);
+
   for (int i = 0; i < 8; ++i) {  // stains and pin holes
     const cv::Point c(static_cast<int>((i % 4 + rng.uniform()) * size.width / 4),
                       static_cast<int>((i / 4 + rng.uniform()) * size.height / 2));
     cv::ellipse(canvas, c, {1 + static_cast<int>(rng.uniform(0, 2.0)), 1}, rng.uniform(0, 180), 0, 360,
                 scalar(tone(m) * rng.uniform(0.5, 0.8)), -1, cv::LINE_AA);
   }
+
   add_hem(canvas, size.height / m.tile_m, rng);
   return canvas;
 }
@@ -232,6 +238,7 @@ Canvas draw_rug(const Material& m, cv::Size size, std::uint64_t seed) {
   const std::array<cv::Scalar, 4> colors = {cv::Scalar(0.10, 0.16, 0.42), cv::Scalar(0.45, 0.60, 0.72),
                                             cv::Scalar(0.30, 0.16, 0.10), cv::Scalar(0.12, 0.42, 0.62)};
   const int cells = 6, step = size.width / cells;
+
   for (int i = 0; i < cells; ++i) {
     for (int k = 0; k < cells; ++k) {
       const cv::Point c(i * step + step / 2, k * step + step / 2);
@@ -244,6 +251,7 @@ Canvas draw_rug(const Material& m, cv::Size size, std::uint64_t seed) {
       }
     }
   }
+
   modulate(canvas, grain(size, seed), 0.2F);
   return canvas;
 }

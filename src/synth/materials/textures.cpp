@@ -57,6 +57,7 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
   cv::Size size(m.pixels, m.pixels);
   if (aspect > 0.0)
     size = {power_of_two(m.pixels * std::min(1.0, aspect)), power_of_two(m.pixels / std::max(1.0, aspect))};
+
   Canvas canvas;
   if (aspect > 0.0) {
     // Drawn with square pixels, then stored at powers of two.
@@ -67,6 +68,7 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
   } else {
     canvas = m.draw(m, size, seed);
   }
+
   if (texture == Texture::kWeak) fade(canvas, 0.2F);
   Texture2d out;
   while (true) {
@@ -77,6 +79,7 @@ Texture2d draw_texture(const Material& material, Texture texture, std::uint64_t 
                cv::INTER_AREA);
     canvas = half;
   }
+
   return out;
 }
 

@@ -47,6 +47,7 @@ std::string write_pair(const SynthSource& source, std::size_t index, const fs::p
 Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs::path& folder) {
   std::string color = "# timestamp filename\n", depth = color, pairs;
   geometry::Trajectory truth;
+
   for (std::size_t i = 0; i < frames; ++i) {
     const dataset::PairInfo info = labelled(source, i);
     color += fmt::format("{:.6f} {}\n", info.stamp, color_name(info));
@@ -57,12 +58,14 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
     const double depth_taken = source.info(i).depth_stamp;
     if (depth_taken != info.stamp) truth.push_back({depth_taken, source.world_from_camera(depth_taken)});
   }
+
   std::sort(truth.begin(), truth.end(),
             [](const geometry::StampedPose& a, const geometry::StampedPose& b) { return a.stamp < b.stamp; });
   if (auto ok = core::write_file(folder / "rgb.txt", color); !ok) return ok;
   if (auto ok = core::write_file(folder / "depth.txt", depth); !ok) return ok;
   if (auto ok = core::write_file(folder / "associations.txt", pairs); !ok) return ok;
   if (auto ok = core::write_file(folder / "camera.yaml", sensor::to_yaml(source.camera())); !ok) return ok;
+
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
 }
 
@@ -80,8 +83,10 @@ Result<std::size_t> write_frames(const Job& job, const core::Executor& executor,
   for (const char* sub : {"rgb", "depth"}) {
     if (auto ok = core::make_folder(job.folder / sub); !ok) return tl::unexpected<core::Error>(ok.error());
   }
+
   const std::size_t batch = static_cast<std::size_t>(executor.threads()) * 4;
   std::size_t done = 0;
+
   while (done < job.source.size() && !stop.stop_requested()) {
     const std::size_t count = std::min(batch, job.source.size() - done);
     std::vector<std::string> problems(count);
@@ -93,6 +98,7 @@ Result<std::size_t> write_frames(const Job& job, const core::Executor& executor,
     done += count;
     if (progress) progress(job.done_before + done, job.all_frames);
   }
+
   if (auto ok = write_lists(job.source, done, job.folder); !ok)
     return tl::unexpected<core::Error>(ok.error());
   return done;
@@ -180,6 +186,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
   for (const auto& source : sources) all_frames += source->size();
   const auto start = std::chrono::steady_clock::now();
   nlohmann::json robots = nlohmann::json::array();
+
   for (std::size_t i = 0; i < sources.size() && !stop.stop_requested(); ++i) {
     const std::string folder = folder_name(static_cast<int>(i));
     const auto written =
@@ -190,6 +197,7 @@ Result<nlohmann::json> write_robots(const std::vector<std::unique_ptr<SynthSourc
     robots.push_back(
         describe_robot(*sources[i], folder, scene.robots[i % scene.robots.size()].name, *written));
   }
+
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return robots;
 }
@@ -212,6 +220,7 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
   if (!robots) return fail(robots.error());
   summary.reference_spacing_m =
       options.reference_spacing > 0.0 ? options.reference_spacing : default_spacing(scene);
+
   if (!stop.stop_requested()) {
     Visibility visibility(*world, summary.reference_spacing_m);
     for (const auto& source : *sources) visibility.add(*source, executor, stop);
@@ -221,9 +230,11 @@ Result<WriteSummary> write_recordings(const Scene& scene, const SynthOptions& op
     summary.reference_samples = counts->samples;
     summary.reference_visible = counts->visible;
   }
+
   summary.stopped = stop.stop_requested();
   const std::string json = describe_world(scene, options, summary, *robots).dump(2) + "\n";
   if (auto ok = core::write_file(output / "scene.json", json); !ok) return fail(ok.error());
+
   log.info(fmt::format("{}: {} frames of {} robot(s) in {:.1f} s, {} reference samples ({} visible)",
                        scene.name, summary.frames, summary.robots, summary.wall_s, summary.reference_samples,
                        summary.reference_visible));

@@ -55,8 +55,10 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
   const Face& face = world.scene.faces[index];
   const Eigen::AlignedBox2d b = face.bounds();
   std::vector<PlySample> out;
+
   // The middle of the grid's cells, whole cells over the face, so that no edge is favoured.
   const int nu = std::max(1, static_cast<int>(std::lround((b.max().x() - b.min().x()) / spacing)));
+
   const int nv = std::max(1, static_cast<int>(std::lround((b.max().y() - b.min().y()) / spacing)));
   const double du = (b.max().x() - b.min().x()) / nu, dv = (b.max().y() - b.min().y()) / nv;
   std::vector<signed char> outside(static_cast<std::size_t>((nu / 16 + 1) * (nv / 16 + 1)), -1);
@@ -64,6 +66,7 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
     for (int i = 0; i < nu; ++i) {
       const Vector2d uv(b.min().x() + (i + 0.5) * du, b.min().y() + (j + 0.5) * dv);
       if (!face.contains(uv, 1e-9)) continue;
+
       const Vector3d p = face.at(uv.x(), uv.y()), before = p + 0.002 * face.normal;
       const bool visible = visibility.seen(index, uv.x(), uv.y());
       if (!visible) {
@@ -71,9 +74,11 @@ std::vector<PlySample> sample_face(const World& world, const Visibility& visibil
         if (skin < 0) skin = faces_nowhere(world, face, before) ? 1 : 0;
         if (skin == 1 || world.inside_solid(before)) continue;
       }
+
       out.push_back(make_sample(world, index, uv.x(), uv.y(), p, visible));
     }
   }
+
   return out;
 }
 
@@ -118,29 +123,36 @@ void Visibility::mark(const geometry::Rigid3& world_from_camera, const sensor::P
     if (c.z() < range.min || c.z() > std::min(range.max, world_->options.visible_range)) return false;
     const Vector2d pixel = camera.project(c);
     if (!camera.contains(pixel, 1.0)) return false;
+
     const Vector3d ray = (p - world_from_camera.translation).normalized();
     if (!measures(world_->options.sensor, *world_->materials[index], {camera.width, camera.height},
                   {pixel.x(), pixel.y()}, c.z(), std::abs(ray.dot(world_->scene.faces[index].normal)))) {
       return false;
     }
+
     return view.ids(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) ==
            static_cast<int>(index);
   };
+
   for (std::size_t index = 0; index < present.size(); ++index) {
     if (present[index] == 0) continue;
     const Face& face = world_->scene.faces[index];
     const Grid& g = grids_[index];
+
     const Eigen::AlignedBox2d b = face.bounds();
     for (int j = 0; j < g.rows; ++j) {
       for (int i = 0; i < g.columns; ++i) {
         std::atomic<std::uint8_t>& flag = flags_[g.at(i, j)];
         if (flag.load(std::memory_order_relaxed) != 0) continue;
+
         const double ua = g.u0 + i * block_, va = g.v0 + j * block_;
         const double ub = std::min(ua + block_, b.max().x()), vb = std::min(va + block_, b.max().y());
         const Vector3d middle = face.at(0.5 * (ua + ub), 0.5 * (va + vb));
         if (!sees(index, middle)) continue;
+
         const Vector3d ray = (middle - world_from_camera.translation).normalized();
         if (std::abs(ray.dot(face.normal)) < kLeastSine) continue;
+
         const double e = 1e-3;
         if (sees(index, face.at(ua + e, va + e)) && sees(index, face.at(ub - e, va + e)) &&
             sees(index, face.at(ua + e, vb - e)) && sees(index, face.at(ub - e, vb - e))) {
@@ -174,26 +186,32 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
   std::vector<std::vector<PlySample>> parts(world.fixed_faces);
   executor.parallel_for(parts.size(),
                         [&](std::size_t i) { parts[i] = sample_face(world, visibility, i, spacing); });
+
   ReferenceCounts counts;
   for (const auto& part : parts) {
     counts.samples += part.size();
     for (const PlySample& s : part) counts.visible += s.visible;
   }
+
   std::ofstream out(file, std::ios::binary);
   out << fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment samples of the true surfaces, {:.4f} m apart; visible = "
       "1 where a camera saw the spot within range\nelement vertex {}\n",
       spacing, counts.samples);
+
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) out << "property float " << name << "\n";
   for (const char* name : {"red", "green", "blue", "visible"}) out << "property uchar " << name << "\n";
   out << "end_header\n";
+
   for (const auto& part : parts) {
     out.write(reinterpret_cast<const char*>(part.data()),
               static_cast<std::streamsize>(part.size() * sizeof(PlySample)));
   }
+
   out.flush();
   if (!out)
     return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
+
   return counts;
 }
 

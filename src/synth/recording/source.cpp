@@ -109,6 +109,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
     const Object& thing =
         world->scene
             .objects[static_cast<std::size_t>(world->scene.faces[static_cast<std::size_t>(hit.face)].object)];
+
     const core::ConfigMark& mark = robot_path.waypoints[k].mark;
     return core::usage_error(
         fmt::format("{}:{}: the path of {} {} {} (line {}) between waypoints {} and {}, at ({:.2f}, {:.2f}, "
@@ -116,14 +117,17 @@ core::Result<void> SynthSource::Impl::check_way() const {
                     mark.file, mark.line, robot_path.name, how, thing.name, thing.mark.line, k, (k + 1) % n,
                     p.x(), p.y(), p.z()));
   };
+
   const double end = frames.back().color - kFirstStamp;
   const Vector3d first = path->world_from_camera(0.0).translation;
   const Vector3d up = Vector3d(0.0123, 0.0211, 1.0).normalized();
   if (const Hit hit = world->cast(first, up, 1e4); hit.face >= 0 && !hit.front) {
     return complain(first, 0.0, hit, "starts inside");
   }
+
   Vector3d at = first;
   const double once = std::min(end, 2.0 * path->duration() + 60.0);  // later rounds repeat the first
+
   for (double t = 0.02; t <= once; t += 0.02) {
     const Vector3d to = path->world_from_camera(t).translation;
     const Vector3d step = to - at;
@@ -135,6 +139,7 @@ core::Result<void> SynthSource::Impl::check_way() const {
     }
     at = to;
   }
+
   return {};
 }
 
@@ -164,6 +169,7 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
                sooner = pose(at.color - 0.5 * kExposure).inverse();
   const int w = (view.ids.cols + 7) / 8, h = (view.ids.rows + 7) / 8;
   cv::Mat2f out(h, w);
+
   const double angle = Rng(seed, 0xb1 + static_cast<std::uint64_t>(at.number / 15)).uniform(0.0, 2.0 * M_PI);
   for (int j = 0; j < h; ++j) {
     for (int i = 0; i < w; ++i) {
@@ -174,12 +180,14 @@ cv::Mat2f SynthSource::Impl::flow(const View& view, const Stamps& at, double ext
         z = 1.0 /
             static_cast<double>(f.c[0] * static_cast<float>(x) + f.c[1] * static_cast<float>(y) + f.c[2]);
       }
+
       const Vector3d p = view.world_from_camera * view.camera.unproject(x, y, z);
       const Eigen::Vector2d d = view.camera.project(later * p) - view.camera.project(sooner * p);
       out(j, i) = {static_cast<float>(d.x() + extra_px * std::cos(angle)),
                    static_cast<float>(d.y() + extra_px * std::sin(angle))};
     }
   }
+
   return out;
 }
 
@@ -209,6 +217,7 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   if (event(EventKind::kLampOff, at.color) != 0.0) exposure.gain *= 0.08F;
   if (event(EventKind::kCover, at.color) != 0.0) exposure.gain *= 0.004F;
   if (event(EventKind::kWhiteout, at.color) != 0.0) exposure.gain *= 60.0F;
+
   cv::Mat3b image = world->options.readout_s > 0.0 ? rolling(at, exposure) : shade(*world, view, exposure);
   const double blur = event(EventKind::kBlur, at.color);
   if (real) {
@@ -217,6 +226,7 @@ cv::Mat3b SynthSource::Impl::color(const Stamps& at) const {
   } else if (blur > 0.0) {
     image = motion_blur(image, flow(view, at, blur));
   }
+
   const float noise_gain = event(EventKind::kLampOff, at.color) != 0.0 ? 3.0F : exposure.gain;
   add_color_noise(image, sensor, noise_gain, tiles, {seed, at.number});
   return image;
@@ -234,6 +244,7 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
     return core::usage_error(
         fmt::format("robot {} of {}: robots count from 0 to {}", robot, o.robots, o.robots - 1));
   }
+
   const auto paths = world->scene.robots.size();
   const RobotPath& way = world->scene.robots[static_cast<std::size_t>(robot) % paths];
   auto impl = std::make_unique<Impl>();
@@ -244,21 +255,25 @@ core::Result<std::unique_ptr<SynthSource::Impl>> SynthSource::plan(std::shared_p
   impl->camera.readout_s = o.readout_s;
   impl->camera.depth_delay_s = o.depth_delay_s;
   impl->seed = mix(static_cast<std::uint64_t>(o.seed), static_cast<std::uint64_t>(robot) + 1);
+
   CameraPath::Options motion;
   motion.speed = o.speed;
   motion.wheeled = (o.motion == Motion::kScene ? world->scene.motion : o.motion) == Motion::kWheeled;
   motion.seed = impl->seed;
+
   // More robots than paths: the next ones start further along.
   const auto lap = static_cast<std::size_t>(robot) / paths;
   motion.start_share = 0.381966 * static_cast<double>(lap);
   motion.events = world->events;
   impl->path = std::make_unique<CameraPath>(way, motion);
+
   const std::size_t frames = o.frames > 0 ? static_cast<std::size_t>(o.frames)
                                           : static_cast<std::size_t>(impl->path->duration() * o.fps) + 1;
   impl->frames = make_stamps(o, world->events, frames, impl->seed);
   if (impl->frames.empty())
     return core::usage_error("events: every frame is dropped, nothing is left to film");
   if (auto free = impl->check_way(); !free) return tl::unexpected<core::Error>(free.error());
+
   return impl;
 }
 
@@ -298,14 +313,17 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
   if (index >= impl_->frames.size()) {
     return core::input_error(fmt::format("{}: frame {} of {}", impl_->name, index, impl_->frames.size()));
   }
+
   const Stamps& at = impl_->frames[index];
   sensor::RgbdFrame frame;
   frame.index = static_cast<std::int64_t>(index);
   frame.stamp = at.color;
   frame.depth_stamp = at.depth;
+
   const cv::Mat3b color = impl_->color(at);
   frame.color = color;
   cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
+
   cv::Mat1w raw;
   if (blind(index)) {
     raw = cv::Mat1w::zeros(color.size());
@@ -314,6 +332,7 @@ core::Result<sensor::RgbdFrame> SynthSource::read(std::size_t index) const {
     raw = measure_depth(*impl_->world, view, impl_->world->options.sensor, impl_->tiles,
                         {impl_->seed, at.number});
   }
+
   raw.convertTo(frame.depth, CV_32F, 1.0 / impl_->camera.depth_scale);
   return frame;
 }

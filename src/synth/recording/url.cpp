@@ -25,9 +25,11 @@ core::Result<Parsed> parse_url(const std::string& url) {
   parsed.scene = body.substr(0, question);
   if (parsed.scene.empty())
     return core::usage_error(fmt::format("'{}' names no scene (synth:SCENE?key=value&...)", url));
+
   core::ConfigNode map;
   map.kind = core::ConfigNode::Kind::kMap;
   map.mark.file = url;
+
   std::string rest = question == std::string::npos ? "" : body.substr(question + 1);
   while (!rest.empty()) {
     const auto amp = rest.find('&');
@@ -36,6 +38,7 @@ core::Result<Parsed> parse_url(const std::string& url) {
     const auto equals = piece.find('=');
     if (equals == std::string::npos)
       return core::usage_error(fmt::format("{}: '{}' is not key=value", url, piece));
+
     core::ConfigNode value;
     value.kind = core::ConfigNode::Kind::kScalar;
     value.scalar = piece.substr(equals + 1);
@@ -43,9 +46,11 @@ core::Result<Parsed> parse_url(const std::string& url) {
     map.entries.emplace_back(piece.substr(0, equals), value);
     map.key_marks.push_back(map.mark);
   }
+
   core::OptionTable table;
   parsed.options.declare(table);
   table.integer("robot", parsed.robot, {0, 63}, "", "Which of the robots, from 0");
+
   core::ConfigProblems problems;
   table.set_all(map, "", problems);
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));

@@ -74,6 +74,7 @@ cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tile
       now_y(tiles.medium, frame_bits(key, 14, key.index));
   cv::Mat1f out(exact.size());
   from.create(exact.size());  // 1 where the neighbourhood is not smooth
+
   for (int y = 0; y < exact.rows; ++y) {
     const float* row = exact[y];
     const float *up = exact[std::max(0, y - 2)], *low = exact[std::min(exact.rows - 1, y + 2)];
@@ -83,10 +84,12 @@ cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tile
       const bool border =
           std::abs(left + right - 2.0F * z) > tolerance || std::abs(up[x] + low[x] - 2.0F * z) > tolerance;
       from(y, x) = border ? 1 : 0;
+
       if (!border) {
         out(y, x) = z;
         continue;
       }
+
       const float jx = d.wander * (0.6F * still_x.at(x, y) + 0.8F * now_x.at(x, y));
       const float jy = d.wander * (0.6F * still_y.at(x, y) + 0.8F * now_y.at(x, y));
       const int sx = std::clamp(x + static_cast<int>(std::lround(jx)), 0, exact.cols - 1);
@@ -94,6 +97,7 @@ cv::Mat1f wander(const cv::Mat1f& exact, const Device& d, const NoiseTiles& tile
       out(y, x) = exact(sy, sx);
     }
   }
+
   return out;
 }
 
@@ -178,12 +182,14 @@ class Measurement {
     const float fixed = std::sqrt(device_.fixed_share), fresh = std::sqrt(1.0F - device_.fixed_share);
     const float step2 = device_.step * device_.step / 12.0F;
     std::fill(out, out + depth.cols, std::uint16_t{0});
+
     const auto [first, end] = seen_columns(device_, depth.cols, depth.rows, y);
     int lit = -1;  // the face that `weak` was worked out for, anew every four pixels
     float weak = 0.0F;
     for (int x = first; x < end; ++x) {
       float z = depth(y, x);
       if (!(z > 0.0F) || ids[x] < 0) continue;
+
       const float chance = flicker.at(x, y);
       if (border(y, x) != 0) {
         if (chance > 0.9F) continue;  // the window saw two surfaces
@@ -192,11 +198,14 @@ class Measurement {
           if (other > 0.0F) z = 0.5F * (z + other);
         }
       }
+
       if (ids[x] != lit || (x & 3) == 0) weak = signal(ids[x], x, y, z);
       lit = ids[x];
       if (weak < kLeastLight + 0.018F * blobs.at(x, y) + 0.012F * chance) continue;
+
       const auto zd = static_cast<double>(z);
       if (zd < range_.min || zd > range_.max + 0.15 * static_cast<double>(blobs.at(x, y))) continue;
+
       const float per_metre = device_.focal_baseline / (z * z);
       const float sigma = static_cast<float>(sensor::depth_sigma(zd)) * per_metre;
       const float own = std::sqrt(std::max(0.15F * sigma * sigma, sigma * sigma - step2));
@@ -205,6 +214,7 @@ class Measurement {
       const float stepped =
           static_cast<float>(static_cast<int>(disparity / device_.step + 0.5F)) * device_.step;
       if (stepped <= device_.step) continue;
+
       const float raw = device_.focal_baseline / stepped * 5000.0F;
       if (raw < 65534.5F) out[x] = static_cast<std::uint16_t>(raw + 0.5F);
     }
@@ -238,6 +248,7 @@ bool measures(Sensor sensor, const Material& material, const cv::Size& size, con
 NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   NoiseTiles tiles;
   if (sensor == Sensor::kIdeal) return tiles;
+
   tiles.fine = white_tile(mix(seed, 1));
   correlate(tiles.fine, sensor == Sensor::kRealsense ? 1.8 : 1.1);
   tiles.medium = white_tile(mix(seed, 7));
@@ -245,14 +256,17 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
   tiles.coarse = white_tile(mix(seed, 2));
   correlate(tiles.coarse, 6.0);
   tiles.color.create(kNoiseTile, kNoiseTile);
+
   // Neighbouring colours are interpolated from a mosaic, hence smooth; the three channels share a part.
   cv::Mat1f channel[4];
   for (std::uint64_t k = 0; k < 4; ++k) {
     channel[k] = white_tile(mix(seed, 3 + k));
     correlate(channel[k], k == 3 ? 0.6 : 1.0);
   }
+
   tiles.fine = 0.72 * tiles.fine + 0.58 * tiles.medium +
                0.38 * tiles.coarse;  // a sharp core with a skirt, as measured
+
   for (int y = 0; y < kNoiseTile; ++y) {
     for (int x = 0; x < kNoiseTile; ++x) {
       for (int k = 0; k < 3; ++k) {
@@ -261,6 +275,7 @@ NoiseTiles make_noise(Sensor sensor, std::uint64_t seed) {
       }
     }
   }
+
   return tiles;
 }
 
@@ -285,15 +300,18 @@ cv::Mat1w measure_depth(const World& world, const View& view, Sensor sensor, con
 void add_color_noise(cv::Mat3b& image, Sensor sensor, float gain, const NoiseTiles& tiles,
                      const FrameKey& key) {
   if (sensor == Sensor::kIdeal) return;
+
   // Shot noise: after the square-root coding it is the same for all levels, but for the shadows; more gain,
   // more noise.
   const float sigma = std::clamp(0.72F * std::sqrt(std::max(gain, 0.3F)), 0.5F, 3.6F);
   const int scale = static_cast<int>(std::lround(256.0F * sigma / 16.0F));
   const std::uint64_t bits = frame_bits(key, 31, key.index);
   const int dx = static_cast<int>(bits & 511U), dy = static_cast<int>(bits >> 9U & 511U);
+
   for (int y = 0; y < image.rows; ++y) {
     const auto* noise = tiles.color[(y + dy) & (kNoiseTile - 1)];
     auto* p = image.ptr<std::uint8_t>(y);
+
     for (int x = 0; x < image.cols;) {
       const int start = (x + dx) & (kNoiseTile - 1), run = std::min(kNoiseTile - start, image.cols - x);
       const auto* n = reinterpret_cast<const std::int8_t*>(noise + start);
@@ -315,6 +333,7 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
     dx[k] = static_cast<int>(std::lround(s * f[0]));
     dy[k] = static_cast<int>(std::lround(s * f[1]));
   }
+
   const int divide = (65536 + taps / 2) / taps;
   for (int y = cell.y; y < cell.y + cell.height; ++y) {
     int sum[3 * 8] = {};
@@ -330,6 +349,7 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
         }
       }
     }
+
     auto* q = out.ptr<std::uint8_t>(y) + 3 * cell.x;
     for (int i = 0; i < 3 * cell.width; ++i)
       q[i] = static_cast<std::uint8_t>(std::min(255, (sum[i] * divide + 32768) >> 16));

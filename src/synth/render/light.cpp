@@ -53,6 +53,7 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
       for (int i = 0; i < map.columns; ++i) {
         const auto at = static_cast<std::size_t>(j * map.columns + i);
         if (hidden[at] == 0) continue;
+
         float sum = 0.0F;
         int count = 0;
         for (int y = std::max(0, j - 1); y <= std::min(map.rows - 1, j + 1); ++y) {
@@ -63,9 +64,11 @@ void fill_hidden(LightMap& map, std::vector<char>& hidden) {
             ++count;
           }
         }
+
         if (count > 0) found.emplace_back(at, sum / static_cast<float>(count));
       }
     }
+
     for (const auto& [at, value] : found) {
       map.nodes[at] = value;
       hidden[at] = 0;
@@ -80,9 +83,11 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
     const double area = 4.0 * lamp.half_u.norm() * lamp.half_v.norm();
     const Vector3d to_lamp = lamp.center - p;
     const double far2 = to_lamp.squaredNorm();
+
     // Behind the face, or too faint to be seen.
     if (to_lamp.dot(face.normal) < -1.0 || lamp.power * area < 0.012 * far2) continue;
     double part = 0.0;
+
     for (int i = -1; i <= 1; ++i) {
       for (int k = -1; k <= 1; ++k) {
         const Vector3d q = lamp.center + 0.66 * (i * lamp.half_u + k * lamp.half_v);
@@ -94,8 +99,10 @@ double lamps_at(const World& world, const Vector3d& p, const Face& face) {
         part += cosines / std::max(r2, 0.05);
       }
     }
+
     sum += lamp.power * area * part / 9.0;
   }
+
   return 2.2 * sum;
 }
 
@@ -106,6 +113,7 @@ LightMap light_face(const World& world, std::size_t index) {
   const double u1 = bounds.max().x(), v1 = bounds.max().y();
   const double w = std::max(u1 - u0, 1e-4), h = std::max(v1 - v0, 1e-4);
   const double pitch = std::max(0.06, std::max(w, h) / 80.0);
+
   LightMap map;
   map.columns = 2 + static_cast<int>(w / pitch);
   map.rows = 2 + static_cast<int>(h / pitch);
@@ -113,8 +121,10 @@ LightMap light_face(const World& world, std::size_t index) {
   map.v0 = static_cast<float>(v0);
   map.per_u = static_cast<float>((map.columns - 1) / w);
   map.per_v = static_cast<float>((map.rows - 1) / h);
+
   std::vector<char> hidden;
   const double inset_u = std::min(0.012, 0.3 * w), inset_v = std::min(0.012, 0.3 * h);
+
   for (int j = 0; j < map.rows; ++j) {
     for (int i = 0; i < map.columns; ++i) {
       const double u = std::clamp(u0 + i / static_cast<double>(map.per_u), u0 + inset_u, u1 - inset_u);
@@ -127,6 +137,7 @@ LightMap light_face(const World& world, std::size_t index) {
       map.nodes.push_back(static_cast<float>(std::sqrt(ambient + lamps_at(world, p, face) + glow)));
     }
   }
+
   fill_hidden(map, hidden);
   return map;
 }

@@ -28,10 +28,12 @@ FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole&
   const Face& face = world.scene.faces[index];
   const Vector3d n = camera_from_world.rotation * face.normal, origin = camera_from_world * face.origin;
   const Vector3d ua = camera_from_world.rotation * face.u_axis, va = camera_from_world.rotation * face.v_axis;
+
   // d = M p is the ray of pixel p with z = 1.
   const auto through_pixels = [&k](const Vector3d& w) {
     return Vector3d(w.x() / k.fx, w.y() / k.fy, w.z() - w.x() * k.cx / k.fx - w.y() * k.cy / k.fy);
   };
+
   const double h = n.dot(origin);
   const Vector3d c = through_pixels(n) / (std::abs(h) > 1e-9 ? h : 1e-9);
   const TexelScale scale = texel_scale(world, index);
@@ -39,12 +41,14 @@ FaceView view_face(const World& world, std::size_t index, const sensor::Pinhole&
   const double shift_v = static_cast<double>(world.offset_v[index]) - va.dot(origin);
   const Vector3d a = scale.u * (through_pixels(ua) + shift_u * c),
                  b = -scale.v * (through_pixels(va) + shift_v * c);
+
   FaceView out;
   for (int i = 0; i < 3; ++i) {
     out.a[i] = static_cast<float>(a[i]);
     out.b[i] = static_cast<float>(b[i]);
     out.c[i] = static_cast<float>(c[i]);
   }
+
   return out;
 }
 
@@ -102,12 +106,14 @@ class EdgeTiles {
     constexpr double kMargin = 1.0;  // px
     const double length = std::max(s1 - s0, 1e-9), slope = (t1 - t0) / length, rate = (w1 - w0) / length;
     const double begin = std::max(s0 - kMargin, 0.0), end = std::min(s1 + kMargin, along * kTile - 1e-6);
+
     for (int i = static_cast<int>(begin / kTile); i < along && i * kTile <= end; ++i) {
       const double from = std::max(begin, static_cast<double>(i * kTile)) - s0 - kMargin,
                    to = std::min(end, static_cast<double>((i + 1) * kTile)) - s0 + kMargin;
       const double ta = t0 + from * slope, tb = t0 + to * slope;
       const double low = std::min(ta, tb) - kMargin, high = std::max(ta, tb) + kMargin;
       if (high < 0.0 || low >= across * kTile) continue;
+
       const int first = static_cast<int>(std::max(low, 0.0) / kTile),
                 last = std::min(static_cast<int>(high / kTile), across - 1);
       const auto w = static_cast<float>(std::max(w0 + from * rate, w0 + to * rate));
@@ -162,11 +168,13 @@ void fill_between(const World& world, View& view) {
   cv::Mat1i& ids = view.ids;
   const int w = ids.cols, h = ids.rows;
   RayBatch rays(world, view);
+
   for (int y = 0; y < h; ++y) {
     int* row = ids[y];
     const bool cast_row = y % 2 == 0;
     const int* up = ids[y - y % 2];
     const int* low = cast_row || y + 1 >= h ? up : ids[y + 1];
+
     for (int x = cast_row ? 1 : 0; x < w; x += cast_row ? 2 : 1) {
       const int x0 = x - x % 2, x1 = x % 2 == 0 || x + 1 >= w ? x0 : x + 1;
       const int id = up[x0];
@@ -177,6 +185,7 @@ void fill_between(const World& world, View& view) {
       }
     }
   }
+
   rays.flush();
 }
 
@@ -191,10 +200,12 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
   const geometry::Rigid3 camera_from_world = world_from_camera.inverse();
   EdgeTiles edges(camera, camera_from_world);
   view.faces.reserve(world.scene.faces.size());
+
   for (std::size_t i = 0; i < world.fixed_faces; ++i) {
     view.faces.push_back(view_face(world, i, camera, camera_from_world));
     edges.add(world.scene.faces[i]);
   }
+
   for (const World::Mover& mover : world.movers) {
     geometry::Rigid3 camera_from_rest = camera_from_world;
     camera_from_rest.translation +=
@@ -203,14 +214,17 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
       view.faces.push_back(view_face(world, i, camera, camera_from_rest));
     }
   }
+
   view.ids.create(camera.height, camera.width);
   RayBatch rays(world, view);
   const cv::Mat1i corners = look_at_corners(rays, edges.columns(), edges.rows());
+
   for (int row = 0; row < edges.rows(); ++row) {
     for (int column = 0; column < edges.columns(); ++column) {
       const cv::Rect tile =
           cv::Rect(column * kTile, row * kTile, kTile, kTile) & cv::Rect({0, 0}, view.ids.size());
       const int id = whole_tile(view, edges, corners, column, row);
+
       for (int y = tile.y; y < tile.y + tile.height; y += 2) {
         for (int x = tile.x; x < tile.x + tile.width; x += 2) {
           if (id == -2) {
@@ -222,6 +236,7 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
       }
     }
   }
+
   rays.flush();
   fill_between(world, view);
   if (time) MovingFaces(world, view, *time).draw(view);

@@ -76,6 +76,7 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
       return 2.0 * w[static_cast<std::size_t>(n - 1)].position - w[static_cast<std::size_t>(n - 2)].position;
     return w[static_cast<std::size_t>(i)].position;
   };
+
   std::vector<Sample> out;
   Vector3d tangent = Vector3d::UnitX();
   for (long k = 0; k < segments; ++k) {
@@ -86,16 +87,19 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
       const double s = static_cast<double>(i) / kSteps;
       Sample p;
       p.position = catmull_rom(at(k - 1), at(k), at(k + 1), at(k + 2), s);
+
       const double e = 0.5 / kSteps;
       const Vector3d ahead = catmull_rom(at(k - 1), at(k), at(k + 1), at(k + 2), std::min(1.0, s + e)) -
                              catmull_rom(at(k - 1), at(k), at(k + 1), at(k + 2), std::max(0.0, s - e));
       if (ahead.head<2>().norm() > 1e-6) tangent = ahead;
+
       const Direction from = wish(a, p.position, tangent), to = wish(b, p.position, tangent);
       const double blend = smoother(s);
       p.yaw = from.yaw + blend * wrap(to.yaw - from.yaw);
       p.pitch = std::clamp(from.pitch + blend * (to.pitch - from.pitch), -1.45, 1.45);
       p.waypoint = static_cast<std::size_t>(k);
       p.time = 0.0;
+
       if (!out.empty()) {
         const Sample& last = out.back();
         p.yaw = last.yaw + wrap(p.yaw - last.yaw);
@@ -103,9 +107,11 @@ std::vector<Sample> sample_path(const RobotPath& robot, double speed_factor) {
         const double dt = std::max((p.position - last.position).norm() / robot.speed, turn / robot.turn_rate);
         p.time = last.time + std::max(dt, 1e-6) / speed_factor;
       }
+
       out.push_back(p);
     }
   }
+
   return out;
 }
 
@@ -117,6 +123,7 @@ CameraPath::CameraPath(const RobotPath& robot, const Options& options) : closed_
   const long count = std::max(4L, std::lround(duration_ / 0.25));
   step_ = duration_ / static_cast<double>(count);
   if (closed_) winding_ = samples.back().yaw - samples.front().yaw;
+
   std::size_t k = 0;
   const long last = closed_ ? count - 1 : count;
   for (long i = 0; i <= last; ++i) {
@@ -127,10 +134,12 @@ CameraPath::CameraPath(const RobotPath& robot, const Options& options) : closed_
     knots_.push_back({a.position + s * (b.position - a.position), a.yaw + s * (b.yaw - a.yaw),
                       a.pitch + s * (b.pitch - a.pitch), a.waypoint});
   }
+
   start_ = options.start_share * duration_;
   for (const Event& e : options.events) {
     if (e.kind == EventKind::kSpin) spins_.push_back(e);
   }
+
   add_sway(options);
 }
 
@@ -142,15 +151,18 @@ void CameraPath::add_sway(const Options& options) {
                              2.0 * M_PI * rng.uniform(lo, hi), rng.uniform(0.0, 2.0 * M_PI)});
     }
   };
+
   if (options.wheeled) {
     for (std::size_t axis = 0; axis < 3; ++axis) add(axis, 0.0004, 5.0, 9.0, 2);
     for (std::size_t axis = 3; axis < 6; ++axis) add(axis, 0.0008, 3.0, 8.0, 3);
     return;
   }
+
   for (std::size_t axis = 0; axis < 3; ++axis) {
     add(axis, 0.018, 0.12, 0.45, 3);  // the arm drifts
     add(axis, 0.004, 1.4, 2.0, 2);    // steps
   }
+
   for (std::size_t axis = 3; axis < 6; ++axis) {
     add(axis, axis == 3 ? 0.022 : 0.018, 0.12, 0.5, 3);
     add(axis, 0.0035, 1.2, 2.4, 2);
@@ -205,6 +217,7 @@ Rigid3 CameraPath::world_from_camera(double t) const {
   const long i = static_cast<long>(floor);
   const double weights[4] = {(1 - x) * (1 - x) * (1 - x) / 6.0, (3 * x * x * x - 6 * x * x + 4) / 6.0,
                              (-3 * x * x * x + 3 * x * x + 3 * x + 1) / 6.0, x * x * x / 6.0};
+
   Vector3d position = Vector3d::Zero();
   double yaw = 0.0, pitch = 0.0;
   for (int k = 0; k < 4; ++k) {
@@ -213,14 +226,17 @@ Rigid3 CameraPath::world_from_camera(double t) const {
     yaw += weights[k] * at.yaw;
     pitch += weights[k] * at.pitch;
   }
+
   for (const Event& e : spins_) yaw += 2.0 * M_PI * e.value * smoother((t - e.start_s) / e.duration_s);
   const double p = pace(t);
   position += p * Vector3d(sway(0, t), sway(1, t), sway(2, t));
   pitch += p * sway(4, t);
   yaw += p * sway(5, t);
+
   // Camera axes: x right, y down, z forward; forward is (cos yaw cos pitch, sin yaw cos pitch, sin pitch).
   const Vector3d forward(std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch));
   const Vector3d right(std::sin(yaw), -std::cos(yaw), 0.0);
+
   Rigid3 pose;
   pose.rotation.col(0) = right;
   pose.rotation.col(1) = forward.cross(right);

@@ -65,6 +65,7 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   const float u = (f.a[0] * x + f.a[1] * y + f.a[2]) * z, v = (f.b[0] * x + f.b[1] * y + f.b[2]) * z;
   const float ux = (f.a[0] - u * f.c[0]) * z, vx = (f.b[0] - v * f.c[0]) * z;
   const float uy = (f.a[1] - u * f.c[1]) * z, vy = (f.b[1] - v * f.c[1]) * z;
+
   // Axes of the footprint: eigenvalues of J J^T.
   const float xx = ux * ux + uy * uy, yy = vx * vx + vy * vy, xy = ux * vx + uy * vy;
   const float mean = 0.5F * (xx + yy), spread = std::sqrt(0.25F * (xx - yy) * (xx - yy) + xy * xy);
@@ -73,6 +74,7 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
   Footprint out{};
   out.probes = major > 3.0F * minor ? 4 : major > 1.5F * minor ? 2 : 1;
   const float size = std::max(minor, major / static_cast<float>(out.probes));
+
   if (out.probes > 1) {
     // The longer axis: eigenvector of the larger eigenvalue, from the row that is not nearly zero.
     const float big = mean + spread;
@@ -82,14 +84,17 @@ Footprint footprint(const Texture2d& texture, const FaceView& f, float x, float 
     out.step_x = ex * step;
     out.step_y = ey * step;
   }
+
   const float last = static_cast<float>(texture.levels.size() - 1);
   const float level = std::clamp(std::log2(size), 0.0F, last);
   // Several probes are smooth enough without mixing levels.
   const auto fine = static_cast<std::size_t>(out.probes > 1 ? level + 0.5F : level);
+
   const auto coarse = std::min(fine + 1, texture.levels.size() - 1);
   out.fine = &texture.levels[fine];
   out.coarse = &texture.levels[coarse];
   out.blend = out.probes > 1 ? 0.0F : level - static_cast<float>(fine);
+
   const auto width = static_cast<float>(texture.levels[0].width),
              height = static_cast<float>(texture.levels[0].height);
   out.fine_x = static_cast<float>(out.fine->width) / width;
@@ -168,6 +173,7 @@ class Shader {
         for (const int face : faces) sum += face < 0 ? at(face, x, y) : Vec4{0.0F, 0.0F, 0.0F, 0.0F};
         continue;
       }
+
       const auto id = static_cast<std::size_t>(faces[k]);
       const float sx = x + spots[k][0], sy = y + spots[k][1];
       const Footprint here = foot(id, sx, sy);
@@ -175,8 +181,10 @@ class Shader {
       for (std::size_t i = k; i < 4; ++i) {
         if (faces[i] == faces[k]) part += color(id, here, x + spots[i][0], y + spots[i][1]);
       }
+
       sum += part * brightness(id, sx, sy);
     }
+
     return sum;
   }
   [[nodiscard]] PLUMBLINE_INLINE Vec4 color(std::size_t id, const Footprint& foot, float x, float y) const {
@@ -237,6 +245,7 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
   constexpr float kSpots[4][2] = {{-0.125F, -0.375F}, {0.375F, -0.125F}, {-0.375F, 0.125F}, {0.125F, 0.375F}};
   const cv::Mat1i& ids = view.ids;
   std::vector<cv::Point> pixels;
+
   for (int y = 0; y < ids.rows; ++y) {
     const int *row = ids[y], *up = ids[std::max(0, y - 1)], *low = ids[std::min(ids.rows - 1, y + 1)];
     for (int x = 0; x < ids.cols; ++x) {
@@ -247,6 +256,7 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
       }
     }
   }
+
   std::vector<std::array<int, 4>> seen(pixels.size());
   RayBatch rays(world, view);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -255,6 +265,7 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
                &seen[i][k]);
     }
   }
+
   rays.flush();
   if (const MovingFaces moving(world, view, view.time.value_or(0.0)); view.time && !moving.empty()) {
     for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -264,6 +275,7 @@ void smooth_borders(const World& world, const View& view, const Shader& shader, 
       }
     }
   }
+
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     Shader::store(
         shader.mean(seen[i], static_cast<float>(pixels[i].x), static_cast<float>(pixels[i].y), kSpots) *

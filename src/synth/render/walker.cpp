@@ -61,6 +61,7 @@ MovingFaces::MovingFaces(const World& world, const View& view, double t) : world
     for (std::size_t i = mover.first; i < mover.first + mover.count; ++i) {
       const Face& face = world.scene.faces[i];
       if (face.normal.dot(view.world_from_camera.translation - shift - face.origin) <= 0.0) continue;
+
       cv::Rect reach({0, 0}, view.ids.size());
       std::vector<cv::Point> pixels;
       for (const Eigen::Vector2d& uv : face.polygon) {
@@ -70,11 +71,13 @@ MovingFaces::MovingFaces(const World& world, const View& view, double t) : world
         pixels.emplace_back(static_cast<int>(std::clamp(pixel.x(), -1e6, 1e6)),
                             static_cast<int>(std::clamp(pixel.y(), -1e6, 1e6)));
       }
+
       if (pixels.size() == face.polygon.size()) {  // else part of it is behind the camera: look everywhere
         cv::Rect box(pixels[0], cv::Size(1, 1));
         for (const cv::Point& p : pixels) box |= cv::Rect(p, cv::Size(1, 1));
         reach &= cv::Rect(box.x - 2, box.y - 2, box.width + 4, box.height + 4);
       }
+
       if (!reach.empty()) spots_.push_back({i, shift, reach});
     }
   }

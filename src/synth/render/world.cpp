@@ -42,19 +42,23 @@ void World::build_bvh() {
   // device lives.
   device_ = rtcNewDevice("set_affinity=0");
   if (device_ == nullptr) throw std::runtime_error("Embree: no device");
+
   bvh_ = rtcNewScene(device_);
   rtcSetSceneFlags(bvh_, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(bvh_, RTC_BUILD_QUALITY_HIGH);
+
   std::size_t vertices = 0, triangles = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
     vertices += scene.faces[i].polygon.size();
     triangles += scene.faces[i].polygon.size() - 2;
   }
+
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                         RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices));
   auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), triangles));
+
   unsigned base = 0;
   for (std::size_t i = 0; i < fixed_faces; ++i) {
     const Face& face = scene.faces[i];
@@ -62,6 +66,7 @@ void World::build_bvh() {
       const Vector3d p = face.at(uv.x(), uv.y());
       for (int k = 0; k < 3; ++k) *v++ = static_cast<float>(p[k]);
     }
+
     const auto corners = static_cast<unsigned>(face.polygon.size());
     for (unsigned k = 1; k + 1 < corners; ++k) {
       *t++ = base;
@@ -69,8 +74,10 @@ void World::build_bvh() {
       *t++ = base + k + 1;
       face_of_triangle_.push_back(static_cast<int>(i));
     }
+
     base += corners;
   }
+
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(bvh_, geometry);
   rtcReleaseGeometry(geometry);
@@ -85,6 +92,7 @@ Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) c
   query.ray.org_y = static_cast<float>(origin.y());
   query.ray.org_z = static_cast<float>(origin.z());
   query.ray.dir_x = static_cast<float>(direction.x());
+
   query.ray.dir_y = static_cast<float>(direction.y());
   query.ray.dir_z = static_cast<float>(direction.z());
   query.ray.tfar = static_cast<float>(far);
@@ -93,6 +101,7 @@ Hit World::cast(const Vector3d& origin, const Vector3d& direction, double far) c
   rtcIntersect1(bvh_, &context, &query);
   Hit hit;
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
+
   hit.face = face_of_triangle_[query.hit.primID];
   hit.distance = static_cast<double>(query.ray.tfar);
   hit.front = scene.faces[static_cast<std::size_t>(hit.face)].normal.dot(direction) < 0.0;
@@ -117,6 +126,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   alignas(64) RTCRayHit16 q;
+
   for (int k = 0; k < kPacket; ++k) {
     q.ray.org_x[k] = origin[0];
     q.ray.org_y[k] = origin[1];
@@ -125,6 +135,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
     q.ray.dir_y[k] = dy[k];
     q.ray.dir_z[k] = dz[k];
     q.ray.tnear[k] = 0.0F;
+
     q.ray.tfar[k] = std::numeric_limits<float>::infinity();
     q.ray.time[k] = 0.0F;
     q.ray.mask[k] = 0xffffffffU;
@@ -133,6 +144,7 @@ void World::cast_packet(const float origin[3], const float* dx, const float* dy,
     q.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
     q.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
   }
+
   rtcIntersect16(kAll, bvh_, &context, &q);
   for (int k = 0; k < kPacket; ++k) {
     faces[k] = q.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID ? -1 : face_of_triangle_[q.hit.primID[k]];
@@ -147,11 +159,13 @@ void World::build_textures(const core::Executor& executor) {
     std::uint64_t seed;
     double aspect;
   };
+
   std::vector<Job> jobs;
   std::map<std::tuple<std::string, int, int>, int> known;
   texture_of.resize(scene.faces.size());
   offset_u.assign(scene.faces.size(), 0.0F);
   offset_v.assign(scene.faces.size(), 0.0F);
+
   const auto seed = static_cast<std::uint64_t>(options.seed);
   for (std::size_t i = 0; i < scene.faces.size(); ++i) {
     const Face& face = scene.faces[i];
@@ -161,11 +175,13 @@ void World::build_textures(const core::Executor& executor) {
     const auto key = std::make_tuple(face.material, variant,
                                      static_cast<int>(std::lround(16.0 * std::log2(std::max(aspect, 1e-3)))));
     const auto [entry, fresh] = known.emplace(key, static_cast<int>(jobs.size()));
+
     if (fresh) {
       std::uint64_t name_hash = 0;
       for (const char letter : face.material) name_hash = mix(name_hash, static_cast<std::uint64_t>(letter));
       jobs.push_back({materials[i], mix(seed, name_hash, static_cast<std::uint64_t>(variant)), aspect});
     }
+
     texture_of[i] = entry->second;
     tile_m.push_back(worn(*materials[i], options.texture).tile_m);
     if (tiled) {
@@ -174,6 +190,7 @@ void World::build_textures(const core::Executor& executor) {
       offset_v[i] = materials[i]->large ? 0.0F : static_cast<float>(rng.uniform(0.0, 8.0));
     }
   }
+
   textures.resize(jobs.size());
   executor.parallel_for(jobs.size(), [&](std::size_t k) {
     textures[k] = draw_texture(*jobs[k].material, options.texture, jobs[k].seed, jobs[k].aspect);
@@ -186,15 +203,18 @@ core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const
   if (scene.faces.empty())
     return core::usage_error(fmt::format("scene '{}': the world is empty", scene.name));
   if (scene.robots.empty()) return core::usage_error(fmt::format("scene '{}': it has no robots", scene.name));
+
   for (const Face& face : scene.faces) {
     if (find_material(face.material) == nullptr) {
       return core::usage_error(fmt::format("scene '{}': no material '{}'", scene.name, face.material));
     }
   }
+
   if (static_cast<std::size_t>(options.walkers) > scene.walkers.size()) {
     return core::usage_error(
         fmt::format("walkers: scene '{}' has {}, not {}", scene.name, scene.walkers.size(), options.walkers));
   }
+
   // The cheap things that can go wrong come before the second or two of drawing.
   if (auto free = check_paths(scene, options); !free) return tl::unexpected<core::Error>(free.error());
   auto world = std::make_shared<World>(scene, options);

@@ -51,20 +51,25 @@ void Builder::polygon(const std::vector<Vector3d>& corners, const Vector3d& u_hi
   face.u_axis = (u_hint - u_hint.dot(face.normal) * face.normal).normalized();
   face.v_axis = face.normal.cross(face.u_axis);
   face.origin = corners[0];
+
   for (const Vector3d& corner : corners) {
     const Vector3d d = corner - face.origin;
     face.polygon.emplace_back(d.dot(face.u_axis), d.dot(face.v_axis));
   }
+
   const Eigen::AlignedBox2d bounds = face.bounds();
   // Texture coordinates count from the lower left corner of the polygon's bounding rectangle.
   face.origin = face.at(bounds.min().x(), bounds.min().y());
+
   for (Vector2d& uv : face.polygon) uv -= bounds.min();
   face.material = skin.material;
   face.seed = skin.seed >= 0 ? skin.seed : seed_;
+
   if (skin.stretched) {
     face.stretch_u = bounds.sizes().x();
     face.stretch_v = bounds.sizes().y();
   }
+
   face.object = static_cast<int>(scene_.objects.size()) - 1;
   scene_.faces.push_back(std::move(face));
 }

@@ -57,15 +57,18 @@ void add_shelf(Builder& b, const Rigid3& f, const Vector3d& size, const std::str
   b.box(f, {-x, -y, 0.0}, {-x + t, y, h}, {material});
   b.box(f, {x - t, -y, 0.0}, {x, y, h}, {material});
   b.box(f, {-x + t, y - 0.01, 0.0}, {x - t, y, h}, {material});
+
   const int boards = std::max(2, static_cast<int>(std::lround(h / 0.36)) + 1);
   Rng rng(static_cast<std::uint64_t>(b.seed()), 0x5e1f);
   for (int i = 0; i < boards; ++i) {
     const double z = 0.05 + (h - 0.05 - t) * i / (boards - 1);
     b.box(f, {-x + t, -y, z}, {x - t, y - 0.01, z + t}, {material});
     if (!books || i + 1 == boards) continue;
+
     const double room = (h - 0.05 - t) / (boards - 1) - t;
     double at = -x + t + 0.01;
     int run = 0;
+
     while (at < x - t - 0.08) {
       const double width = std::min(rng.uniform(0.12, 0.42), x - t - 0.01 - at);
       if (rng.uniform() < 0.82) {
@@ -75,6 +78,7 @@ void add_shelf(Builder& b, const Rigid3& f, const Vector3d& size, const std::str
         b.box(f, {at, -y + 0.02, z + t}, {at + width, std::min(-y + 0.02 + depth, y - 0.02), z + t + height},
               side, &spines);
       }
+
       at += width + rng.uniform(0.0, 0.08);
       ++run;
     }
@@ -128,12 +132,14 @@ void add_plant(Builder& b, const Rigid3& f, double height) {
   b.cylinder(f, Vector3d::Zero(), 0.11, 0.15, pot, 16, {"terracotta"});
   b.cylinder(f, {0.0, 0.0, pot}, 0.015, 0.008, 0.55 * height, 6, {"leaf"});
   Rng rng(static_cast<std::uint64_t>(b.seed()), 0x91a7);
+
   for (int i = 0; i < 22; ++i) {
     const double z = rng.uniform(pot + 0.1 * height, 0.85 * height), yaw = rng.uniform(0.0, 2.0 * M_PI);
     const double length = rng.uniform(0.16, 0.34), width = rng.uniform(0.05, 0.1),
                  rise = rng.uniform(-0.2, 0.9);
     const Rigid3 turned = placed(f, {0.0, 0.0, z}, {yaw, Vector3d::UnitZ()});
     const Rigid3 leaf = placed(turned, Vector3d::Zero(), {-rise, Vector3d::UnitY()});
+
     const double t = 0.0015;
     for (const double s : {-1.0, 1.0}) {  // both sides of the leaf
       std::vector<Vector3d> p = {{0.02, 0.0, s * t},
@@ -176,12 +182,14 @@ void add_ceiling_lamp(Builder& b, const Rigid3& f, double width, double depth, d
 void add_clutter(Builder& b, const Rigid3& f, double width, double depth, int count) {
   Rng rng(static_cast<std::uint64_t>(b.seed()), 0xc1077e5);
   static const std::array<const char*, 5> kCovers = {"cover", "paper", "cardboard", "cover", "plastic_blue"};
+
   for (int i = 0; i < count; ++i) {
     const double cell = width / count;
     const Vector3d at(-0.5 * width + cell * (i + rng.uniform(0.35, 0.65)), rng.uniform(-0.32, 0.32) * depth,
                       0.0);
     const Rigid3 item = placed(f, at, {rng.uniform(-0.6, 0.6), Vector3d::UnitZ()});
     const double kind = rng.uniform();
+
     if (kind < 0.25) {
       b.cylinder(item, Vector3d::Zero(), 0.038, 0.042, rng.uniform(0.09, 0.13), 14,
                  {rng.uniform() < 0.5 ? "ceramic" : "plastic_blue"});

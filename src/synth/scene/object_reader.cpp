@@ -167,6 +167,7 @@ void read_wall(const Context& c) {
   r.length("bottom", wall.bottom, -50.0, 50.0).length("thickness", wall.thickness, 0.005, 5.0);
   r.material("material", wall.material).material("skirting", wall.skirting);
   if (!r.read({"doors", "windows"})) return;
+
   wall.from = {from[0], from[1]};
   wall.to = {to[0], to[1]};
   if ((wall.to - wall.from).norm() < 0.01) {
@@ -174,6 +175,7 @@ void read_wall(const Context& c) {
               fmt::format("degenerate wall: from and to are the same place ({}, {})", from[0], from[1]));
     return;
   }
+
   const std::size_t before = c.problems.size();
   read_openings(c, "doors", false, wall);
   read_openings(c, "windows", true, wall);
@@ -188,15 +190,18 @@ void read_panels(const Context& c) {
   wall.thickness = 0.02;
   wall.height = 2.0;
   wall.material = "cloth";
+
   ObjectReader r(c.node, c.path, c.problems);
   r.length("height", wall.height, 0.01, 50.0).length("bottom", wall.bottom, -50.0, 50.0);
   r.length("thickness", wall.thickness, 0.001, 5.0).material("material", wall.material);
   if (!r.read({"points"})) return;
+
   const ConfigNode* list = c.node.find("points");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
     r.problem(c.node.mark, "needs 'points', a list of at least two [x, y]");
     return;
   }
+
   std::vector<Vector2d> points;
   for (std::size_t i = 0; i < list->items.size(); ++i) {
     core::OptionTable table;
@@ -205,12 +210,14 @@ void read_panels(const Context& c) {
     const std::size_t before = c.problems.size();
     table.set("point", list->items[i], fmt::format("{}.points[{}]", c.path, i), c.problems);
     if (c.problems.size() != before) return;
+
     points.emplace_back(p[0], p[1]);
     if (i > 0 && (points[i] - points[i - 1]).norm() < 0.01) {
       r.problem(list->items[i].mark, "degenerate wall: this point is the same as the one before");
       return;
     }
   }
+
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
     c.builder.begin_object(c.type, r.name.empty() ? "" : fmt::format("{} {}", r.name, i + 1), c.node.mark);
     add_zigzag_panel(c.builder, wall, points, i);
@@ -276,10 +283,12 @@ void read_panel(const Context& c) {
   int seed = -1;
   std::string material = c.type == "whiteboard" ? "whiteboard" : c.type == "sign" ? "sign" : "poster";
   if (c.type == "picture") material = "picture";
+
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 3).size("size", size, 2).angle("yaw", yaw).length("thickness", thickness, 0.001, 0.5);
   r.material("material", material).count("seed", seed, 0, 1 << 20);
   if (!begin(c, r)) return;
+
   const std::size_t first = c.builder.scene().faces.size();
   const bool framed = c.type == "whiteboard" || c.type == "picture";
   add_panel(c.builder, upright(to3(at), yaw), size[0], size[1], thickness, material,
@@ -296,10 +305,12 @@ void read_furniture(const Context& c) {
       {"desk", {1.5, 0.75, 0.74}}, {"table", {1.2, 0.7, 0.72}},   {"shelf", {0.9, 0.32, 1.9}},
       {"sofa", {1.9, 0.9, 0.85}},  {"cabinet", {0.9, 0.45, 0.8}},
   };
+
   static const std::map<std::string, std::string> kMaterialOfWord = {
       {"desk", "wood"}, {"table", "wood_dark"},   {"shelf", "wood"},
       {"sofa", "sofa"}, {"cabinet", "wood_dark"}, {"chair", "fabric"},
   };
+
   std::vector<double> at, size = kSizes.count(c.type) != 0 ? kSizes.at(c.type) : std::vector<double>{};
   double yaw = 0.0;
   bool books = true;
@@ -307,14 +318,17 @@ void read_furniture(const Context& c) {
   std::string material = kMaterialOfWord.at(c.type);
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 0).angle("yaw", yaw).material("material", material);
+
   if (!size.empty()) r.size("size", size, 3);
   if (c.type == "shelf") r.flag("books", books);
   if (c.type == "cabinet") r.count("doors", doors, 1, 8);
   if (!r.read()) return;
+
   if (at.size() != 2 && at.size() != 3) {
     r.problem(c.node.mark, "'at' is [x, y] or [x, y, z]");
     return;
   }
+
   c.builder.begin_object(c.type, r.name, c.node.mark);
   const geometry::Rigid3 frame = upright(to3(at), yaw);
   const Vector3d extent = size.empty() ? Vector3d::Zero() : to3(size);
@@ -335,24 +349,29 @@ void read_thing(const Context& c) {
   std::string material = "curtain";
   ObjectReader r(c.node, c.path, c.problems);
   r.point("at", at, 3).angle("yaw", yaw);
+
   if (c.type == "monitor") r.length("width", width, 0.1, 5.0).flag("stand", stand);
   if (c.type == "plant") r.length("height", height, 0.2, 5.0);
   if (c.type == "lamp") r.length("width", width, 0.05, 5.0).length("depth", depth, 0.05, 5.0).power(power);
+
   if (c.type == "floor_lamp") {
     height = 1.6;
     r.length("height", height, 0.5, 3.0).power(power);
   }
+
   if (c.type == "clutter") {
     width = 1.2;
     depth = 0.5;
     r.length("width", width, 0.1, 10.0).length("depth", depth, 0.1, 10.0).count("count", count, 1, 50);
   }
+
   if (c.type == "curtain") {
     height = 2.2;
     r.length("width", width, 0.1, 20.0).length("height", height, 0.1, 10.0).length("fold", fold, 0.02, 1.0);
     r.material("material", material);
   }
   if (!begin(c, r)) return;
+
   const geometry::Rigid3 frame = upright(to3(at), yaw);
   if (c.type == "monitor") add_monitor(c.builder, frame, width, stand);
   if (c.type == "plant") add_plant(c.builder, frame, height);
@@ -385,8 +404,10 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
         {list.mark, "objects", "is a list of things such as '- box: {at: [0, 0, 0], size: [1, 1, 1]}'"});
     return;
   }
+
   std::vector<std::string> types;
   for (const auto& [type, unused] : object_readers()) types.push_back(type);
+
   for (std::size_t i = 0; i < list.items.size(); ++i) {
     const ConfigNode& item = list.items[i];
     const std::string path = fmt::format("objects[{}]", i);
@@ -394,12 +415,14 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
       problems.push_back({item.mark, path, "is one thing, written '- type: {key: value, ...}'"});
       continue;
     }
+
     const auto& [type, body] = item.entries.front();
     const auto reader = object_readers().find(type);
     if (reader == object_readers().end()) {
       problems.push_back({item.mark, path + "." + type, "is no kind of thing" + core::hint(type, types)});
       continue;
     }
+
     reader->second({body, path + "." + type, type, builder, problems});
   }
 }

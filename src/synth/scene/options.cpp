@@ -18,6 +18,7 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
                "full; weak: faint; none: white cloth and grey floors");
+
   table.choice("sensor", sensor,
                {{"ideal", Sensor::kIdeal}, {"kinect", Sensor::kKinect}, {"realsense", Sensor::kRealsense}},
                "ideal has no noise, no offset between stamps and no blur");
@@ -25,6 +26,7 @@ void SynthOptions::declare(core::OptionTable& table) {
                {{"scene", Motion::kScene}, {"handheld", Motion::kHandheld}, {"wheeled", Motion::kWheeled}},
                "How the camera is carried; scene: as the scene file says");
   table.integer("seed", seed, {0, 2147483647}, "", "Seed of textures, sway and noise");
+
   table.integer("width", width, {64, 4096}, "px", "Picture width");
   table.integer("height", height, {48, 4096}, "px", "Picture height");
   table.number("fps", fps, {1.0, 240.0}, "Hz", "Frames a second");
@@ -32,6 +34,7 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.number(
       "readout", readout_s, {0.0, 0.1}, "s",
       "Rolling shutter of the colour camera: from the first row to the last; a stamp is the middle row's");
+
   table.number("depth_delay", depth_delay_s, {-0.1, 0.1}, "s",
                "How much later than its stamp says a depth image is taken");
   table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
@@ -79,10 +82,12 @@ core::Result<Event> parse_event(const std::string& text) {
     names.emplace_back(k.name);
     if (name == k.name) kind = &k;
   }
+
   if (kind == nullptr) {
     return core::usage_error(
         fmt::format("events: '{}' is no kind of event{}", name, core::hint(name, names)));
   }
+
   Event event{kind->kind, 0.0, 0.0, kind->default_value};
   const bool formed =
       at != std::string::npos && plus != std::string::npos && (star == std::string::npos || star > plus) &&
@@ -94,6 +99,7 @@ core::Result<Event> parse_event(const std::string& text) {
     return core::usage_error(fmt::format(
         "events: '{}' is not kind@start+duration[*value] in seconds, such as blur@6+0.5*12", text));
   }
+
   return event;
 }
 

@@ -27,16 +27,19 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
   table.numbers("look", look, 3, {-1000.0, 1000.0}, "m", "Point looked at");
   table.number("pitch", w.pitch_rad, {-1.5, 1.5}, "rad", "Looks up by");
   table.number("yaw", w.yaw_rad, {-7.0, 7.0}, "rad", "Looks left by");
+
   if (node.kind == ConfigNode::Kind::kSequence) {
     table.set("at", node, path, problems);
   } else {
     table.set_all(node, path, problems);
   }
+
   if (problems.size() != before) return false;
   if (at.size() != 2 && at.size() != 3) {
     problems.push_back({node.mark, path, "a waypoint is [x, y], [x, y, z] or {at: [...], look: [x, y, z]}"});
     return false;
   }
+
   w.position = {at[0], at[1], at.size() == 3 ? at[2] : height};
   if (!look.empty()) w.look = Vector3d(look[0], look[1], look[2]);
   return true;
@@ -46,6 +49,7 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
   const std::string path = fmt::format("robots[{}]", index);
   double height = 1.3, pitch = 0.0;
   robot.name = fmt::format("robot{}", index);
+
   core::OptionTable table;
   table.text("name", robot.name, "Name");
   table.boolean("closed", robot.closed, "The path goes on from its last waypoint to the first");
@@ -54,16 +58,19 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
                "Slower where the camera would turn faster");
   table.number("height", height, {-100.0, 100.0}, "m", "Height of waypoints given as [x, y]");
   table.number("pitch", pitch, {-1.5, 1.5}, "rad", "Looks up by");
+
   if (node.kind != ConfigNode::Kind::kMap) {
     problems.push_back({node.mark, path, "needs a path: a list of waypoints"});
     return;
   }
+
   table.set_all(node, path, problems, {"path"});
   const ConfigNode* list = node.find("path");
   if (list == nullptr || list->kind != ConfigNode::Kind::kSequence || list->items.size() < 2) {
     problems.push_back({node.mark, path + ".path", "needs a list of at least two waypoints"});
     return;
   }
+
   for (std::size_t i = 0; i < list->items.size(); ++i) {
     Waypoint w;
     if (!read_waypoint(list->items[i], fmt::format("{}.path[{}]", path, i), height, pitch, w, problems))
@@ -73,10 +80,12 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
     }
     robot.waypoints.push_back(w);
   }
+
   double length = 0.0;
   for (std::size_t i = 1; i < robot.waypoints.size(); ++i) {
     length += (robot.waypoints[i].position - robot.waypoints[i - 1].position).norm();
   }
+
   if (robot.waypoints.size() == list->items.size() && length < 0.01) {
     problems.push_back({list->mark, path + ".path", "all waypoints are the same place"});
   }
@@ -101,10 +110,12 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     problems.push_back({list.mark, "walkers", "must be a list: '- {from: [0, 0], to: [1, 0]}'"});
     return;
   }
+
   for (std::size_t i = 0; i < list.items.size(); ++i) {
     const ConfigNode& node = list.items[i];
     const std::string path = fmt::format("walkers[{}]", i);
     std::vector<double> from, to;
+
     Walker walker;
     walker.mark = node.mark;
     core::OptionTable table;
@@ -112,6 +123,7 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     table.numbers("to", to, 2, {-1000.0, 1000.0}, "m", "Where it turns back");
     table.number("speed", walker.speed, {0.02, 5.0}, "m/s", "Speed");
     table.choice("material", walker.material, material_names(), "What is worn");
+
     const std::size_t before = problems.size();
     table.set_all(node, path, problems);
     if (problems.size() != before) continue;
@@ -119,6 +131,7 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
       problems.push_back({node.mark, path, "needs from: [x, y] and to: [x, y], two places"});
       continue;
     }
+
     walker.from = {from[0], from[1], 0.0};
     walker.to = {to[0], to[1], 0.0};
     scene.walkers.push_back(walker);
@@ -135,18 +148,21 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   table.text("events", events, "Hard moments, as the option of the same name");
   table.set_all(root, "", problems, {"objects", "robots", "walkers"});
   scene.motion = motion == "wheeled" ? Motion::kWheeled : Motion::kHandheld;
+
   if (auto parsed = parse_events(events)) {
     scene.events = *parsed;
   } else {
     const ConfigNode* node = root.find("events");
     problems.push_back({node != nullptr ? node->mark : root.mark, "events", parsed.error().message});
   }
+
   Builder builder(scene);
   if (const ConfigNode* objects = root.find("objects")) {
     read_objects(*objects, builder, problems);
   } else {
     problems.push_back({root.mark, "objects", "a scene needs a list of objects"});
   }
+
   read_robots(root, scene, problems);
   if (const ConfigNode* walkers = root.find("walkers")) read_walkers(*walkers, scene, problems);
   if (problems.empty() && scene.faces.empty())

@@ -17,6 +17,7 @@ void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, dou
   const double half = 0.5 * wall.thickness;
   const std::size_t first = b.scene().faces.size();
   b.box(frame, {x0, -half, z0}, {x1, half, z1}, {wall.material});
+
   const double length = (wall.to - wall.from).norm();
   for (std::size_t i = first; i < b.scene().faces.size(); ++i) {
     Face& face = b.scene().faces[i];
@@ -27,6 +28,7 @@ void add_piece(Builder& b, const Rigid3& frame, const Wall& wall, double x0, dou
     face.origin = face.at(shift.x(), shift.y());
     for (Eigen::Vector2d& uv : face.polygon) uv -= shift;
   }
+
   if (!wall.skirting.empty() && z0 < 1e-6) {
     const double out = half + 0.012;
     b.box(frame, {x0, -out, z0}, {x1, out, z0 + 0.08}, {wall.skirting});
@@ -82,6 +84,7 @@ void add_wall(Builder& b, const Wall& wall) {
     add_piece(b, frame, wall, o.at, o.at + o.width, o.bottom + o.height, wall.height);
     x = o.at + o.width;
   }
+
   add_piece(b, frame, wall, x, along.norm(), 0.0, wall.height);
   for (const Opening& o : wall.openings) {
     add_frame(b, frame, wall, o, "paint_white");
