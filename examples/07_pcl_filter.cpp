@@ -56,7 +56,7 @@ std::size_t measured(const Points& points) {
   return count;
 }
 
-/// What the filter leaves, still as a picture: the others are NaN.
+/// Points that the filter keeps, still as a picture: the others are NaN.
 Points::Ptr filtered(pcl::FilterIndices<pcl::PointNormal>& filter, const Points::ConstPtr& points,
                      const char* name) {
   auto left = std::make_shared<Points>();

@@ -17,7 +17,7 @@ int take(std::vector<Observation>& observations, KeyframeId keyframe) {
   return feature;
 }
 
-/// What `of` has of any of the keyframes, valid ids only; sorted, each once.
+/// Elements that `of` gives for any of the keyframes, valid ids only; sorted, without repetition.
 template <typename Id, typename Of>
 std::vector<Id> of_any(const std::vector<KeyframeId>& keyframes, const Of& of) {
   std::vector<Id> ids;

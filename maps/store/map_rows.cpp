@@ -95,7 +95,7 @@ std::vector<Row> MapRows::gathered(const Table<std::vector<Row>>& pages, std::in
   return all;
 }
 
-/// Of several robots' own maps.
+/// Checks that each row belongs to a map, in a store with several robots' own maps.
 void MapRows::check_owners() const {
   if (maps_.size() <= 1) return;
   const auto check = [&](const auto& rows) {

@@ -33,7 +33,7 @@ class MapRows {
   template <typename Row>
   [[nodiscard]] std::vector<Row> gathered(const Table<std::vector<Row>>& pages, std::int64_t robot) const;
   [[nodiscard]] StoredMap map(std::int64_t robot, const MapRow& row) const;
-  /// Whether a row is of the map of `robot`.
+  /// True if a row belongs to the map of `robot`.
   [[nodiscard]] bool is_of(const Key& key, std::int64_t robot) const;
   void check_owners() const;
 

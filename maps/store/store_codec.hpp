@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a map consists of as bytes (docs/reference/store.md), before packing: `fields` of each type is the
-// format.
+// Parts of a map as bytes (docs/reference/store.md), before packing: `fields` of each type is the format.
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -53,7 +52,7 @@ void fields(Io& io, CameraVersion& version) {
   io(version.camera, version.first_keyframe, version.first_frame);
 }
 
-/// Those of one robot's camera.
+/// Versions of one robot's camera.
 struct CameraVersions {
   std::int32_t robot = 0;
   std::vector<CameraVersion> versions;
@@ -135,7 +134,7 @@ void fields(Io& io, FramePose& f) {
   io(f.stamp, f.reference, f.camera_from_reference, f.tracked, f.camera_from_previous, f.step_sigma_m);
 }
 
-/// What belongs to a map as a whole, and how much of everything there must be: tells when rows were lost.
+/// Data of a map as a whole, and the expected number of everything else: detects lost rows.
 struct MapRow {
   std::uint64_t keyframes = 0;
   std::uint64_t points = 0;

@@ -35,7 +35,7 @@ bool is_complete(Database& database) {
   return database.number("SELECT data FROM header WHERE key = 'complete'") == 1;
 }
 
-/// What frames saw, for a run that goes on.
+/// Reads the points that frames saw, for a run that is resumed.
 void read_seen(Database& database, std::vector<FramePose>& frames) {
   std::map<std::int32_t, std::int32_t> next;  // number of a robot's next frame
   Statement row(database, "SELECT data FROM seen WHERE robot = ? AND number = ?");

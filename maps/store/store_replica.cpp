@@ -39,7 +39,7 @@ std::unique_ptr<Database> open_database(const std::filesystem::path& file) {
   }
   check_store(*database);
   database->run("PRAGMA journal_mode = WAL");
-  // What was acknowledged may exist nowhere else: it must survive a power cut, too.
+  // An acknowledged row may exist nowhere else: it must survive a power cut, too.
   database->run("PRAGMA synchronous = FULL");
   return database;
 }

@@ -15,7 +15,7 @@
 
 namespace plumbline::maps {
 
-/// What went wrong and what to do about it, without the file's name.
+/// Failure and remedy, without the file's name.
 struct StoreFailure : std::runtime_error {
   StoreFailure(core::ErrorKind k, const std::string& what) : std::runtime_error(what), kind(k) {}
   core::ErrorKind kind;

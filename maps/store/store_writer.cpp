@@ -99,7 +99,7 @@ ByRobot<Thing> read_lists(Database& database, const std::string& table) {
   return lists;
 }
 
-/// How many there are of one robot, or (-1) of all.
+/// Number of things of one robot, or (-1) of all.
 template <typename Thing>
 std::size_t count(const ByRobot<Thing>& lists, std::int32_t robot) {
   std::size_t sum = 0;
@@ -368,7 +368,7 @@ core::Result<void> StoreWriter::attach(const std::string& name, const std::vecto
 core::Result<void> StoreWriter::save_final(const Map& map, const std::vector<FramePose>& frames,
                                            const ResultFrame& result, const std::vector<StoreStep>& rest,
                                            const std::vector<RobotInfo>& robots) {
-  // Of a store that is written in one go, this is the first moment that it is whole.
+  // A store written in one go is first complete here.
   auto synced =
       guarded(impl_->file, ErrorKind::kOutput, [&] { impl_->database->run("PRAGMA synchronous = NORMAL"); });
   if (!synced) return synced;

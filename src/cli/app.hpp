@@ -18,7 +18,7 @@
 
 namespace plumbline::cli {
 
-/// What every command shares. Values are there once the command line has been parsed.
+/// State shared by all commands. Values are set once the command line has been parsed.
 struct Session {
   bool quiet = false;
   bool verbose = false;
@@ -31,7 +31,7 @@ struct Session {
   [[nodiscard]] core::Result<std::filesystem::path> pipelines_folder() const;
   /// The built-in filters and those of the plugins.
   [[nodiscard]] core::Result<cloud::FilterRegistry> filters() const;
-  /// Where a run finds pipelines and filters.
+  /// Fills in the folders of pipelines and filters.
   core::Result<void> equip(pipeline::RunRequest& request) const;
   /// Made on first use: messages and progress on stderr.
   Console& console();
@@ -57,7 +57,7 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
 void add_plugin_option(CLI::App& command, Session& session);
 /// -p, --set, --plugin and --force.
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request);
-/// What all commands that map a recording take besides.
+/// Adds the options common to all commands that map a recording.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
 /// --from S and --to S, for commands that read recordings.
 /// "701362 4485513 0 m (...)": what was taken off large coordinates while reading a cloud.

@@ -5,7 +5,8 @@
 
 namespace plumbline::cli {
 
-/// What from now on the first Ctrl-C (or SIGTERM) asks to end the run in order; the second ends the program.
+/// After this call the first Ctrl-C (or SIGTERM) requests an orderly end of the run; the second ends the
+/// program.
 const core::StopToken& stop_on_signals();
 
 /// A full disk's or a closed pipe's signal becomes an error of the write, which can be told.

@@ -8,7 +8,7 @@
 
 namespace plumbline::cli {
 
-/// Whether a film is wanted by the file's name: .gif or .mp4.
+/// True if the file's name asks for a film: .gif or .mp4.
 bool is_film(const std::filesystem::path& file);
 
 /// "" or why films cannot be made here.

@@ -36,7 +36,7 @@ std::string folded(const std::string& word) {
   return out;
 }
 
-/// Whether a text reads back as itself without quotes.
+/// True if a text reads back as itself without quotes.
 bool reads_back_plain(const std::string& text) {
   const auto is_plain = [](unsigned char c) {
     return std::isalnum(c) != 0 ||

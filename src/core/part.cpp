@@ -17,8 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Where the dynamic linker looks for the libraries of the program: its RUNPATH, then the system's folders.
-/// dlopen would look there itself, but not when a sanitizer stands between. Never the current folder.
+/// Folders in which the dynamic linker looks for the libraries of the program: its RUNPATH, then the system's
+/// folders. dlopen would look there itself, but not when a sanitizer stands between. Never the current
+/// folder.
 std::vector<fs::path> library_folders() {
   void* program = dlopen(nullptr, RTLD_LAZY);
   Dl_serinfo head{};

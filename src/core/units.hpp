@@ -26,11 +26,11 @@ std::string with_unit(double value, const std::string& unit);
 /// "0.1 m to 5 m", "at least 0 s", "any number".
 std::string range_text(double min, double max, const std::string& unit);
 
-/// Whether a limit of a range is one at all: ranges that were left open end at the type's own limits.
+/// True if a limit of a range is set: open ranges end at the type's own limits.
 bool is_lower_limit(double min);
 bool is_upper_limit(double max);
 
-/// What a value is, for messages: "'5 foo'", "a list", "a map", "nothing".
+/// Description of a value for messages: "'5 foo'", "a list", "a map", "nothing".
 std::string describe(const ConfigNode& node);
 
 }  // namespace plumbline::core

@@ -208,8 +208,8 @@ class TreeBuilder : public YAML::EventHandler {
   ConfigNode root_;
 };
 
-/// What would cost time or memory out of proportion, and control characters: yaml-cpp takes 0x04 for the end
-/// of the file, so control characters would hide what follows them.
+/// Refuses texts that would cost excessive time or memory, and control characters: yaml-cpp takes 0x04 for
+/// the end of the file, so they would hide what follows them.
 void check_characters(const std::string& text, const std::string& file) {
   int line = 1;
   int column = 1;

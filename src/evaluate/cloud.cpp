@@ -30,7 +30,7 @@ constexpr std::size_t kMostMeshSamples = 5000000;
 constexpr std::size_t kPointsAtOnce = 4096;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-/// What the reference is in all its forms.
+/// The reference in all its forms.
 struct Truth {
   std::unique_ptr<PointIndex> index;  ///< of samples; null for a mesh
   std::unique_ptr<MeasuredSurface> surface;

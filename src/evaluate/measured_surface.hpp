@@ -13,7 +13,7 @@
 
 namespace plumbline::evaluate {
 
-/// Where a query point comes down on the surface.
+/// Foot of a query point on the surface.
 struct Foot {
   double distance = 0.0;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();

@@ -22,7 +22,7 @@ class PointIndex {
  public:
   explicit PointIndex(const std::vector<Eigen::Vector3f>& points);
 
-  /// Of equally near points always the same one.
+  /// Among equally near points always returns the same one.
   [[nodiscard]] Neighbor nearest(const Eigen::Vector3d& q) const;
 
   /// The k nearest, nearest first (fewer if there are fewer points). `found` is reused storage.
@@ -34,7 +34,7 @@ class PointIndex {
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return tree_.vAcc; }
 
  private:
-  /// As nanoflann asks for points.
+  /// Interface that nanoflann requires of a data set.
   struct Dataset {
     const std::vector<Eigen::Vector3f>& points;
     [[nodiscard]] std::size_t kdtree_get_point_count() const { return points.size(); }
@@ -60,7 +60,7 @@ void for_chunks(const core::Executor& executor, std::size_t count, std::size_t c
                         [&](std::size_t c) { body(c * chunk, std::min(count, (c + 1) * chunk)); });
 }
 
-/// How densely a surface is sampled.
+/// Sampling density of a surface.
 struct Density {
   double spacing_m = 0.0;      ///< median distance to the nearest other place
   double points_per_m2 = 0.0;  ///< median of 16 / (pi r16^2), r16 the distance to the 16th neighbour

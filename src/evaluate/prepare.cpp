@@ -18,7 +18,7 @@ Eigen::Vector3f unit_or_zero(const Eigen::Vector3f& n) {
   return n / length;
 }
 
-/// Whether normals have anything to do with the surface; some files carry a constant in their place.
+/// True if the normals fit the surface; some files carry a constant in their place.
 bool plausible(const Points& normals, const PointIndex& index) {
   constexpr std::size_t kMost = 2000;
   const std::size_t stride = (index.size() + kMost - 1) / kMost;

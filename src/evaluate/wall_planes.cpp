@@ -35,7 +35,7 @@ PatchIndices members(const Patches& patches, const SharedPlane& plane, double sl
   return own;
 }
 
-/// What most patches share of the planes they propose.
+/// The plane that most patches propose.
 SharedPlane most_shared(const Patches& patches, double slab_m) {
   SharedPlane best{patches.front().normal, patches.front().normal.dot(patches.front().center)};
   std::size_t most = 0;

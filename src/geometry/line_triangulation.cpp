@@ -158,7 +158,8 @@ double depth_sigma(const Fit& fit, const LineView& view, const Eigen::Vector2d& 
   return std::sqrt(derivative.dot(fit.information.ldlt().solve(derivative)));
 }
 
-/// Whether a view that sees the segment [a, b] (world) at all sees it where it says; false behind the camera.
+/// True if a view that sees the segment [a, b] (world) at all sees it at the observed position; false behind
+/// the camera.
 bool overlaps(const LineView& view, const Eigen::Vector3d& a, const Eigen::Vector3d& b, double min_depth,
               double min_overlap, bool& in_front) {
   const Eigen::Vector3d p = view.camera_from_world * a;
@@ -174,7 +175,7 @@ bool overlaps(const LineView& view, const Eigen::Vector3d& a, const Eigen::Vecto
   return e > s && common >= min_overlap * std::min(length, e - s);
 }
 
-/// None where a view is degenerate.
+/// Empty if a view is degenerate.
 std::optional<std::vector<Plane>> interpretation_planes(const std::vector<LineView>& views) {
   std::vector<Plane> planes;
   for (const LineView& view : views) {

@@ -42,11 +42,10 @@ class FitSum {
   double sum_ = 0.0;
 };
 
-/// What slid along is off by more than this: corners and lines that are known to a tenth of a pixel do not
-/// wait for a third of one.
+/// Least first gate, pixels: corners and lines known to a tenth of a pixel need not wait for a third of one.
 constexpr double kLeastFirstGate_px = 0.8;
 
-/// What is off by more squared standard deviations than a gate, and by more than `least_px`, is an outlier.
+/// Rejects as an outlier what exceeds a gate of squared standard deviations and `least_px`.
 class Gate {
  public:
   Gate(const BundleState& state, const sensor::Pinhole& camera, double point_gate, double line_gate,

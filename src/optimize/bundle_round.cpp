@@ -4,7 +4,8 @@
 namespace plumbline::optimize {
 namespace {
 
-/// How many inliers see each landmark. What one pose alone sees without depth would leave its block singular.
+/// Counts the inliers that see each landmark. One that a single pose sees without depth would make its block
+/// singular.
 template <typename Seen>
 std::vector<int> views(const std::vector<Seen>& observations, int Seen::*landmark, std::size_t landmarks) {
   std::vector<int> count(landmarks, 0);

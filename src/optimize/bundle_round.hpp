@@ -16,7 +16,7 @@ namespace plumbline::optimize {
 
 inline std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
-/// What a squared error costs, and what its term weighs (Huber).
+/// Cost of a squared error and weight of its term (Huber).
 struct Huber {
   double threshold;
   [[nodiscard]] double cost(double squared) const {
@@ -34,7 +34,7 @@ struct Target {
   const double* w;
 };
 
-/// How far the linearised problem is believed: grows with steps that bring what they promised (Madsen,
+/// Region in which the linearisation is trusted: grows with steps that reduce the cost as predicted (Madsen,
 /// Nielsen, Tingleff, 2004; as in Ceres).
 class TrustRegion {
  public:
@@ -83,7 +83,7 @@ struct NormalEquations {
   [[nodiscard]] double largest_gradient() const;
 };
 
-/// What is left of the normal equations when landmarks are eliminated.
+/// Normal equations of the poses after the landmarks are eliminated.
 class SchurComplement {
  public:
   explicit SchurComplement(int free_poses);

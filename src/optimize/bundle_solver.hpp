@@ -12,7 +12,7 @@
 
 namespace plumbline::optimize {
 
-/// What is solved for. Lines are kept as the solver turns them.
+/// Unknowns of the solver. Lines are in its own parametrisation.
 struct BundleState {
   std::vector<geometry::Rigid3> poses;  ///< camera_from_world
   std::vector<Eigen::Vector3d> points;

@@ -16,10 +16,10 @@ namespace plumbline::optimize {
 /// Squared error of a point behind the camera: constant, and so large that the gate takes it for an outlier.
 constexpr double kBehind = 2e6;
 
-/// What was seen of a point; where it lies in the world is not filled in.
+/// Measurement of a point as a term; the point's position in the world is not filled in.
 PointTerm to_term(const BundlePointObservation& o);
 
-/// What a line's observation needs of its camera.
+/// Quantities of the camera for a line's observation.
 struct LineView {
   LineView(const BundleLineObservation& seen, const sensor::Pinhole& camera);
   Eigen::Vector2d start;

@@ -15,7 +15,7 @@
 
 namespace plumbline::optimize {
 
-/// Of a problem that does not own its losses and manifolds.
+/// Options of a problem that does not own its losses and manifolds.
 inline ceres::Problem::Options borrowing() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;

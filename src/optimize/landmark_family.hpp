@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the solver knows of all landmarks of one kind (points: 3 unknowns, lines: 4) at one linearisation, and
-// their elimination from the normal equations (Schur complement). Poses are slots: free ones first, at their
-// places in the elimination, then those that are fixed. Sightings lie in the order of their poses.
+// All landmarks of one kind (points: 3 unknowns, lines: 4) at one linearisation, and their elimination from
+// the normal equations (Schur complement). Poses are slots: free ones first, in the order of elimination,
+// then fixed ones. Observations are in the order of their poses.
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
@@ -99,7 +99,7 @@ struct LandmarkFamily {
     for (std::size_t n = 0; n < hessian.size(); ++n) damping[n].set_diagonal(hessian[n].diagonal());
   }
 
-  /// Of a landmark that its poses do not hold in some direction the inverse is taken in the others.
+  /// Inverts each landmark's block; along directions that its poses do not constrain the inverse is zero.
   void invert(double radius) {
     for (std::size_t n = 0; n < hessian.size(); ++n) {
       Square h = hessian[n];

@@ -20,7 +20,7 @@ using geometry::Rigid3;
 constexpr std::size_t kBlock = 512;  // terms that are looked up together, and summed in single precision
 using Seen = std::array<float, kBlock>;
 
-/// Where a family's image shows points of the reference camera.
+/// Projection of points of the reference camera into a family's image.
 struct View {
   View(const PhotometricFamily& family, const Rigid3& camera_from_world)
       : pixels(family.image.ptr<float>()),
@@ -51,7 +51,7 @@ using Integers = std::int32_t __attribute__((vector_size(32)));
 constexpr std::size_t kLanes = sizeof(Floats) / sizeof(float);
 static_assert(kBlock % kLanes == 0);
 
-/// What is looked up for a block of terms, in columns.
+/// Values looked up for a block of terms, in columns.
 struct Places {
   alignas(32) float x[kBlock], y[kBlock], z[kBlock];  // of the points
   alignas(32) std::int32_t pixel[kBlock];

@@ -30,7 +30,7 @@ Robust huber(double squared, double threshold) {
   return {threshold * (error - 0.5 * threshold), threshold / error};
 }
 
-/// What a term costs that has no image at a pose, standard deviations: hiding it behind the camera must not
+/// Residual of a term without an image at a pose, standard deviations: moving it behind the camera must not
 /// pay.
 constexpr double kUnseen = 1e3;
 

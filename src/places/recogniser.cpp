@@ -9,7 +9,7 @@ using core::KeyframeId;
 
 namespace {
 
-/// Whether two sorted lists have one in common.
+/// True if two sorted lists have an element in common.
 bool meet(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& b) {
   return std::any_of(a.begin(), a.end(),
                      [&](KeyframeId id) { return std::binary_search(b.begin(), b.end(), id); });

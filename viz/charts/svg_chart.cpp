@@ -16,7 +16,7 @@ namespace {
 constexpr double kLeft = 64.0, kRight = 14.0, kTop = 8.0, kBelow = 22.0, kLabelBelow = 18.0;
 constexpr double kLeast = 260.0, kMost = 760.0;  ///< height of a plot whose axes have one scale, px
 
-/// Of the finite values.
+/// Range of the finite values.
 struct Extent {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
@@ -215,7 +215,7 @@ std::string marks(const SvgChart& chart, const Plot& plot) {
   return out;
 }
 
-/// What a legend explains: a sample of 22 x 10 pixels and its label.
+/// Entries of the legend: a sample of 22 x 10 pixels and its label.
 std::vector<std::pair<std::string, std::string>> legend_entries(const SvgChart& chart) {
   std::vector<std::pair<std::string, std::string>> entries;
   for (const SvgLine& line : chart.lines) {
@@ -262,7 +262,7 @@ SvgDrawing draw(const SvgChart& chart) {
 
 std::string hex(const Rgb& color) { return fmt::format("#{:02x}{:02x}{:02x}", color.r, color.g, color.b); }
 
-/// As svg_chart_style() on white ground, without variables: not every viewer knows them.
+/// The style of svg_chart_style() on white ground, without variables: not every viewer knows them.
 std::string document_style() {
   std::string css =
       "text{font:12px sans-serif;fill:#59606b}.title{font-size:14px;fill:#2d3036}"

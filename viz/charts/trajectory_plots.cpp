@@ -135,7 +135,7 @@ double start_of(const std::vector<TrajectoryComparison>& comparisons) {
   return std::isfinite(start) ? start : 0.0;
 }
 
-/// Where tracking was lost the line must not go on: indices before which a curve of these poses is broken.
+/// Indices before which a curve of these poses is broken, because tracking was lost there.
 std::vector<bool> gaps_in(const Trajectory& trajectory) {
   constexpr double kLeast_s = 0.25, kUsualSteps = 5.0;
   std::vector<bool> broken(trajectory.size(), false);

@@ -40,7 +40,7 @@ void add_robots(const ReportData& data, Facts& facts) {
   facts.emplace_back("Points by who saw them most", text);
 }
 
-/// What filters took: from the clouds of keyframes, or from the merged one.
+/// Adds the points that filters removed from the clouds of keyframes, or from the merged one.
 void add_left_out(const ReportData& data, const char* place, const char* name, Facts& facts) {
   std::string text;
   for (const auto& part : list_at(data.summary, place)) {
@@ -60,14 +60,14 @@ std::string range_text(const Eigen::Vector3d& low, const Eigen::Vector3d& high) 
                      low.y(), high.y(), low.z(), high.z());
 }
 
-/// What the plan shows: all but what lies far away from all the rest.
+/// Corners of the plan's area: all but points far away from all others.
 std::pair<Eigen::Vector3d, Eigen::Vector3d> shown(const CloudExtent& extent) {
   const Eigen::Vector3d margin = 0.25 * extent.central_size();
   return {extent.low.cwiseMax(extent.central_low - margin),
           extent.high.cwiseMin(extent.central_high + margin)};
 }
 
-/// How many points fall into each cell; rows from the top.
+/// Number of points in each cell; rows from the top.
 cv::Mat counted(const ReportData& data, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                 double cell_m) {
   const auto [across, up] = plan_axes(data);
@@ -86,7 +86,7 @@ cv::Mat counted(const ReportData& data, const Eigen::Vector3d& low, const Eigen:
   return counts;
 }
 
-/// What a cell must count to be as dark as it gets: 97 of 100 cells that count anything count less.
+/// Count of the darkest cells: the 97th percentile of the counts above zero.
 double darkest(const cv::Mat& counts) {
   std::vector<double> known;
   std::copy_if(counts.begin<int>(), counts.end<int>(), std::back_inserter(known),

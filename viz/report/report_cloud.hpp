@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a report wants to know of the merged cloud.
+// Measurements of the merged cloud for a report.
 #include <optional>
 
 #include "plumbline/cloud/types.hpp"
@@ -10,7 +10,7 @@
 
 namespace plumbline::report {
 
-/// None without finite points.
+/// Empty for a cloud without finite points.
 std::optional<CloudExtent> measure_extent(const cloud::Cloud& cloud);
 
 /// The two axes of the plan: x and y where z is up, else x and z.

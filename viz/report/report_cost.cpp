@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a run took: time, memory; its configuration and files.
+// Cost of a run: time and memory; its configuration and files.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -96,7 +96,7 @@ std::string stages_table(const Json& summary) {
   return table.html();
 }
 
-/// What the files of a result are, by the end of their name.
+/// Description of a result's file by the end of its name.
 std::string what_is(const std::string& name) {
   struct Known {
     const char* name;

@@ -66,8 +66,8 @@ void add_loops(const maps::StoredResult& stored, ReportData& data) {
   }
 }
 
-/// What only map.db knows: which robot has which number (of its points and of its colour), loops, how well
-/// all fits.
+/// Adds what only map.db knows: the number of each robot (in the ids of points, and of its colour), loops,
+/// residuals.
 void add_store(ReportData& data) {
   const fs::path file = data.folder / "map.db";
   std::error_code ec;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a result folder holds, read for its report. Anything but summary.json may be missing.
+// Contents of a result folder, read for its report. Any file but summary.json may be missing.
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -49,7 +49,7 @@ struct LostStretch {
   double gap_m = 0.0;  ///< between the poses before and after; NaN: one of them is not there
 };
 
-/// Of the merged cloud; metres, frame of the results.
+/// Extent of the merged cloud; metres, frame of the results.
 struct CloudExtent {
   Eigen::Vector3d low, high;                  ///< all points
   Eigen::Vector3d central_low, central_high;  ///< without the outer 0.5 % of either side, along each axis

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How well the finished map fits what its keyframes saw.
+// Residuals of the finished map against the observations of its keyframes.
 #include <cstddef>
 #include <cstdint>
 #include <map>

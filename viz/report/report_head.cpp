@@ -98,7 +98,7 @@ std::string frame_of_results(const ReportData& data) {
   return up.empty() ? up : "that of the first camera: x right, y down, z forward; metres";
 }
 
-/// Those in the result, and those that were mapped but left out.
+/// Robots in the result, and those that were mapped but left out.
 std::string robots_text(const ReportData& data) {
   std::string in, out;
   const auto is_in = [&](const std::string& name) {

@@ -37,7 +37,7 @@ class HtmlTable {
   std::string body_;
 };
 
-/// What is reported of each robot, a column each; without heads when there is one that needs no name.
+/// Table with a column for each robot; without heads for a single robot without a name.
 class RobotTable {
  public:
   /// A robot's column, to be filled from the top.

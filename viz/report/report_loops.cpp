@@ -179,7 +179,7 @@ std::string closings_html(const ReportData& data) {
              "surfaces. Correction: how far closing the loop would move the keyframe, after the way since.");
 }
 
-/// Of a robot that was told what others have mapped.
+/// Report of a robot that received the maps of others.
 std::string feedback_html(const Json& summary) {
   if (!flag_at(summary, "/feedback/on")) return {};
   return "<h3>By maps of other robots</h3>\n" +
@@ -212,7 +212,7 @@ std::string merges_html(const ReportData& data) {
   return overview.html() + details;
 }
 
-/// What the maps say of their cameras; empty: none was asked, or none could tell.
+/// Report of camera refinement; empty: it was not done, or found nothing.
 static std::string cameras_html(const Json& s) {
   HtmlTable table("camera of|parameter|>given|>found|>±|>gain|");
   for (const Json& camera : list_at(s, "/camera")) {

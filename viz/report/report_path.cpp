@@ -108,7 +108,7 @@ class PathChart {
     chart_.lines.push_back(std::move(line));
   }
 
-  /// Where the path jumps though the tracker saw no jump.
+  /// Adds marks where the path jumps although the tracker saw no jump.
   void add_tears() {
     viz::SvgDots torn{"torn", "lost", {}, {}, 7.0, true};
     for (const auto& tear : tears_of(data_.summary)) {
@@ -134,7 +134,7 @@ class PathChart {
   bool truth_reported_ = false;
 };
 
-/// How far a path reaches along an axis.
+/// Extent of a path along an axis.
 double reach(const geometry::Trajectory& poses, int axis) {
   const auto less = [axis](const geometry::StampedPose& a, const geometry::StampedPose& b) {
     return a.world_from_camera.translation[axis] < b.world_from_camera.translation[axis];

@@ -42,7 +42,7 @@ std::size_t count_of(std::string_view what, std::string_view text) {
   return count;
 }
 
-/// As far as they are there: each view in the camera's colours, then by robot.
+/// Snapshots that exist: each view in the camera's colours, then by robot.
 std::string snapshots_html(ReportData& data) {
   std::string out;
   std::error_code ec;

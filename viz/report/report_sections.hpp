@@ -30,7 +30,7 @@ std::string files_html(const ReportData& data, const std::filesystem::path& left
 inline std::string count_at(const nlohmann::ordered_json& json, const std::string& place) {
   return count_text(number_at(json, place));
 }
-/// Of a length in metres.
+/// Value of a length in metres as text in millimetres.
 inline std::string mm_at(const nlohmann::ordered_json& json, const std::string& place) {
   return number_text(1e3 * number_at(json, place), 1, "mm");
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is drawn over the points of a snapshot: camera paths, title, legend, scale bar, axes, colour bar.
+// Drawing over the points of a snapshot: camera paths, title, legend, scale bar, axes, colour bar.
 #include <string>
 
 #include "canvas/painter.hpp"

@@ -167,7 +167,7 @@ std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& 
 
     const Eigen::Vector3d to_viewer = projection.to_viewer(position(p));
     const bool away = normal(p).dot(to_viewer) < kFacesAway;  // false for NaN normals
-    // Of a ceiling that is left out no dust must stay: points whose normals are noise go with their
+    // A ceiling that is left out must leave no isolated points: those whose normals are noise follow their
     // surroundings.
     if (away || surroundings->direction(p).dot(to_viewer) < kSurroundedAway) continue;
     facing.push_back(static_cast<std::uint32_t>(i));

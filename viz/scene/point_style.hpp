@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which points of a cloud a picture shows, how large and in what colour.
+// Choice of the points of a cloud that a picture shows, their size and colour.
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,8 +15,8 @@ namespace plumbline::viz {
 std::vector<std::uint32_t> visible_points(const Scene& scene, const Projection& projection, bool cull,
                                           std::size_t step = 1);
 
-/// Of the points that fall into one cell of `cell_px` pixels the nearest; those outside the picture and its
-/// depth range are left out. What is dropped would be drawn over anyway: this bounds the drawing of huge
+/// For each cell of `cell_px` pixels the nearest of the points that fall into it; those outside the picture
+/// and its depth range are left out. The others would be drawn over anyway: this bounds the drawing of huge
 /// clouds.
 std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vector<std::uint32_t>& points,
                                             const Projection& projection, double cell_px);
@@ -24,7 +24,7 @@ std::vector<std::uint32_t> nearest_per_cell(const Scene& scene, const std::vecto
 /// Typical distance between neighbouring points of the surfaces, metres; 0 for fewer than two points.
 double point_spacing(const Scene& scene, const std::vector<std::uint32_t>& points);
 
-/// What a colour bar explains.
+/// Scale of a colour bar.
 struct ColorScale {
   bool shown = false;
   double low = 0.0;

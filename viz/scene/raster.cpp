@@ -62,7 +62,7 @@ void Raster::draw_line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, d
   const int top = std::min(first_from(std::max(from.y(), to.y()) + half), first_row_ + depth_.rows);
 
   for (int row = std::max(first_from(std::min(from.y(), to.y()) - half), first_row_); row < top; ++row) {
-    // Where the row crosses the rectangle: between both sides, and between both ends.
+    // Interval in which the row crosses the rectangle: between both sides, and between both ends.
     const double up = row + 0.5 - from.y();
 
     double first = std::min(from.x(), to.x()) - half, last = std::max(from.x(), to.x()) + half;

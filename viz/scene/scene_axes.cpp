@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which way is up, and which way do the walls run: peaks of the normals' distribution.
+// Upright direction and direction of the walls: peaks of the normals' distribution.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 

@@ -47,7 +47,7 @@ struct Band {
   int height = 0;
 };
 
-/// What is drawn over the points, in a band.
+/// Drawing over the points, in a band.
 class Overlay : public vtkContextItem {
  public:
   static Overlay* New();
@@ -147,7 +147,7 @@ Projection choose_projection(const Scene& scene, const SnapshotOptions& options,
   return directions;
 }
 
-/// How large each point is drawn, whole pixels; 0: it is behind the viewer.
+/// Size of each point in whole pixels; 0: it is behind the viewer.
 std::vector<int> point_sizes(const Scene& scene, const std::vector<std::uint32_t>& points,
                              const SnapshotOptions& options, const Projection& projection, double spacing_m) {
   constexpr double kOverlap = 1.7;  // neighbours at a slant, and voxels that are not quite full
@@ -173,7 +173,7 @@ std::vector<int> point_sizes(const Scene& scene, const std::vector<std::uint32_t
   return sizes;
 }
 
-/// What one picture is made of.
+/// Objects that one picture is made of.
 struct Drawn {
   std::vector<std::uint32_t> points;
   PointColors styled;

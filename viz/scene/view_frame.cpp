@@ -83,7 +83,7 @@ std::vector<Eigen::Vector3d> evened(const std::vector<Eigen::Vector3d>& points) 
   std::set<std::array<long, 3>> taken;
   std::vector<Eigen::Vector3d> result;
   for (const auto& p : points) {
-    // What lies far outside of 99 % of the points shares the border cubes.
+    // Points far outside of 99 % of all points share the border cubes.
     const Eigen::Array3d cell = ((p - low).array() / side).floor().max(-kCells).min(2.0 * kCells);
     const auto index = [&cell](int axis) { return std::lround(cell[axis]); };
     if (taken.insert({index(0), index(1), index(2)}).second) result.push_back(p);

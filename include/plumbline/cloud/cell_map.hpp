@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is known of the cells of a grid, by cell.
+// Values by cell of a grid.
 #include <tsl/robin_map.h>
 
 #include <Eigen/Core>
@@ -31,7 +31,7 @@ inline Eigen::Vector3i unpack_cell(std::uint64_t key) {
 /// The cell that a place lies in; both in the unit of cells.
 inline Eigen::Vector3i cell_of(const Eigen::Vector3d& at) { return at.array().floor().cast<int>(); }
 
-/// Which axis a normal is nearest to, and which way along it: 0-5.
+/// Axis nearest to a normal, and direction along it: 0-5.
 template <typename Normal>
 int facing(const Normal& normal) {
   Eigen::Index axis = 0;

@@ -24,7 +24,7 @@ class ChoosingFilter : public pcl::FilterIndices<PointT> {
 
   using pcl::FilterIndices<PointT>::applyFilter;
 
-  /// Of the points that were asked for, in their order, those for which keep(index) holds.
+  /// Requested points, in their order, for which keep(index) holds.
   template <typename Keep>
   void choose(pcl::Indices& indices, const Keep& keep) {
     indices.clear();

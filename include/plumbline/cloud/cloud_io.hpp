@@ -14,13 +14,13 @@
 
 namespace plumbline::cloud {
 
-/// What may be known of every point beside the Point itself; each empty or one value per point.
+/// Optional values of every point beside the Point itself; each empty or one value per point.
 struct CloudColumns {
   std::vector<float> confidence;            ///< 0-1, see VoxelMap
   std::vector<std::uint32_t> observations;  ///< views that saw the point
   std::vector<std::uint8_t> robot;          ///< who saw it
 
-  /// What other programs have written, by its name in the file ("intensity").
+  /// A column of another program, by its name in the file ("intensity").
   struct Other {
     std::string name;
     std::vector<float> values;
@@ -65,7 +65,7 @@ struct CloudFile {
   std::size_t nan_normals = 0;  ///< points whose normal is unknown (NaN or zero) though the file has normals
 };
 
-/// What becomes of coordinates, such as UTM's, that have more digits than a float.
+/// Treatment of coordinates, such as UTM's, that have more digits than a float.
 enum class LargeCoordinates {
   kRounded,  ///< to the nearest float
   kShifted   ///< whole metres near their middle are taken off first: CloudFile::shift

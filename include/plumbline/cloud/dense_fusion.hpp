@@ -54,8 +54,8 @@ struct FusionViews {
   std::vector<sensor::Pinhole> cameras;  ///< that the clouds were taken with
   std::vector<std::uint8_t> robots;  ///< whose view it is, 0-254; empty: of one robot, and no columns.robot
   ReadView read;
-  /// Of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; empty: not known, and no column
-  /// of kSigmaColumn.
+  /// Covariances of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians; empty: not known, and
+  /// no column of kSigmaColumn.
   std::vector<geometry::Matrix6d> covariances = {};
 };
 

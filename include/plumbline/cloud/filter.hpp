@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a cloud filter is, and the list of those that exist. A filter is a class with declared options, one
-// registration (a FilterInfo) and its words for the reference page docs/reference/filters.md, which is made
-// from these.
+// Interface of a cloud filter, and the list of those that exist. A filter is a class with declared options,
+// one registration (a FilterInfo) and its texts for the reference page docs/reference/filters.md, which is
+// made from these.
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
@@ -21,24 +21,25 @@ namespace plumbline::cloud {
 
 struct CloudColumns;
 
-/// What a filter may know beside the cloud.
+/// Additional knowledge that a filter may use.
 struct FilterContext {
-  /// Where the sensor stood, in the cloud's frame; without it the cloud's own sensor_origin_.
+  /// Position of the sensor in the cloud's frame; without it the cloud's own sensor_origin_.
   std::optional<Eigen::Vector3f> viewpoint;
-  /// What was taken off the positions while reading (CloudFile::shift): options in metres are about positions
-  /// with it.
+  /// Offset that was subtracted from the positions while reading (CloudFile::shift): options in metres refer
+  /// to positions with it.
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-  /// How far neighbouring points are apart, metres, where that is known (the voxel of a fused cloud); 0: not.
+  /// Distance of neighbouring points, metres, if it is known (the voxel of a fused cloud); 0: unknown.
   double spacing_m = 0.0;
   std::uint32_t seed = 0;  ///< of random choices
   /// Threads for the filters that can use several; without it one. Results do not depend on it.
   const core::Executor* executor = nullptr;
-  /// Which run of many this is ("12"): part of the names of files that filters write. Empty: the only one.
+  /// Number of this run among many ("12"): part of the names of files that filters write. Empty: the only
+  /// one.
   std::string run;
-  /// What is known of the input's points beside the Point (confidence ...); null: nothing.
+  /// Columns of the input's points beside the Point (confidence ...); null: there are none.
   const CloudColumns* columns = nullptr;
-  /// Where, if not null, a filter that makes points of several, or takes some from elsewhere, puts what is
-  /// known of its output's. Others leave it alone: the chain follows the points by itself (carry_columns).
+  /// If not null, a filter that makes points of several, or takes some from elsewhere, puts the columns of
+  /// its output here. Others leave it alone: the chain follows the points by itself (carry_columns).
   CloudColumns* made_columns = nullptr;
 };
 
@@ -47,9 +48,9 @@ class Filter {
   virtual ~Filter() = default;
   /// Binds the options of this very filter.
   virtual void declare(core::OptionTable& table) = 0;
-  /// What is wrong with the options taken together, "" if nothing.
+  /// Problem with the options taken together, "" if there is none.
   [[nodiscard]] virtual std::string check() const { return ""; }
-  /// What keeps the filter from running, found before the chain begins: files that are missing.
+  /// Problem that keeps the filter from running, found before the chain begins: missing files.
   [[nodiscard]] virtual core::Result<void> ready(const FilterContext& /*context*/) const { return {}; }
   /// The file that it writes, "" if none: no two filters may write the same.
   [[nodiscard]] virtual std::string writes() const { return ""; }

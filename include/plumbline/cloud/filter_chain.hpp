@@ -22,7 +22,7 @@
 
 namespace plumbline::cloud {
 
-/// What one filter did. Points are those with finite coordinates.
+/// Counts of one filter. Points are those with finite coordinates.
 struct FilterReport {
   std::string type;
   std::size_t points_in = 0;
@@ -30,7 +30,7 @@ struct FilterReport {
   double ms = 0.0;
 };
 
-/// How far a chain is: filters done, filters there are, and the one that runs now ("" at the end).
+/// Progress of a chain: filters done, filters in all, and the one that runs now ("" at the end).
 using ChainProgress = std::function<void(std::size_t done, std::size_t total, const std::string& type)>;
 
 /// Filters in the order they are applied. Cheap to copy; const use from several threads is safe.
@@ -51,7 +51,8 @@ class FilterChain {
   /// The chain with every option spelt out, as YAML that `load` accepts.
   [[nodiscard]] std::string to_yaml() const;
 
-  /// What keeps the chain from running, such as a missing file of merge; nothing is read or written yet.
+  /// Problem that keeps the chain from running, such as a missing file of merge; nothing is read or written
+  /// yet.
   [[nodiscard]] core::Result<void> ready(const FilterContext& context = {}) const;
   /// The files that its filters write (tee), in their order.
   [[nodiscard]] std::vector<std::string> writes() const;

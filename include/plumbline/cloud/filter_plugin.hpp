@@ -31,8 +31,8 @@ constexpr std::uint32_t kFilterPluginMagic = 0x464c4250;
 /// The one symbol of a plugin, an extern "C" function: const FilterPlugin* plumbline_filter_plugin().
 constexpr const char* kFilterPluginSymbol = "plumbline_filter_plugin";
 
-/// What a plugin says of itself. The first three members stay as they are for ever, so that any program can
-/// tell why it does not fit any plugin.
+/// Description of a plugin. The first three members never change, so that any program can tell why it does
+/// not fit any plugin.
 struct FilterPlugin {
   std::uint32_t magic = kFilterPluginMagic;
   std::uint32_t interface = kFilterInterface;
@@ -42,7 +42,7 @@ struct FilterPlugin {
 
 #define PLUMBLINE_TEXT_(x) #x
 #define PLUMBLINE_TEXT(x) PLUMBLINE_TEXT_(x)
-/// What must be the same on both sides for their objects to be laid out alike.
+/// Properties that must be equal on both sides for their objects to have the same layout.
 inline std::string plugin_toolchain() {
   return std::string("plumbline ") + core::version() +
          ", PCL " PCL_VERSION_PRETTY ", Eigen alignment " PLUMBLINE_TEXT(

@@ -31,7 +31,7 @@ class FlyingPixels : public ChoosingFilter<PointT> {
     this->filter_name_ = "FlyingPixels";
   }
 
-  /// Where the camera stood, in the cloud's frame; without it the cloud's sensor_origin_.
+  /// Position of the camera in the cloud's frame; without it the cloud's sensor_origin_.
   void setViewpoint(const Eigen::Vector3f& viewpoint) { viewpoint_ = viewpoint; }
   /// A jump is more than this many standard deviations of the depth, > 0.
   void setSigmas(double sigmas) { sigmas_ = sigmas; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What views say about places that are not on their surfaces: nothing can be where a view looks through.
+// Evidence of views about points that are not on their surfaces: nothing can be where a view looks through.
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
@@ -33,10 +33,10 @@ DepthRaster depth_raster(const Cloud& camera_cloud, const sensor::Pinhole& camer
 CloudPtr depth_view(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera, double min_depth_m,
                     double max_depth_m);
 
-/// Whether a view of `camera` is a depth view, which tests free space and adds no points.
+/// True if a view of `camera` is a depth view, which tests free space and adds no points.
 bool is_depth_view(const Cloud& camera_cloud, const sensor::Pinhole& camera);
 
-/// What one view says about a place.
+/// Evidence of one view about a point.
 enum class Evidence { kNone, kSurface, kFree, kHidden };
 
 /// The nearest and the furthest depth around each cell of a raster, which must outlive it: what a view says

@@ -20,11 +20,11 @@ class IncidenceAngle : public ChoosingFilter<PointT> {
     this->filter_name_ = "IncidenceAngle";
   }
 
-  /// Where the camera stood, in the cloud's frame; without it the cloud's sensor_origin_.
+  /// Position of the camera in the cloud's frame; without it the cloud's sensor_origin_.
   void setViewpoint(const Eigen::Vector3f& viewpoint) { viewpoint_ = viewpoint; }
   /// Radians in [0, pi / 2].
   void setMaxAngle(double max_angle_rad) { max_angle_rad_ = max_angle_rad; }
-  /// Whether points without normal (NaN) count as well seen.
+  /// True: points without normal (NaN) count as well seen.
   void setKeepUnknown(bool keep_unknown) { keep_unknown_ = keep_unknown; }
 
  protected:

@@ -27,11 +27,11 @@ class NormalConsistency : public ChoosingFilter<PointT> {
     this->filter_name_ = "NormalConsistency";
   }
 
-  /// How many nearest neighbours are looked at, >= 1.
+  /// Number of nearest neighbours to compare, >= 1.
   void setNeighbours(int neighbours) { neighbours_ = neighbours; }
   /// Between normals that agree, radians in [0, pi].
   void setMaxAngle(double max_angle_rad) { max_angle_rad_ = max_angle_rad; }
-  /// Of the neighbours so many must agree, 0 to 1; more than 1/2 eats edges.
+  /// Share of the neighbours that must agree, 0 to 1; more than 1/2 eats edges.
   void setMinShare(double min_share) { min_share_ = min_share; }
   /// Its threads are used; null (the default): one. The result does not depend on it.
   void setExecutor(const core::Executor* executor) { executor_ = executor; }

@@ -39,7 +39,7 @@ class SurfaceSearch {
   using Tree = pcl::search::KdTree<SurfacePoint>;
   explicit SurfaceSearch(SurfaceCloud::ConstPtr cloud);
   [[nodiscard]] const SurfaceCloud::ConstPtr& cloud() const { return cloud_; }
-  /// Of this cloud; null when it is empty.
+  /// Search tree of this cloud; null if it is empty.
   [[nodiscard]] const Tree::Ptr& tree() const { return tree_; }
 
  private:

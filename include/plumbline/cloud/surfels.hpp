@@ -29,7 +29,7 @@ struct Surfel {
   float scatter = 0.0F;   ///< weighted sum of squared spreads within voxels, m^2
   std::uint32_t points = 0;
 
-  // What fit_planes() finds: the plane normal . (p - origin) = 0 of this surfel and its surroundings.
+  // Results of fit_planes(): the plane normal . (p - origin) = 0 of this surfel and its surroundings.
   Eigen::Vector3f origin{0, 0, 0};  ///< metres from the block's centre
   Eigen::Vector3f normal{0, 0, 0};  ///< unit
   float noise_m = 0.0F;             ///< standard deviation of one measurement
@@ -76,8 +76,8 @@ class Surfels {
   /// Plane of a weighted set of points; false when there are too few.
   static bool set_plane(const Surfel& sums, Surfel& surfel);
   [[nodiscard]] bool explained(const Surfel& surfel) const;
-  /// How noisy the points really are: residuals of the surroundings, the middle one, over what the sensor
-  /// model lets expect; a generous upper limit, 0 to 1. Exact depth must not be flattened.
+  /// Measures the points' real noise: median residual of the surroundings over the sensor model's
+  /// expectation; a generous upper limit, 0 to 1. Exact depth must not be flattened.
   void measure_noise();
 
   double block_m_;

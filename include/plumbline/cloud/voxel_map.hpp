@@ -68,7 +68,7 @@ struct VoxelSide {
 };
 static_assert(sizeof(VoxelSide) == 64);
 
-/// What was measured of a voxel.
+/// Measurement of a voxel.
 struct VoxelSample {
   Eigen::Vector3i voxel{0, 0, 0};
   VoxelSide side;

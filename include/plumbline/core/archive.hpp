@@ -34,7 +34,7 @@ using BitsOf =
                        std::conditional_t<sizeof(T) == 4, std::uint32_t,
                                           std::conditional_t<sizeof(T) == 2, std::uint16_t, std::uint8_t>>>;
 
-/// What both directions share: how things fall apart into numbers. Io has number(), list(), planes() and
+/// Shared by both directions: how types fall apart into numbers. Io has number(), list(), planes() and
 /// check().
 template <typename Io>
 class Archive {

@@ -53,8 +53,8 @@ Result<ConfigNode> read_yaml(const std::filesystem::path& file);
 Result<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name);
 
 /// The same, with the problems added to a list, so that those of a file's meaning can be told with them.
-/// None: nothing sensible can be read (no such file, broken syntax, a limit). Of a key given twice the first
-/// holds.
+/// Empty if nothing sensible can be read (no such file, broken syntax, a limit). Of a key given twice the
+/// first holds.
 std::optional<ConfigNode> read_yaml(const std::filesystem::path& file, ConfigProblems& problems);
 std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string& file_name,
                                      ConfigProblems& problems);
@@ -72,8 +72,8 @@ std::string to_flow_yaml(const ConfigNode& node);
 /// candidates the last part alone will do.
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates);
 
-/// What follows "unknown key": "; did you mean voxel? (allowed: voxel, filters)". Of many that are allowed
-/// only the one that is near, if one is, else their groups: "(allowed: voxel, filters.*)".
+/// Text that follows "unknown key": "; did you mean voxel? (allowed: voxel, filters)". Of many allowed keys
+/// it names only a similar one, else their groups: "(allowed: voxel, filters.*)".
 std::string hint(const std::string& word, const std::vector<std::string>& allowed);
 
 }  // namespace plumbline::core

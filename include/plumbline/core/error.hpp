@@ -9,7 +9,7 @@
 
 namespace plumbline::core {
 
-/// What kind of failure this is; the number is the exit code of the command line.
+/// Kind of a failure; the number is the exit code of the command line.
 enum class ErrorKind {
   kInternal = 1,       ///< a bug
   kUsage = 2,          ///< command line or configuration

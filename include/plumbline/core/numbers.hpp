@@ -24,7 +24,7 @@ inline std::optional<double> to_number(std::string_view word) {
   return value;
 }
 
-/// Whether the words of a line, separated by blanks, are numbers with decimal commas, as a locale writes
+/// True if the words of a line, separated by blanks, are numbers with decimal commas, as a locale writes
 /// them: "0,5 1,25". Words that lists separate by commas ("1,2,3" or "1, 2") are not.
 inline bool has_decimal_comma(const std::vector<std::string>& words) {
   const auto decimal = [](const std::string& word) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is made of option declarations for other programs and for people: JSON Schema (draft 7, what editors
+// Texts made of option declarations for other programs and for people: JSON Schema (draft 7, what editors
 // understand) and Markdown.
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -19,7 +19,7 @@ nlohmann::ordered_json option_schema(const OptionSpec& spec);
 /// "properties" of a map that holds these options.
 nlohmann::ordered_json options_schema(const std::vector<OptionSpec>& specs);
 
-/// What values an option takes: "0.1 m to 5 m", "on, off", "3 numbers, -1 m to 1 m".
+/// Values that an option takes: "0.1 m to 5 m", "on, off", "3 numbers, -1 m to 1 m".
 std::string allowed_text(const OptionSpec& spec);
 
 /// A Markdown table of options: key, default, allowed values, help; "" when there are none.

@@ -31,7 +31,7 @@ struct Range {
 
 enum class OptionType { kBoolean, kInteger, kNumber, kText, kChoice, kNumbers, kTextOrList };
 
-/// What is known of one option; values as text in the syntax that the parser accepts.
+/// Declaration of one option; values as text in the syntax that the parser accepts.
 struct OptionSpec {
   std::string key;
   OptionType type = OptionType::kText;

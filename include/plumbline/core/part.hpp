@@ -32,7 +32,7 @@ constexpr std::uint64_t layout_of() {
   return hash;
 }
 
-/// What the one symbol of a part, the extern "C" function plumbline_part(), returns.
+/// Result of a part's only symbol, the extern "C" function plumbline_part().
 struct PartEntry {
   std::uint64_t layout = 0;
   const void* functions = nullptr;

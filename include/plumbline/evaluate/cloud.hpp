@@ -25,7 +25,7 @@ enum class CloudAlignment {
   kSe3,   ///< start from trajectories if there are any, then trimmed point-to-plane ICP
 };
 
-/// What the distance to a sampled surface is. Triangles are always measured exactly.
+/// Definition of the distance to a sampled surface. Triangles are always measured exactly.
 enum class SampleDistance {
   /// To the plane through the nearest sample where samples surround the foot of the perpendicular, so that
   /// sampling density does not enter; to the sample itself at borders and holes. Normals are estimated where

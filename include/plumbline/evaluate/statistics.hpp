@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is said of a list of errors.
+// Statistics of a list of errors.
 #include <cstddef>
 #include <vector>
 
 namespace plumbline::evaluate {
 
-/// Of n values e, in their unit. Zeros when n = 0.
+/// Statistics of n values e, in their unit. Zeros when n = 0.
 struct Statistics {
   std::size_t count = 0;
   double rmse = 0.0;    ///< sqrt(sum e^2 / n)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How thick flat walls are in a cloud, from the cloud alone.
+// Thickness of flat walls in a cloud, from the cloud alone.
 #include <Eigen/Core>
 #include <cstddef>
 #include <vector>

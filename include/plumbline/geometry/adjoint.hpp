@@ -14,7 +14,7 @@ inline Matrix6d adjoint(const Rigid3& t) {
   return a;
 }
 
-/// Of (rho, phi), each direction known as well: standard deviations in metres and radians.
+/// Information of (rho, phi) with equal standard deviations in all directions, metres and radians.
 inline Matrix6d information_of(double sigma_m, double sigma_rad) {
   Vector6d diagonal;
   diagonal << Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m)),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How fast a camera moves, by its trajectory.
+// Velocity of a camera from its trajectory.
 #include "plumbline/geometry/trajectory.hpp"
 
 namespace plumbline::geometry {

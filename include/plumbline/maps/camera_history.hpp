@@ -25,7 +25,7 @@ class CameraHistory {
   CameraHistory() = default;
   explicit CameraHistory(const std::vector<RobotInfo>& robots);
 
-  /// Whether anything that was read as an earlier version's is known of this keyframe, or frame.
+  /// True if something of this keyframe or frame was read with an earlier version of the camera.
   [[nodiscard]] bool changes(KeyframeId keyframe) const { return !of(keyframe).empty(); }
   [[nodiscard]] bool changes(FrameId frame) const { return !of(frame).empty(); }
   /// The cloud of a keyframe or of a frame; its sensor pose, too. `velocity`: as in recalibrate().

@@ -25,7 +25,7 @@ struct SeenPoint {
   float depth = 0.0F;                               ///< metres, as the depth camera gave it; 0: none
   float sigma_px = 1.0F;
 };
-/// What a frame saw.
+/// Points that a frame saw.
 struct SeenPoints {
   double depth_delay_s =
       0.0;  ///< of the camera that was believed then: so much of it is not in the depths any more
@@ -58,12 +58,12 @@ struct PathCheck {
   std::vector<PathStep> tears;  ///< beyond noise: 5 cm or 3 degrees, and 4 standard deviations
 };
 
-/// Whether the map has torn: the path must lead from frame to frame as the tracker saw it. Frames hang on
-/// keyframes, so that steps change only where the keyframe does, and a correction that is spread over the way
-/// changes each by little. The frames of each robot in order.
+/// Checks whether the map has torn: the path must lead from frame to frame as the tracker saw it. Frames hang
+/// on keyframes, so that steps change only where the keyframe does, and a correction that is spread over the
+/// way changes each by little. The frames of each robot are in order.
 PathCheck check_path(const std::vector<FramePose>& frames, const Map& map);
 
-/// Whether a step that the tracker knows to `sigma_m` cannot be off by so much.
+/// True if a step that the tracker knows to `sigma_m` cannot be off by this much.
 bool beyond_noise(double off_m, double off_rad, double sigma_m);
 
 /// World poses of the tracked frames, in the order given, as their keyframes lie in `map` now.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What laying clouds down takes besides clouds and poses. It is kept with a map, so that a cloud that is made
-// of a store has the bytes of the run's own.
+// Inputs of the fusion besides clouds and poses. They are kept with a map, so that a cloud made of a store
+// has the bytes of the run's own.
 #include <cstdint>
 #include <map>
 #include <utility>
@@ -16,10 +16,10 @@ namespace plumbline::maps {
 inline const char* const kFusionAttachment = "fusion";  ///< its name in a store
 
 struct FusionState {
-  /// Of keyframes' poses, by robot and stamp; empty: not known.
+  /// Covariances of keyframes' poses, by robot and stamp; empty: not known.
   std::map<std::pair<std::int32_t, double>, geometry::Matrix6d> covariances;
 
-  /// Of views: as those of the keyframes, and between these as that of the one before; empty: not known.
+  /// Covariances of views: those of keyframes, and in between that of the previous one; empty: not known.
   [[nodiscard]] std::vector<geometry::Matrix6d> covariances_of(const std::vector<std::int32_t>& robots,
                                                                const std::vector<double>& stamps) const;
 };

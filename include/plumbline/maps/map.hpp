@@ -31,7 +31,7 @@ struct SurfaceSample {
   float sigma = 0.01F;                                ///< metres, along the normal
 };
 
-/// What was measured at a keyframe; never changes after creation, but that patches are given up
+/// Measurements of a keyframe; they never change after creation, but patches are given up
 /// (kPatchedKeyframes).
 struct Keyframe {
   KeyframeId id;
@@ -63,7 +63,7 @@ struct Observation {
 };
 static_assert(sizeof(Observation) == 12, "a map has thousands of them for each keyframe");
 
-/// Whether one of the observations is this keyframe's.
+/// True if one of the observations is this keyframe's.
 bool seen_by(const std::vector<Observation>& observations, KeyframeId keyframe);
 
 /// So many keyframes of each robot, those made last, keep the patches of their corners.
@@ -95,14 +95,14 @@ struct MapLine {
   int found = 0;
 };
 
-/// How two keyframes lie to each other. The information is of xi = log(b_from_a_estimate * b_from_a^-1).
+/// Relative pose of two keyframes. The information is of xi = log(b_from_a_estimate * b_from_a^-1).
 struct KeyframeEdge {
   KeyframeId a;
   KeyframeId b;
   geometry::Rigid3 b_from_a;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
 };
-/// As their surfaces say (dense alignment); singular where these do not hold all directions.
+/// Edge from the alignment of their surfaces; singular where these do not constrain all directions.
 using SurfaceEdge = KeyframeEdge;
 /// A place that was seen again: as their landmarks say.
 using LoopEdge = KeyframeEdge;
@@ -130,7 +130,7 @@ struct LandmarkPage {
   std::vector<Landmark> landmarks;  ///< by id
 };
 
-/// What a map consists of; the rest (who shares what, children) follows from it. For stores.
+/// Parts of a map; everything else (who shares what, children) follows from them. For stores.
 struct MapParts {
   struct KeyframePart {
     std::shared_ptr<const Keyframe> data;
@@ -145,8 +145,8 @@ struct MapParts {
   NextIds next;
 };
 
-/// What a map holds beyond what it held at an earlier revision: a copy that goes on living while the map
-/// changes, at the cost of what was touched.
+/// Changes of a map since an earlier revision, for a copy that follows the map at the cost of what was
+/// touched.
 struct MapChanges {
   bool whole = false;                             ///< since before anything was there
   std::vector<MapParts::KeyframePart> keyframes;  ///< all of them: poses move

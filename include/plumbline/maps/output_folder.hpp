@@ -8,7 +8,7 @@
 
 namespace plumbline::maps {
 
-/// Whether a folder holds the result of an earlier run.
+/// True if a folder holds the result of an earlier run.
 bool is_result_folder(const std::filesystem::path& folder);
 
 /// Results are written to OUT.partial, which commit() renames to OUT; an earlier result is replaced only
@@ -24,7 +24,7 @@ class OutputFolder {
   /// committed.
   static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace,
                                             bool takes_over = false, IsEarlier is_earlier = is_result_folder);
-  /// Where results are written until they are whole.
+  /// Folder in which results are written until they are complete.
   static std::filesystem::path partial_of(const std::filesystem::path& out);
 
   OutputFolder(OutputFolder&& other) noexcept;
@@ -33,7 +33,7 @@ class OutputFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const { return partial_; }  ///< where to write
   core::Result<void> commit();
-  /// What is there stays when this one ends without commit(), for another run to go on from.
+  /// Keeps the files if this object ends without commit(), for another run to continue.
   void keep() { kept_ = true; }
 
  private:

@@ -23,7 +23,7 @@ namespace plumbline::maps {
 constexpr int kStoreFormat = 9;
 constexpr const char* kStoreFile = "map.db";  ///< in a result folder
 
-/// What a robot's camera turned out to be while its map grew, or when it was finished.
+/// A robot's refined camera, found while its map grew or when it was finished.
 struct CameraVersion {
   sensor::Camera camera;
   std::int32_t first_keyframe = 0;  ///< keyframes from this number on were read as this camera's
@@ -40,7 +40,7 @@ struct RobotInfo {
   std::vector<CameraVersion> versions = {};  ///< in order; empty: it is as it was given
 };
 
-/// What is written once, when a store is made.
+/// Header of a store, written once when it is made.
 struct StoreHeader {
   std::vector<RobotInfo> robots;  ///< by number
   std::string configuration;      ///< the effective one, YAML
@@ -69,7 +69,7 @@ struct StoredMap {
   ResultFrame result;             ///< of a store that is not complete: the map's own frame
 };
 
-/// What a store holds, without reading it all.
+/// Contents of a store, without reading it all.
 struct StoreContents {
   bool complete = false;
   std::size_t keyframes = 0;
@@ -84,8 +84,8 @@ struct StoreContents {
   std::vector<std::string> attachments;
 };
 
-/// What of a keyframe's cloud is wanted whenever its map is read: the cloud thinned to one sample per voxel
-/// and direction, in the frame of the keyframe's camera.
+/// Part of a keyframe's cloud that is needed whenever its map is read: the cloud thinned to one sample per
+/// voxel and direction, in the frame of the keyframe's camera.
 struct StoredSurface {
   double voxel_m = 0.0;
   std::vector<SurfaceSample> samples;
@@ -99,9 +99,9 @@ struct StoreCloud {
   std::shared_ptr<const StoredSurface> surface = nullptr;  ///< of a keyframe's cloud; null: none is kept
 };
 
-/// What a run adds in one go.
+/// Additions of a run in one transaction.
 struct StoreStep {
-  /// Whose own map this is, beside those of other robots; -1: the map is the only one, whoever made it.
+  /// Robot whose own map this is, beside those of others; -1: the map is the only one, whoever made it.
   std::int32_t robot = -1;
   std::shared_ptr<const MapChanges> map;  ///< since the last step's of this robot
   std::vector<FramePose> frames;          ///< that came since
@@ -112,7 +112,7 @@ struct StoreStep {
   std::shared_ptr<const std::vector<RobotInfo>> robots = nullptr;
 };
 
-/// How a new store comes about.
+/// Ways to make a new store.
 enum class StoreUse {
   kGrowing,  ///< while a run goes: whatever ends the program, the file holds what was added
   kInOneGo,  ///< at the end of a run, quicker: nothing can be relied on before save_final()
@@ -191,7 +191,7 @@ class StoreReader {
   [[nodiscard]] core::Result<std::vector<FrameId>> frame_cloud_ids() const;
   [[nodiscard]] core::Result<cloud::CloudPtr> cloud(FrameId frame) const;
   [[nodiscard]] core::Result<std::vector<std::uint8_t>> cloud_bytes(FrameId frame) const;
-  /// None: nothing has this name. Errors (kInput): damaged.
+  /// Empty if nothing has this name. Errors (kInput): damaged.
   [[nodiscard]] core::Result<std::optional<std::vector<std::uint8_t>>> attachment(
       const std::string& name) const;
 
@@ -204,8 +204,8 @@ class StoreReader {
 /// A surface as it was kept, rounded. Errors (kInput): damaged.
 core::Result<StoredSurface> unpack_surface(const std::vector<std::uint8_t>& bytes);
 
-/// Whether a file is a store in whose first moment its run ended: nothing was ever committed. Errors
-/// (kInput): not there, no SQLite file.
+/// True if a file is a store whose run ended before anything was committed. Errors (kInput): the file does
+/// not exist or is no SQLite file.
 core::Result<bool> is_blank_store(const std::filesystem::path& file);
 
 /// StoreReader::open and load.

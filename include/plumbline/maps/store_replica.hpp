@@ -73,7 +73,7 @@ class StoreReplica {
   [[nodiscard]] const StoreHeads& heads() const;
   /// Number of keyframes in it.
   [[nodiscard]] std::size_t keyframes() const;
-  /// Whether the run came to its end (StoredMap::complete); true only for the last transaction's.
+  /// True if the run came to its end (StoredMap::complete); true only with the last transaction.
   [[nodiscard]] bool complete() const;
 
   /// Begins transaction `number`, which must be above heads()[stream]; one that was not committed is rolled

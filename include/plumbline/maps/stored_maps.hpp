@@ -55,9 +55,9 @@ class StoredMaps {
   /// The coarse surface of a keyframe's cloud; none: none was kept. May be called from several threads at a
   /// time.
   [[nodiscard]] core::Result<std::optional<StoredSurface>> surface(std::size_t index) const;
-  /// Of all parts, by this run's numbers.
+  /// Robots of all parts, by this run's numbers.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
-  /// What to say of a cloud that cannot be used.
+  /// Error about a cloud that cannot be used.
   [[nodiscard]] core::Error damaged(core::KeyframeId id, FrameId frame, const core::Error& how) const;
   /// The part of that name, or that has a robot of that name. Errors (kUsage): none has.
   [[nodiscard]] core::Result<std::size_t> find_part(const std::string& name) const;

@@ -19,7 +19,7 @@ namespace plumbline::maps {
 
 struct StoredViews;
 
-/// What a user names as a map.
+/// A map as the user named it.
 struct MapPlace {
   std::optional<ResultFolder> result;  ///< of a run that came to its end
   std::filesystem::path store;  ///< its map.db, or that of a run that was interrupted; empty: there is none
@@ -46,7 +46,7 @@ class StoredResult {
   [[nodiscard]] geometry::Trajectory keyframe_trajectory() const { return maps::trajectory(keyframes()); }
   [[nodiscard]] std::vector<LineSegment3> lines() const;
 
-  /// How the run fused its clouds, as far as its configuration tells; else the defaults.
+  /// Options with which the run fused its clouds, as far as its configuration tells; else the defaults.
   [[nodiscard]] cloud::DenseFusionOptions fusion_options() const;
   /// The filters of its merged cloud, as far as its configuration tells. None where there is one of a plugin,
   /// or one that writes a file.

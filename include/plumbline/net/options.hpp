@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How robots and hub find each other (docs/guide/network.md).
+// Options by which robots and hub find each other (docs/guide/network.md).
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -26,7 +26,7 @@ struct NetworkOptions {
 /// name or number, a TCP robot without peer.
 core::Result<NetworkOptions> checked(NetworkOptions options, bool hub);
 
-/// Whether a name matches [A-Za-z0-9][A-Za-z0-9._-]{0,63}: names become folders and text in logs.
+/// True if a name matches [A-Za-z0-9][A-Za-z0-9._-]{0,63}: names become folders and text in logs.
 bool is_robot_name(const std::string& name);
 
 }  // namespace plumbline::net

@@ -83,7 +83,7 @@ struct BundleOptions {
   void declare(core::OptionTable& table);
 };
 
-/// How well what was seen of one kind fits.
+/// Residuals of the observations of one kind.
 struct BundleFit {
   std::size_t all = 0;      ///< observations
   std::size_t fitting = 0;  ///< within BundleOptions::point_gate or line_gate

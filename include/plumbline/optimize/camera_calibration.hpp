@@ -15,7 +15,7 @@
 
 namespace plumbline::optimize {
 
-/// What all images share, as a change of the camera that was given.
+/// Unknowns common to all images, as changes of the given camera.
 enum CameraUnknown : std::size_t {
   kFocal,    ///< fx and fy are longer by this share
   kReadout,  ///< seconds, from the first row to the last: the value itself, not a change
@@ -57,7 +57,7 @@ struct CalibrationProblem {
   std::vector<CalibrationObservation> observations;
 };
 
-/// What a problem says of its camera, poses and points being the best for each: half the squared standard
+/// Evidence of a problem about its camera, with poses and points at their optimum: half the squared standard
 /// deviations, a quadratic function of the change.
 struct CameraEvidence {
   CameraChange at = CameraChange::Zero();  ///< where it was linearised
@@ -82,7 +82,7 @@ sensor::Camera changed_camera(const sensor::Camera& given, const CameraChange& c
 /// begins there. None: it could not be solved.
 std::optional<CameraEvidence> camera_evidence(CalibrationProblem& problem, const CameraChange& change);
 
-/// What all the evidence and the prior say together. Unknowns that are not free have the prior's mean.
+/// Most likely change given all evidence and the prior. Unknowns that are not free have the prior's mean.
 CameraChange most_likely(const std::vector<CameraEvidence>& evidence, const FreeUnknowns& free,
                          const CameraPrior& prior);
 

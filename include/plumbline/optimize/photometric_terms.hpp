@@ -16,7 +16,8 @@ namespace plumbline::optimize {
 /// A surface sample and its grey value in the reference camera's image. The derivative and the value lie side
 /// by side: sum_photometric() takes them as one row.
 struct PhotometricTerm {
-  /// Of the expected grey value by xi = (rho, phi), camera_from_reference <- camera_from_reference Exp(xi).
+  /// Derivative of the expected grey value by xi = (rho, phi), camera_from_reference <- camera_from_reference
+  /// Exp(xi).
   Eigen::Matrix<float, 6, 1> derivative = Eigen::Matrix<float, 6, 1>::Zero();
   float value = 0.0F;   ///< grey value that is expected, of the reference image
   float weight = 1.0F;  ///< standard deviation of the family over that of the term
@@ -36,7 +37,7 @@ struct PhotometricFamily {
 std::vector<float> photometric_residuals(const PhotometricFamily& family,
                                          const geometry::Rigid3& camera_from_world);
 
-/// What a family adds to the normal equations of the left perturbation of camera_from_world.
+/// Contribution of a family to the normal equations of the left perturbation of camera_from_world.
 struct PhotometricSums {
   geometry::Matrix6d h = geometry::Matrix6d::Zero();  ///< of w j^T j
   geometry::Vector6d g = geometry::Vector6d::Zero();  ///< of w j^T e

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a bundle says about how exactly its poses are known (docs/method/refinement.md).
+// Covariances of the poses of a bundle (docs/method/refinement.md).
 #include <vector>
 
 #include "plumbline/optimize/bundle_adjustment.hpp"

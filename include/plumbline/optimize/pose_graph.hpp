@@ -28,7 +28,7 @@ struct PoseGraph {
   std::vector<GraphEdge> edges;
 };
 
-/// What became of one edge.
+/// Outcome of one edge.
 struct EdgeVerdict {
   double chi2 = 0.0;    ///< squared error at the solution, in variances, whether the edge counted or not
   int dimensions = 0;   ///< directions the edge holds: rank of its information

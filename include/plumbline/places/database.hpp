@@ -36,7 +36,7 @@ class Database {
   [[nodiscard]] bool contains(core::KeyframeId id) const { return slots_.contains(id); }
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
 
-  /// How an image scores against every keyframe that shares words with it.
+  /// Scores of an image against every keyframe that shares words with it.
   class Scores {
    public:
     [[nodiscard]] double of(core::KeyframeId id) const;

@@ -42,8 +42,8 @@ class Vocabulary {
 
   /// One more feature in `word`.
   void count(Word word);
-  /// Whether the word has become so common that it should be divided. Words near the root wait for more
-  /// features, for what they decide stays.
+  /// True if the word has become so common that it should be divided. Words near the root wait for more
+  /// features, because their decision is final.
   [[nodiscard]] bool overfull(Word word) const;
   /// Divides a word into children, seeded by its number; `members` are the descriptors of all its features.
   /// Returns the new word of each; empty when they do not differ enough (asked again when twice as many).

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What can be chosen when a world is filmed.
+// Options for filming a world.
 #include <string>
 #include <vector>
 

@@ -30,13 +30,13 @@ struct Face {
   int object = -1;  ///< index into Scene::objects
 
   [[nodiscard]] Eigen::Vector3d at(double u, double v) const { return origin + u * u_axis + v * v_axis; }
-  /// Of the polygon, (u, v).
+  /// Bounds of the polygon, (u, v).
   [[nodiscard]] Eigen::AlignedBox2d bounds() const;
-  /// Whether (u, v) lies in the polygon; `slack`: twice the area, m^2, by which an edge may be missed.
+  /// True if (u, v) lies in the polygon; `slack`: twice the area, m^2, by which an edge may be missed.
   [[nodiscard]] bool contains(const Eigen::Vector2d& uv, double slack = 0.0) const;
 };
 
-/// What a face belongs to, for messages.
+/// Object that a face belongs to, for messages.
 struct Object {
   std::string type;  ///< "wall", "desk", ...
   std::string name;  ///< from the file, or type and number
@@ -76,7 +76,7 @@ struct Walker {
   std::string material = "fabric";
   core::ConfigMark mark;
 
-  /// Where the feet are, t seconds after the first frame.
+  /// Position of the feet, t seconds after the first frame.
   [[nodiscard]] Eigen::Vector3d at(double t) const;
 };
 

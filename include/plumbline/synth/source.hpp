@@ -19,7 +19,7 @@ class World;  // scene made ready to render: textures, light maps, BVH
 core::Result<std::shared_ptr<const World>> build_world(const Scene& scene, const SynthOptions& options,
                                                        const core::Executor& executor);
 
-/// What one frame was made from; for tests and instruments.
+/// Ground truth of one frame, for tests and instruments.
 struct ExactFrame {
   geometry::Rigid3 world_from_depth;  ///< pose at the depth stamp
   cv::Mat depth;  ///< CV_32FC1 metres, of the true surfaces at the depth stamp, 0 = nothing hit
@@ -45,7 +45,7 @@ class SynthSource final : public dataset::FrameSource {
   /// Exact pose at any time between first and last stamp (clamped to them).
   [[nodiscard]] geometry::Rigid3 world_from_camera(double stamp) const;
   [[nodiscard]] ExactFrame exact(std::size_t index) const;
-  /// Whether an event blinds the depth sensor in this frame (covered camera, no depth).
+  /// True if an event blinds the depth sensor in this frame (covered camera, no depth).
   [[nodiscard]] bool blind(std::size_t index) const;
   /// Metres of path from the first to the last frame.
   [[nodiscard]] double path_length() const;
@@ -58,8 +58,8 @@ class SynthSource final : public dataset::FrameSource {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether every robot's path is free, without building textures and light. The error names the segment and
-/// the thing.
+/// Checks that every robot's path is free, without building textures and light. The error names the segment
+/// and the object.
 core::Result<void> check_paths(const Scene& scene, const SynthOptions& options);
 
 /// Opens "synth:SCENE?key=value&..."; keys are those of SynthOptions and `robot` (0 .. robots-1).
@@ -69,7 +69,7 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_synth(const std::string
                                                                const core::Executor& executor,
                                                                core::Log& log);
 
-/// Whether an input is such a URL ("synth:...").
+/// True if an input is such a URL ("synth:...").
 bool is_synth_url(const std::string& input);
 
 /// The camera of a sensor at an image size. kinect: TUM fr3's intrinsics; depth_scale 5000; no distortion.

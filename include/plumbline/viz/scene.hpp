@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a picture of a map shows. Plain data, all in one frame (the map's), metres.
+// Contents of a picture of a map. Plain data, all in one frame (the map's), metres.
 #include <Eigen/Core>
 #include <memory>
 #include <string>

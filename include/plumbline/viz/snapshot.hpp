@@ -16,8 +16,8 @@
 
 namespace plumbline::viz {
 
-/// Where the picture is taken from. All but iso and explicit are orthographic; top is a plan, front looks
-/// along the first camera's horizontal viewing direction, iso looks down at 35 degrees.
+/// Viewpoint of a picture. All but iso and explicit are orthographic; top is a plan, front looks along the
+/// first camera's horizontal viewing direction, iso looks down at 35 degrees.
 enum class View { kIso, kTop, kBottom, kFront, kBack, kLeft, kRight, kExplicit };
 
 enum class ColorMode { kRgb, kHeight, kNormal, kRobot, kError, kConfidence, kSigma };

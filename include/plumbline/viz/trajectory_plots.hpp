@@ -31,7 +31,7 @@ std::vector<SvgChart> path_charts(const std::vector<TrajectoryComparison>& compa
 SvgChart error_chart(const std::vector<TrajectoryComparison>& comparisons);
 /// x, y, z over time (even ones) and roll, pitch, yaw over time (odd ones), estimates and truth.
 std::vector<SvgChart> pose_charts(const std::vector<TrajectoryComparison>& comparisons);
-/// Which share of the poses has at most which error.
+/// Share of the poses over the error that they do not exceed.
 SvgChart error_distribution_chart(const std::vector<TrajectoryComparison>& comparisons);
 
 /// Writes path, error, poses and error_distribution (.svg) into `folder` (made if missing). Errors: kUsage

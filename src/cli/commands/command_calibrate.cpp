@@ -74,7 +74,7 @@ class Mapped {
   }
 
  private:
-  /// Whether both files say the same of one camera, whatever they call it.
+  /// True if both files describe the same camera, whatever they call it.
   static bool same(sensor::Camera a, sensor::Camera b) {
     a.name.clear();
     b.name.clear();

@@ -29,7 +29,7 @@ struct TrajectoryRequest {
   OptionFlags flags;
 };
 
-/// What an estimate is called: its result folder or robot, else the file.
+/// Name of an estimate: its result folder or robot, else the file.
 std::string estimate_name(const fs::path& file) {
   if (file.filename() == "trajectory.txt") return display_name(fs::absolute(file).parent_path());
   return file.stem().string();

@@ -30,7 +30,7 @@ struct CloudRequest {
   const CLI::App* command = nullptr;
 };
 
-/// What the user named, else what lies beside cloud and reference.
+/// Pairs of trajectories that the user named, else those beside cloud and reference.
 core::Result<std::vector<evaluate::TrajectoryPair>> read_pairs(const CloudRequest& request,
                                                                const fs::path& cloud) {
   std::vector<evaluate::TrajectoryFiles> files;

@@ -33,7 +33,7 @@ core::Result<cloud::FilterChain> load_chain(const std::string& name, const Sessi
   return cloud::FilterChain::load(*file, *registry);
 }
 
-/// What is wrong with the output is reported before anything is read.
+/// Reports a problem with the output before anything is read.
 core::Result<void> check_output(const fs::path& output, const cloud::FilterChain& chain) {
   const auto extension = output.extension();
   if (extension != ".ply" && extension != ".pcd") {
@@ -72,7 +72,7 @@ core::Result<cloud::CloudPtr> read_inputs(const FilterRequest& request, cloud::C
   return all;
 }
 
-/// Where a chain leaves no point: which filter took the last.
+/// Error that names the filter which removed the last point, if none is left.
 core::Result<void> something_left(const cloud::FilterChain& chain,
                                   const std::vector<cloud::FilterReport>& reports) {
   if (reports.empty() || reports.back().points_out > 0) return {};

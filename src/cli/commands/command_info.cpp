@@ -117,7 +117,7 @@ core::Result<void> describe_map(const maps::MapPlace& place) {
   return place.store.empty() ? core::Result<void>() : describe_store(place.store);
 }
 
-/// Whether the file is a trajectory; clouds of points are text files too.
+/// True if the file is a trajectory; clouds of points are text files too.
 bool is_trajectory(const std::filesystem::path& file) {
   return (file.extension() == ".txt" || file.extension() == ".csv") && dataset::holds_poses(file);
 }

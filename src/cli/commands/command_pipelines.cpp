@@ -16,7 +16,7 @@
 namespace plumbline::cli {
 namespace {
 
-/// What the commands are given; each uses its part.
+/// Options of the commands; each uses its part.
 struct PipelinesRequest {
   std::string name;  ///< of a pipeline or a stage
   std::vector<std::string> overrides;

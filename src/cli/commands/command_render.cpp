@@ -128,7 +128,7 @@ core::Result<void> add_scalars(const cloud::CloudFile& file, const fs::path& inp
   return {};
 }
 
-/// What the name of the output must be, found before anything is drawn.
+/// Checks the name of the output before anything is drawn.
 core::Result<void> check_output(const RenderRequest& request) {
   if (request.turntable == 0) {
     if (request.output.extension() == ".png") return {};

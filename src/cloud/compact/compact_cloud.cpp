@@ -197,7 +197,7 @@ void list(Io& io, double step_m, Cloud& cloud) {
   columns(io, points);
 }
 
-/// Of the sensor, behind everything else; a pose that is none takes no bytes.
+/// Fields of the sensor, behind all others; a missing pose takes no bytes.
 template <typename Io>
 void sensor_pose_fields(Io& io, Cloud& cloud) {
   for (int k = 0; k < 3; ++k) io(cloud.sensor_origin_[k]);

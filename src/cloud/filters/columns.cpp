@@ -56,7 +56,7 @@ bool same_places(const Cloud& before, const Cloud& after) {
   return true;
 }
 
-/// Where each point of `after` is in `before`; empty when one is not there.
+/// Index in `before` of each point of `after`; empty if one is not found.
 std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
   std::vector<std::size_t> found;
   found.reserve(after.size());
@@ -86,7 +86,8 @@ std::vector<std::size_t> find_all(const Cloud& before, const Cloud& after) {
   return found;
 }
 
-/// Of every point of `after` the nearest one of `before`; a point without place takes the first.
+/// Index in `before` of the point nearest to each point of `after`; a point without finite coordinates gets
+/// the first.
 std::vector<std::size_t> nearest(const Cloud& before, const Cloud& after) {
   const auto points = std::make_shared<Cloud>();
   const std::vector<std::size_t> places = finite_indices(before);

@@ -8,8 +8,8 @@
 namespace plumbline::cloud {
 namespace {
 
-/// Which points meet both comparisons. Not ConditionalRemoval's own run: it has no negative, and it moves an
-/// organised cloud's rejected points only.
+/// Indices of the points that meet both comparisons. ConditionalRemoval's own run cannot invert its choice,
+/// and only moves the rejected points of an organised cloud.
 template <typename Compare>
 std::vector<bool> within(const Cloud& input, const std::string& name, double min, double max) {
   pcl::ConditionAnd<Point> both;

@@ -162,7 +162,7 @@ class GridFilter : public Filter {
   }
 
  protected:
-  /// Those of the resampled points when they are not simply some of the input's.
+  /// Columns of the resampled points if they are not a subset of the input's.
   [[nodiscard]] virtual CloudColumns columns(const Cloud& /*points*/, const CloudColumns& /*all*/) const {
     return {};
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What several filters need.
+// Functions shared by several filters.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
@@ -87,7 +87,7 @@ CloudPtr select(const Cloud& input, const Keep& keep) {
   return output;
 }
 
-/// Those points that a filter of PCL's kind (pcl::FilterIndices) keeps; an organised cloud keeps its shape.
+/// Points that a filter of PCL's kind (pcl::FilterIndices) keeps; an organised cloud keeps its shape.
 template <typename PclFilter>
 CloudPtr chosen_by(PclFilter& filter, const CloudConstPtr& input) {
   pcl::Indices kept;  // in the order of the input
@@ -100,7 +100,7 @@ CloudPtr chosen_by(PclFilter& filter, const CloudConstPtr& input) {
   });
 }
 
-/// What one of PCL's filters makes of a cloud.
+/// Result of one of PCL's filters on a cloud.
 template <typename PclFilter>
 CloudPtr filtered_by(PclFilter& filter, const CloudConstPtr& input) {
   filter.setInputCloud(input);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is in PCL's libraries surface and io: these load VTK, so they are a part of their own (core/part.hpp).
-// The rest of PCL is linked as usual.
+// Functions of PCL's libraries surface and io: these load VTK, so they are a part of their own
+// (core/part.hpp). The rest of PCL is linked as usual.
 #include <pcl/PolygonMesh.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -19,7 +19,7 @@ struct PclFunctions {
     return core::layout_of<PclFunctions, Point, Cloud, pcl::PointNormal, pcl::Indices, pcl::PolygonMesh>();
   }
 
-  /// Those that are left are told by `indices`.
+  /// `indices` gets the indices of the points that are left.
   CloudPtr (*moving_least_squares)(const CloudConstPtr& points, double radius, int order,
                                    pcl::Indices& indices);
   pcl::PolygonMesh (*poisson)(const pcl::PointCloud<pcl::PointNormal>::ConstPtr& points, int depth);

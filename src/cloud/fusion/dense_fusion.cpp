@@ -31,12 +31,12 @@ std::size_t cells_within(double megabytes, double bytes_per_side, const DenseFus
       std::max(64.0, megabytes * 1e6 / (kLayers * per_axis * per_axis * bytes_per_side)));
 }
 
-/// Of a tile that is being finished: in the voxel map, as points, and in surfels.
+/// Cells of a tile that is being finished: in the voxel map, as points, and in surfels.
 std::size_t cells_per_tile(const DenseFusionOptions& options) {
   return cells_within(options.tile_mb, 240.0, options);
 }
 
-/// Of the tiles that are filled together, in the voxel maps.
+/// Cells of the tiles that are filled together, in the voxel maps.
 std::size_t cells_at_a_time(const DenseFusionOptions& options) {
   return cells_within(6.0 * options.tile_mb, 110.0, options);
 }
@@ -222,7 +222,7 @@ class Fusion {
     points.resize(kept);
   }
 
-  /// How far poses may be off, carried to what their views saw.
+  /// Carries the covariances of the poses to the points that their views measured.
   void find_pose_noise(const std::vector<std::vector<ColorCell>>& cells) {
     for (std::size_t v = 0; v < cells.size(); ++v) {
       const geometry::Rigid3 camera_from_world = views_.world_from_camera[v].inverse();

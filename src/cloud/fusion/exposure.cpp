@@ -20,7 +20,7 @@ constexpr float kMostLog = 0.693F;
 constexpr int kDark = 12;
 constexpr int kBright = 245;
 
-/// What a view saw of a cell.
+/// Mean colour of one view in a cell.
 struct CellColor {
   std::uint64_t cell = 0;
   std::size_t view = 0;

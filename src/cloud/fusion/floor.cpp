@@ -19,7 +19,7 @@ struct Found {
   std::size_t voxels = 0;
 };
 
-/// Those points that face `up`, one for each voxel.
+/// Points that face `up`, one for each voxel.
 CloudPtr thinned(const Cloud& cloud, const Eigen::Vector3f& up) {
   constexpr float kVoxel_m = 0.05F;
   const float cosine = std::cos(0.25F * static_cast<float>(M_PI));

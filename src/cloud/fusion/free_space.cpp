@@ -22,7 +22,7 @@ constexpr int kPasses = 3;         // the side of a person is 0.3 m deep
 
 enum class Verdict : std::uint8_t { kStays, kDoubtful, kHardlySeen, kGoes };
 
-/// How many views say what about a place.
+/// Counts of the views' evidence about a point.
 class Votes {
  public:
   int& operator[](Evidence evidence) { return of_[static_cast<std::size_t>(evidence)]; }
@@ -59,7 +59,7 @@ NearViews views_near(const Eigen::AlignedBox3d& box, const std::vector<DepthRast
   return views;
 }
 
-/// What the views say about each of the surfels `asked`.
+/// Counts the evidence of the views about each of the surfels `asked`.
 void count(const std::vector<std::uint32_t>& asked, const std::vector<Eigen::Vector3f>& positions,
            const std::vector<NearView>& views, std::vector<Votes>& votes) {
   if (asked.empty()) return;
@@ -79,7 +79,7 @@ Verdict judge(const Votes& v) {
   return free > 0 ? Verdict::kDoubtful : Verdict::kStays;
 }
 
-/// Of every surfel. Depth views are tested only where clouds leave a doubt.
+/// Verdict on every surfel. Depth views are tested only where clouds leave a doubt.
 std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const NearViews& views) {
   std::vector<Votes> votes(positions.size());
   std::vector<std::uint32_t> asked(positions.size());
@@ -97,7 +97,7 @@ std::vector<Verdict> judge(const std::vector<Eigen::Vector3f>& positions, const 
   return verdicts;
 }
 
-/// What goes with what is around it.
+/// Removal of surfels together with their surroundings.
 class Surroundings {
  public:
   Surroundings(const std::vector<Surfel>& surfels, const std::vector<Eigen::Vector3f>& positions,
@@ -106,7 +106,7 @@ class Surroundings {
     for (std::uint32_t s = 0; s < positions.size(); ++s) cells_[pack_cell(cell(s))].push_back(s);
   }
 
-  /// Whether at least half of the points within the radius that are no matter of doubt go.
+  /// True if at least half of the certain points within the radius go.
   [[nodiscard]] bool go(std::uint32_t surfel, const std::vector<Verdict>& verdicts) const {
     std::size_t going = 0;
     std::size_t staying = 0;

@@ -24,9 +24,9 @@ int base_cells(float w, float sigma, float at_2m, int stride, int longest) {
   return std::clamp(static_cast<int>(std::lround(pixels / static_cast<float>(stride))), 2, longest);
 }
 
-/// How far this image's depth may be smoothed, 0 to 1: its noise over that of the sensor model, from bends
-/// of the inverse depth, which is straight on planes. 1 from half the model's noise on; below, details of the
-/// surface soon outweigh it. Exact depth stays as it is.
+/// Strength of smoothing for this depth image, 0 to 1: its noise relative to the sensor model's, measured by
+/// the bending of the inverse depth, which is straight on planes. 1 from half the model's noise on; below,
+/// details of the surface soon outweigh it. Exact depth is not changed.
 float smoothing_share(const cv::Mat& depth, float min_depth, float max_depth) {
   constexpr int kStep = 4;  // px
   constexpr float kMedianOfNormal = 0.6745F;

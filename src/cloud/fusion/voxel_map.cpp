@@ -29,14 +29,14 @@ bool locate(const Eigen::Vector3d& position, double voxel_m, VoxelSample& sample
   return true;
 }
 
-/// Whether a sample lies on the other side of a thin wall.
+/// True if a sample lies on the other side of a thin wall.
 bool opposed(const VoxelSide& sample, const VoxelSide& front) {
   if (!(front.weight > 0.0F)) return false;
   const float along = front.normal.dot(sample.normal);
   return along < 0.0F && along < kOpposed * front.normal.norm() * sample.normal.norm();
 }
 
-/// Who measured most: whoever has more than all others together is found (Boyer and Moore).
+/// Majority vote on who measured most of the samples (Boyer and Moore).
 void vote(const VoxelSide& sample, VoxelSide& side) {
   constexpr std::uint32_t kMost = 0x7FFFFFU;
   if (side.weight == 0.0F) {

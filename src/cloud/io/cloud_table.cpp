@@ -25,7 +25,7 @@ Point blank_point(bool color) {
   return p;
 }
 
-/// Of x, y and z, where `x` stands for x.
+/// Index of the axis of x, y or z, where `x` stands for x.
 int axis_of(Meaning meaning, Meaning x) { return static_cast<int>(meaning) - static_cast<int>(x); }
 
 bool holds(const std::vector<Meaning>& meanings, std::initializer_list<Meaning> wanted) {

@@ -10,7 +10,7 @@
 
 namespace plumbline::cloud {
 
-/// What a column of a file means for a point.
+/// Meaning of a column of a file for a point.
 enum class Meaning {
   kNone,
   kX,

@@ -26,7 +26,7 @@ void check_columns(const Cloud& cloud, const CloudColumns& columns) {
   }
 }
 
-/// As floats, or as doubles with the shift added.
+/// Writes the position as floats, or as doubles with the shift added.
 void put_position(const Point& p, const Eigen::Vector3d& shift, core::OutputFile& out) {
   if (shift.isZero(0.0)) {
     out.put(std::array<float, 3>{p.x, p.y, p.z});
@@ -36,7 +36,7 @@ void put_position(const Point& p, const Eigen::Vector3d& shift, core::OutputFile
   }
 }
 
-/// What is known of point `i` besides.
+/// Writes the additional columns of point `i`.
 void put_columns(const CloudColumns& columns, std::size_t i, core::OutputFile& out) {
   if (!columns.confidence.empty()) out.put(columns.confidence[i]);
   if (!columns.observations.empty()) out.put(columns.observations[i]);

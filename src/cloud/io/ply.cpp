@@ -44,7 +44,7 @@ class Body {
     return true;
   }
 
-  /// Of the list that was read last.
+  /// Items of the last list that was read.
   [[nodiscard]] const std::vector<double>& items() const { return items_; }
   [[nodiscard]] bool ascii() const { return ascii_; }
   [[nodiscard]] bool swap() const { return swap_; }
@@ -74,7 +74,7 @@ class Body {
   std::string problem_;
 };
 
-/// Where one fixed-size scalar of a vertex goes.
+/// Destination of one fixed-size scalar of a vertex.
 struct Sink {
   ScalarType type = ScalarType::kFloat32;
   std::size_t offset = 0;

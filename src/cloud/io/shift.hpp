@@ -12,11 +12,11 @@
 
 namespace plumbline::cloud {
 
-/// Whether values of this type can hold more digits than a 32-bit float.
+/// True if values of this type can hold more digits than a 32-bit float.
 bool exceeds_float(ScalarType type);
 
-/// What to take off the values of one axis so that floats hold the rest: whole units near their median; 0
-/// where it is below 1000.
+/// Offset to subtract from the values of one axis so that floats hold the rest: whole units near their
+/// median; 0 where it is below 1000.
 double axis_shift(const std::vector<double>& values);
 
 /// Stands for x, y or z: 0, 1, 2; none for other columns.

@@ -53,7 +53,7 @@ double spread_of(const std::vector<Match>& matches, const Eigen::Vector3d& middl
   return std::sqrt(sum / static_cast<double>(matches.size()));
 }
 
-/// What most matches agree on; at least what their noise explains.
+/// Scale of the residuals of most matches; at least their noise.
 double scale_of(const std::vector<Match>& matches) {
   std::vector<double> errors;
   for (const Match& m : matches) errors.push_back(std::abs(m.distance));

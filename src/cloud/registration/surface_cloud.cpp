@@ -22,7 +22,7 @@ Part part_of(const SurfacePoint& p, float block_m) {
   return {facing(p.getNormalVector3fMap()), block(p.x), block(p.y), block(p.z)};
 }
 
-/// Of a block whose points face one way.
+/// Appends the filtered points of a block that face one way.
 void append_filtered(const SurfaceCloud::Ptr& part, float voxel_m, bool independent, SurfaceCloud& result) {
   pcl::VoxelGrid<SurfacePoint> grid;
   grid.setInputCloud(part);

@@ -71,7 +71,7 @@ class HubMeetings {
   std::map<std::string, Robot> robots_;
   std::vector<std::string> names_;  ///< by number
   std::map<std::string, SharedFrame> frames_;
-  /// What a job leaves for report().
+  /// Results of a job, for report().
   struct Work {
     std::int64_t entry = 0;  ///< number of the last one
     std::vector<std::string> lines;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What surfaces are made of: how they look and how a depth sensor's infrared light likes them.
+// Materials of surfaces: their look, and how they return a depth sensor's infrared light.
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>

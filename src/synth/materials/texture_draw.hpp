@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the drawing of textures is made of. Private to the module.
+// Tools for drawing textures. Private to the module.
 #include <cstdint>
 #include <opencv2/core.hpp>
 

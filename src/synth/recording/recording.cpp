@@ -69,7 +69,7 @@ Result<void> write_lists(const SynthSource& source, std::size_t frames, const fs
   return dataset::write_trajectory(folder / "groundtruth.txt", truth);
 }
 
-/// What one robot's recording takes along.
+/// State of one robot's recording.
 struct Job {
   const SynthSource& source;
   fs::path folder;

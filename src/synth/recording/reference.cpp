@@ -18,8 +18,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Of the angle between ray and surface: 20 degrees. The shipped filters keep points down to 15 degrees; what
-/// was never seen better than that is not held against a map.
+/// Sine of the smallest angle between ray and surface: 20 degrees. The shipped filters keep points down to 15
+/// degrees; surface never seen at a larger angle than this is not required of a map.
 constexpr double kLeastSine = 0.342;
 
 /// Whether nothing but emptiness lies before a spot: the outside of the world.

@@ -37,7 +37,7 @@ sensor::Camera make_camera(Sensor sensor, int width, int height, double fps) {
   return camera;
 }
 
-/// Of one frame, seconds.
+/// Time stamps of one frame, seconds.
 struct Stamps {
   std::int64_t number;  ///< of the frame before any were dropped; the noise's counter
   double color, depth;

@@ -120,7 +120,7 @@ void cast_shadow(cv::Mat1f& depth, float focal_baseline) {
 
 constexpr float kLeastLight = 0.075F;  // less of the projector's light is no measurement
 
-/// How much light of the projector comes back: 1 = plenty.
+/// Share of the projector's light that comes back: 1 = plenty.
 float light_back(const Material& m, float cosine, float z) {
   if (m.gloss > 0.25F && cosine > 0.997F) return 0.0F;  // glint straight back
   return m.infrared * cosine * (1.0F - m.gloss * (1.0F - cosine)) * 3.0F / (0.6F + 0.4F * z * z);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a depth sensor and a colour chip make of exact pictures. Every disturbance is a pure function of seed,
+// Disturbances that a depth sensor and a colour chip add to exact pictures. Each is a pure function of seed,
 // robot, frame index and pixel.
 #include <cstdint>
 #include <opencv2/core.hpp>

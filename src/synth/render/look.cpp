@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Who is in front: the face behind every pixel.
+// Visibility: the face behind every pixel.
 #include <algorithm>
 #include <cmath>
 

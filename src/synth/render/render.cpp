@@ -50,7 +50,7 @@ PLUMBLINE_INLINE Vec4 bilinear(const Texture2d::Level& level, float x, float y) 
   return t + sy * (l - t);
 }
 
-/// Where on the pyramid to read, and in how many places along the longer axis of the pixel's footprint.
+/// Level of the pyramid to read, and number of samples along the longer axis of the pixel's footprint.
 struct Footprint {
   const Texture2d::Level* fine;
   const Texture2d::Level* coarse;

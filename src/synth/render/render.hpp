@@ -12,8 +12,8 @@
 
 namespace plumbline::synth {
 
-/// How one face appears in one picture. With p = (x, y, 1) in pixels: 1/z = c.p, and texture coordinates
-/// (level 0 texels) are (a.p) z and (b.p) z: flat faces need no rays but for who is in front.
+/// One face as it appears in one picture. With p = (x, y, 1) in pixels: 1/z = c.p, and texture coordinates
+/// (level 0 texels) are (a.p) z and (b.p) z: flat faces need no rays but for visibility.
 struct FaceView {
   float a[3], b[3], c[3];
 };
@@ -63,7 +63,7 @@ View look(const World& world, const sensor::Pinhole& camera, const geometry::Rig
 /// Metres along z of what `ids` names; 0 = nothing.
 cv::Mat1f exact_depth(const View& view);
 
-/// What the lens and the exposure do to light.
+/// Effects of lens and exposure on light.
 struct Exposure {
   float gain = 1.0F;      ///< multiplies the square root of radiance
   float vignette = 0.0F;  ///< share of it lost in the corners

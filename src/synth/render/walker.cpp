@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Those who walk through a world while it is filmed.
+// Walkers that move through a world while it is filmed.
 #include <algorithm>
 #include <cmath>
 

@@ -80,7 +80,7 @@ class World {
   /// Distance to the nearest thing or `far`.
   [[nodiscard]] double free_distance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                      double far) const;
-  /// How many rays are cast together.
+  /// Number of rays that are cast together.
   static constexpr int kPacket = 16;
   /// kPacket rays from one origin; faces[k] = -1 for nothing. dx, dy, dz: directions.
   void cast_packet(const float origin[3], const float* dx, const float* dy, const float* dz,

@@ -17,7 +17,7 @@ geometry::Rigid3 upright(const Eigen::Vector3d& origin, double yaw_rad);
 geometry::Rigid3 placed(const geometry::Rigid3& frame, const Eigen::Vector3d& at,
                         const Eigen::AngleAxisd& turn);
 
-/// Which texture a face carries.
+/// Texture of a face.
 struct Skin {
   std::string material;
   bool stretched = false;  ///< one copy over the whole face instead of tiling

@@ -62,7 +62,7 @@ class ObjectReader {
     return *this;
   }
 
-  /// Whether everything was well; problems are reported otherwise.
+  /// Reads the values. False: there was a problem, which is reported.
   bool read(const std::vector<std::string>& reserved = {}) {
     if (node_.kind != ConfigNode::Kind::kMap) {
       problem(node_.mark, "needs keys and values in braces or below it");
@@ -91,7 +91,7 @@ class ObjectReader {
 
 Vector3d to3(const std::vector<double>& v) { return {v[0], v[1], v.size() > 2 ? v[2] : 0.0}; }
 
-/// What reading an object needs.
+/// Arguments of the functions that read an object.
 struct Context {
   const ConfigNode& node;
   std::string path;
