@@ -14,10 +14,10 @@ struct TrajectoryFiles {
   std::filesystem::path truth;
 };
 
-/// Pairs by robot: <cloud folder>/trajectory.txt with <reference folder>/groundtruth.txt or, if just one
-/// subfolder has one, with that; <cloud folder>/robots/<name>/trajectory.txt with <reference
-/// folder>/<name>/groundtruth.txt. Empty when nothing fits together without a guess. `cloud` and `reference`
-/// are files; sorted by robot.
+/// Pairs by robot, of files beside `cloud` and `reference`: `trajectory.txt` beside the cloud with
+/// `groundtruth.txt` beside the reference or, if just one subfolder there has one, with that;
+/// `robots/NAME/trajectory.txt` with `NAME/groundtruth.txt`. Empty if nothing fits together without a guess.
+/// Sorted by robot.
 std::vector<TrajectoryFiles> find_trajectories(const std::filesystem::path& cloud,
                                                const std::filesystem::path& reference);
 

@@ -57,8 +57,8 @@ struct SvgChart {
   std::vector<SvgDots> dots;
 };
 
-/// <figure> with legend and SVG, of ASCII and escaped labels. Long curves are thinned to what can be seen,
-/// peaks are kept. Needs no identifiers, so any number of charts fit on a page.
+/// An HTML figure with legend and SVG, of ASCII and escaped labels. Long curves are thinned to the visible
+/// resolution, and peaks are kept. It has no identifiers, so a page can hold any number of charts.
 std::string svg_chart(const SvgChart& chart);
 
 /// CSS rules of all charts of a page.

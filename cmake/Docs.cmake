@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# cmake --build DIR --target docs: the reference of the public headers, in DIR/docs/html. A warning is an error.
+find_package(Doxygen QUIET)
+if(NOT DOXYGEN_FOUND)
+  add_custom_target(docs COMMAND ${CMAKE_COMMAND} -E echo "Doxygen is missing; scripts/install-deps installs it"
+                         COMMAND ${CMAKE_COMMAND} -E false)
+  return()
+endif()
+set(DOXYGEN_PROJECT_BRIEF "${PROJECT_DESCRIPTION}")
+set(DOXYGEN_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/docs)
+set(DOXYGEN_STRIP_FROM_PATH ${PROJECT_SOURCE_DIR}/include)
+set(DOXYGEN_STRIP_FROM_INC_PATH ${PROJECT_SOURCE_DIR}/include)
+set(DOXYGEN_USE_MDFILE_AS_MAINPAGE ${PROJECT_SOURCE_DIR}/cmake/library.md)
+set(DOXYGEN_EXTRACT_ALL YES)
+set(DOXYGEN_JAVADOC_AUTOBRIEF YES)
+set(DOXYGEN_AUTOLINK_SUPPORT NO) # words such as "Map" are not meant as links
+set(DOXYGEN_EXCLUDE_SYMBOLS "std::*")
+set(DOXYGEN_HAVE_DOT NO)
+set(DOXYGEN_QUIET YES)
+set(DOXYGEN_WARN_AS_ERROR FAIL_ON_WARNINGS)
+doxygen_add_docs(docs ${PROJECT_SOURCE_DIR}/include/plumbline ${PROJECT_SOURCE_DIR}/cmake/library.md
+                 COMMENT "Reference of the public headers")
