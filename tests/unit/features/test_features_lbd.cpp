@@ -83,7 +83,7 @@ TEST(Lbd, TakesDegenerateInput) {
 }
 
 TEST(Lbd, FindsTheSameEdgesInMovedPictures) {
-  // Floors a little under what is measured; the table of lbd_recall sets them beside OpenCV's.
+  // Floors slightly below the measured values.
   world::RecallMeter all;
   for (const world::ViewPair& pair : world::view_pairs()) {
     const auto [a, b] = world::make_views(pair, 1);
