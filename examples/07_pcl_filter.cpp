@@ -26,6 +26,7 @@ using Points = pcl::PointCloud<pcl::PointNormal>;
 /// 320 x 240 pixels, seen from the origin along z; metres, y points down.
 Points::Ptr picture() {
   auto points = std::make_shared<Points>(320, 240);
+
   for (int v = 0; v < 240; ++v) {
     for (int u = 0; u < 320; ++u) {
       const Eigen::Vector3f ray(static_cast<float>(u - 160) / 260.0F, static_cast<float>(v - 120) / 260.0F,

@@ -263,17 +263,17 @@ void warn_when_apart(const CloudOptions& options, CloudReport& report) {
 void CloudOptions::declare(core::OptionTable& table) {
   table.choice(
       "align", align, {{"none", CloudAlignment::kNone}, {"se3", CloudAlignment::kSe3}},
-      "Lay the cloud on the reference first: not at all, or from the trajectories if given, then by ICP");
+      "Alignment of the cloud with the reference: none, or from the trajectories if given, then by ICP");
   table.choice(
       "distance", distance, {{"surface", SampleDistance::kSurface}, {"point", SampleDistance::kPoint}},
       "Distance to a sampled surface: to the plane through the nearest sample, or to the sample itself");
   table.boolean(
       "visible_only", visible_only,
-      "Completeness counts only what cameras could see, if the reference says so (property visible)");
-  table.number("mesh_spacing", mesh_spacing_m, {1e-4, 1.0}, "m", "A reference mesh is sampled this densely");
+      "Completeness counts only samples that cameras could see, if the reference has the property visible");
+  table.number("mesh_spacing", mesh_spacing_m, {1e-4, 1.0}, "m", "Spacing of samples on a reference mesh");
   table.number("icp_max_distance", icp_max_distance_m, {1e-3, 100.0}, "m",
-               "Farthest pairs that ICP starts with");
-  table.number("icp_trim", icp_trim, {0.1, 1.0}, "", "Share of the pairs that ICP keeps, the nearest ones");
+               "Largest distance of pairs in the first step of ICP");
+  table.number("icp_trim", icp_trim, {0.1, 1.0}, "", "Share of the nearest pairs that ICP keeps");
   wall.declare(table);
   planes.declare(table);
 }

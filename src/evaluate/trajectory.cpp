@@ -293,9 +293,9 @@ void TrajectoryOptions::declare(core::OptionTable& table) {
       {{"none", TrajectoryAlignment::kNone},
        {"se3", TrajectoryAlignment::kSe3},
        {"start", TrajectoryAlignment::kStart}},
-      "How the estimate is laid on the truth: not at all, least squares over all positions, first pose");
+      "Alignment of the estimate with the truth: none, least squares over all positions, or first pose");
   table.number("max_dt", max_dt_s, {1e-4, 10.0}, "s",
-               "Truth is interpolated; gaps over twice this are not bridged");
+               "The truth is interpolated, but not over gaps longer than twice this");
   table.integer("rpe_frames", rpe_frames, {1, 100000}, "",
                 "Frames between the two poses of a relative error");
   table.number("rpe_seconds", rpe_seconds, {1e-3, 1e5}, "s",

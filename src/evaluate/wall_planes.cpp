@@ -110,8 +110,9 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
 }  // namespace
 
 void WallPlanesOptions::declare(core::OptionTable& table) {
-  table.integer("wall_planes", planes, {0, 100}, "", "So many of the largest planes are measured one by one");
-  table.number("wall_slab", slab_m, {0.005, 0.5}, "m", "What lies within this of a plane belongs to it");
+  table.integer("wall_planes", planes, {0, 100}, "",
+                "Number of the largest planes that are measured one by one");
+  table.number("wall_slab", slab_m, {0.005, 0.5}, "m", "Largest distance of a plane's points from it");
 }
 
 std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<WallPatch> patches,

@@ -262,10 +262,12 @@ class PatchMeasure {
 
 void WallThicknessOptions::declare(core::OptionTable& table) {
   table.number("wall_patch", patch_m, {0.05, 5.0}, "m",
-               "Edge of the planar patches that wall thickness is taken on");
-  table.number("wall_cell", cell_m, {0.005, 1.0}, "m", "Edge of the cells of a patch");
-  table.number("wall_max_spacing", max_spacing_m, {0.005, 1.0}, "m", "Layers further apart are two walls");
-  table.number("wall_flatness", flatness_m, {0.001, 0.5}, "m", "A patch's main layer is this flat");
+               "Edge length of the planar patches on which wall thickness is measured");
+  table.number("wall_cell", cell_m, {0.005, 1.0}, "m", "Edge length of the cells of a patch");
+  table.number("wall_max_spacing", max_spacing_m, {0.005, 1.0}, "m",
+               "Largest distance between layers of one wall");
+  table.number("wall_flatness", flatness_m, {0.001, 0.5}, "m",
+               "Largest deviation of a patch's main layer from a plane");
 }
 
 std::vector<WallPatch> wall_patches(const SurfaceSamples& cloud, double spacing_m,

@@ -187,8 +187,8 @@ CornerDepth corner_depth(const cv::Mat& depth, float x, float y) {
 }
 
 void FeatureOptions::declare(core::OptionTable& table) {
-  table.boolean("points", points, "ORB points: extract, track, and look for a lost place by them");
-  table.boolean("lines", lines, "Lines: extract and track");
+  table.boolean("points", points, "Extract ORB points, track them, and relocalise with them");
+  table.boolean("lines", lines, "Extract and track lines");
   table.boolean("photometric", photometric, "Align grey values with keyframes directly");
   orb.declare(table);
   line.declare(table);

@@ -238,8 +238,8 @@ double endpoint_sigma(const Eigen::Vector3d& end, const EndpointNoise& noise) {
 }
 
 void LineDepthOptions::declare(core::OptionTable& table) {
-  table.integer("line.depth_samples", samples, {8, 400}, "", "Depth samples along a line, at most");
-  table.number("line.max_depth", max_depth_m, {0.5, 100.0}, "m", "Depth beyond this does not make 3D lines");
+  table.integer("line.depth_samples", samples, {8, 400}, "", "Largest number of depth samples along a line");
+  table.number("line.max_depth", max_depth_m, {0.5, 100.0}, "m", "Largest depth of 3D lines");
 }
 
 std::optional<Line3> fit_line_depth(const LineSegment& segment, const cv::Mat& depth_m,

@@ -189,11 +189,10 @@ void OrbOptions::declare(core::OptionTable& table) {
   table.integer("orb.levels", levels, {1, 12}, "", "Pyramid levels");
   table.integer("orb.fast_threshold", fast_threshold, {1, 200}, "", "FAST threshold, grey values");
   table.integer("orb.fast_threshold_min", fast_threshold_min, {1, 200}, "",
-                "FAST threshold where a cell of the image has no corner otherwise");
-  table.number(
-      "orb.min_corner", min_corner, {0.0, 1.0}, "",
-      "Corners whose gradients across the main direction are weaker, squared, than this share of those "
-      "along it lie on an edge and are left out; 0: none are");
+                "FAST threshold in cells of the image that have no corner otherwise");
+  table.number("orb.min_corner", min_corner, {0.0, 1.0}, "",
+               "Drop corners on edges: those whose squared gradient across the main direction is below this "
+               "share of that along it; 0: none");
   table.boolean("orb.spread", spread, "Points evenly over the image; off: the strongest, wherever they are");
 }
 

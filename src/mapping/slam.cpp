@@ -18,8 +18,8 @@ void SlamOptions::declare(core::OptionTable& table) {
   keyframe.declare(table);
   mapper.declare(table);
   table.integer("bundle.lag", bundle_lag, {0, 1000}, "",
-                "Frames after which an adjusted bundle is put back into the map; the tracker goes on "
-                "meanwhile. 0: it waits on the spot");
+                "Number of frames after which an adjusted bundle is put back into the map, while the tracker "
+                "continues; 0: the tracker waits");
   loops.declare(table);
   table.boolean(
       "components", components,

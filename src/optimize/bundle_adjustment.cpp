@@ -174,7 +174,8 @@ BundleState state_of(const BundleProblem& problem) {
 }
 
 void BundleOptions::declare(core::OptionTable& table) {
-  table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "", "Iterations of each round at most");
+  table.integer("bundle.max_iterations", max_iterations, {1, 1000}, "",
+                "Largest number of iterations in each round");
   table.integer("bundle.rounds", rounds, {1, 10}, "", "Solves; between them outliers are put aside");
 }
 

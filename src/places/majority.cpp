@@ -122,6 +122,7 @@ Clusters k_majority(const std::vector<Descriptor256>& descriptors, int k, int it
     for (std::size_t i = 0; i < descriptors.size(); ++i) {
       counters[static_cast<std::size_t>(clusters.member_of[i])].add(descriptors[i]);
     }
+
     const std::vector<Descriptor256> before = clusters.centres;
     for (std::size_t c = 0; c < counters.size(); ++c) clusters.centres[c] = counters[c].majority();
     drop_idle(clusters.centres, counters);

@@ -19,7 +19,7 @@ bool meet(const std::vector<KeyframeId>& a, const std::vector<KeyframeId>& b) {
 
 void RecogniserOptions::declare(core::OptionTable& table) {
   table.number("places.min_score", min_score, {0.0, 1.0}, "",
-               "Score of a candidate over that of the keyframe before, at least");
+               "Smallest score of a candidate relative to that of the previous keyframe");
   table.number("places.min_absolute", min_absolute, {0.0, 1.0}, "", "Score of a candidate, at least");
   table.integer("places.consistent", consistent, {1, 100}, "",
                 "Keyframes in a row that must see the same surroundings");

@@ -20,8 +20,9 @@ std::size_t index_of(Word word) { return static_cast<std::size_t>(word); }
 }  // namespace
 
 void VocabularyOptions::declare(core::OptionTable& table) {
-  table.integer("vocabulary.branching", branching, {2, kMaxBranching}, "", "Children of a node at most");
-  table.integer("vocabulary.levels", levels, {1, 12}, "", "Levels of the tree at most");
+  table.integer("vocabulary.branching", branching, {2, kMaxBranching}, "",
+                "Largest number of children of a node");
+  table.integer("vocabulary.levels", levels, {1, 12}, "", "Largest number of levels of the tree");
   table.integer("vocabulary.split", split, {10, 100000}, "",
                 "A word with more features than this is divided");
 }

@@ -85,7 +85,7 @@ std::vector<WorldSurface> collect_surface(const maps::Map& map, const std::vecto
 void LocalMapOptions::declare(core::OptionTable& table) {
   table.integer("local.keyframes", keyframes, {1, 200}, "", "Keyframes whose landmarks are tracked");
   table.integer("local.surface_keyframes", surface_keyframes, {1, 50}, "",
-                "Keyframes whose surfaces are aligned to");
+                "Keyframes to whose surfaces depth is aligned");
   table.number("local.voxel", voxel_m, {0.001, 1.0}, "m", "Surface samples closer than this are fused");
   table.number("local.overlap_angle", overlap_angle_rad, {0.05, 3.0}, "rad",
                "Keyframes whose optical axes differ less may overlap");

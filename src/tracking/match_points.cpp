@@ -90,14 +90,14 @@ BestTwo best_two(const std::vector<features::PointFeature>& corners, const std::
 
 void AssociationOptions::declare(core::OptionTable& table) {
   table.integer("match.max_hamming", max_hamming, {1, 256}, "bit",
-                "Point descriptors may differ by so many bits");
-  table.number("match.ratio", ratio, {0.1, 1.0}, "", "Best distance over second best, at most");
+                "Largest difference of matched point descriptors");
+  table.number("match.ratio", ratio, {0.1, 1.0}, "", "Largest ratio of the best distance to the second best");
   table.boolean("match.align", align,
-                "Matched corners are aligned with what their landmark looked like, to a tenth of a pixel");
+                "Align matched corners with the appearance of their landmark, to a tenth of a pixel");
   table.number("match.aligned_sigma", aligned_sigma, {0.01, 1.0}, "",
-               "Standard deviation of corners that were aligned, over that of others");
+               "Standard deviation of aligned corners relative to others");
   table.integer("match.max_line_hamming", max_line_hamming, {1, 256}, "bit",
-                "Line descriptors may differ by so many bits");
+                "Largest difference of matched line descriptors");
   table.number("match.min_line_ratio", min_line_ratio, {0.0, 1.0}, "",
                "Shorter over longer of a predicted and a measured line, at least");
 }

@@ -174,8 +174,8 @@ void take_evenly(const std::vector<SurfaceCandidate>& all, const std::vector<std
 void SurfaceSamplerOptions::declare(core::OptionTable& table) {
   table.integer("surface.samples", samples, {100, 20000}, "",
                 "Surface samples kept of a keyframe's depth image");
-  table.number("surface.min_depth", min_depth_m, {0.0, 10.0}, "m", "Nearest depth that is aligned to");
-  table.number("surface.max_depth", max_depth_m, {0.1, 50.0}, "m", "Farthest depth that is aligned to");
+  table.number("surface.min_depth", min_depth_m, {0.0, 10.0}, "m", "Smallest depth that is aligned");
+  table.number("surface.max_depth", max_depth_m, {0.1, 50.0}, "m", "Largest depth that is aligned");
   table.number("surface.max_incidence", max_incidence_rad, {0.1, 1.57}, "rad",
                "Largest angle between surface normal and viewing ray");
 }

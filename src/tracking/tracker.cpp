@@ -35,18 +35,18 @@ const char* to_string(TrackState state) {
 void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
   table.boolean("align_stamps", align_stamps,
-                "Bring colour and depth stamped apart together with the motion model");
+                "Synchronise colour and depth with different stamps by the motion model");
   table.boolean("thumbnails", thumbnails, "Small images tell where the camera may be");
   table.boolean("motion_prior", motion_prior, "The motion model holds what measurements leave open");
   table.boolean(
       "pnp_start", pnp_start,
       "Every frame begins with PnP over descriptors, where these are enough, not with the motion model");
-  table.number(
-      "readout", readout_s, {0.0, 0.1}, "s",
-      "Rolling shutter: time from the first to the last row of an image; 0: as the camera's file says");
-  table.integer("min_inliers", min_inliers, {3, 1000}, "", "Features that a pose must explain to be trusted");
+  table.number("readout", readout_s, {0.0, 0.1}, "s",
+               "Rolling shutter: time from the first to the last row of an image; 0: from the camera file");
+  table.integer("min_inliers", min_inliers, {3, 1000}, "",
+                "Smallest number of features that agree with a trusted pose");
   table.integer("min_surface", min_surface, {10, 100000}, "",
-                "Depth samples that a pose without enough features must explain");
+                "Smallest number of depth samples that agree with a pose without enough features");
   association.declare(table);
   local_map.declare(table);
   solver.declare(table);

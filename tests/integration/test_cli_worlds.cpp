@@ -126,7 +126,8 @@ TEST_F(Worlds, RecordingOfTwoRobotsIsWhole) {
 
 TEST_F(Worlds, WrongScenesAreRefused) {
   expect_refused("synth offcie -o x", 2, {"'offcie'", "did you mean office?"});
-  expect_refused("synth none.yaml -o x", 2, {"scene 'none.yaml': neither a file nor one of", "allowed: corridor"});
+  expect_refused("synth none.yaml -o x", 2,
+                 {"scene 'none.yaml': neither a file nor one of", "allowed: corridor"});
   expect_refused("map 'synth:rom?frames=5' -o x", 2, {"'rom'", "did you mean room?"});
   expect_refused("map 'synth:room?frmes=5' -o x", 2, {"frmes", "did you mean frames?"});
   write_scene("key.yaml", "from: [0, 3], to: [4, 3], hieght: 2.6", "[[1, 1], [3, 1]]");

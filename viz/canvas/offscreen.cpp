@@ -74,7 +74,6 @@ core::Result<std::unique_ptr<OffscreenWindow>> OffscreenWindow::open(int width_p
     return core::failure(core::ErrorKind::kInternal, "VTK cannot use the OpenGL context of OSMesa");
   }
   return result;
-
 }
 
 OffscreenWindow::~OffscreenWindow() {

@@ -74,6 +74,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
        {"configuration", "Configuration", configuration_html(*data)},
        {"files", "Files", files_html(*data, file)}},
       fmt::format("Written by plumbline {} from the result folder {}.", core::version(), data->name));
+
   if (auto written = core::write_file(file, page); !written)
     return tl::unexpected<core::Error>(written.error());
 

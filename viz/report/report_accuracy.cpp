@@ -138,9 +138,11 @@ std::string saved_html(const ReportData& data) {
   }
 
   std::sort(names.begin(), names.end());
+
   HtmlTable paths(
       "evaluation of a path|>ATE rmse (mm)|>median (mm)|>max (mm)|>orientation rmse (deg)"
       "|>RPE per frame (mm)|>RPE per second (mm)|>tracked (%)");
+
   HtmlTable clouds(
       "evaluation of a cloud|>accuracy median (mm)|>rmse (mm)|>completeness median (mm)|>rmse (mm)"
       "|>F at 10 mm|>walls' thickness, rms (mm)");

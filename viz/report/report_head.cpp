@@ -29,7 +29,8 @@ std::string verdict_html(const ReportData& data) {
   if (!flag_at(s, "/trustworthy")) {
     const std::string reason = text_at(s, "/reason");
     out += banner("bad", "Not trustworthy (exit code 4)",
-                  reason.empty() ? "The run told no reason." : "Reason: " + reason + ".");
+                  reason.empty() ? "The run gave no reason." : "Reason: " + reason + ".");
+
   } else if (without > 0.0) {
     out += banner(
         "warn", "Trustworthy, with gaps (exit code 0)",
@@ -37,7 +38,7 @@ std::string verdict_html(const ReportData& data) {
                     count_text(number_at(s, "/frames/read") + number_at(s, "/frames/unreadable")),
                     count_at(s, "/frames/longest_loss")));
   } else {
-    out += banner("good", "Trustworthy (exit code 0)", "Nothing the run found speaks against this result.");
+    out += banner("good", "Trustworthy (exit code 0)", "The run found no reason to doubt this result.");
   }
 
   if (flag_at(s, "/stopped")) {

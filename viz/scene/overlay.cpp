@@ -34,6 +34,7 @@ void cased_line(Painter& painter, const std::vector<Eigen::Vector2d>& line, cons
 
 void draw_path(Painter& painter, const Projection& projection, const CameraPath& path) {
   std::vector<std::vector<Eigen::Vector2d>> pieces(1);
+
   for (const auto& pose : path.trajectory) {
     const Eigen::Vector3d& p = pose.world_from_camera.translation;
     if (in_front(projection, p)) {

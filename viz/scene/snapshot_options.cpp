@@ -34,13 +34,14 @@ std::string view_name(View view) { return name_of(views(), view); }
 std::string color_mode_name(ColorMode mode) { return name_of(color_modes(), mode); }
 
 void SnapshotOptions::declare(core::OptionTable& table) {
-  table.choice("view", view, views(), "Where the picture is taken from");
-  table.choice("color", color, color_modes(), "What the points' colours mean");
+  table.choice("view", view, views(), "Viewpoint");
+  table.choice("color", color, color_modes(), "Meaning of the points' colours");
   table.integer("width", width_px, {64, 8192}, "px", "Picture width");
   table.integer("height", height_px, {64, 8192}, "px", "Picture height");
-  table.number("point_size", point_size_px, {0.0, 50.0}, "px", "Point size; 0 = so that surfaces close");
-  table.boolean("cull_back_faces", cull_back_faces, "Leave out points that face away, which opens rooms");
-  table.boolean("shading", shading, "Shade mildly by normal, so that structure shows on white walls");
+  table.number("point_size", point_size_px, {0.0, 50.0}, "px",
+               "Point size; 0: large enough to close surfaces");
+  table.boolean("cull_back_faces", cull_back_faces, "Omit points that face away, to look into rooms");
+  table.boolean("shading", shading, "Shade slightly by normal, to show structure on white walls");
   table.boolean("annotations", annotations, "Title, legend, scale bar, axes and colour bar");
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What filters of ours that choose points share. They are filters of PCL's kind, for any program that uses
+// Base of our filters that choose points. They are filters of PCL's kind, for any program that uses
 // PCL: setInputCloud, setIndices, filter(indices), filter(cloud), setNegative, setKeepOrganized and
 // getRemovedIndices do what they do with pcl::PassThrough. With setKeepOrganized(true) construct them with
 // `true`, as PCL's.

@@ -83,7 +83,7 @@ class FilterRegistry {
   std::vector<FilterInfo> filters_;
 };
 
-/// All filters of this library.
+/// List all filters of this library.
 FilterRegistry builtin_filters();
 
 /// The reference page of a registry's filters as Markdown (docs/reference/filters.md).

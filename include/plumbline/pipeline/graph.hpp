@@ -46,8 +46,7 @@ struct Node {
 struct Graph {
   std::filesystem::path file;  ///< that it was read from
   std::string description;
-  std::vector<Node> nodes;            ///< each after all it reads from; otherwise in file order, taps last
-  std::vector<std::string> warnings;  ///< to be told: options under names of earlier versions
+  std::vector<Node> nodes;  ///< each after all it reads from; otherwise in file order, taps last
 
   [[nodiscard]] const Node& source() const;
   [[nodiscard]] std::size_t stage_count() const;  ///< taps do not count

@@ -137,12 +137,11 @@ void add_trajectory(CLI::App& group, Session& session) {
                   [&session, request] { return evaluate_paths(*request, session.console()); });
 
   command
-      ->add_option(
-          "EST... GT", request->files,
-          "One or several estimates (TUM, EuRoC or KITTI format, or result folders), and last the true "
-          "poses (the same formats, or a recording with groundtruth.txt)")
+      ->add_option("EST... GT", request->files,
+                   "One or more estimates (TUM, EuRoC or KITTI format, or result folders), then the true "
+                   "poses (the same formats, or a recording with groundtruth.txt)")
       ->required()
-      ->expected(2, 100);
+      ->expected(2, CLI::detail::expected_max_vector_size);
 
   command->add_option("--frames", request->frames, "The recording's rgb.txt, for the share of frames tracked")
       ->type_name("LIST");

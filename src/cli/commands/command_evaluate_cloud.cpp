@@ -127,17 +127,16 @@ void add_evaluate_cloud(CLI::App& group, Session& session) {
   CLI::App* command =
       add_command(group, session, "cloud", "Accuracy, completeness, wall thickness of a cloud",
                   [&session, request] { return evaluate_surfaces(*request, session); });
-  command->add_option("CLOUD", request->cloud, "A PLY file, or a result folder")->required();
-  command->add_option(
-      "REFERENCE", request->reference,
-      "The true surface (PLY, mesh or samples); without it only what the cloud tells of itself");
+  command->add_option("CLOUD", request->cloud, "PLY file or result folder")->required();
+  command->add_option("REFERENCE", request->reference,
+                      "True surface (PLY, mesh or samples); without it only measures of the cloud itself");
 
   command
       ->add_option("--trajectory", request->trajectories,
-                   "Estimated path to start the alignment from; --align is se3 then, if it is not given")
+                   "Estimated path to start the alignment from; sets --align to se3 unless it is given")
       ->type_name("EST")
       ->allow_extra_args(false);
-  command->add_option("--truth", request->truths, "Its truth, in the reference's frame")
+  command->add_option("--truth", request->truths, "True path, in the reference's frame")
       ->type_name("GT")
       ->allow_extra_args(false);
 

@@ -202,10 +202,11 @@ void add_export(CLI::App& app, Session& session) {
       ->add_option("--keyframes", request->keyframes,
                    "Write the cloud of every keyframe as DIR/<number>.ply, from map.db")
       ->type_name("DIR");
-  command
-      ->add_option("--voxel", request->voxel, "Lay the cloud down anew from map.db, with voxels of this size")
+  command->add_option("--voxel", request->voxel, "Fuse the cloud again from map.db, with voxels of this size")
       ->type_name("LENGTH");
-  command->add_option("--robot", request->robot, "Whose map, of an interrupted run of several robots")
+  command
+      ->add_option("--robot", request->robot,
+                   "Robot whose map to use, for an interrupted run of several robots")
       ->type_name("NAME");
   CLI::Option* what = command->add_option("--what", request->what, "What to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));

@@ -166,13 +166,13 @@ void add_filter(CLI::App& app, Session& session) {
       ->expected(2, -1);
   add_plugin_option(*command, session);
 
-  CLI::App* group = add_group(app, "filters", "What filters there are");
+  CLI::App* group = add_group(app, "filters", "List, describe and check filters");
   add_plugin_option(
-      *add_command(*group, session, "list", "All filters", [&session] { return list_filters(session); }),
+      *add_command(*group, session, "list", "List all filters", [&session] { return list_filters(session); }),
       session);
 
   const auto name = std::make_shared<std::string>();
-  CLI::App* describe = add_command(*group, session, "describe", "One filter: options and an example",
+  CLI::App* describe = add_command(*group, session, "describe", "Describe a filter: options and an example",
                                    [&session, name] { return describe_filter(*name, session); });
   describe->add_option("NAME", *name, "Type of the filter")->required();
   add_plugin_option(*describe, session);

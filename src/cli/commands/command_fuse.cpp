@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // plumbline fuse MAP MAP... -o OUT
+#include <fmt/format.h>
+
 #include <memory>
 
 #include "app.hpp"
@@ -9,7 +11,14 @@
 namespace plumbline::cli {
 namespace {
 
+constexpr std::size_t kMaxMaps = 255;
+
 int fuse(Session& session, pipeline::FuseRequest request) {
+  if (request.maps.size() > kMaxMaps) {
+    return session.fail(
+        core::usage_error(fmt::format("MAP: give at most {} maps at once, and fuse the results", kMaxMaps))
+            .value());
+  }
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   Console& console = session.console();
   const auto summary = pipeline::fuse_stored_maps(request, session.executor(), console, stop_on_signals(),
@@ -28,11 +37,11 @@ void add_fuse(CLI::App& app, Session& session) {
       ->add_option("MAP", request->maps,
                    "Result folders of plumbline map or fuse; their order does not matter")
       ->required()
-      ->expected(2, 255);
+      ->expected(2, CLI::detail::expected_max_vector_size);
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
   command
       ->add_option("--anchor", request->anchor,
-                   "Robot whose frame the maps are laid into (default: that of the largest map)")
+                   "Robot whose map defines the frame of the result (default: the one with the largest map)")
       ->type_name("NAME");
   add_pipeline_options(*command, session, *request);
 }

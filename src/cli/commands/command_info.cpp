@@ -168,7 +168,7 @@ core::Result<void> info(Session& session, InfoRequest& request) {
 
 void add_info(CLI::App& app, Session& session) {
   const auto request = std::make_shared<InfoRequest>();
-  CLI::App* command = add_command(app, session, "info", "Say what a recording, a map or a cloud holds",
+  CLI::App* command = add_command(app, session, "info", "Describe a recording, a map or a cloud",
                                   [&session, request] { return info(session, *request); });
   command
       ->add_option("INPUT", request->input,

@@ -40,16 +40,13 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
       ->check(CLI::Range(1, 100000));
 
   command
-      .add_option(
-          "--pace", request.pace_hz,
-          "Play recordings as a live camera would: so many frames a second, at most (default: as fast "
-          "as that goes)")
+      .add_option("--pace", request.pace_hz,
+                  "Play recordings at this rate, like a live camera (default: as fast as possible)")
       ->type_name("HZ")
       ->check(CLI::Range(0.0, 1000.0));
 
   command.add_flag("--resume", request.resume,
-                   "Go on from what a run that was interrupted left in OUT.partial; input and settings must "
-                   "be those of that run");
+                   "Continue an interrupted run from OUT.partial, with the same input and settings");
   add_pipeline_options(command, session, request);
 }
 
@@ -60,8 +57,8 @@ void add_map(CLI::App& app, Session& session) {
                                   [&session, request, inputs] { return map(session, *request, *inputs); });
   command
       ->add_option("INPUT", *inputs,
-                   "A TUM RGB-D, 7-Scenes or Redwood folder, or synth:SCENE?frames=900&texture=none&seed=3; "
-                   "several: recordings of as many robots, fused into one map")
+                   "Folder of a recording, or synth:SCENE?frames=900&texture=none&seed=3; give several, one "
+                   "per robot, to fuse them into one map")
       ->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
   add_map_options(*command, session, *request);

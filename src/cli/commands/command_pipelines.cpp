@@ -157,7 +157,7 @@ void add_chain_schema(CLI::App& filters, Session& session) {
 }  // namespace
 
 void add_pipelines(CLI::App& app, Session& session) {
-  CLI::App* group = add_group(app, "pipelines", "What pipelines and stages there are");
+  CLI::App* group = add_group(app, "pipelines", "List, describe, check and draw pipelines and their stages");
   const auto request = std::make_shared<PipelinesRequest>();
   const auto command = [&](const char* name, const char* help,
                            int (*run)(Session&, const PipelinesRequest&, const pipeline::StageRegistry&)) {
@@ -167,15 +167,14 @@ void add_pipelines(CLI::App& app, Session& session) {
     });
   };
 
-  CLI::App* listed =
-      command("list", "The shipped pipelines, and the stages that pipelines are made of", list);
+  CLI::App* listed = command("list", "List the shipped pipelines and all stages", list);
   add_plugin_option(*listed, session);
 
-  CLI::App* described =
-      command("describe", "A stage: ports and options; without STAGE the whole reference", describe);
+  CLI::App* described = command(
+      "describe", "Describe a stage's ports and options; without STAGE the whole reference", describe);
   described->add_option("STAGE", request->name, "Type of a stage");
   described->add_flag("--markdown", request->markdown, "As a section of the reference page");
-  described->add_flag("--all", request->all, "Options for those who know what they do, too");
+  described->add_flag("--all", request->all, "Include advanced options");
 
   CLI::App* checked = command("check", "Check a pipeline without running it", check);
   add_pipeline_arguments(*checked, request);

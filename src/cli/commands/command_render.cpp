@@ -204,13 +204,15 @@ void add_render(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->output, "Picture to write")
       ->required()
       ->type_name("FILE.png|DIR|.gif|.mp4");
-  command->add_option("--robot", request->robot, "Whose map, of an interrupted run of several robots")
+  command
+      ->add_option("--robot", request->robot,
+                   "Robot whose map to use, for an interrupted run of several robots")
       ->type_name("NAME");
   command->add_option("--size", request->size, "Size of the picture, like 1600x1200")->type_name("WxH");
 
   command
       ->add_option("--turntable", request->turntable,
-                   "So many pictures from all sides: into a folder, or as .gif or .mp4 with ffmpeg")
+                   "Number of pictures from all sides, written to a folder, or as .gif or .mp4 with ffmpeg")
       ->check(CLI::Range(2, 3600))
       ->type_name("N");
   command->add_flag("--lines", request->lines, "Draw the map's 3D lines, too");

@@ -24,16 +24,15 @@ int report(Session& session, const report::ReportRequest& request) {
 
 void add_report(CLI::App& app, Session& session) {
   const auto request = std::make_shared<report::ReportRequest>();
-  CLI::App* command = add_command(app, session, "report", "Tell a result as one HTML page: OUT/report.html",
+  CLI::App* command = add_command(app, session, "report", "Write an HTML report of a result: OUT/report.html",
                                   [&session, request] { return report(session, *request); });
   command->add_option("OUT", request->result, "Result folder of plumbline map or fuse")->required();
   command->add_option("-o,--output", request->output, "File to write (default: OUT/report.html)")
       ->type_name("FILE.html");
   command
-      ->add_option(
-          "--truth", request->truth,
-          "Compare the paths with the truth: a recording with groundtruth.txt, a folder with one for each "
-          "robot, or a file in TUM format")
+      ->add_option("--truth", request->truth,
+                   "Compare the paths with the true ones: a recording with groundtruth.txt, a folder with "
+                   "one for each robot, or a file in TUM format")
       ->type_name("FOLDER|FILE");
   command->add_flag("--force", request->replace, "Replace an earlier report");
 }

@@ -114,6 +114,7 @@ void columns(Io& io, const std::vector<Point*>& points) {
   }
 
   io.planes(bytes.data(), bytes.size());
+
   if constexpr (Io::kReads) {
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t k = 0; k < before.size(); ++k) {

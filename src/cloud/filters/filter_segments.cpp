@@ -34,6 +34,7 @@ CloudPtr by_segment(const Cloud& input, const std::vector<int>& segments, Mode m
   }
 
   CloudPtr output = select(input, [](std::size_t, const Point&) { return true; });
+
   for (Point& p : output->points) {
     if (!finite(p)) continue;
     const int segment = segments[next++];

@@ -67,6 +67,7 @@ inline void make_list(Cloud& cloud) {
 template <typename Keep>
 CloudPtr select(const Cloud& input, const Keep& keep) {
   auto output = like(input);
+
   if (organised(input)) {
     output->points = input.points;
     output->width = input.width;

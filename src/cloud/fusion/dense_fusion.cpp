@@ -282,16 +282,16 @@ class Fusion {
 void DenseFusionOptions::declare(core::OptionTable& table) {
   voxels.declare(table);
   table.integer("min_observations", min_observations, {1, 1000}, "",
-                "Keyframes that must have seen a voxel for it to stay");
+                "Smallest number of keyframes that see a voxel which is kept");
   table.boolean("plane_projection", plane_projection,
-                "Lay the points of flat pieces of surface on their common plane: thin walls");
-  table.boolean("free_space", free_space, "Remove what other keyframes look through: people, flying pixels");
-  table.boolean("exposure", exposure, "Even out colours between keyframes");
+                "Project the points of flat pieces of surface onto their common plane, for thin walls");
+  table.boolean("free_space", free_space,
+                "Remove points that other keyframes look through: people, flying pixels");
+  table.boolean("exposure", exposure, "Balance colours between keyframes");
   table.integer("min_support", min_support, {0, 1000}, "",
-                "Points with fewer others around that face the same way are isolated and go; 0: none");
-  table.number(
-      "tile_mb", tile_mb, {16.0, 100000.0}, "",
-      "Memory that one tile of the map may take, MB; as many as may take six times that are filled together");
+                "Remove points with fewer neighbours of similar normal than this; 0: keep all");
+  table.number("tile_mb", tile_mb, {16.0, 100000.0}, "",
+               "Memory per tile, MB; tiles that take up to six times this in total are filled at a time");
 }
 
 core::Result<FusedCloud> fuse_views(const FusionViews& views, const DenseFusionOptions& options,

@@ -170,12 +170,12 @@ class PointMaker {
 
 void KeyframeCloudOptions::declare(core::OptionTable& table) {
   table.integer("stride", stride_px, {1, 16}, "px", "One point per stride x stride pixels");
-  table.number("min_depth", min_depth_m, {0.05, 20.0}, "m", "Nearer measurements are no points");
-  table.number("max_depth", max_depth_m, {0.1, 20.0}, "m", "Measurements beyond are no points");
+  table.number("min_depth", min_depth_m, {0.05, 20.0}, "m", "Smallest depth of points");
+  table.number("max_depth", max_depth_m, {0.1, 20.0}, "m", "Largest depth of points");
   table.integer("smooth", smooth_px, {1, 31}, "px", "Window of the edge-aware mean of inverse depth, odd");
   table.boolean("smooth_position", smooth_position,
-                "Points lie on the edge-aware mean of the depth round them, the wider the noisier it is; "
-                "off: the raw measurement");
+                "Move points onto the edge-aware mean of the depth around them, wider where it is noisier; "
+                "off: raw measurements");
   table.number("base", base_px, {2.0, 60.0}, "px", "Half base of the differences for normals at 2 m");
 }
 

@@ -57,7 +57,7 @@ void vote(const VoxelSide& sample, VoxelSide& side) {
 void VoxelMapOptions::declare(core::OptionTable& table) {
   table.number("voxel", voxel_m, {0.001, 1.0}, "m", "Edge length of a voxel");
   table.number("min_cos_incidence", min_cos_incidence, {0.0, 1.0}, "",
-               "Measurements seen more obliquely than this cosine are left out");
+               "Smallest cosine of incidence of a measurement");
 }
 
 std::vector<VoxelSample> VoxelMap::measured(const Cloud& camera_cloud,

@@ -147,9 +147,9 @@ core::Result<void> write_obj(const std::filesystem::path& file, const PlyData& m
 }  // namespace
 
 void MeshOptions::declare(core::OptionTable& table) {
-  table.number("resolution", resolution_m, {0.001, 10.0}, "m", "Length of the mesh's edges, about");
+  table.number("resolution", resolution_m, {0.001, 10.0}, "m", "Approximate length of the mesh's edges");
   table.number("reach", reach_m, {0.001, 10.0}, "m",
-               "Surface further than this from every point is left out");
+               "Largest distance of the surface from the nearest point");
 }
 
 core::Result<PlyData> make_mesh(const Cloud& cloud, const MeshOptions& options) {

@@ -251,20 +251,20 @@ GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
 
 void GlobalAdjustmentOptions::declare(core::OptionTable& table) {
   table.integer("adjust.observations", observations, {10, 100000}, "",
-                "Points, and lines, that a keyframe is tied with at most");
+                "Largest number of points, and of lines, per keyframe in the adjustment");
   table.integer("adjust.iterations", bundle_options.max_iterations, {1, 1000}, "",
-                "Iterations of each round of the adjustment at most");
-  table.number("adjust.gate", first_gate, {0.0, 1000.0}, "",
-               "Observations further off than so many standard deviations, and 0.8 px, where the pose graph "
-               "has put the keyframes wait for the second round: those that caused a drift would restore it; "
-               "0: none");
+                "Largest number of iterations in each round of the adjustment");
+  table.number(
+      "adjust.gate", first_gate, {0.0, 1000.0}, "",
+      "Observations off by more than this many standard deviations, and 0.8 px, after the pose graph wait "
+      "for the second round, because those that caused a drift would restore it; 0: none");
   table.number("adjust.aligned_sigma", noise.aligned, {0.01, 1.0}, "",
-               "Standard deviation of corners that were aligned, over that of others");
+               "Standard deviation of aligned corners relative to others");
   noise.declare(table, "adjust.");
   table.number("adjust.surface_weight", surface_weight, {0.0, 1000.0}, "",
                "Weight of the map's surface edges");
   table.choice<bool>("adjust.robust", robust, {{"none", false}, {"graduated", true}},
-                     "What the pose graph does about wrong edges: nothing, or graduated non-convexity");
+                     "Treatment of wrong edges in the pose graph; graduated: graduated non-convexity");
 }
 
 std::vector<PoseEdge> believed_edges(const std::vector<PoseEdge>& edges,

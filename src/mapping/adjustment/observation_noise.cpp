@@ -12,13 +12,12 @@ namespace plumbline::mapping {
 void ObservationNoise::declare(core::OptionTable& table, const std::string& prefix) {
   table.number(prefix + "line_sigma", line_sigma_px, {0.01, 10.0}, "px",
                "Standard deviation of a line's ends across it");
-  table.number(
-      prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
-      "By how much the depth of landmarks is worse than its noise: it is alike in neighbouring views");
+  table.number(prefix + "depth_factor", depth_factor, {0.1, 100.0}, "",
+               "Factor on the noise of landmarks' depth, whose errors are alike in neighbouring views");
   table.boolean(prefix + "depth_rows", depth_rows,
                 "The depth of corners and lines, beside where they are in the image");
   table.number(prefix + "turn_rate", turn_rate, {0.01, 1000.0}, "rad/s",
-               "What an image says counts for half when the camera turned this fast");
+               "Turn rate of the camera at which an image's observations count for half");
 }
 
 double ObservationNoise::motion_factor_of(double rate) const {

@@ -59,7 +59,7 @@ void RefinementOptions::declare(core::OptionTable& table) {
   pairs.declare(table);
   alignment.declare(table);
   adjustment.declare(table);
-  table.boolean("accuracy", accuracy, "Find out how exactly the keyframes are known: columns sigma");
+  table.boolean("accuracy", accuracy, "Compute the accuracy of the keyframes (columns sigma)");
 }
 
 Refinement refine_map(maps::Map& map, const std::map<core::KeyframeId, CoarseSurface>& surfaces,

@@ -59,30 +59,32 @@ bool enough(std::size_t matched, int wanted, std::size_t visible) {
 
 void KeyframeRuleOptions::declare(core::OptionTable& table) {
   table.choice("keyframe.rule", rule, {{"plain", Rule::kPlain}, {"cone", Rule::kCone}},
-               "plain: movement and what is lost from view; cone: from which sides landmarks are seen");
-  table.integer("keyframe.min_frames", min_frames, {1, 1000}, "", "Frames between keyframes, at least");
+               "plain: by movement and by what is lost from view; cone: by the directions from which "
+               "landmarks are seen");
+  table.integer("keyframe.min_frames", min_frames, {1, 1000}, "",
+                "Smallest number of frames between keyframes");
   table.integer("keyframe.max_frames", max_frames, {1, 10000}, "",
-                "Frames between keyframes, at most, while the camera moves");
+                "Largest number of frames between keyframes while the camera moves");
   table.number("keyframe.min_shared", min_shared, {0.05, 1.0}, "",
-               "A smaller share of features still tracked makes a keyframe");
+               "Make a keyframe when the share of features still tracked falls below this");
   table.number("keyframe.min_overlap", min_surface_overlap, {0.05, 1.0}, "",
-               "A smaller share of the last keyframe's surface in view makes a keyframe");
+               "Make a keyframe when the share of the last keyframe's surface in view falls below this");
   table.number("keyframe.max_parallax", max_parallax, {0.005, 2.0}, "",
-               "More movement over depth makes a keyframe");
+               "Make a keyframe when movement over depth exceeds this");
   table.number("keyframe.max_rotation", max_rotation_rad, {0.01, 3.0}, "rad",
-               "More rotation makes a keyframe");
+               "Make a keyframe when rotation exceeds this");
   table.integer("keyframe.min_features", min_features, {0, 10000}, "",
-                "With fewer features tracked a keyframe is urgent, if the scene has more to offer");
+                "With fewer tracked features a keyframe is urgent, if the image has more");
   table.boolean("keyframe.reuse", reuse,
-                "Plain rule: where an older keyframe serves as well, track against that one again instead of "
-                "making another");
+                "Plain rule: return to an older keyframe that serves as well instead of making another");
   table.integer("keyframe.cone_max_wait", cone_patience, {0, 10000}, "",
-                "Cone rule: after so many frames a bundle under way no longer holds a keyframe up");
+                "Cone rule: number of frames after which a running bundle no longer delays a keyframe");
   table.number("keyframe.cone_max_shared", cone_max_shared, {0.05, 1.0}, "",
-               "Cone rule: no keyframe while a larger share of the last one's landmarks is matched");
+               "Cone rule: largest share of the last keyframe's landmarks that are matched in a new one");
   table.integer("keyframe.cone_min_points", cone_min_points, {0, 10000}, "",
-                "Cone rule: points a keyframe must match, or half of what should be seen");
-  table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "", "The same of lines");
+                "Cone rule: smallest number of points that a keyframe matches, or half of the visible ones");
+  table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "",
+                "Cone rule: smallest number of lines that a keyframe matches, or half of the visible ones");
   table.number("keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
                "Cone rule: points whose viewing angle changed more are asked to spread over the image");
   table.choice("keyframe.cone_balance", cone_balance,

@@ -8,12 +8,12 @@ constexpr int kMaxAge =
 
 void LandmarkCullingOptions::declare(core::OptionTable& table) {
   table.number("landmark.min_found", min_found_share, {0.0, 1.0}, "",
-               "Landmarks found in a smaller share of the frames that should see them are removed");
+               "Remove landmarks found in a smaller share of the frames that should see them");
   table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
                 "Frames that should have seen a landmark before that share is judged");
   table.boolean("landmark.by_keyframes", by_keyframes, "Only frames that become keyframes are counted");
   table.integer("landmark.min_keyframes", min_keyframes, {1, 100}, "",
-                "Landmarks that fewer keyframes see are removed after the grace time; 1: none");
+                "Remove landmarks that fewer keyframes see after the grace time; 1: none");
   table.integer("landmark.min_age", grace_keyframes, {1, 1000}, "",
                 "Keyframes made after a landmark's own before it is judged by those that see it");
 }

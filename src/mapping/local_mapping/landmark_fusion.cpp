@@ -104,8 +104,8 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
 
 void FusionOptions::declare(core::OptionTable& table) {
   table.integer("fuse.keyframes", keyframes, {1, 50}, "",
-                "Neighbours in which a keyframe's landmarks are looked for, and the other way round");
-  table.number("fuse.radius", radius_px, {0.5, 50.0}, "px", "Around a landmark's projection");
+                "Number of neighbouring keyframes between which landmarks are compared");
+  table.number("fuse.radius", radius_px, {0.5, 50.0}, "px", "Search radius around a landmark's projection");
 }
 
 FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,

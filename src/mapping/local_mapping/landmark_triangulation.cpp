@@ -198,7 +198,8 @@ core::PointId add_landmark(maps::Map& map, KeyframeId keyframe, int feature,
 }  // namespace
 
 void TriangulationOptions::declare(core::OptionTable& table) {
-  table.integer("triangulate.keyframes", keyframes, {1, 50}, "", "Neighbours that are searched");
+  table.integer("triangulate.keyframes", keyframes, {1, 50}, "",
+                "Number of neighbouring keyframes to search");
   table.number("triangulate.max_sigma", max_relative_sigma, {0.001, 1.0}, "",
                "Standard deviation of a triangulated depth over that depth, at most");
   table.integer("triangulate.line_views", min_line_views, {2, 10}, "",

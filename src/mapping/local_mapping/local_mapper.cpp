@@ -18,25 +18,24 @@ bool still(const geometry::Rigid3& motion) {
 
 void LocalMapperOptions::declare(core::OptionTable& table) {
   table.number("landmark.max_depth", max_landmark_depth_m, {0.5, 100.0}, "m",
-               "Landmarks are made of depth up to here");
+               "Largest depth of landmarks made from depth");
   table.number("landmark.max_turn_rate", max_landmark_turn_rate, {0.0, 100.0}, "rad/s",
-               "Images taken while turning faster are distorted by the rolling shutter of common sensors: no "
-               "landmark is "
-               "triangulated, looked for or merged with them");
+               "Largest turn rate of images used to triangulate, find or merge landmarks: faster ones are "
+               "distorted by the rolling shutter");
   culling.declare(table);
-  table.boolean("triangulate", triangulate, "Landmarks without depth, from several keyframes");
+  table.boolean("triangulate", triangulate, "Triangulate landmarks without depth from several keyframes");
   triangulation.declare(table);
-  table.boolean("fuse", fuse, "Look for landmarks in neighbouring keyframes and merge doubles");
+  table.boolean("fuse", fuse, "Find landmarks in neighbouring keyframes and merge duplicates");
   fusion.declare(table);
   table.boolean("bundle", bundle, "Local bundle adjustment after each keyframe");
   table.integer("bundle.keyframes", bundle_keyframes, {2, 200}, "", "Keyframes that are adjusted together");
   bundle_noise.declare(table, "bundle.");
   table.boolean("edges", edges,
-                "Align the surfaces of neighbouring keyframes and use it in bundle adjustment");
+                "Align the surfaces of neighbouring keyframes, as edges for bundle adjustment");
   table.integer("edges.keyframes", edge_keyframes, {1, 100}, "",
-                "Neighbours that a new keyframe is aligned with");
+                "Number of neighbours that a new keyframe is aligned with");
   table.number("edges.min_overlap", edge_min_overlap, {0.0, 1.0}, "",
-               "Share of a neighbour's surface in view that must be confirmed");
+               "Smallest share of a neighbour's surface in view that is confirmed");
   table.boolean("edges.photometric", edge_photometric, "Align their grey values, too");
   bundle_options.declare(table);
   surface.declare(table);

@@ -30,14 +30,14 @@ Rigid3 world_from_query(const maps::Map& map, const Loop& loop) {
 void LoopOptions::declare(core::OptionTable& table) {
   table.boolean("loops", enabled, "Recognise places and close loops");
   table.number("loops.min_gap", min_gap_s, {0.0, 3600.0}, "s",
-               "Keyframes made within this time of each other never make a loop");
+               "Shortest time between the keyframes of a loop");
   table.integer("loops.min_consistent", agreeing, {1, 20}, "",
-                "Verified keyframes that must agree before a loop is closed");
+                "Number of verified keyframes that must agree before a loop is closed");
   table.number("loops.max_alternative", max_alternative, {0.0, 1.0}, "",
-               "Share of these that may agree on another place at most");
+               "Largest share of these that may agree on another place");
   table.number("loops.max_drift", max_drift, {0.0, 10.0}, "",
-               "Share of the way since a place was seen that a loop may correct; 10 cm are always allowed");
-  table.boolean("loops.robust", robust, "Loops that do not fit the others are taken for wrong");
+               "Largest correction by a loop, as a share of the distance travelled since (at least 10 cm)");
+  table.boolean("loops.robust", robust, "Reject loops that do not fit the others");
   table.boolean("loops.bundle", bundle, "Adjust the whole map after a loop");
   vocabulary.declare(table);
   places.declare(table);

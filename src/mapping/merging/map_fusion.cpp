@@ -129,14 +129,14 @@ MapFusionOptions::MapFusionOptions() {
 
 void MapFusionOptions::declare_decision(core::OptionTable& table, const std::string& prefix) {
   table.integer(prefix + "min_pairs", min_pairs, {2, 1000}, "",
-                "Keyframes of each of two maps that must agree on how the maps lie");
+                "Smallest number of keyframes of each of two maps that agree on their relative pose");
   table.integer(prefix + "few_pairs", few_pairs, {1, 1000}, "",
-                "So few will do when they have few_inliers in common and nothing speaks for another answer");
+                "This many keyframes suffice if they share few_inliers features and no other answer fits");
   table.integer(prefix + "few_inliers", few_inliers, {1, 10000}, "",
-                "Points and lines (counted twice) that so few keyframes need in common");
+                "Smallest number of features that few_pairs keyframes share; lines count twice");
   table.number(prefix + "few_extent", few_extent_m, {0.0, 1000.0}, "m",
-               "How far both maps must reach along a direction that no surface holds: only then it is seen "
-               "whether things repeat");
+               "Smallest extent of both maps along a direction that no surface constrains, to detect "
+               "repeated structure");
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
                "How far apart the keyframes that agree lie, at least");
   table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
@@ -152,7 +152,7 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
   table.number(prefix + "min_confirmed", min_confirmed, {0.0, 1.0}, "",
                "Share of the keyframes with a view of the other map that must see what it holds");
   table.integer(prefix + "verifications", verifications, {1, 100000}, "",
-                "Pairs of keyframes that are verified for each two maps, at most");
+                "Largest number of pairs of keyframes to verify for each two maps");
   table.boolean(prefix + "robust", robust, "The pose graph may take pairs of keyframes for wrong");
 }
 

@@ -221,16 +221,17 @@ cloud::SurfaceSearch search_of(const CoarseSurface& surface) {
 }
 
 void AlignmentOptions::declare(core::OptionTable& table) {
-  table.integer("icp.samples", samples, {100, 100000}, "", "Samples of each local map that are matched");
+  table.integer("icp.samples", samples, {100, 100000}, "", "Number of samples of each local map to match");
   table.number("icp.distance", distance_m, {0.01, 1.0}, "m",
-               "Matched samples are this near at first; it falls to half");
-  table.integer("icp.iterations", max_iterations, {1, 1000}, "", "Iterations of each alignment at most");
+               "Largest distance of matched samples in the first step; it falls to half");
+  table.integer("icp.iterations", max_iterations, {1, 1000}, "",
+                "Largest number of iterations of each alignment");
   table.number("icp.min_overlap", min_overlap, {0.0, 1.0}, "",
-               "Share of the surface that must fit for an alignment to be used");
+               "Smallest share of the surface that must fit for an alignment to be used");
   table.number("icp.max_rms", max_rms, {0.1, 100.0}, "",
-               "How well these must fit, standard deviations of the depth noise");
-  table.number("icp.max_shift", max_shift_m, {0.0, 10.0}, "m", "Alignments that move further are not used");
-  table.number("icp.max_turn", max_turn_rad, {0.0, 3.2}, "rad", "Alignments that turn more are not used");
+               "Largest RMS of the fitting surface, standard deviations of the depth noise");
+  table.number("icp.max_shift", max_shift_m, {0.0, 10.0}, "m", "Largest shift by an alignment");
+  table.number("icp.max_turn", max_turn_rad, {0.0, 3.2}, "rad", "Largest rotation by an alignment");
   table.number(
       "icp.min_information", min_information, {0.0, 0.3}, "",
       "A direction is held when its share of the normals, squared, is larger: a corridor's length, with "

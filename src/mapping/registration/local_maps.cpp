@@ -133,17 +133,18 @@ std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>&
 }  // namespace
 
 void LocalMapOptions::declare(core::OptionTable& table) {
-  table.integer("local_map.keyframes", keyframes, {1, 1000}, "", "Keyframes in one local map at most");
+  table.integer("local_map.keyframes", keyframes, {1, 1000}, "",
+                "Largest number of keyframes in a local map");
   table.number("local_map.distance", distance_m, {0.0, 100.0}, "m",
-               "A local map ends this far from its first keyframe");
+               "Largest distance of a local map's keyframes from its first");
   table.number("local_map.angle", angle_rad, {0.0, 3.2}, "rad", "A local map ends after this turn");
-  table.number("local_map.voxel", voxel_m, {0.005, 0.5}, "m", "Voxels of the surfaces that are aligned");
+  table.number("local_map.voxel", voxel_m, {0.005, 0.5}, "m", "Voxel size of the surfaces to align");
 }
 
 void PairOptions::declare(core::OptionTable& table) {
   table.number("pairs.min_overlap", min_overlap, {0.01, 1.0}, "",
-               "Share of the smaller local map that both must have seen to be aligned");
-  table.integer("pairs.per_map", per_map, {1, 1000}, "", "Alignments of each local map at most");
+               "Smallest share of the smaller local map that both have seen");
+  table.integer("pairs.per_map", per_map, {1, 1000}, "", "Largest number of alignments of each local map");
 }
 
 CoarseSurface coarse_surface(const cloud::Cloud& camera_cloud, double voxel_m) {

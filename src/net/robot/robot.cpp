@@ -103,7 +103,6 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
                       folder.string(), command));
     }
     std::this_thread::sleep_for(50ms);
-
   }
 }
 

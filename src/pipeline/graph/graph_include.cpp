@@ -7,7 +7,6 @@
 #include <system_error>
 
 #include "graph/graph_parts.hpp"
-#include "plumbline/core/renamed_options.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -91,56 +90,10 @@ void change_stage(const ConfigNode& own, ConfigNode& base) {
   }
 }
 
-/// A stage that is changed is known by its name.
-std::string type_of(const std::string& name, const ConfigNode& body) {
-  const ConfigNode* type = body.find("type");
-  return type != nullptr ? type->scalar : name;
-}
-
-/// Gives the stage of that type an option that it does not have yet.
-void give(const std::string& type, const std::string& key, const ConfigNode& value, ConfigNode& stages) {
-  for (auto& [name, body] : stages.entries) {
-    if (type_of(name, body) != type) continue;
-    if (body.find(key) == nullptr) put(body, key, value, value.mark);
-    return;
-  }
-  ConfigNode body;
-  body.mark = value.mark;
-  put(body, key, value, value.mark);
-  put(stages, type, std::move(body), value.mark);
-}
-
-/// Options under names of earlier versions get those of today.
-void rename_options(ConfigNode& root, std::vector<std::string>& warnings) {
-  ConfigNode* stages = find(root, "stages");
-  if (stages == nullptr) return;
-  std::vector<std::pair<std::string, ConfigNode>> moved;
-  for (auto& [name, body] : stages->entries) {
-    const std::string type = type_of(name, body);
-    for (std::size_t i = 0; i < body.entries.size(); ++i) {
-      std::string& key = body.entries[i].first;
-      const std::string elsewhere = core::moved_option(type, key);
-      const std::string now = elsewhere.empty() ? core::renamed_option(type, key) : elsewhere;
-      if (now == key) continue;
-      const ConfigMark at = body.key_marks[i];
-      warnings.push_back(fmt::format("{}:{}: {}.{} is called {} now", at.file, at.line, name, key, now));
-      key = now;
-      if (elsewhere.empty()) continue;
-      moved.emplace_back(now, std::move(body.entries[i].second));
-      body.entries.erase(body.entries.begin() + static_cast<std::ptrdiff_t>(i));
-      body.key_marks.erase(body.key_marks.begin() + static_cast<std::ptrdiff_t>(i--));
-    }
-  }
-  for (const auto& [now, value] : moved) {
-    const std::size_t dot = now.find('.');
-    give(now.substr(0, dot), now.substr(dot + 1), value, *stages);
-  }
-}
-
 class Includer {
  public:
-  Includer(const fs::path& pipelines_folder, ConfigProblems& problems, std::vector<std::string>& warnings)
-      : pipelines_folder_(pipelines_folder), problems_(problems), warnings_(warnings) {}
+  Includer(const fs::path& pipelines_folder, ConfigProblems& problems)
+      : pipelines_folder_(pipelines_folder), problems_(problems) {}
 
   /// `file` is the one that `own` was read from.
   std::optional<ConfigNode> expand(ConfigNode own, const fs::path& file) {
@@ -149,7 +102,6 @@ class Includer {
       return std::nullopt;
     }
     check_top(own);
-    rename_options(own, warnings_);
     const auto includes = words(own, "include", "include: rgbd.yaml", problems_);
     const auto removes = words(own, "remove", "remove: [refine]", problems_);
     if (includes.empty()) {
@@ -290,7 +242,6 @@ class Includer {
 
   fs::path pipelines_folder_;
   ConfigProblems& problems_;
-  std::vector<std::string>& warnings_;
   std::vector<fs::path> open_;  ///< files that are being included
   std::size_t files_ = 0;
 };
@@ -298,9 +249,8 @@ class Includer {
 }  // namespace
 
 std::optional<ConfigNode> with_includes(ConfigNode own, const fs::path& file,
-                                        const fs::path& pipelines_folder, ConfigProblems& problems,
-                                        std::vector<std::string>& warnings) {
-  return Includer(pipelines_folder, problems, warnings).expand(std::move(own), file);
+                                        const fs::path& pipelines_folder, ConfigProblems& problems) {
+  return Includer(pipelines_folder, problems).expand(std::move(own), file);
 }
 
 }  // namespace plumbline::pipeline

@@ -36,18 +36,15 @@ std::vector<std::string> names_of(const StageSpecs& specs);
 std::string quoted(const std::string& text);
 
 /// graph_include.cpp: the file's tree with the stages and taps of what it includes; marks keep naming the
-/// file that each part stands in. Options under earlier names get theirs of today, and a warning. None when
-/// too little can be read to go on.
+/// file that each part stands in. None when too little can be
+/// read to continue.
 std::optional<core::ConfigNode> with_includes(core::ConfigNode own, const std::filesystem::path& file,
                                               const std::filesystem::path& pipelines_folder,
-                                              core::ConfigProblems& problems,
-                                              std::vector<std::string>& warnings);
+                                              core::ConfigProblems& problems);
 
 /// graph_stages.cpp: the stages of a tree, made and their options read. `root` must outlive the specs.
 StageSpecs read_stages(const core::ConfigNode& root, const StageRegistry& registry,
-                       core::ConfigProblems& problems, std::vector<std::string>& warnings);
-/// Whether an option of earlier versions is read and has no effect.
-bool is_retired(const std::string& key);
+                       core::ConfigProblems& problems);
 
 /// graph_connect.cpp: resolves the inputs of every stage.
 void connect(StageSpecs& specs, core::ConfigProblems& problems);
@@ -57,8 +54,8 @@ void add_taps(const core::ConfigNode& root, const StageRegistry& registry, Stage
               core::ConfigProblems& problems);
 
 /// graph_set.cpp: "stage.key=value" texts of the command line.
-void apply_overrides(const std::vector<std::string>& texts, StageSpecs& specs, core::ConfigProblems& problems,
-                     std::vector<std::string>& warnings);
+void apply_overrides(const std::vector<std::string>& texts, StageSpecs& specs,
+                     core::ConfigProblems& problems);
 
 /// graph_shape.cpp: an order in which every stage comes after those it reads from; cycles, unused stages,
 /// missing and second sources are problems.

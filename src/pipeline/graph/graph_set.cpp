@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "graph/graph_parts.hpp"
-#include "plumbline/core/renamed_options.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -24,18 +23,7 @@ void place_on_command_line(ConfigNode& node) {
   for (ConfigMark& mark : node.key_marks) mark = kCommandLine;
 }
 
-/// "stage.key=value" with the name that the option has now.
-std::string renamed(const std::string& text, std::vector<std::string>& warnings) {
-  const std::size_t dot = text.find('.'), equals = text.find('=');
-  if (dot == std::string::npos || equals == std::string::npos || equals < dot) return text;
-  const std::string path = text.substr(0, equals);
-  const std::string now = core::renamed_setting(path.substr(0, dot), path.substr(dot + 1));
-  if (now != path) warnings.push_back(fmt::format("--set {}: is called {} now", path, now));
-  return now + text.substr(equals);
-}
-
-void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems,
-           std::vector<std::string>& warnings) {
+void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems) {
   const auto refuse = [&](const std::string& path, std::string what) {
     problems.push_back({kCommandLine, path, std::move(what)});
   };
@@ -59,16 +47,14 @@ void apply(const std::string& text, StageSpecs& specs, ConfigProblems& problems,
     return refuse(path, "only options can be set; change the graph in a pipeline file");
   }
   if (specs[target].node.type == nullptr) return;  // reported already
-  if (is_retired(key)) return warnings.push_back(fmt::format("--set {}: has no effect", path));
   specs[target].node.options.set(key, *value, stage, problems);
   specs[target].set.push_back(key);
 }
 
 }  // namespace
 
-void apply_overrides(const std::vector<std::string>& texts, StageSpecs& specs, ConfigProblems& problems,
-                     std::vector<std::string>& warnings) {
-  for (const std::string& text : texts) apply(renamed(text, warnings), specs, problems, warnings);
+void apply_overrides(const std::vector<std::string>& texts, StageSpecs& specs, ConfigProblems& problems) {
+  for (const std::string& text : texts) apply(text, specs, problems);
 }
 
 }  // namespace plumbline::pipeline

@@ -19,8 +19,7 @@ bool is_stage_name(const std::string& name) {
   return !name.empty() && name[0] >= 'a' && name[0] <= 'z' && std::all_of(name.begin(), name.end(), allowed);
 }
 
-void read_stage(const StageRegistry& registry, StageSpec& spec, ConfigProblems& problems,
-                std::vector<std::string>& warnings) {
+void read_stage(const StageRegistry& registry, StageSpec& spec, ConfigProblems& problems) {
   const ConfigNode& body = *spec.body;
   if (body.kind != Kind::kMap) {
     problems.push_back({spec.mark, spec.path, "must be a map with a type, e.g. {type: read}"});
@@ -41,18 +40,10 @@ void read_stage(const StageRegistry& registry, StageSpec& spec, ConfigProblems& 
   }
   spec.node.stage = spec.node.type->make();
   spec.node.stage->declare(spec.node.options);
-  std::vector<std::string> others{"type", "inputs"};
-  for (const auto& [key, value] : body.entries) {
-    if (!is_retired(key)) continue;
-    others.push_back(key);
-    warnings.push_back(fmt::format("{}.{}: has no effect", spec.path, key));
-  }
-  spec.node.options.set_all(body, spec.path, problems, others);
+  spec.node.options.set_all(body, spec.path, problems, {"type", "inputs"});
 }
 
 }  // namespace
-
-bool is_retired(const std::string& key) { return key == "solver.max_iterations"; }
 
 std::size_t find_spec(const StageSpecs& specs, const std::string& name) {
   const auto found =
@@ -68,8 +59,7 @@ std::vector<std::string> names_of(const StageSpecs& specs) {
   return names;
 }
 
-StageSpecs read_stages(const ConfigNode& root, const StageRegistry& registry, ConfigProblems& problems,
-                       std::vector<std::string>& warnings) {
+StageSpecs read_stages(const ConfigNode& root, const StageRegistry& registry, ConfigProblems& problems) {
   StageSpecs specs;
   const ConfigNode* stages = root.find("stages");
   if (stages == nullptr || stages->kind != Kind::kMap || stages->entries.empty()) {
@@ -88,7 +78,7 @@ StageSpecs read_stages(const ConfigNode& root, const StageRegistry& registry, Co
     spec.mark = stages->key_marks[i];
     spec.path = "stages." + name;
     spec.body = &body;
-    read_stage(registry, spec, problems, warnings);
+    read_stage(registry, spec, problems);
     specs.push_back(std::move(spec));
   }
   return specs;

@@ -33,7 +33,6 @@ std::string names_of(const maps::StoredMaps& maps) {
 core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
   auto graph = load_pipeline(request);
   if (!graph) return graph;
-  for (const std::string& warning : graph->warnings) log.warning(warning);
   if (graph->source().type->name == "maps") return graph;
   return core::usage_error(fmt::format(
       "{}: begins with a {} stage; finished maps are fused by a pipeline that begins with a maps stage",

@@ -171,7 +171,6 @@ class MapRun {
     auto graph = load_pipeline(request_);
     if (!graph) return tl::unexpected(graph.error());
     graph_ = std::move(*graph);
-    for (const std::string& warning : graph_.warnings) log_.warning(warning);
     if (auto can = fits(graph_, request_); !can) return can;
     auto source = open_inputs(request_, executor_, log_);
     if (!source) return tl::unexpected(source.error());

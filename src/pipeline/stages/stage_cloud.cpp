@@ -63,11 +63,10 @@ class CloudStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.integer(
-        "intermediate_every", intermediate_every_, {0, 100000}, "",
-        "Every so many frames, and at the end, one that is no keyframe gives a cloud as well; 0: none");
+    table.integer("intermediate_every", intermediate_every_, {0, 100000}, "",
+                  "Also make a cloud of every N-th frame between keyframes, and of the last; 0: of none");
     table.integer("free_space_every", free_space_every_, {0, 100000}, "",
-                  "Every so many frames one that gives no cloud is kept as what it sees through; 0: none");
+                  "Keep every N-th frame without a cloud as a test of free space; 0: none");
     filters_.declare(table, "Filter chain for the cloud of each keyframe; empty: none");
   }
   void check(const CheckContext& context, const core::ConfigMark& /*mark*/, const std::string& path,

@@ -29,13 +29,12 @@ class FuseStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice<Up>(
-        "up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
-        "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' own up on "
-        "average), z up as the first camera was held, or the frame of the poses as they are");
+    table.choice<Up>("up", up_, {{"floor", Up::kFloor}, {"camera", Up::kCamera}, {"none", Up::kNone}},
+                     "Frame of all results: z up and 0 on the floor (within 45 degrees of the cameras' mean "
+                     "up), z up as the first camera was held, or the frame of the poses");
     table.choice<Yaw>("yaw", yaw_, {{"walls", Yaw::kWalls}, {"camera", Yaw::kCamera}},
-                      "Where x points unless up is none: along the walls, as near as can be to where the "
-                      "first camera looks, or just there");
+                      "Direction of x unless up is none: along the walls, the one nearest to where the first "
+                      "camera looks, or exactly there");
     table.boolean("keyframe_clouds", keyframe_clouds_,
                   "Write the cloud of every keyframe to keyframes/, in the frame of the results");
     filters_.declare(table, "Filter chain for the merged cloud; empty: none");

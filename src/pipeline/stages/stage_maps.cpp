@@ -63,9 +63,9 @@ class MapsStage : public Stage {
 }  // namespace
 
 StageType maps_stage() {
-  return stage_type<MapsStage>(
-      "maps", "Reads finished maps of robots, with the clouds that are stored with them", Mode::kStateless,
-      {}, {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}});
+  return stage_type<MapsStage>("maps", "Reads finished maps of robots, with their stored clouds",
+                               Mode::kStateless, {},
+                               {{"cloud", keyframe_cloud_port()}, {"maps", maps_port()}});
 }
 
 }  // namespace plumbline::pipeline

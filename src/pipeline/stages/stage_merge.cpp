@@ -85,9 +85,9 @@ class MergeStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.boolean("online", online_, "Look for overlaps while robots map, not only at the end");
+    table.boolean("online", online_, "Find overlaps while robots map, not only at the end");
     table.integer("lag", lag_, {0, 10000}, "",
-                  "Frames of all robots until what a keyframe shows of an overlap is told");
+                  "Number of frames of all robots after which an overlap found by a keyframe is reported");
     table.boolean("pictures", pictures_, "Draw the maps of robots that met, in meetings/*/map.png");
   }
   [[nodiscard]] std::vector<std::string> files() const override {
@@ -189,7 +189,7 @@ class MergeStage : public Stage {
 StageType merge_stage() {
   return stage_type<MergeStage>(
       "merge",
-      "Finds where maps of several robots overlap, lays them into one frame and adjusts them together",
+      "Finds where maps of several robots overlap, transforms them into one frame and adjusts them together",
       Mode::kSerial, {{"track", track_port(), false}, {"maps", maps_port()}}, {{"map", map_port()}});
 }
 

@@ -32,7 +32,7 @@ class OutputStage : public Stage {
     table.boolean("ply", ply_, "Write map.ply");
     table.boolean("pcd", pcd_, "Write map.pcd");
     table.integer("levels", levels_, {0, 6}, "",
-                  "Coarser clouds for viewing in levels/, each of twice the voxel size of the one before");
+                  "Number of coarser clouds in levels/, each with twice the voxel size of the previous one");
     table.boolean("lines", lines_, "Write lines.ply, the 3D line landmarks");
     table.text("views", views_,
                "Pictures in snapshots/: any of iso top bottom front back left right; empty: none");

@@ -20,12 +20,12 @@ class PosesStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     table.text("file", file_,
-               "Poses in TUM format (stamp tx ty tz qx qy qz qw), in a file for each robot when {robot} in "
-               "its name stands for the robot's; empty: the recordings' own truth");
+               "Poses in TUM format (stamp tx ty tz qx qy qz qw); {robot} in the name stands for each "
+               "robot's name; empty: the recordings' own truth");
     table.number("max_gap", max_gap_s_, {0.0, 10.0}, "s",
-                 "Poses are interpolated; a frame further than this from the nearest pose has none");
-    table.number("keyframe_distance", keyframe_distance_m_, {0.0, 10.0}, "m", "A keyframe after this way");
-    table.number("keyframe_angle", keyframe_angle_rad_, {0.0, 3.2}, "rad", "A keyframe after this turn");
+                 "Poses are interpolated; frames further than this from the nearest pose have none");
+    table.number("keyframe_distance", keyframe_distance_m_, {0.0, 10.0}, "m", "Distance between keyframes");
+    table.number("keyframe_angle", keyframe_angle_rad_, {0.0, 3.2}, "rad", "Rotation between keyframes");
   }
 
   core::Result<void> start(const RunContext& context) override {

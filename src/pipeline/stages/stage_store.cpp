@@ -20,7 +20,7 @@ class StoreStage : public Stage {
   void declare(core::OptionTable& table) override {
     table.boolean(
         "enabled", enabled_,
-        "Write map.db, the map with its clouds, as the run goes: what a run that was ended can go on from");
+        "Write map.db, the map with its clouds, during the run, so that an interrupted run can be continued");
   }
   [[nodiscard]] std::vector<std::string> files() const override {
     return enabled_ ? std::vector<std::string>{maps::kStoreFile} : std::vector<std::string>{};
@@ -128,7 +128,7 @@ class StoreStage : public Stage {
 
 StageType store_stage() {
   return stage_type<StoreStage>(
-      "store", "Keeps the maps in map.db as the run goes, one transaction a keyframe", Mode::kSerial,
+      "store", "Writes the maps to map.db during the run, one transaction per keyframe", Mode::kSerial,
       {{"track", track_port(), false},
        {"cloud", keyframe_cloud_port(), false},
        {"map", map_port()},

@@ -45,10 +45,9 @@ class TrackStage : public Stage {
  public:
   void declare(core::OptionTable& table) override {
     options_.declare(table);
-    table.choice<bool>(
-        "camera.refine", refine_, {{"auto", true}, {"off", false}},
-        "Look for a better camera in the map itself, after 40 keyframes or 10 s and at the end, "
-        "and make the map anew for it");
+    table.choice<bool>("camera.refine", refine_, {{"auto", true}, {"off", false}},
+                       "Estimate the camera from the map, after 40 keyframes or 10 s and at the end, and "
+                       "rebuild the map for it");
   }
 
   core::Result<void> start(const RunContext& context) override {

@@ -45,8 +45,8 @@ class FeaturesTap : public Tap {
 
 StageType features_tap() {
   return tap_type<FeaturesTap>(features_port(),
-                               "Points and lines of a frame, one a line: pixels, depth, and the 3D ends "
-                               "(camera frame) of lines that have them",
+                               "Points and lines of a frame, one per line: pixels, depth, and the 3D ends "
+                               "(camera frame) of lines with depth",
                                Mode::kStateless);
 }
 

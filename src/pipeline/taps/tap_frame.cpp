@@ -60,8 +60,8 @@ class FrameTap : public Tap {
 
 StageType frame_tap() {
   return tap_type<FrameTap>(frame_port(),
-                            "Colour and depth (16 bit, at the camera's depth_scale) with a camera.yaml "
-                            "beside; as frame-*.png a recording of its own",
+                            "Colour and depth (16 bit, at the camera's depth_scale) with a camera.yaml; "
+                            "named frame-*.png they are a recording",
                             Mode::kStateless);
 }
 

@@ -78,7 +78,7 @@ class CloudTap : public Tap {
 }  // namespace
 
 StageType track_tap() {
-  return tap_type<TrackTap>(track_port(), "One line a tracked frame: number, stamp, keyframe made of it",
+  return tap_type<TrackTap>(track_port(), "One line per tracked frame: number, stamp, keyframe made of it",
                             Mode::kSerial);
 }
 StageType keyframe_cloud_tap() {

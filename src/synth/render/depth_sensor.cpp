@@ -335,8 +335,10 @@ void smear(const cv::Mat3b& image, const cv::Rect& cell, const cv::Vec2f& f, int
   }
 
   const int divide = (65536 + taps / 2) / taps;
+
   for (int y = cell.y; y < cell.y + cell.height; ++y) {
     int sum[3 * 8] = {};
+
     for (int k = 0; k < taps; ++k) {
       const auto* row = image.ptr<std::uint8_t>(std::clamp(y + dy[k], 0, image.rows - 1));
       if (cell.x + dx[k] >= 0 && cell.x + dx[k] + cell.width <= image.cols) {

@@ -14,14 +14,14 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("frames", frames, {-1, 1000000}, "", "Frames of each robot; -1 = the path once");
   table.integer("robots", robots, {1, 64}, "", "Number of recordings");
   table.integer("walkers", walkers, {0, 16}, "",
-                "How many of the scene's walkers are about: filmed, but no part of reference.ply");
+                "Number of walkers in the scene: filmed, but no part of reference.ply");
   table.choice("texture", texture,
                {{"full", Texture::kFull}, {"weak", Texture::kWeak}, {"none", Texture::kNone}},
-               "full; weak: faint; none: white cloth and grey floors");
+               "Strength of textures; none: white cloth and grey floors");
 
   table.choice("sensor", sensor,
                {{"ideal", Sensor::kIdeal}, {"kinect", Sensor::kKinect}, {"realsense", Sensor::kRealsense}},
-               "ideal has no noise, no offset between stamps and no blur");
+               "Camera model; ideal: no noise, no offset between stamps, no blur");
   table.choice("motion", motion,
                {{"scene", Motion::kScene}, {"handheld", Motion::kHandheld}, {"wheeled", Motion::kWheeled}},
                "How the camera is carried; scene: as the scene file says");
@@ -30,21 +30,19 @@ void SynthOptions::declare(core::OptionTable& table) {
   table.integer("width", width, {64, 4096}, "px", "Picture width");
   table.integer("height", height, {48, 4096}, "px", "Picture height");
   table.number("fps", fps, {1.0, 240.0}, "Hz", "Frames a second");
-  table.number("speed", speed, {0.05, 20.0}, "", "Times the scene's own speed");
-  table.number(
-      "readout", readout_s, {0.0, 0.1}, "s",
-      "Rolling shutter of the colour camera: from the first row to the last; a stamp is the middle row's");
+  table.number("speed", speed, {0.05, 20.0}, "", "Speed factor");
+  table.number("readout", readout_s, {0.0, 0.1}, "s",
+               "Rolling shutter of the colour camera: time from the first row to the last; stamps are those "
+               "of the middle row");
 
-  table.number("depth_delay", depth_delay_s, {-0.1, 0.1}, "s",
-               "How much later than its stamp says a depth image is taken");
+  table.number("depth_delay", depth_delay_s, {-0.1, 0.1}, "s", "Delay of depth images after their stamps");
   table.number("reference_spacing", reference_spacing, {0.0, 1.0}, "m",
                "Distance between samples of reference.ply; 0 = 5 mm, more for large scenes");
   table.number("visible_range", visible_range, {0.5, 20.0}, "m",
-               "What no camera saw from nearer than this does not count as visible in reference.ply");
-  table.text(
-      "events", events,
-      "Hard moments, kind@start+duration[*value] in seconds, separated by commas; kinds: whiteout, lampoff, "
-      "blur (value px), drop, cover, spin (value turns), nodepth");
+               "Largest distance from a camera at which a sample of reference.ply counts as visible");
+  table.text("events", events,
+             "Difficult moments, kind@start+duration[*value] in seconds, separated by commas; kinds: "
+             "whiteout, lampoff, blur (value px), drop, cover, spin (value turns), nodepth");
 }
 
 namespace {
@@ -95,6 +93,7 @@ core::Result<Event> parse_event(const std::string& text) {
       read_number(trim(text.substr(plus + 1, star == std::string::npos ? star : star - plus - 1)),
                   event.duration_s) &&
       (star == std::string::npos || read_number(trim(text.substr(star + 1)), event.value));
+
   if (!formed || event.start_s < 0.0 || event.duration_s <= 0.0 || std::abs(event.value) > 100.0) {
     return core::usage_error(fmt::format(
         "events: '{}' is not kind@start+duration[*value] in seconds, such as blur@6+0.5*12", text));

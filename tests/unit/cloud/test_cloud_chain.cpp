@@ -55,7 +55,8 @@ TEST(FilterChain, NotAChain) {
 
 TEST(FilterChain, SpelledOutChainReadsBackTheSame) {
   const auto chain = load(
-      "chain: a\nfilters:\n  - {type: radius_outlier, radius: 250 cm}\n  - type: crop_box\n  - type: pass_through\n");
+      "chain: a\nfilters:\n  - {type: radius_outlier, radius: 250 cm}\n  - type: crop_box\n  - type: "
+      "pass_through\n");
   ASSERT_TRUE(chain) << chain.error().message;
   const auto again = load(chain->to_yaml());
   ASSERT_TRUE(again) << again.error().message << "\n" << chain->to_yaml();

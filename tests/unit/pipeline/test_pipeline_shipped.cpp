@@ -10,7 +10,6 @@
 
 #include "../../../src/pipeline/graph/option_levels.hpp"
 #include "plumbline/cloud/filter_chain.hpp"
-#include "plumbline/core/renamed_options.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/reference.hpp"
 #include "plumbline/sensor/camera_file.hpp"
@@ -141,40 +140,6 @@ bool has_option(const StageRegistry& registry, const std::string& stage, const s
                      [&](const core::OptionSpec& spec) { return spec.key == key; });
 }
 
-TEST(Shipped, EarlierNamesOfOptionsStillServe) {
-  StageRegistry registry;
-  register_stages(registry);
-  for (const core::RenamedOption& option : core::renamed_options()) {
-    EXPECT_TRUE(has_option(registry, option.stage, option.now)) << option.stage << "." << option.now;
-    EXPECT_FALSE(has_option(registry, option.stage, option.before)) << option.stage << "." << option.before;
-  }
-  const fs::path file = fs::path(testing::TempDir()) / "plumbline_earlier_names.yaml";
-  std::ofstream(file) << "description: x\ninclude: rgbd.yaml\nstages:\n  fuse: {settle: off}\n";
-  const auto graph =
-      load_graph(file, registry, kShipped,
-                 {"robots.merge.min_pairs=6", "robots.features.x=1", "features.method=edlines"});
-  ASSERT_FALSE(graph) << "there is no such option";
-  const auto good =
-      load_graph(file, registry, kShipped, {"robots.merge.min_pairs=6", "features.method=edlines"});
-  ASSERT_TRUE(good) << good.error().message;
-  ASSERT_EQ(good->warnings.size(), 3U);
-  EXPECT_EQ(good->warnings[0], file.string() + ":4: fuse.settle is called plane_projection now");
-  EXPECT_EQ(good->warnings[1], "--set robots.merge.min_pairs: is called merge.min_pairs now");
-  EXPECT_NE(to_yaml(*good).find("plane_projection: off"), std::string::npos);
-  EXPECT_NE(to_yaml(*good).find("line.detector: edlines"), std::string::npos);
-  std::ofstream(file)
-      << "description: x\ninclude: rgbd.yaml\nstages:\n  track: {lines: off, thumbnails: off}\n";
-  const auto moved = load_graph(file, registry, kShipped, {"track.photometric=off"});
-  ASSERT_TRUE(moved) << moved.error().message;
-  ASSERT_EQ(moved->warnings.size(), 2U);
-  EXPECT_EQ(moved->warnings[0], file.string() + ":4: track.lines is called features.lines now");
-  const std::string text = to_yaml(*moved);
-  for (const char* option : {"\n    lines: off", "\n    photometric: off", "\n    thumbnails: off"}) {
-    EXPECT_NE(text.find(option), std::string::npos) << option;
-  }
-  fs::remove(file);
-}
-
 TEST(Shipped, LevelsNameOptionsThatAreThere) {
   StageRegistry registry;
   register_stages(registry);
@@ -191,18 +156,6 @@ TEST(Shipped, LevelsNameOptionsThatAreThere) {
   EXPECT_LE(count[OptionLevel::kBasic], 90U);
   EXPECT_LE(count[OptionLevel::kAdvanced], 75U);
   RecordProperty("basic", static_cast<int>(count[OptionLevel::kBasic]));
-}
-
-TEST(Shipped, AnOptionThatWentIsReadAndHasNoEffect) {
-  StageRegistry registry;
-  register_stages(registry);
-  const std::string own = "include: rgbd.yaml\nstages:\n  track: {solver.max_iterations: 7}\n";
-  const auto graph = parse_graph(own, "own.yaml", registry, kShipped, {"track.solver.max_iterations=9"});
-  ASSERT_TRUE(graph) << graph.error().message;
-  ASSERT_EQ(graph->warnings.size(), 2U);
-  EXPECT_EQ(graph->warnings[0], "stages.track.solver.max_iterations: has no effect");
-  EXPECT_EQ(graph->warnings[1], "--set track.solver.max_iterations: has no effect");
-  EXPECT_EQ(to_yaml(*graph).find("solver.max_iterations"), std::string::npos);
 }
 
 }  // namespace

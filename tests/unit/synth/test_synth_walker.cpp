@@ -36,7 +36,8 @@ SynthOptions small(int walkers, int frames) {
   return options;
 }
 
-core::Result<std::shared_ptr<const World>> walked_world(const std::string& yaml, const SynthOptions& options) {
+core::Result<std::shared_ptr<const World>> walked_world(const std::string& yaml,
+                                                        const SynthOptions& options) {
   const auto scene = parse_scene(yaml, "test.yaml");
   if (!scene) return tl::unexpected<core::Error>(scene.error());
   const core::Executor executor(2);
