@@ -7,21 +7,13 @@
 #include <cstdio>
 #include <memory>
 
+#include "example.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/features/frame_features.hpp"
 #include "plumbline/mapping/slam.hpp"
 #include "plumbline/pipeline/input.hpp"
 
 using namespace plumbline;
-
-namespace {
-
-int fail(const core::Error& error) {
-  std::fprintf(stderr, "%s\n", error.message.c_str());
-  return static_cast<int>(error.kind);
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 4) {

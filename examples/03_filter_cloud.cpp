@@ -10,21 +10,13 @@
 #include <cstdio>
 #include <vector>
 
+#include "example.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/filter_chain.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/pipeline/input.hpp"
 
 using namespace plumbline;
-
-namespace {
-
-int fail(const core::Error& error) {
-  std::fprintf(stderr, "%s\n", error.message.c_str());
-  return static_cast<int>(error.kind);
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 5) {

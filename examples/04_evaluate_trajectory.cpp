@@ -4,20 +4,12 @@
 //   04_evaluate_trajectory TRAJECTORY.txt INPUT PIPELINES
 #include <cstdio>
 
+#include "example.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/pipeline/input.hpp"
 
 using namespace plumbline;
-
-namespace {
-
-int fail(const core::Error& error) {
-  std::fprintf(stderr, "%s\n", error.message.c_str());
-  return static_cast<int>(error.kind);
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 4) {

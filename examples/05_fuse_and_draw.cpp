@@ -7,21 +7,13 @@
 
 #include <cstdio>
 
+#include "example.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/cloud/voxel_map.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/viz/snapshot.hpp"
 
 using namespace plumbline;
-
-namespace {
-
-int fail(const core::Error& error) {
-  std::fprintf(stderr, "%s\n", error.message.c_str());
-  return static_cast<int>(error.kind);
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 4) {

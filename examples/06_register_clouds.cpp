@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "example.hpp"
 #include "plumbline/cloud/constrained_point_to_plane.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
 #include "plumbline/cloud/two_way_correspondences.hpp"
@@ -22,11 +23,6 @@
 using namespace plumbline;
 
 namespace {
-
-int fail(const core::Error& error) {
-  std::fprintf(stderr, "%s\n", error.message.c_str());
-  return static_cast<int>(error.kind);
-}
 
 /// Points with normals, and their standard deviation as curvature, one for each 3 cm.
 cloud::SurfaceSearch surface_of(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera) {

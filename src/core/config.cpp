@@ -113,6 +113,7 @@ std::string to_string(const ConfigProblems& problems) {
       if (!text.empty()) text += '\n';
       text += file;
       if (p->mark.line > 0) text += fmt::format(":{}:{}", p->mark.line, p->mark.column);
+
       // "--set features.points: ..." is how the user wrote it; a file is followed by a colon.
       const bool command_line = file.rfind("--", 0) == 0;
       if (!file.empty()) text += command_line ? " " : ": ";

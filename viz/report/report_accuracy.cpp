@@ -9,6 +9,7 @@
 
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/companions.hpp"
+#include "report_fill.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -119,13 +120,9 @@ std::string error_chart(const ReportData& data) {
   return svg_chart(chart);
 }
 
-void add_saved_path(const std::string& file, const Json& json, HtmlTable& table) {
-  const auto mm = [&](const char* place) { return number_text(1e3 * number_at(json, place), 1); };
+void add_saved_path(const std::string& file, const Json& json, JsonTable& table) {
   const std::string name = text_at(json, "/name");
-  table.row({name.empty() ? file : file + ": " + name, mm("/ate_m/rmse"), mm("/ate_m/median"),
-             mm("/ate_m/max"), number_text(number_at(json, "/rotation_deg/rmse"), 3),
-             mm("/rpe/per_frame/translation_m/rmse"), mm("/rpe/per_second/translation_m/rmse"),
-             number_text(number_at(json, "/tracked_percent"), 1)});
+  table.row(json, {name.empty() ? file : file + ": " + name});
 }
 
 /// evaluation*.json of the folder: what plumbline evaluate --json printed.
@@ -139,30 +136,34 @@ std::string saved_html(const ReportData& data) {
 
   std::sort(names.begin(), names.end());
 
-  HtmlTable paths(
-      "evaluation of a path|>ATE rmse (mm)|>median (mm)|>max (mm)|>orientation rmse (deg)"
-      "|>RPE per frame (mm)|>RPE per second (mm)|>tracked (%)");
+  JsonTable paths({{"evaluation of a path", ""},
+                   {">ATE rmse (mm)", "{/ate_m/rmse:1mm}"},
+                   {">median (mm)", "{/ate_m/median:1mm}"},
+                   {">max (mm)", "{/ate_m/max:1mm}"},
+                   {">orientation rmse (deg)", "{/rotation_deg/rmse:3}"},
+                   {">RPE per frame (mm)", "{/rpe/per_frame/translation_m/rmse:1mm}"},
+                   {">RPE per second (mm)", "{/rpe/per_second/translation_m/rmse:1mm}"},
+                   {">tracked (%)", "{/tracked_percent:1}"}});
 
-  HtmlTable clouds(
-      "evaluation of a cloud|>accuracy median (mm)|>rmse (mm)|>completeness median (mm)|>rmse (mm)"
-      "|>F at 10 mm|>walls' thickness, rms (mm)");
+  JsonTable clouds({{"evaluation of a cloud", ""},
+                    {">accuracy median (mm)", "{/accuracy_mm/median:1}"},
+                    {">rmse (mm)", "{/accuracy_mm/rmse:1}"},
+                    {">completeness median (mm)", "{/completeness_mm/median:1}"},
+                    {">rmse (mm)", "{/completeness_mm/rmse:1}"},
+                    {">F at 10 mm", "{/at/10mm/f:3}"},
+                    {">walls' thickness, rms (mm)", "{/wall_thickness_mm/rms:1}"}});
+
   std::string out;
 
   for (const std::string& name : names) {
     std::ifstream stream(data.folder / name, std::ios::binary);
     const Json json = Json::parse(stream, nullptr, false);
-    const auto number = [&](const char* place, int decimals) {
-      return number_text(number_at(json, place), decimals);
-    };
-
     if (json.is_object() && json.contains("ate_m")) {
       add_saved_path(name, json, paths);
     } else if (json.is_object() && json.contains("estimates")) {
       for (const Json& one : list_at(json, "/estimates")) add_saved_path(name, one, paths);
     } else if (json.is_object() && (json.contains("accuracy_mm") || json.contains("wall_thickness_mm"))) {
-      clouds.row({name, number("/accuracy_mm/median", 1), number("/accuracy_mm/rmse", 1),
-                  number("/completeness_mm/median", 1), number("/completeness_mm/rmse", 1),
-                  number("/at/10mm/f", 3), number("/wall_thickness_mm/rms", 1)});
+      clouds.row(json, {name});
     } else {
       out += note(name + " is no output of plumbline evaluate --json.");
     }

@@ -15,6 +15,7 @@
 
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/image_io.hpp"
+#include "report_fill.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -171,11 +172,11 @@ std::string cloud_html(const ReportData& data) {
     facts.emplace_back("Bounding box without the outer 0.5 % of each side", box_text(extent->central_size()));
     facts.emplace_back("Coordinates", range_text(extent->low, extent->high));
 
-    if (const double sigma_m = number_at(data.summary, "/cloud/sigma_m/median"); sigma_m > 0.0) {
-      facts.emplace_back(
-          "Standard deviation along the normal, of poses and depth",
-          fmt::format("{} in the middle, below {} for 90 % of the points",
-                      number_text(1e3 * sigma_m, 1, "mm"), mm_at(data.summary, "/cloud/sigma_m/p90")));
+    if (number_at(data.summary, "/cloud/sigma_m/median") > 0.0) {
+      facts.emplace_back("Standard deviation along the normal, of poses and depth",
+                         filled(data.summary,
+                                "{/cloud/sigma_m/median:1 mm} in the middle, below {/cloud/sigma_m/p90:1 mm} "
+                                "for 90 % of the points"));
     }
 
     add_robots(data, facts);

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "plumbline/core/numbers.hpp"
+#include "report_fill.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -83,14 +84,15 @@ std::string time_charts(const ReportData& data) {
 }
 
 std::string stages_table(const Json& summary) {
-  HtmlTable table("stage|>a frame, median (ms)|>95 % of frames (ms)|>at the end (ms)|>times");
-  for (const auto& [name, stage] : list_at(summary, "/timing/stages_ms").items()) {
-    table.row({name, number_text(number_at(stage, "/median"), 2), number_text(number_at(stage, "/p95"), 2),
-               number_text(number_at(stage, "/finish"), 0), ""});
-  }
+  JsonTable table({{"stage", ""},
+                   {">a frame, median (ms)", "{/median:2}"},
+                   {">95 % of frames (ms)", "{/p95:2}"},
+                   {">at the end (ms)", "{/finish:0}"},
+                   {">times", ""}});
+  for (const auto& [name, stage] : list_at(summary, "/timing/stages_ms").items()) table.row(stage, {name});
   for (const auto& [name, part] : list_at(summary, "/timing/parts_ms").items()) {
-    table.row({name, number_text(number_at(part, "/median"), 2), number_text(number_at(part, "/p95"), 2), "",
-               count_at(part, "/times")},
+    table.row(part,
+              {name, filled(part, "{/median:2}"), filled(part, "{/p95:2}"), "", filled(part, "{/times}")},
               "no");
   }
   return table.html();
@@ -132,25 +134,21 @@ std::string what_is(const std::string& name) {
 
 std::string cost_html(const ReportData& data) {
   const Json& s = data.summary;
-  const auto seconds = [&](const char* place) { return number_text(number_at(s, place), 2, "s"); };
-  Facts facts{
-      {"The whole run", fmt::format("{}: {} frames a second without the time for export",
-                                    seconds("/timing/wall_s"), number_text(number_at(s, "/timing/fps"), 1))},
-      {"Mapping, first frame read to last change of the map", seconds("/timing/map_s")},
-      {"Clouds, pictures and tables", seconds("/timing/export_s")}};
+  Facts facts = filled_facts(
+      s,
+      {{"The whole run", "{/timing/wall_s:2 s}: {/timing/fps:1} frames a second without the time for export"},
+       {"Mapping, first frame read to last change of the map", "{/timing/map_s:2 s}"},
+       {"Clouds, pictures and tables", "{/timing/export_s:2 s}"}});
+  const auto add = [&](const char* label, const char* pattern) {
+    facts.emplace_back(label, filled(s, pattern));
+  };
 
-  if (number_at(s, "/timing/pace_hz") > 0.0) {
-    facts.emplace_back("Played at", fmt::format("{} a second; {} behind at most",
-                                                number_text(number_at(s, "/timing/pace_hz"), 1),
-                                                seconds("/timing/behind_s")));
-  }
-
-  facts.emplace_back("Threads", count_at(s, "/timing/threads"));
-  facts.emplace_back("Memory at most", number_text(number_at(s, "/memory/peak_rss_mb"), 0, "MB"));
+  if (number_at(s, "/timing/pace_hz") > 0.0)
+    add("Played at", "{/timing/pace_hz:1} a second; {/timing/behind_s:2 s} behind at most");
+  add("Threads", "{/timing/threads}");
+  add("Memory at most", "{/memory/peak_rss_mb:0 MB}");
   if (number_at(s, "/frames/resumed") > 0.0) {
-    facts.emplace_back("Not counted",
-                       fmt::format("{} frames that an earlier run had mapped before it was interrupted",
-                                   count_at(s, "/frames/resumed")));
+    add("Not counted", "{/frames/resumed} frames that an earlier run had mapped before it was interrupted");
   }
 
   return facts_html(facts) + stages_table(s) + time_charts(data);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report_fill.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -67,26 +68,23 @@ std::string figures_html(const ReportData& data) {
   const auto& s = data.summary;
   double length_m = 0.0;
   for (const ReportPath& path : data.paths) length_m += path.length_m();
-  return tiles_html(
-      {{"of the frames tracked", number_text(number_at(s, "/frames/tracked_percent"), 1, "%")},
-       {"path", number_text(length_m, 2, "m")},
-       {"keyframes", count_at(s, "/keyframes")},
-       {"cloud points", count_at(s, "/cloud/points")},
-       {"extent of the cloud", extent_text(data)},
-       data.fused_afterwards
-           ? std::pair{std::string("to fuse"), number_text(number_at(s, "/timing/wall_s"), 1, "s")}
-           : std::pair{std::string("frames a second"), number_text(number_at(s, "/timing/fps"), 1)}});
+  return tiles_html({{"of the frames tracked", number_text(number_at(s, "/frames/tracked_percent"), 1, "%")},
+                     {"path", number_text(length_m, 2, "m")},
+                     {"keyframes", count_at(s, "/keyframes")},
+                     {"cloud points", count_at(s, "/cloud/points")},
+                     {"extent of the cloud", extent_text(data)},
+                     data.fused_afterwards
+                         ? std::pair{std::string("to fuse"), filled(s, "{/timing/wall_s:1 s}")}
+                         : std::pair{std::string("frames a second"), filled(s, "{/timing/fps:1}")}});
 }
 
 std::string frames_text(const ReportData& data) {
   const auto& s = data.summary;
-  std::string text = fmt::format("{} of {} read, {} tracked", count_at(s, "/frames/read"),
-                                 count_at(s, "/frames/available"), count_at(s, "/frames/tracked"));
-  if (number_at(s, "/frames/lost") > 0) text += fmt::format(", {} lost", count_at(s, "/frames/lost"));
-  if (number_at(s, "/frames/unreadable") > 0)
-    text += fmt::format(", {} unreadable", count_at(s, "/frames/unreadable"));
+  std::string text = filled(s, "{/frames/read} of {/frames/available} read, {/frames/tracked} tracked");
+  if (number_at(s, "/frames/lost") > 0) text += filled(s, ", {/frames/lost} lost");
+  if (number_at(s, "/frames/unreadable") > 0) text += filled(s, ", {/frames/unreadable} unreadable");
   if (number_at(s, "/frames/resumed") > 0)
-    text += fmt::format("; {} of them by the run that this one went on from", count_at(s, "/frames/resumed"));
+    text += filled(s, "; {/frames/resumed} of them by the run that this one continued");
   return text;
 }
 
@@ -114,17 +112,15 @@ std::string robots_text(const ReportData& data) {
 
 std::string facts(const ReportData& data) {
   const auto& s = data.summary;
-  return facts_html(
-      {{"Input", text_at(s, "/input")},
-       {"Robots", robots_text(data)},
-       {"Frames", frames_text(data)},
-       {"Duration of the recording", duration_text(data.end_s - data.start_s)},
-       {"Pipeline", text_at(s, "/pipeline")},
-       {"Frame of the results", frame_of_results(data)},
-       {"Landmarks", fmt::format("{} points, {} lines", count_at(s, "/landmarks/points"),
-                                 count_at(s, "/landmarks/lines"))},
-       {"Threads, seed", fmt::format("{}, {}", count_at(s, "/timing/threads"), count_at(s, "/seed"))},
-       {"Version", "plumbline " + text_at(s, "/version")}});
+  return facts_html({{"Input", text_at(s, "/input")},
+                     {"Robots", robots_text(data)},
+                     {"Frames", frames_text(data)},
+                     {"Duration of the recording", duration_text(data.end_s - data.start_s)},
+                     {"Pipeline", text_at(s, "/pipeline")},
+                     {"Frame of the results", frame_of_results(data)},
+                     {"Landmarks", filled(s, "{/landmarks/points} points, {/landmarks/lines} lines")},
+                     {"Threads, seed", filled(s, "{/timing/threads}, {/seed}")},
+                     {"Version", "plumbline " + text_at(s, "/version")}});
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "report_fill.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -13,29 +14,23 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostRows = 300;
 constexpr std::size_t kShownMerges = 3;  ///< so few need not be folded
-constexpr double kDegrees = 180.0 / M_PI;
 
-/// "found 0.61": a share in percent.
-std::string percent(double share) { return number_text(100.0 * share, 0, "%"); }
-
-HtmlTable trials_table(bool closed) {
-  std::string columns =
-      ">keyframe|>looks like|>score|>matches|>points + lines|>rms (σ)|>found|>overlap|>contradiction"
-      "|>correction (m)|>(deg)|>way (m)";
-  if (!closed) columns += "|why it was refused";
-  return HtmlTable(columns);
-}
-
-void add_trial(const Json& trial, HtmlTable& table) {
-  const auto number = [&](const char* place, int decimals) {
-    return number_text(number_at(trial, place), decimals);
-  };
-  table.row({number("/query", 0), number("/match", 0), number("/score", 3), number("/matches", 0),
-             number("/points", 0) + " + " + number("/lines", 0), number("/rms", 2),
-             percent(number_at(trial, "/found")), percent(number_at(trial, "/overlap")),
-             percent(number_at(trial, "/contradiction")), number("/correction_m", 3),
-             number_text(kDegrees * number_at(trial, "/correction_rad"), 2), number("/path_m", 2),
-             text_at(trial, "/reason")});
+/// Attempts to close a loop, one per row.
+JsonTable trials_table(bool closed) {
+  std::vector<std::pair<const char*, const char*>> columns{{">keyframe", "{/query:0}"},
+                                                           {">looks like", "{/match:0}"},
+                                                           {">score", "{/score:3}"},
+                                                           {">matches", "{/matches:0}"},
+                                                           {">points + lines", "{/points:0} + {/lines:0}"},
+                                                           {">rms (σ)", "{/rms:2}"},
+                                                           {">found", "{/found:0 %}"},
+                                                           {">overlap", "{/overlap:0 %}"},
+                                                           {">contradiction", "{/contradiction:0 %}"},
+                                                           {">correction (m)", "{/correction_m:3}"},
+                                                           {">(deg)", "{/correction_rad:2deg}"},
+                                                           {">way (m)", "{/path_m:2}"}};
+  if (!closed) columns.emplace_back("why it was refused", "{/reason:text}");
+  return JsonTable(columns);
 }
 
 /// "no pose from 106 points and 18 lines" and the like are one reason.
@@ -48,49 +43,37 @@ std::string kind_of_reason(const std::string& reason) {
 }
 
 std::string merge_evidence(const Json& m) {
-  const auto overlay = [&](const std::string& at) {
-    return fmt::format("{} expected, {} found again ({} by chance), {} seen through",
-                       count_at(m, at + "/expected"), count_at(m, at + "/matched"),
-                       count_at(m, at + "/chance"), count_at(m, at + "/seen_through"));
-  };
-
-  Facts facts{
-      {"Decision", flag_at(m, "/accepted") ? "merged" : "not merged: " + text_at(m, "/reason")},
-      {"Keyframes that look alike",
-       fmt::format("{}; {} verified or refused, {} show the same place", count_at(m, "/candidates"),
-                   count_at(m, "/tried"), count_at(m, "/verified"))},
-      {"Keyframes that agree",
-       fmt::format("{}; {} in the best other answer", count_at(m, "/agreeing"), count_at(m, "/alternative"))},
-      {"Asked for confirmation",
-       fmt::format("{}, of which {} confirmed", count_at(m, "/expected"), count_at(m, "/confirmed"))},
-      {"Landmarks laid over each other", overlay("/overlay")},
-      {"Matches", fmt::format("{} by descriptor; {} points and lines fit, rms {}", count_at(m, "/matches"),
-                              count_at(m, "/inliers"), number_text(number_at(m, "/rms"), 2, "σ"))},
-      {"Surfaces overlap", percent(number_at(m, "/overlap"))},
-      {"Spread of the keyframes",
-       fmt::format("{} and {} apart; they agree to {}", number_text(number_at(m, "/span_m"), 2, "m"),
-                   number_text(kDegrees * number_at(m, "/span_rad"), 0, "deg"), mm_at(m, "/spread_m"))},
-      {"Pairs of the pose graph",
-       fmt::format("{}, of which {} were taken for wrong", count_at(m, "/pairs"), count_at(m, "/rejected"))}};
+  Facts facts = filled_facts(
+      m, {{"Keyframes that look alike",
+           "{/candidates}; {/tried} verified or refused, {/verified} show the same place"},
+          {"Keyframes that agree", "{/agreeing}; {/alternative} in the best other answer"},
+          {"Asked for confirmation", "{/expected}, of which {/confirmed} confirmed"},
+          {"Landmarks laid over each other",
+           "{/overlay/expected} expected, {/overlay/matched} found again ({/overlay/chance} by chance), "
+           "{/overlay/seen_through} seen through"},
+          {"Matches", "{/matches} by descriptor; {/inliers} points and lines fit, rms {/rms:2 σ}"},
+          {"Surfaces overlap", "{/overlap:0 %}"},
+          {"Spread of the keyframes",
+           "{/span_m:2 m} and {/span_rad:0 deg} apart; they agree to {/spread_m:1 mm}"},
+          {"Pairs of the pose graph", "{/pairs}, of which {/rejected} were taken for wrong"}});
+  facts.insert(facts.begin(),
+               {"Decision", flag_at(m, "/accepted") ? "merged" : "not merged: " + text_at(m, "/reason")});
 
   if (number_at(m, "/alternative_m") > 0.0) {
-    facts.emplace_back("Best other answer", number_text(number_at(m, "/alternative_m"), 2, "m") + " off; " +
-                                                overlay("/alternative_overlay"));
+    facts.emplace_back("Best other answer",
+                       filled(m,
+                              "{/alternative_m:2 m} off; {/alternative_overlay/expected} expected, "
+                              "{/alternative_overlay/matched} found again ({/alternative_overlay/chance} by "
+                              "chance), {/alternative_overlay/seen_through} seen through"));
   }
-
-  if (number_at(m, "/time_s") >= 0.0) {
-    facts.emplace_back("Certain after", number_text(number_at(m, "/time_s"), 1, "s of the recordings"));
-  }
-
+  if (number_at(m, "/time_s") >= 0.0)
+    facts.emplace_back("Certain after", filled(m, "{/time_s:1 s of the recordings}"));
   if (!list_at(m, "/sigma").empty()) {
     facts.emplace_back("Standard deviation of the placement",
-                       fmt::format("{}, {}, {} along x, y, z; {}, {}, {} about them", mm_at(m, "/sigma/0"),
-                                   mm_at(m, "/sigma/1"), mm_at(m, "/sigma/2"),
-                                   number_text(kDegrees * number_at(m, "/sigma/3"), 2, "deg"),
-                                   number_text(kDegrees * number_at(m, "/sigma/4"), 2, "deg"),
-                                   number_text(kDegrees * number_at(m, "/sigma/5"), 2, "deg")));
+                       filled(m,
+                              "{/sigma/0:1 mm}, {/sigma/1:1 mm}, {/sigma/2:1 mm} along x, y, z; "
+                              "{/sigma/3:2 deg}, {/sigma/4:2 deg}, {/sigma/5:2 deg} about them"));
   }
-
   return facts_html(facts);
 }
 
@@ -112,10 +95,13 @@ std::string adjustment_html(const Json& s) {
     const Json& before = list_at(s, std::string("/refine/before/") + name);
     const Json& after = list_at(s, std::string("/refine/after/") + name);
     if (after.empty()) continue;
+
     const double all = number_at(after, "/all");
-    table.row({what, count_text(all), percent(number_at(before, "/fitting") / all),
-               percent(number_at(after, "/fitting") / all), number_text(number_at(before, "/rms"), 2),
-               number_text(number_at(after, "/rms"), 2)});
+    const auto fitting = [all](const Json& family) {
+      return number_text(100.0 * number_at(family, "/fitting") / all, 0, "%");
+    };
+    table.row({what, count_text(all), fitting(before), fitting(after), filled(before, "{/rms:2}"),
+               filled(after, "{/rms:2}")});
   }
   return table.html();
 }
@@ -136,10 +122,10 @@ std::string fit_html(const ReportData& data) {
 }
 
 std::string sigma_text(const Json& s) {
-  const double median_m = number_at(s, "/refine/sigma_position_m/median");
-  if (!(median_m > 0.0)) return "not known";
-  return fmt::format("{} in the middle, below {} for 90 % of them", number_text(1e3 * median_m, 1, "mm"),
-                     mm_at(s, "/refine/sigma_position_m/p90"));
+  if (!(number_at(s, "/refine/sigma_position_m/median") > 0.0)) return "not known";
+  return filled(s,
+                "{/refine/sigma_position_m/median:1 mm} in the middle, below "
+                "{/refine/sigma_position_m/p90:1 mm} for 90 % of them");
 }
 
 std::string closings_html(const ReportData& data) {
@@ -149,21 +135,21 @@ std::string closings_html(const ReportData& data) {
     return paragraph("No keyframe looked like a place seen before: there was no loop to close.");
   }
 
-  HtmlTable closed = trials_table(true), refused = trials_table(false);
+  JsonTable closed = trials_table(true), refused = trials_table(false);
   std::map<std::string, std::size_t> reasons;
   for (const Json& trial : list) {
     if (flag_at(trial, "/closed")) {
-      add_trial(trial, closed);
+      closed.row(trial);
       continue;
     }
     ++reasons[kind_of_reason(text_at(trial, "/reason"))];
-    if (refused.rows() < kMostRows) add_trial(trial, refused);
+    if (refused.rows() < kMostRows) refused.row(trial);
   }
 
-  std::string out = paragraph(fmt::format(
-      "{} candidates, {} verified; loops moved the map {} times; the pose graph took {} for wrong.",
-      count_at(data.summary, "/loops/candidates"), count_at(data.summary, "/loops/verified"),
-      count_at(data.summary, "/loops/accepted"), count_at(data.summary, "/loops/rejected")));
+  std::string out =
+      paragraph(filled(data.summary,
+                       "{/loops/candidates} candidates, {/loops/verified} verified; loops moved the map "
+                       "{/loops/accepted} times; the pose graph took {/loops/rejected} for wrong."));
   if (closed.rows() > 0) out += "<h3>Closed</h3>\n" + closed.html();
 
   HtmlTable why("why candidates were refused|>times");
@@ -183,9 +169,9 @@ std::string closings_html(const ReportData& data) {
 std::string feedback_html(const Json& summary) {
   if (!flag_at(summary, "/feedback/on")) return {};
   return "<h3>By maps of other robots</h3>\n" +
-         facts_html({{"Keyframes received", count_at(summary, "/feedback/keyframes_received")},
-                     {"Frames relocalised", count_at(summary, "/feedback/relocalised")},
-                     {"Loops that moved the map", count_at(summary, "/feedback/loops")}}) +
+         facts_html(filled_facts(summary, {{"Keyframes received", "{/feedback/keyframes_received}"},
+                                           {"Frames relocalised", "{/feedback/relocalised}"},
+                                           {"Loops that moved the map", "{/feedback/loops}"}})) +
          note(text_at(summary, "/feedback/note"));
 }
 
@@ -196,16 +182,19 @@ std::string loops_html(const ReportData& data) { return closings_html(data) + fe
 std::string merges_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/merges");
   if (list.empty()) return {};
-  HtmlTable overview("maps||>look alike|>verified|>agreeing|>confirmed|>landmarks found again|why not");
+  JsonTable overview({{"maps", ""},
+                      {"", ""},
+                      {">look alike", "{/candidates}"},
+                      {">verified", "{/verified}"},
+                      {">agreeing", "{/agreeing}"},
+                      {">confirmed", "{/confirmed} of {/expected}"},
+                      {">landmarks found again", "{/overlay/matched} of {/overlay/expected}"},
+                      {"why not", "{/reason:text}"}});
   std::string details;
   for (const Json& m : list) {
     const bool accepted = flag_at(m, "/accepted");
-    const std::string names = text_at(m, "/a") + " and " + text_at(m, "/b");
-    overview.row(
-        {names, accepted ? "merged" : "not merged", count_at(m, "/candidates"), count_at(m, "/verified"),
-         count_at(m, "/agreeing"), count_at(m, "/confirmed") + " of " + count_at(m, "/expected"),
-         count_at(m, "/overlay/matched") + " of " + count_at(m, "/overlay/expected"), text_at(m, "/reason")},
-        accepted ? "yes" : "bad");
+    const std::string names = filled(m, "{/a:text} and {/b:text}");
+    overview.row(m, {names, accepted ? "merged" : "not merged"}, accepted ? "yes" : "bad");
     details +=
         folded("Evidence: " + names, merge_evidence(m) + refused_pairs(m), list.size() <= kShownMerges);
   }
@@ -238,18 +227,16 @@ std::string refinement_html(const ReportData& data) {
            cameras_html(s) + fit_html(data);
   }
 
-  std::string out = facts_html(
-      {{"Local maps", count_at(s, "/refine/local_maps")},
-       {"Alignments of their surfaces",
-        fmt::format("{} tried, {} used; the pose graph took {} of them for wrong",
-                    count_at(s, "/refine/tried"), count_at(s, "/refine/accepted"),
-                    count_at(s, "/refine/rejected"))},
-       {"Mean rms of the surfaces aligned",
-        number_text(number_at(s, "/refine/mean_rms"), 2, "σ of the depth noise")},
-       {"Keyframes moved", fmt::format("{} on average, {} at most", mm_at(s, "/refine/mean_shift_m"),
-                                       mm_at(s, "/refine/max_shift_m"))},
-       {"Standard deviation of keyframes beside the first", sigma_text(s)}});
+  Facts facts = filled_facts(
+      s, {{"Local maps", "{/refine/local_maps}"},
+          {"Alignments of their surfaces",
+           "{/refine/tried} tried, {/refine/accepted} used; the pose graph took {/refine/rejected} of them "
+           "for wrong"},
+          {"Mean rms of the surfaces aligned", "{/refine/mean_rms:2 σ of the depth noise}"},
+          {"Keyframes moved", "{/refine/mean_shift_m:1 mm} on average, {/refine/max_shift_m:1 mm} at most"}});
+  facts.emplace_back("Standard deviation of keyframes beside the first", sigma_text(s));
 
+  std::string out = facts_html(facts);
   out += adjustment_html(s);
   return out + cameras_html(s) + fit_html(data);
 }

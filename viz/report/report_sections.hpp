@@ -26,13 +26,9 @@ std::string configuration_html(const ReportData& data);
 /// `left_out`: the report itself.
 std::string files_html(const ReportData& data, const std::filesystem::path& left_out);
 
-/// Numbers of the summary by their place, as text.
+/// A count of the summary as text, by its JSON pointer.
 inline std::string count_at(const nlohmann::ordered_json& json, const std::string& place) {
   return count_text(number_at(json, place));
-}
-/// Value of a length in metres as text in millimetres.
-inline std::string mm_at(const nlohmann::ordered_json& json, const std::string& place) {
-  return number_text(1e3 * number_at(json, place), 1, "mm");
 }
 
 /// CSS classes of a robot's marks.
