@@ -288,7 +288,7 @@ core::Result<StoreWriter> StoreWriter::create(const std::filesystem::path& file,
                                               StoreUse use) {
   std::error_code ignored;
   if (std::filesystem::exists(file, ignored)) {
-    return core::output_error(file.string() + ": is there already; remove it or write to another folder");
+    return core::output_error(file.string() + ": exists already; remove it or write to another folder");
   }
 
   core::Result<StoreWriter> made = guarded(file, ErrorKind::kOutput, [&] {

@@ -19,7 +19,7 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   if (request.resume && pipeline::is_finished(request.output)) {
     if (!session.quiet)
-      fmt::print("{}: is finished; there is nothing to go on with\n", request.output.string());
+      fmt::print("{}: is finished; there is nothing to continue\n", request.output.string());
     return 0;
   }
   Console& console = session.console();

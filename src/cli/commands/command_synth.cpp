@@ -33,7 +33,7 @@ core::Result<void> film(SynthRequest& request, Session& session) {
   std::error_code ec;
   if (std::filesystem::exists(request.output, ec) && !std::filesystem::is_empty(request.output, ec)) {
     return core::usage_error(
-        fmt::format("{}: is there already and not empty; name a new folder", request.output.string()));
+        fmt::format("{}: exists and is not empty; name a new folder", request.output.string()));
   }
 
   Console& console = session.console();

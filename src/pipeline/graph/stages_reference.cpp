@@ -15,7 +15,7 @@ constexpr const char* kIntroduction =
     "may carry a unit\n"
     "(`5 mm`, `10 deg`, `0.5 s`); without one a number is in the unit of its default. `plumbline pipelines "
     "describe STAGE --all`\n"
-    "shows more options, for those who know what they do.\n";
+    "also shows the advanced options.\n";
 
 constexpr const char* kTaps =
     "\n## Taps\n\n"
