@@ -28,6 +28,7 @@ using LineId = Id<struct LineTag>;
 
 }  // namespace plumbline::core
 
+/// @cond
 template <typename Tag>
 struct std::hash<plumbline::core::Id<Tag>> {
   std::size_t operator()(const plumbline::core::Id<Tag>& id) const noexcept {
@@ -35,3 +36,4 @@ struct std::hash<plumbline::core::Id<Tag>> {
                                       static_cast<std::uint32_t>(id.index));
   }
 };
+/// @endcond
