@@ -30,7 +30,7 @@ std::string names_of(const maps::StoredMaps& maps) {
   return names;
 }
 
-core::Result<Graph> load_fusion(const FuseRequest& request, core::Log& log) {
+core::Result<Graph> load_fusion(const FuseRequest& request) {
   auto graph = load_pipeline(request);
   if (!graph) return graph;
   if (graph->source().type->name == "maps") return graph;
@@ -67,7 +67,7 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
                                           core::Log& log, const core::StopToken& stop,
                                           const Progress& progress) {
   const auto began = RunClock::now();
-  auto graph = load_fusion(request, log);
+  auto graph = load_fusion(request);
   if (!graph) return tl::unexpected(graph.error());
   const auto maps = open_maps(request, executor);
   if (!maps) return tl::unexpected(maps.error());
