@@ -107,6 +107,7 @@ void check(const sensor::Camera& camera) {
   if (camera.depth) check(*camera.depth);
   if (camera.color_from_depth) check(*camera.color_from_depth);
   for (const double k : camera.distortion) demand(std::isfinite(k), "the camera is not finite");
+  for (const double k : camera.depth_lens.k) demand(std::isfinite(k), "the camera is not finite");
   for (const double k : camera.depth_slope) demand(std::isfinite(k), "the camera is not finite");
   demand(std::isfinite(camera.depth_delay_s), "the camera is not finite");
 }

@@ -33,9 +33,20 @@ void fields(Io& io, Pinhole& p) {
 }
 
 template <typename Io>
+void fields(Io& io, Lens& lens) {
+  auto model = static_cast<std::uint8_t>(lens.model);
+  io(model, lens.k);
+  lens.model = static_cast<LensModel>(model);
+  io.check(lens.model <= LensModel::kEquidistant, "a lens is of no known kind");
+}
+
+template <typename Io>
 void fields(Io& io, Camera& c) {
-  io(c.name, c.color, c.distortion, c.depth_scale, c.fps, c.color_from_depth, c.depth, c.readout_s,
+  Lens lens = c.lens();
+  io(c.name, c.color, lens, c.depth_scale, c.fps, c.color_from_depth, c.depth, c.depth_lens, c.readout_s,
      c.depth_slope, c.depth_delay_s);
+  c.model = lens.model;
+  c.distortion = lens.k;
 }
 
 }  // namespace plumbline::sensor

@@ -147,7 +147,13 @@ std::optional<sensor::Camera> guessed_camera(const Layout& layout) {
 std::string distortion_text(const sensor::Camera& camera) {
   if (!camera.distorted()) return "no distortion";
   const sensor::Distortion& k = camera.distortion;
-  return fmt::format("distortion k1 {:g} k2 {:g} p1 {:g} p2 {:g} k3 {:g}", k[0], k[1], k[2], k[3], k[4]);
+  if (camera.model == sensor::LensModel::kEquidistant)
+    return fmt::format("equidistant (fisheye) k1 {:g} k2 {:g} k3 {:g} k4 {:g}", k[0], k[1], k[2], k[3]);
+  const std::string more = k[5] != 0.0 || k[6] != 0.0 || k[7] != 0.0
+                               ? fmt::format(" k4 {:g} k5 {:g} k6 {:g}", k[5], k[6], k[7])
+                               : "";
+  return fmt::format("distortion k1 {:g} k2 {:g} p1 {:g} p2 {:g} k3 {:g}{}", k[0], k[1], k[2], k[3], k[4],
+                     more);
 }
 
 /// What was understood, and where each number comes from.

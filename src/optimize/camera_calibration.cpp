@@ -94,17 +94,11 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
     const double* change = parameters[0];
     const RowPoint row(*pose_, share_, change, parameters[1], parameters[2]);
     if (row.p.z() < 0.05) return false;
-
-    const double x = row.p.x() / row.p.z();
-    const double y = row.p.y() / row.p.z();
-    const double r2 = x * x + y * y;
-    const sensor::Distortion& k = camera_->distortion;
-    const double k1 = k[0] + change[kK1];
-    const double k2 = k[1] + change[kK2];
-    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k[4]));
-    const Eigen::Vector2d distorted(x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
-                                    y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y);
-
+    const Eigen::Vector2d ray(row.p.x() / row.p.z(), row.p.y() / row.p.z());
+    sensor::Lens lens = camera_->lens();
+    lens.k[0] += change[kK1];
+    lens.k[1] += change[kK2];
+    const Eigen::Vector2d distorted = lens.distort(ray);
     const sensor::Pinhole& c = camera_->color;
     const Eigen::Vector2d focal = Eigen::Vector2d(c.fx, c.fy) * (1.0 + change[kFocal]);
     const Eigen::Vector2d centre(c.cx + change[kCentreX], c.cy + change[kCentreY]);
@@ -113,22 +107,17 @@ class PixelCost final : public ceres::SizedCostFunction<2, kCameraUnknowns, kSte
         weight * (seen_->pixel - focal.cwiseProduct(distorted) - centre);
     if (jacobians == nullptr) return true;
 
-    const double by_r2 = k1 + r2 * (2.0 * k2 + 3.0 * r2 * k[4]);
-    Eigen::Matrix2d by_ray;
-    by_ray << radial + 2.0 * x * x * by_r2 + 2.0 * k[2] * y + 6.0 * k[3] * x,
-        2.0 * x * y * by_r2 + 2.0 * k[2] * x + 2.0 * k[3] * y,
-        2.0 * x * y * by_r2 + 2.0 * k[2] * x + 2.0 * k[3] * y,
-        radial + 2.0 * y * y * by_r2 + 6.0 * k[2] * y + 2.0 * k[3] * x;
+    const Eigen::Matrix2d by_ray = lens.jacobian(ray);
+    const sensor::Lens::ByCoefficients by_k = lens.by_coefficients(ray);
     Eigen::Matrix<double, 2, 3> ray_by_p;
-    ray_by_p << 1.0, 0.0, -x, 0.0, 1.0, -y;
-
+    ray_by_p << 1.0, 0.0, -ray.x(), 0.0, 1.0, -ray.y();
     const Eigen::Matrix<double, 2, 3> by_p = -weight / row.p.z() * focal.asDiagonal() * by_ray * ray_by_p;
     Eigen::Matrix<double, 2, kCameraUnknowns> by_camera = Eigen::Matrix<double, 2, kCameraUnknowns>::Zero();
     by_camera.col(kFocal) = -weight * Eigen::Vector2d(c.fx, c.fy).cwiseProduct(distorted);
     by_camera(0, kCentreX) = -weight;
     by_camera(1, kCentreY) = -weight;
-    by_camera.col(kK1) = -weight * r2 * focal.cwiseProduct(Eigen::Vector2d(x, y));
-    by_camera.col(kK2) = r2 * by_camera.col(kK1);
+    by_camera.col(kK1) = -weight * by_k.by_k1 * focal.cwiseProduct(ray);
+    by_camera.col(kK2) = by_k.k2_by_k1 * by_camera.col(kK1);
     Derivatives<2>(jacobians).put(by_camera, by_p, row);
     return true;
   }

@@ -2,6 +2,7 @@
 #include "plumbline/sensor/camera.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -99,6 +100,37 @@ void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblem
   camera.color_from_depth = geometry::Rigid3(Eigen::Quaterniond(r), matrix->topRightCorner<3, 1>());
 }
 
+/// The lens of an image: its model and coefficients, as they stand in the file.
+struct LensKeys {
+  std::string model = "pinhole";
+  std::vector<double> distortion = {0.0, 0.0, 0.0, 0.0, 0.0};
+
+  void declare(core::OptionTable& table) {
+    table.choice("model", model, {"pinhole", "equidistant", "fisheye"}, "Camera model");
+    table.numbers("distortion", distortion, 0, {}, "",
+                  "k1 k2 p1 p2 k3 [k4 k5 k6] of a pinhole, k1 k2 k3 k4 of an equidistant camera (fisheye)");
+  }
+  [[nodiscard]] Lens lens(const ConfigNode& map, const std::string& path, ConfigProblems& problems) const;
+};
+
+Lens LensKeys::lens(const ConfigNode& map, const std::string& path, ConfigProblems& problems) const {
+  Lens lens;
+  if (model != "pinhole") lens.model = LensModel::kEquidistant;
+  const bool pinhole = lens.model == LensModel::kRadialTangential;
+  const std::size_t n = distortion.size();
+  const ConfigNode* node = map.find("distortion");
+  const bool zeros = node == nullptr;  // the default, which is shorter for a fisheye
+  if (!zeros && !(pinhole ? (n >= 1 && n <= 5) || n == 8 : n >= 1 && n <= 4)) {
+    problems.push_back({node->mark, join(path, "distortion"),
+                        fmt::format("has {} numbers (allowed: {})", n,
+                                    pinhole ? "[k1, k2, p1, p2, k3] and [k1, k2, p1, p2, k3, k4, k5, k6]"
+                                            : "[k1, k2, k3, k4]")});
+    return lens;
+  }
+  if (!zeros) std::copy(distortion.begin(), distortion.end(), lens.k.begin());
+  return lens;
+}
+
 void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& problems) {
   const ConfigNode* transform = root.find("color_from_depth");
   const ConfigNode* depth = root.find("depth");
@@ -118,11 +150,14 @@ void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& p
     return;
   }
   Pinhole pinhole;
+  LensKeys lens;
   core::OptionTable table;
   declare_pinhole(table, pinhole);
+  lens.declare(table);
   table.set_all(*depth, "depth", problems);
   check_pinhole(*depth, pinhole, "depth", problems);
   camera.depth = pinhole;
+  camera.depth_lens = lens.lens(*depth, "depth", problems);
 }
 
 /// Quoted where YAML needs it.
@@ -138,15 +173,18 @@ std::string pinhole_yaml(const Pinhole& p, const std::string& indent) {
                      indent, p.width, p.height, p.fx, p.fy, p.cx, p.cy);
 }
 
-/// `numbers`: k1, k2, p1, p2, k3, or the first of them.
-void take_distortion(const ConfigNode& root, const std::vector<double>& numbers, Camera& camera,
-                     ConfigProblems& problems) {
-  if (numbers.empty() || numbers.size() > camera.distortion.size()) {
-    problems.push_back({root.find("distortion")->mark, "distortion",
-                        fmt::format("has {} numbers (allowed: [k1, k2, p1, p2, k3])", numbers.size())});
-    return;
-  }
-  std::copy(numbers.begin(), numbers.end(), camera.distortion.begin());
+/// Model and coefficients, as few of these as there are.
+std::string lens_yaml(const Lens& lens, const std::string& indent) {
+  const bool pinhole = lens.model == LensModel::kRadialTangential;
+  const bool rational = pinhole && (lens.k[5] != 0.0 || lens.k[6] != 0.0 || lens.k[7] != 0.0);
+  const std::size_t count = !pinhole ? 4 : rational ? 8 : 5;
+  const std::vector<double> k(lens.k.begin(), lens.k.begin() + static_cast<std::ptrdiff_t>(count));
+  const char* names = !pinhole ? "k1 k2 k3 k4" : rational ? "k1 k2 p1 p2 k3 k4 k5 k6" : "k1 k2 p1 p2 k3";
+  return fmt::format("{}distortion: [{}]  # {}\n", indent, fmt::join(k, ", "), names);
+}
+
+const char* model_name(LensModel model) {
+  return model == LensModel::kEquidistant ? "equidistant" : "pinhole";
 }
 
 }  // namespace
@@ -163,13 +201,11 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   if (root->mark.file.empty()) root->mark = {file.string(), 1, 1};
 
   Camera camera;
-  std::string model = "pinhole";
-  std::vector<double> distortion(camera.distortion.size(), 0.0);
+  LensKeys lens;
   core::OptionTable table;
   declare_pinhole(table, camera.color);
   table.text("name", camera.name, "Name of the camera");
-  table.choice("model", model, {"pinhole"}, "Camera model");
-  table.numbers("distortion", distortion, 0, {}, "", "k1 k2 p1 p2 k3 of the colour image");
+  lens.declare(table);
   table.number("depth_scale", camera.depth_scale, {1e-3, 1e7}, "", "Raw depth units per metre");
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
   double readout_s = 0.0;
@@ -183,7 +219,9 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
 
   check_pinhole(*root, camera.color, "", problems);
-  take_distortion(*root, distortion, camera, problems);
+  const Lens color_lens = lens.lens(*root, "", problems);
+  camera.model = color_lens.model;
+  camera.distortion = color_lens.k;
   if (root->find("readout") != nullptr) camera.readout_s = readout_s;
   if (slope.size() == camera.depth_slope.size()) std::copy_n(slope.begin(), 2, camera.depth_slope.begin());
   read_depth_camera(*root, camera, problems);
@@ -195,9 +233,8 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
 
 std::string to_yaml(const Camera& camera) {
   std::string text = camera.name.empty() ? "" : fmt::format("name: {}\n", text_yaml(camera.name));
-  text += "model: pinhole\n" + pinhole_yaml(camera.color, "");
-  const Distortion& k = camera.distortion;
-  text += fmt::format("distortion: [{}, {}, {}, {}, {}]  # k1 k2 p1 p2 k3\n", k[0], k[1], k[2], k[3], k[4]);
+  text += fmt::format("model: {}\n", model_name(camera.model)) + pinhole_yaml(camera.color, "");
+  text += lens_yaml(camera.lens(), "");
   text += fmt::format("depth_scale: {}  # raw units per metre\nfps: {}\n", camera.depth_scale, camera.fps);
   if (camera.readout_s) {
     text += fmt::format("readout: {}  # s from the first row of an image to the last; 0: all at once\n",
@@ -218,6 +255,10 @@ std::string to_yaml(const Camera& camera) {
       text += fmt::format("  - [{}, {}, {}, {}]\n", m(r, 0), m(r, 1), m(r, 2), m(r, 3));
     }
     text += "depth:\n" + pinhole_yaml(*camera.depth, "  ");
+    if (camera.depth_lens.distorts()) {
+      text += fmt::format("  model: {}\n", model_name(camera.depth_lens.model));
+      text += lens_yaml(camera.depth_lens, "  ");
+    }
   }
   return text;
 }

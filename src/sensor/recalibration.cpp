@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/sensor/recalibration.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -9,30 +8,6 @@ namespace plumbline::sensor {
 namespace {
 
 constexpr int kCell = 4;  // px between nodes of the table
-
-/// Radial-tangential distortion of a ray (x, y, 1), OpenCV's.
-Eigen::Vector2d distorted(const Distortion& k, const Eigen::Vector2d& ray) {
-  const double x = ray.x();
-  const double y = ray.y();
-  const double r2 = ray.squaredNorm();
-  const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
-  return {x * radial + 2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
-          y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y};
-}
-
-Eigen::Matrix2d distortion_jacobian(const Distortion& k, const Eigen::Vector2d& ray) {
-  const double x = ray.x();
-  const double y = ray.y();
-  const double r2 = ray.squaredNorm();
-  const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
-  const double by_r2 = k[0] + r2 * (2.0 * k[1] + 3.0 * r2 * k[4]);
-  Eigen::Matrix2d j;
-  j(0, 0) = radial + 2.0 * x * x * by_r2 + 2.0 * k[2] * y + 6.0 * k[3] * x;
-  j(0, 1) = 2.0 * x * y * by_r2 + 2.0 * k[2] * x + 2.0 * k[3] * y;
-  j(1, 0) = 2.0 * x * y * by_r2 + 2.0 * k[2] * x + 2.0 * k[3] * y;
-  j(1, 1) = radial + 2.0 * y * y * by_r2 + 6.0 * k[2] * y + 2.0 * k[3] * x;
-  return j;
-}
 
 bool same(const Pinhole& a, const Pinhole& b) {
   return a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy;
@@ -43,21 +18,14 @@ bool same(const Pinhole& a, const Pinhole& b) {
 Eigen::Vector2d ImageModel::lens_pixel(const Eigen::Vector2d& rectified) const {
   if (!camera_.distorted() && same(camera_.color, image_)) return rectified;
   const Eigen::Vector2d ray = image_.unproject(rectified.x(), rectified.y(), 1.0).head<2>();
-  const Eigen::Vector2d d = distorted(camera_.distortion, ray);
+  const Eigen::Vector2d d = camera_.lens().distort(ray);
   return {camera_.color.fx * d.x() + camera_.color.cx, camera_.color.fy * d.y() + camera_.color.cy};
 }
 
 Eigen::Vector2d ImageModel::rectified_pixel(const Eigen::Vector2d& lens) const {
   if (!camera_.distorted() && same(camera_.color, image_)) return lens;
-  constexpr int kSteps = 8;
-  const Eigen::Vector2d wanted = camera_.color.unproject(lens.x(), lens.y(), 1.0).head<2>();
-  Eigen::Vector2d ray = wanted;
-  for (int i = 0; i < kSteps; ++i) {
-    const Eigen::Vector2d error = wanted - distorted(camera_.distortion, ray);
-    const Eigen::Vector2d step = distortion_jacobian(camera_.distortion, ray).inverse() * error;
-    ray += step;
-    if (step.squaredNorm() < 1e-20) break;
-  }
+  const Eigen::Vector2d distorted = camera_.color.unproject(lens.x(), lens.y(), 1.0).head<2>();
+  const Eigen::Vector2d ray = camera_.lens().undistort(distorted);
   return {image_.fx * ray.x() + image_.cx, image_.fy * ray.y() + image_.cy};
 }
 
@@ -78,7 +46,7 @@ double ImageModel::true_depth(const Eigen::Vector2d& rectified, double measured)
 
 Recalibration::Recalibration(const Pinhole& image, const Camera& before, const Camera& after)
     : before_(image, before), after_(image, after) {
-  moves_pixels_ = before.distortion != after.distortion || !same(before.color, after.color);
+  moves_pixels_ = before.lens() != after.lens() || !same(before.color, after.color);
   moves_depth_ = before.depth_slope != after.depth_slope ||
                  (moves_pixels_ && !(before.color_from_depth && before.depth));
   if (!moves_pixels_) return;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plumbline/sensor/rectify.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -43,25 +44,98 @@ void correct_slope(const Pinhole& camera, const std::array<double, 2>& slope, cv
   }
 }
 
+/// What a depth pixel covers of another image: a rectangle of a plane.
+struct DepthPatch {
+  Eigen::Vector2d centre;  ///< pixels
+  Eigen::Vector2d half;    ///< of its sides, pixels
+  double z = 0.0;          ///< metres, at the centre
+  /// Relative change of the inverse depth a pixel, which is the same all over a plane.
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+
+  void paint(cv::Mat& out) const;
+};
+
+/// Into a depth image whose 0 is nothing; what is nearer stays.
+void DepthPatch::paint(cv::Mat& out) const {
+  // clamped before the cast: a point far outside must not overflow an int
+  const int u0 = static_cast<int>(std::ceil(std::clamp(centre.x() - half.x(), 0.0, out.cols + 0.0)));
+  const int u1 = static_cast<int>(std::floor(std::clamp(centre.x() + half.x(), -1.0, out.cols - 1.0)));
+  const int v0 = static_cast<int>(std::ceil(std::clamp(centre.y() - half.y(), 0.0, out.rows + 0.0)));
+  const int v1 = static_cast<int>(std::floor(std::clamp(centre.y() + half.y(), -1.0, out.rows - 1.0)));
+  for (int y = v0; y <= v1; ++y) {
+    auto* to = out.ptr<float>(y);
+    for (int x = u0; x <= u1; ++x) {
+      const double grow = 1.0 + slope.x() * (x - centre.x()) + slope.y() * (y - centre.y());
+      const auto here = static_cast<float>(z / grow);
+      if (to[x] == 0.0F || here < to[x]) to[x] = here;
+    }
+  }
+}
+
+/// Relative change of the inverse depth from one pixel to the next, of the surface that a measured pixel is
+/// on: the mean of both sides, of one where the other is on another surface, and 0 where both are.
+double surface_slope(std::uint16_t here, std::uint16_t before, std::uint16_t after) {
+  constexpr double kSameSurface = 0.05;
+  const auto to = [here](std::uint16_t there) {
+    const bool measured = there != kNoReading && there != kSaturated;
+    return measured ? static_cast<double>(here) / static_cast<double>(there) - 1.0 : 1.0;
+  };
+  const double back = -to(before);
+  const double ahead = to(after);
+  const bool level_back = std::abs(back) < kSameSurface;
+  const bool level_ahead = std::abs(ahead) < kSameSurface;
+  if (level_back && level_ahead) return 0.5 * (back + ahead);
+  return level_back ? back : level_ahead ? ahead : 0.0;
+}
+
+Eigen::Vector2d surface_slope(const cv::Mat& raw, int u, int v) {
+  const auto at = [&raw](int x, int y) {
+    const bool inside = x >= 0 && y >= 0 && x < raw.cols && y < raw.rows;
+    return inside ? raw.at<std::uint16_t>(y, x) : kNoReading;
+  };
+  const std::uint16_t here = at(u, v);
+  return {surface_slope(here, at(u - 1, v), at(u + 1, v)), surface_slope(here, at(u, v - 1), at(u, v + 1))};
+}
+
 }  // namespace
 
 struct Rectifier::Maps {
+  /// What a pixel of a bent image sees: its ray (x, y, 1), and half the size of its square there.
+  struct LensRay {
+    Eigen::Vector2d ray;
+    Eigen::Vector2d half;  ///< 0: beyond what the lens shows
+  };
   Camera camera;
   Pinhole target;
   cv::Mat fixed_xy;                   ///< CV_16SC2, whole part of the source pixel
   cv::Mat fixed_fraction;             ///< CV_16UC1, index into OpenCV's table of bilinear weights
   std::vector<std::int32_t> nearest;  ///< source pixel of every target pixel, -1 outside
+  std::vector<LensRay> depth_rays;    ///< of every depth pixel, where a lens bends them
 
   Maps(const Camera& c, const Pinhole& t) : camera(c), target(t) {
+    if (camera.color_from_depth && camera.depth && camera.depth_lens.distorts()) fill_depth_rays();
     if (!moves_pixels()) return;
-    const auto matrix = [](const Pinhole& p) { return cv::Matx33d(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1); };
-    const cv::Mat distortion(1, static_cast<int>(camera.distortion.size()), CV_64F, camera.distortion.data());
     cv::Mat x;
     cv::Mat y;
-    cv::initUndistortRectifyMap(matrix(camera.color), distortion, cv::noArray(), matrix(target),
-                                {target.width, target.height}, CV_32FC1, x, y);
+    source_pixels(x, y);
     cv::convertMaps(x, y, fixed_xy, fixed_fraction, CV_16SC2);
     if (!(camera.color_from_depth && camera.depth)) fill_nearest(x, y);
+  }
+
+  /// Where the lens shows what is at each pixel of the target.
+  void source_pixels(cv::Mat& x, cv::Mat& y) const {
+    const auto matrix = [](const Pinhole& p) { return cv::Matx33d(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1); };
+    const cv::Size size(target.width, target.height);
+    Distortion k = camera.distortion;
+    if (camera.model == LensModel::kEquidistant) {
+      const cv::Mat four(1, 4, CV_64F, k.data());
+      cv::fisheye::initUndistortRectifyMap(matrix(camera.color), four, cv::Matx33d::eye(), matrix(target),
+                                           size, CV_32FC1, x, y);
+      return;
+    }
+    const cv::Mat all(1, static_cast<int>(k.size()), CV_64F, k.data());
+    cv::initUndistortRectifyMap(matrix(camera.color), all, cv::noArray(), matrix(target), size, CV_32FC1, x,
+                                y);
   }
 
   [[nodiscard]] bool moves_pixels() const {
@@ -82,6 +156,17 @@ struct Rectifier::Maps {
     }
   }
 
+  void fill_depth_rays() {
+    const Pinhole& d = *camera.depth;
+    depth_rays.reserve(static_cast<std::size_t>(d.width) * static_cast<std::size_t>(d.height));
+    for (int v = 0; v < d.height; ++v) {
+      for (int u = 0; u < d.width; ++u) depth_rays.push_back(lens_ray(u, v));
+    }
+  }
+
+  [[nodiscard]] LensRay lens_ray(int u, int v) const;
+  /// (x, y, 1) of a depth pixel, and half the size of its square there; that is 0 beyond the lens's rim.
+  Eigen::Vector3d ray_of(int u, int v, Eigen::Vector2d& half) const;
   [[nodiscard]] cv::Mat converted(const cv::Mat& raw) const;
   [[nodiscard]] cv::Mat undistorted(const cv::Mat& raw) const;
   [[nodiscard]] cv::Mat registered(const cv::Mat& raw) const;
@@ -107,14 +192,34 @@ cv::Mat Rectifier::Maps::undistorted(const cv::Mat& raw) const {
   return out;
 }
 
+Rectifier::Maps::LensRay Rectifier::Maps::lens_ray(int u, int v) const {
+  const Pinhole& d = *camera.depth;
+  const auto ray = camera.depth_lens.ray_of(d.unproject(u, v, 1.0).head<2>());
+  if (!ray) return {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  const Eigen::Matrix2d by_lens = camera.depth_lens.jacobian(*ray).inverse();
+  return {*ray, 0.5 * by_lens.cwiseAbs() * Eigen::Vector2d(1.0 / d.fx, 1.0 / d.fy)};
+}
+
+Eigen::Vector3d Rectifier::Maps::ray_of(int u, int v, Eigen::Vector2d& half) const {
+  const Pinhole& d = *camera.depth;
+  if (depth_rays.empty()) {
+    half = {0.5 / d.fx, 0.5 / d.fy};
+    return d.unproject(u, v, 1.0);
+  }
+  const LensRay& bent = depth_rays[static_cast<std::size_t>(v) * static_cast<std::size_t>(d.width) +
+                                   static_cast<std::size_t>(u)];
+  half = bent.half;
+  return bent.ray.homogeneous();
+}
+
 /// Every depth pixel covers, in the colour image, the rectangle that its own square projects to; the
 /// nearest surface wins. Rectangles of neighbours on one surface meet, so a change of resolution tears no
-/// holes.
+/// holes, and where each covers several pixels it is tilted as the surface is.
 cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
-  constexpr double slack_px = 0.25;  // closes the seams that parallax opens between neighbours on a slope
-  const Pinhole& d = *camera.depth;
+  constexpr double kSlack_px = 0.25;  // closes the seams that parallax opens between neighbours on a slope
+  constexpr double kCoarse = 1.5;     // pixels that a depth pixel covers
   const Pinhole& c = target;
-  const geometry::Rigid3& color_from_depth = *camera.color_from_depth;
+  const bool coarse = c.fx > kCoarse * camera.depth->fx;
   const auto scale = static_cast<float>(camera.depth_scale);
   cv::Mat out = cv::Mat::zeros(c.height, c.width, CV_32FC1);
   for (int v = 0; v < raw.rows; ++v) {
@@ -122,23 +227,17 @@ cv::Mat Rectifier::Maps::registered(const cv::Mat& raw) const {
     for (int u = 0; u < raw.cols; ++u) {
       const double z_depth = static_cast<double>(metres(from[u], scale));
       if (z_depth <= 0.0) continue;
-      const Eigen::Vector3d p = color_from_depth * d.unproject(u, v, z_depth);
-      if (p.z() <= 1e-3) continue;
-      const Eigen::Vector2d centre = c.project(p);
-      const double half_u = 0.5 * c.fx / d.fx * z_depth / p.z() + slack_px;
-      const double half_v = 0.5 * c.fy / d.fy * z_depth / p.z() + slack_px;
-      // clamped before the cast: a point far outside must not overflow an int
-      const int u0 = static_cast<int>(std::ceil(std::clamp(centre.x() - half_u, 0.0, c.width + 0.0)));
-      const int u1 = static_cast<int>(std::floor(std::clamp(centre.x() + half_u, -1.0, c.width - 1.0)));
-      const int v0 = static_cast<int>(std::ceil(std::clamp(centre.y() - half_v, 0.0, c.height + 0.0)));
-      const int v1 = static_cast<int>(std::floor(std::clamp(centre.y() + half_v, -1.0, c.height - 1.0)));
-      const auto z = static_cast<float>(p.z());
-      for (int y = v0; y <= v1; ++y) {
-        auto* to = out.ptr<float>(y);
-        for (int x = u0; x <= u1; ++x) {
-          if (to[x] == 0.0F || z < to[x]) to[x] = z;
-        }
-      }
+      Eigen::Vector2d half;
+      const Eigen::Vector3d ray = ray_of(u, v, half);
+      const Eigen::Vector3d p = *camera.color_from_depth * (z_depth * ray);
+      if (p.z() <= 1e-3 || half.x() == 0.0) continue;
+      const Eigen::Vector2d focal(c.fx, c.fy);
+      DepthPatch patch;
+      patch.centre = c.project(p);
+      patch.half = (half.cwiseProduct(focal) * (z_depth / p.z())).array() + kSlack_px;
+      patch.z = p.z();
+      if (coarse) patch.slope = surface_slope(raw, u, v).cwiseQuotient(2.0 * half.cwiseProduct(focal));
+      patch.paint(out);
     }
   }
   return out;

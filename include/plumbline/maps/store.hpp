@@ -20,7 +20,7 @@
 namespace plumbline::maps {
 
 /// Stores of other formats are refused.
-constexpr int kStoreFormat = 9;
+constexpr int kStoreFormat = 10;
 constexpr const char* kStoreFile = "map.db";  ///< in a result folder
 
 /// A robot's refined camera, found while its map grew or when it was finished.

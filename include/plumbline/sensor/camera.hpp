@@ -10,6 +10,7 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/sensor/lens.hpp"
 
 namespace plumbline::sensor {
 
@@ -41,37 +42,32 @@ struct Pinhole {
   }
 };
 
-/// OpenCV's radial-tangential model: k1 k2 p1 p2 k3.
-using Distortion = std::array<double, 5>;
-
 struct Camera {
   std::string name;
   Pinhole color;
-  Distortion distortion{};      ///< of the colour image; all 0 = none
-  double depth_scale = 5000.0;  ///< raw units per metre
+  LensModel model = LensModel::kRadialTangential;  ///< of the colour image's lens
+  Distortion distortion{};                         ///< of the colour image; all 0 = none
+  double depth_scale = 5000.0;                     ///< raw units per metre
   double fps = 30.0;
   /// Rolling shutter: from the first row of a colour image to the last, seconds; 0: all rows at once.
   std::optional<double> readout_s;  ///< none: not known
   /// When present, depth is not registered to colour: the reader does that.
   std::optional<geometry::Rigid3> color_from_depth;
   std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
+  Lens depth_lens;               ///< of the depth image when color_from_depth is present
   /// What depth gets wrong across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
   /// ray (x, y, 1) of the undistorted colour camera. A depth camera whose axis is not where its maker thinks.
   std::array<double, 2> depth_slope{};
   double depth_delay_s = 0.0;  ///< so much later than their stamps say were depth images taken
   bool guess = false;          ///< typical values, of no file
 
-  [[nodiscard]] bool distorted() const {
-    for (double k : distortion) {
-      if (k != 0.0) return true;
-    }
-    return false;
-  }
+  [[nodiscard]] Lens lens() const { return {model, distortion}; }
+  [[nodiscard]] bool distorted() const { return lens().distorts(); }
 };
 
 /// Reads our own camera file (camera.yaml: model width height fx fy cx cy distortion depth_scale fps readout
-/// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy}]). All problems are told
-/// together with file:line:column (kUsage).
+/// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy model distortion}]). All
+/// problems are told together with file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
 
 /// The same calibration as camera.yaml text; read_camera(write) gives the same camera.

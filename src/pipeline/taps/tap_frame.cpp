@@ -23,7 +23,9 @@ class FrameTap : public Tap {
   core::Result<void> start(const RunContext& context) override {
     if (auto made = Tap::start(context); !made) return made;
     sensor::Camera camera = context.source->camera();
-    camera.distortion = {};  // frames are rectified and registered
+    camera.model = sensor::LensModel::kRadialTangential;  // frames are rectified and registered
+    camera.distortion = {};
+    camera.depth_lens = {};
     camera.depth_slope = {};
     camera.color_from_depth.reset();
     camera.depth.reset();

@@ -3,6 +3,7 @@
 #include "plumbline/sensor/camera_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -179,8 +180,10 @@ std::string camera_problem(const Camera& camera) {
   if (camera.depth) {
     if (std::string wrong = pinhole_problem(*camera.depth, "depth: "); !wrong.empty()) return wrong;
   }
-  const bool finite = std::all_of(camera.distortion.begin(), camera.distortion.end(),
-                                  [](double k) { return std::isfinite(k); });
+  const auto is_finite = [](const Distortion& k) {
+    return std::all_of(k.begin(), k.end(), [](double c) { return std::isfinite(c); });
+  };
+  const bool finite = is_finite(camera.distortion) && is_finite(camera.depth_lens.k);
   if (!finite) return "a distortion coefficient is not finite";
   if (!(camera.depth_scale >= 1e-3 && camera.depth_scale <= 1e7))
     return fmt::format("the depth scale {} makes no sense (raw units per metre: 0.001 to 1e7)",
@@ -196,12 +199,20 @@ std::string camera_lines(const Camera& camera) {
     return value != 0.0 && std::isfinite(value) ? fmt::format("{}", value) : std::string(otherwise);
   };
   const Distortion& k = camera.distortion;
+  const bool fisheye = camera.model == LensModel::kEquidistant;
+  const bool rational = !fisheye && (k[5] != 0.0 || k[6] != 0.0 || k[7] != 0.0);
+  const std::ptrdiff_t count = fisheye ? 4 : rational ? 8 : 5;
+  const std::vector<double> coefficients(k.begin(), k.begin() + count);
   return fmt::format(
-      "  width: {}\n  height: {}\n  fx: {}\n  fy: {}\n  cx: {}\n  cy: {}\n  distortion: [{}, {}, {}, {}, {}] "
-      " # k1 k2 "
-      "p1 p2 k3\n  depth_scale: {}  # raw units per metre",
-      known(p.width, "WIDTH"), known(p.height, "HEIGHT"), known(p.fx, "FX"), known(p.fy, "FY"),
-      known(p.cx, "CX"), known(p.cy, "CY"), k[0], k[1], k[2], k[3], k[4], camera.depth_scale);
+      "{}  width: {}\n  height: {}\n  fx: {}\n  fy: {}\n  cx: {}\n  cy: {}\n  distortion: [{}]  # {}\n"
+      "  depth_scale: {}  # raw units per metre",
+      fisheye ? "  model: equidistant\n" : "", known(p.width, "WIDTH"), known(p.height, "HEIGHT"),
+      known(p.fx, "FX"), known(p.fy, "FY"), known(p.cx, "CX"), known(p.cy, "CY"),
+      fmt::join(coefficients, ", "),
+      fisheye    ? "k1 k2 k3 k4"
+      : rational ? "k1 k2 p1 p2 k3 k4 k5 k6"
+                 : "k1 k2 p1 p2 k3",
+      camera.depth_scale);
 }
 
 }  // namespace plumbline::sensor

@@ -118,27 +118,40 @@ std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
   return "";
 }
 
-std::string take_coefficients(const std::string& model, const std::vector<double>& numbers, Camera& camera) {
-  const auto names = [&](const char* word) { return model.find(word) != std::string::npos; };
-  for (const char* word : {"equidistant", "fisheye", "kannala", "kb4", "ftheta", "fov", "omni", "eucm"}) {
-    if (!names(word)) continue;
+std::string take_coefficients(const std::string& model, const std::vector<double>& numbers, Lens& lens) {
+  const auto names = [&](std::initializer_list<const char*> words) {
+    return std::any_of(words.begin(), words.end(),
+                       [&](const char* word) { return model.find(word) != std::string::npos; });
+  };
+  if (names({"ftheta", "fov", "omni", "eucm", "double_sphere", "thin_prism", "mei", "ds-"})) {
     return fmt::format(
-        "the model '{}' is that of a fisheye lens, which is not supported; undistort the images first",
+        "the model '{}' is not supported (OpenCV's with k1 k2 p1 p2 k3 [k4 k5 k6] and the equidistant one of "
+        "fisheye lenses are); undistort the images first",
         model);
   }
-  const std::size_t known = camera.distortion.size();
+  const bool fisheye = names({"equidistant", "fisheye", "kannala", "kb4"});
+  const std::size_t known = fisheye ? 4 : lens.k.size();
   const bool more =
       numbers.size() > known && std::any_of(numbers.begin() + static_cast<std::ptrdiff_t>(known),
                                             numbers.end(), [](double k) { return k != 0.0; });
   if (more) {
     return fmt::format(
-        "the model{} has {} coefficients; k1 k2 p1 p2 k3 are supported: calibrate with those, or undistort "
-        "the "
-        "images first",
-        model.empty() ? "" : " '" + model + "'", numbers.size());
+        "the model{} has {} coefficients; {} are supported: calibrate with those, or undistort "
+        "the images first",
+        model.empty() ? "" : " '" + model + "'", numbers.size(),
+        fisheye ? "k1 k2 k3 k4" : "k1 k2 p1 p2 k3 k4 k5 k6");
   }
-  std::copy_n(numbers.begin(), std::min(known, numbers.size()), camera.distortion.begin());
+  lens.model = fisheye ? LensModel::kEquidistant : LensModel::kRadialTangential;
+  std::copy_n(numbers.begin(), std::min(known, numbers.size()), lens.k.begin());
   return "";
+}
+
+std::string take_coefficients(const std::string& model, const std::vector<double>& numbers, Camera& camera) {
+  Lens lens;
+  std::string wrong = take_coefficients(model, numbers, lens);
+  camera.model = lens.model;
+  camera.distortion = lens.k;
+  return wrong;
 }
 
 std::string take_pinhole(const ConfigNode& map, Pinhole& pinhole) {

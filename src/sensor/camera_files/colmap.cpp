@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 
 #include "camera_files/camera_formats.hpp"
@@ -19,21 +20,20 @@ struct ColmapModel {
   const char* name;
   std::size_t parameters;
   bool one_focal;  ///< f cx cy ..., else fx fy cx cy ...
-  bool supported;
 };
 
 constexpr std::array<ColmapModel, 11> kColmapModels = {{
-    {"SIMPLE_PINHOLE", 3, true, true},
-    {"PINHOLE", 4, false, true},
-    {"SIMPLE_RADIAL", 4, true, true},
-    {"RADIAL", 5, true, true},
-    {"OPENCV", 8, false, true},
-    {"FULL_OPENCV", 12, false, true},
-    {"OPENCV_FISHEYE", 8, false, false},
-    {"FOV", 5, false, false},
-    {"SIMPLE_RADIAL_FISHEYE", 4, true, false},
-    {"RADIAL_FISHEYE", 5, true, false},
-    {"THIN_PRISM_FISHEYE", 12, false, false},
+    {"SIMPLE_PINHOLE", 3, true},
+    {"PINHOLE", 4, false},
+    {"SIMPLE_RADIAL", 4, true},
+    {"RADIAL", 5, true},
+    {"OPENCV", 8, false},
+    {"FULL_OPENCV", 12, false},
+    {"OPENCV_FISHEYE", 8, false},
+    {"FOV", 5, false},
+    {"SIMPLE_RADIAL_FISHEYE", 4, true},
+    {"RADIAL_FISHEYE", 5, true},
+    {"THIN_PRISM_FISHEYE", 12, false},
 }};
 
 const ColmapModel* colmap_model(const CameraLine& line) {
@@ -70,7 +70,10 @@ std::string take_colmap(const ColmapModel& model, const std::vector<double>& n, 
   camera.color.cx = n[2 + focals] - kHalfPixel;
   camera.color.cy = n[3 + focals] - kHalfPixel;
   std::vector<double> coefficients(n.begin() + static_cast<std::ptrdiff_t>(4 + focals), n.end());
-  return take_coefficients(model.supported ? "" : "fisheye " + std::string(model.name), coefficients, camera);
+  std::string name = model.name;
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return take_coefficients(name, coefficients, camera);
 }
 
 core::Result<CameraReading> read_colmap(const CameraText& text) {

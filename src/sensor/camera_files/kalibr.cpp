@@ -30,7 +30,9 @@ core::Result<CameraReading> read_kalibr(const CameraText& text) {
 
   const std::string model = word_at(node, {"camera_model"});
   if (!model.empty() && model != "pinhole")
-    return refuse(node, fmt::format("the model '{}' is not supported, only 'pinhole' is", model));
+    return refuse(node, fmt::format("the model '{}' is not supported, only 'pinhole' is (with the distortion "
+                                    "'radtan' or 'equidistant')",
+                                    model));
   const core::ConfigNode& intrinsics = *find_any(node, {"intrinsics"});
   const auto k = numbers_in(intrinsics);
   if (!k || k->size() != 4) return refuse(intrinsics, "intrinsics are not the four numbers [fx, fy, cx, cy]");

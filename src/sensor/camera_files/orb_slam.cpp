@@ -24,10 +24,11 @@ bool recognises_orb_slam(const CameraText& text) {
 
 std::string take_orb_distortion(const CameraText& text, const std::string& prefix, const std::string& model,
                                 Camera& camera) {
+  std::vector<std::string> names = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  if (model.find("kannala") != std::string::npos) names = {"k1", "k2", "k3", "k4"};
   std::vector<double> numbers;
-  for (const char* name : {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}) {
+  for (const std::string& name : names)
     numbers.push_back(number_at(text.tree, {prefix + name}).value_or(0.0));
-  }
   return take_coefficients(model, numbers, camera);
 }
 

@@ -49,13 +49,13 @@ bool recognises_realsense(const CameraText& text) {
   return found.color != nullptr || found.depth != nullptr;
 }
 
-std::string take_stream(const core::ConfigNode& node, Camera& camera, Pinhole& pinhole) {
+std::string take_stream(const core::ConfigNode& node, Lens& lens, Pinhole& pinhole) {
   if (std::string missing = take_pinhole(node, pinhole); !missing.empty()) return missing;
   const core::ConfigNode* coefficients = find_any(node, {"coeffs", "distortion_coeffs", "coefficients"});
   if (coefficients == nullptr) return "";
   const auto d = numbers_in(*coefficients);
   if (!d) return "the distortion coefficients are not made of numbers";
-  return take_coefficients(word_at(node, {"model", "distortion_model"}), *d, camera);
+  return take_coefficients(word_at(node, {"model", "distortion_model"}), *d, lens);
 }
 
 /// librealsense writes rotations column by column.
@@ -80,7 +80,7 @@ bool same_pinhole(const Pinhole& a, const Pinhole& b) {
 /// A depth camera of its own where the file has its place too. Returns "" or what is wrong.
 std::string take_depth_stream(const RealSenseStreams& found, CameraReading& reading) {
   Pinhole depth;
-  Camera lens;
+  Lens lens;
   if (std::string wrong = take_stream(*found.depth, lens, depth); !wrong.empty()) return wrong;
   if (same_pinhole(depth, reading.camera.color)) return "";
   if (found.extrinsics == nullptr) {
@@ -88,8 +88,8 @@ std::string take_depth_stream(const RealSenseStreams& found, CameraReading& read
         "depth is taken as aligned to colour: the file has no extrinsics depth_to_color");
     return "";
   }
-  if (lens.distorted()) return "the depth stream is distorted, which is not supported";
   reading.camera.depth = depth;
+  reading.camera.depth_lens = lens;
   return take_extrinsics(*found.extrinsics, reading.camera);
 }
 
@@ -101,8 +101,11 @@ core::Result<CameraReading> read_realsense(const CameraText& text) {
   const auto refuse = [&](const core::ConfigNode& at, const std::string& what) {
     return refuse_camera(text, kRealSenseCamera, at.mark, what, camera);
   };
-  if (const std::string wrong = take_stream(node, camera, camera.color); !wrong.empty())
+  Lens lens;
+  if (const std::string wrong = take_stream(node, lens, camera.color); !wrong.empty())
     return refuse(node, wrong);
+  camera.model = lens.model;
+  camera.distortion = lens.k;
   reading.has_size = camera.color.width > 0 && camera.color.height > 0;
   if (camera.distorted() && has_word(word_at(node, {"model"}), "inverse"))
     reading.notes.emplace_back(

@@ -122,8 +122,27 @@ TEST_F(CameraFile, ImpossibleValues) {
   EXPECT_THAT(error_of(with("cx: 31.5", "cx: 64")), AllOf(HasSubstr("camera.yaml:6"), HasSubstr("outside")));
   EXPECT_THAT(error_of(with("cy: 23.5", "cy: .nan")), HasSubstr("cy"));
   EXPECT_THAT(error_of(with("depth_scale: 1000", "depth_scale: 0")), HasSubstr("depth_scale"));
-  EXPECT_THAT(error_of(with("model: pinhole", "model: fisheye")), HasSubstr("pinhole"));
+  EXPECT_THAT(error_of(with("model: pinhole", "model: omni")), HasSubstr("pinhole"));
+  EXPECT_THAT(error_of(with("model: pinhole", "model: fisheye")), HasSubstr("[k1, k2, k3, k4]"));
   EXPECT_THAT(error_of(with("0.002, 0.05]", "0.002, 0.05, 1]")), HasSubstr("k1, k2, p1, p2, k3"));
+}
+
+TEST_F(CameraFile, LensesOfBothCamerasReadBackTheSame) {
+  const std::string text =
+      "model: fisheye\nwidth: 64\nheight: 48\nfx: 30\nfy: 30\ncx: 31.5\ncy: 23.5\n"
+      "distortion: [0.1, -0.02, 0.003, -0.0004]\n"
+      "color_from_depth: [[1, 0, 0, 0.025], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+      "depth: {width: 32, height: 24, fx: 26, fy: 26, cx: 15.5, cy: 11.5, "
+      "distortion: [1, 2, 3, 4, 5, 6, 7, 8]}\n";
+  const auto camera = read_camera(write(text));
+  ASSERT_TRUE(camera) << camera.error().message;
+  EXPECT_EQ(camera->lens(), (Lens{LensModel::kEquidistant, {0.1, -0.02, 0.003, -0.0004}}));
+  EXPECT_EQ(camera->depth_lens, (Lens{LensModel::kRadialTangential, {1, 2, 3, 4, 5, 6, 7, 8}}));
+  const auto again = read_camera(write(to_yaml(*camera), "again.yaml"));
+  ASSERT_TRUE(again) << again.error().message << to_yaml(*camera);
+  EXPECT_EQ(again->lens(), camera->lens());
+  EXPECT_EQ(again->depth_lens, camera->depth_lens);
+  EXPECT_THAT(error_of(text.substr(0, text.rfind(", 8]")) + "]}\n"), HasSubstr("depth.distortion"));
 }
 
 TEST_F(CameraFile, DepthSlopeIsTwoSmallNumbers) {

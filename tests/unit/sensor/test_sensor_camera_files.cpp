@@ -88,18 +88,17 @@ TEST_F(ForeignCamera, OrbSlam3WithNumberedCameraSizeAndMatrix) {
       "Camera.fps: 15\r\nRGBD.DepthMapFactor: 1000.0\r\n"
       "IMU.T_b_c1: !!opencv-matrix\r\n   rows: 1\r\n   cols: 1\r\n   dt: f\r\n   data: [1.0]\r\n");
   expect_example_of_size(reading);
-  EXPECT_THAT(reading.camera.distortion, ElementsAre(0.2624, -0.9531, -0.0054, 0.0026, 1.1633));
+  EXPECT_THAT(reading.camera.distortion, ElementsAre(0.2624, -0.9531, -0.0054, 0.0026, 1.1633, 0, 0, 0));
   EXPECT_EQ(reading.camera.depth_scale, 1000.0);
   EXPECT_EQ(reading.camera.fps, 15.0);
 }
 
 TEST_F(ForeignCamera, OrbSlamThatCannotBeTaken) {
   EXPECT_THAT(
-      refusal(
-          "%YAML:1.0\nCamera.type: \"KannalaBrandt8\"\nCamera1.fx: 480\nCamera1.fy: 480\nCamera1.cx: 320\n"
-          "Camera1.cy: 240\nCamera1.k1: 0.1\n"),
-      AllOf(HasSubstr("cam.yaml"), HasSubstr("ORB-SLAM"), HasSubstr("kannalabrandt8"), HasSubstr("fisheye"),
-            HasSubstr("fx: 480")));
+      refusal("%YAML:1.0\nCamera.type: \"Omnidirectional\"\nCamera1.fx: 480\nCamera1.fy: 480\nCamera1.cx: "
+              "320\nCamera1.cy: 240\nCamera1.k1: 0.1\n"),
+      AllOf(HasSubstr("cam.yaml"), HasSubstr("ORB-SLAM"), HasSubstr("omnidirectional"),
+            HasSubstr("undistort the images first"), HasSubstr("fx: 480")));
   EXPECT_THAT(refusal("Camera.fx: 480\nCamera.fy: 480\nCamera.cx: 320\n"),
               AllOf(HasSubstr("Camera.cy"), HasSubstr("cx: 320"), HasSubstr("cy: CY")));
 }
@@ -117,7 +116,7 @@ TEST_F(ForeignCamera, RosInBlockAndInFlow) {
       "0.05\n"
       "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n");
   expect_example_of_size(block);
-  EXPECT_THAT(block.camera.distortion, ElementsAre(0.1, -0.2, 0.001, 0.002, 0.05));
+  EXPECT_THAT(block.camera.distortion, ElementsAre(0.1, -0.2, 0.001, 0.002, 0.05, 0, 0, 0));
   EXPECT_FALSE(block.has_depth_scale);
 }
 
@@ -136,15 +135,25 @@ TEST_F(ForeignCamera, RosMessagesAsTheyAreEchoed) {
       HasSubstr("binning"));
 }
 
-TEST_F(ForeignCamera, RationalAndFisheyeModelsAreNamed) {
+TEST_F(ForeignCamera, RationalAndFisheyeModels) {
   const std::string k = "height: 480\nwidth: 640\nK: [481.2, 0, 319.5, 0, 480, 239.5, 0, 0, 1]\n";
-  EXPECT_THAT(refusal(k + "distortion_model: rational_polynomial\nD: [1, 2, 0, 0, 3, 4, 5, 6]\n"),
-              AllOf(HasSubstr("rational_polynomial"), HasSubstr("8 coefficients")));
-  EXPECT_THAT(refusal(k + "distortion_model: equidistant\nD: [0, 0, 0, 0]\n"),
-              AllOf(HasSubstr("equidistant"), HasSubstr("fisheye")));
   EXPECT_THAT(
-      read(k + "distortion_model: rational_polynomial\nD: [1, 2, 0, 0, 3, 0, 0, 0]\n").camera.distortion,
-      ElementsAre(1, 2, 0, 0, 3));
+      read(k + "distortion_model: rational_polynomial\nD: [1, 2, 0, 0, 3, 4, 5, 6]\n").camera.distortion,
+      ElementsAre(1, 2, 0, 0, 3, 4, 5, 6));
+  EXPECT_THAT(
+      refusal(k + "distortion_model: rational_polynomial\nD: [1, 2, 0, 0, 3, 4, 5, 6, 7, 8, 9, 10]\n"),
+      AllOf(HasSubstr("rational_polynomial"), HasSubstr("12 coefficients")));
+  const auto fisheye = read(k + "distortion_model: equidistant\nD: [0.1, 0.2, 0.3, 0.4]\n");
+  EXPECT_EQ(fisheye.camera.model, LensModel::kEquidistant);
+  EXPECT_THAT(fisheye.camera.distortion, ElementsAre(0.1, 0.2, 0.3, 0.4, 0, 0, 0, 0));
+  EXPECT_TRUE(read(k + "distortion_model: equidistant\nD: [0, 0, 0, 0]\n").camera.distorted());
+  EXPECT_THAT(refusal(k + "distortion_model: equidistant\nD: [0, 0, 0, 0, 1]\n"), HasSubstr("k1 k2 k3 k4"));
+  EXPECT_THAT(refusal(k + "distortion_model: ftheta\nD: [1]\n"), HasSubstr("'ftheta'"));
+  const auto orb = read(
+      "%YAML:1.0\nCamera.type: \"KannalaBrandt8\"\nCamera1.fx: 481.2\nCamera1.fy: 480\nCamera1.cx: 319.5\n"
+      "Camera1.cy: 239.5\nCamera1.k1: 0.1\nCamera1.k2: 0.2\nCamera1.k3: 0.3\nCamera1.k4: 0.4\n");
+  EXPECT_EQ(orb.camera.model, LensModel::kEquidistant);
+  EXPECT_THAT(orb.camera.distortion, ElementsAre(0.1, 0.2, 0.3, 0.4, 0, 0, 0, 0));
 }
 
 TEST_F(ForeignCamera, Open3dInColumnsAndByMistakeInRows) {
@@ -182,8 +191,15 @@ TEST_F(ForeignCamera, ColmapPutsPixelCentresAtHalf) {
   EXPECT_EQ(simple.camera.color.fy, 500.0);
   EXPECT_EQ(simple.camera.color.cy, 239.5);
   EXPECT_EQ(simple.camera.distortion[0], 0.1);
-  EXPECT_THAT(refusal("1 OPENCV_FISHEYE 640 480 481 480 320 240 0 0 0 0\n", "cameras.txt"),
-              AllOf(HasSubstr("cameras.txt:1"), HasSubstr("OPENCV_FISHEYE")));
+  const auto fisheye = read("1 OPENCV_FISHEYE 640 480 481.2 480 320 240 0.1 0.2 0.3 0.4\n", "cameras.txt");
+  expect_example_of_size(fisheye);
+  EXPECT_EQ(fisheye.camera.model, LensModel::kEquidistant);
+  EXPECT_EQ(fisheye.camera.distortion[3], 0.4);
+  EXPECT_THAT(
+      read("1 FULL_OPENCV 640 480 481 480 320 240 1 2 3 4 5 6 7 8\n", "cameras.txt").camera.distortion,
+      ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
+  EXPECT_THAT(refusal("1 FOV 640 480 481 480 320 240 0.9\n", "cameras.txt"),
+              AllOf(HasSubstr("cameras.txt:1"), HasSubstr("'fov'")));
   EXPECT_THAT(refusal("1 PINHOLE 640 480 481 480 320\n", "cameras.txt"), HasSubstr("4 numbers"));
   EXPECT_THAT(
       refusal("1 PINHOLE 640 480 481 480 320 240\n2 PINHOLE 640 480 500 500 320 240\n", "cameras.txt"),
@@ -199,17 +215,17 @@ TEST_F(ForeignCamera, KalibrAndEuroc) {
       "  distortion_model: radtan\n  intrinsics: [481.2, 480.0, 319.5, 239.5]\n  resolution: [640, 480]\n"
       "  rostopic: /cam0/image_raw\ncam1:\n  camera_model: pinhole\n  intrinsics: [1, 1, 1, 1]\n");
   expect_example_of_size(reading);
-  EXPECT_THAT(reading.camera.distortion, ElementsAre(-0.28, 0.07, 0.0002, 0.00001, 0.0));
+  EXPECT_THAT(reading.camera.distortion, ElementsAre(-0.28, 0.07, 0.0002, 0.00001, 0, 0, 0, 0));
   EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("cam0")));
   expect_example_of_size(
       read("sensor_type: camera\nrate_hz: 20\nresolution: [640, 480]\ncamera_model: pinhole\n"
            "intrinsics: [481.2, 480, 319.5, 239.5]\ndistortion_model: radial-tangential\n"
            "distortion_coefficients: [0, 0, 0, 0]\n"));
-  EXPECT_THAT(
-      refusal(
-          "cam0: {camera_model: pinhole, intrinsics: [481.2, 480, 319.5, 239.5], resolution: [640, 480],\n"
-          "  distortion_model: equidistant, distortion_coeffs: [0.1, 0, 0, 0]}\n"),
-      AllOf(HasSubstr("Kalibr"), HasSubstr("equidistant")));
+  EXPECT_EQ(
+      read("cam0: {camera_model: pinhole, intrinsics: [481.2, 480, 319.5, 239.5], resolution: [640, 480],\n"
+           "  distortion_model: equidistant, distortion_coeffs: [0.1, 0, 0, 0]}\n")
+          .camera.model,
+      LensModel::kEquidistant);
   EXPECT_THAT(refusal("cam0: {camera_model: omni, intrinsics: [1, 481.2, 480, 319.5, 239.5]}\n"),
               HasSubstr("'omni'"));
 }
@@ -228,9 +244,9 @@ TEST_F(ForeignCamera, PlainMatricesAndLines) {
     EXPECT_FALSE(reading.camera.distorted()) << text;
   }
   EXPECT_THAT(read("481.2 480 319.5 239.5 0.1 0.2 0.3 0.4\n", "a.txt").camera.distortion,
-              ElementsAre(0.1, 0.2, 0.3, 0.4, 0.0));
+              ElementsAre(0.1, 0.2, 0.3, 0.4, 0, 0, 0, 0));
   EXPECT_THAT(read("481.2 480 319.5 239.5 0.1 0.2 0.3 0.4 0.5\n", "a.txt").camera.distortion,
-              ElementsAre(0.1, 0.2, 0.3, 0.4, 0.5));
+              ElementsAre(0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0));
   EXPECT_THAT(refusal("481.2 480 319.5\n", "a.txt"), AllOf(HasSubstr("3 numbers"), HasSubstr("fx fy cx cy")));
   EXPECT_THAT(refusal("481,2 480,0 319,5 239,5\n", "a.txt"),
               AllOf(HasSubstr("a.txt:1"), HasSubstr("decimal comma")));
