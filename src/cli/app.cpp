@@ -130,6 +130,32 @@ void add_time_range(CLI::App& command, dataset::OpenOptions& open) {
       ->check(CLI::NonNegativeNumber);
 }
 
+void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
+  const auto take = [&open](const std::vector<std::string>& given) {
+    for (const std::string& pair : given) {
+      const std::size_t equals = pair.find('=');
+      const std::string what = pair.substr(0, equals);
+      std::string* name = what == "color"        ? &open.topics.color
+                          : what == "depth"      ? &open.topics.depth
+                          : what == "info"       ? &open.topics.info
+                          : what == "depth_info" ? &open.topics.depth_info
+                                                 : nullptr;
+      if (name == nullptr || equals == std::string::npos || equals + 1 == pair.size()) {
+        throw CLI::ValidationError(
+            "--topic", fmt::format("'{}' (allowed: color=, depth=, info= or depth_info= and a topic)", pair));
+      }
+      *name = pair.substr(equals + 1);
+    }
+  };
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--topic", take,
+          "Of a bag: the topic of color, depth, info (colour's CameraInfo) or depth_info, where it is not "
+          "found by itself; may be repeated")
+      ->type_name("WHAT=/TOPIC")
+      ->allow_extra_args(false);
+}
+
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help) {
   CLI::App* group = parent.add_subcommand(name, help);
   group->set_version_flag("--version", version_text());
@@ -144,8 +170,9 @@ int run(int argc, char** argv) {
   app.footer(kFooter);
 
   Session session;
-  for (const auto add : {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_info, add_render,
-                         add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines}) {
+  for (const auto add :
+       {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_convert, add_info, add_render,
+        add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines}) {
     add(app, session);
   }
 

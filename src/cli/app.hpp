@@ -64,6 +64,8 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
 std::string shift_text(const Eigen::Vector3d& shift);
 
 void add_time_range(CLI::App& command, dataset::OpenOptions& open);
+/// --topic, for commands that read recordings, which may be bags.
+void add_topic_option(CLI::App& command, dataset::OpenOptions& open);
 /// A word that only groups commands, like `evaluate`.
 CLI::App* add_group(CLI::App& parent, const std::string& name, const std::string& help);
 
@@ -73,6 +75,7 @@ void add_hub(CLI::App& app, Session& session);
 void add_robot(CLI::App& app, Session& session);
 void add_keys(CLI::App& app, Session& session);
 void add_calibrate(CLI::App& app, Session& session);
+void add_convert(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);
 void add_export(CLI::App& app, Session& session);

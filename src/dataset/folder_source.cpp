@@ -39,10 +39,11 @@ class FolderSource final : public FrameSource {
 
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
     const PairInfo& pair = layout_.pairs.at(index);
-    auto color = read_color(pair.color_file, camera_.color, layout_.color_reduction, video_.get());
+    auto color = read_color(pair.color_file, camera_.color, layout_.color_reduction, video_.get(),
+                            layout_.images.get());
     if (!color) return tl::unexpected(color.error());
-    auto depth =
-        read_depth(pair.depth_file, camera_.depth ? *camera_.depth : camera_.color, camera_.depth_scale);
+    auto depth = read_depth(pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
+                            camera_.depth_scale, layout_.images.get());
     if (!depth) return tl::unexpected(depth.error());
     if (!layout_.confidence.empty()) {
       const auto mask =
@@ -59,7 +60,37 @@ class FolderSource final : public FrameSource {
     return frame;
   }
 
+  [[nodiscard]] core::Result<StoredPair> stored(std::size_t index) const override {
+    const PairInfo& pair = layout_.pairs.at(index);
+    auto color = stored_image(pair.color_file);
+    if (!color) return tl::unexpected(color.error());
+    auto depth = layout_.confidence.empty() ? stored_image(pair.depth_file) : masked_depth(pair);
+    if (!depth) return tl::unexpected(depth.error());
+    return StoredPair{std::move(*color), std::move(*depth)};
+  }
+
  private:
+  [[nodiscard]] core::Result<StoredImage> stored_image(const std::string& name) const {
+    if (layout_.images) return layout_.images->stored(name);
+    if (video_frame_of(name) && !is_file(name)) {
+      auto pixels = read_stored_color(name, video_.get());
+      if (!pixels) return tl::unexpected(pixels.error());
+      return StoredImage{"", {}, std::move(*pixels)};
+    }
+    return stored_file(name);
+  }
+
+  /// A copy has no masks: what they take out is taken out.
+  [[nodiscard]] core::Result<StoredImage> masked_depth(const PairInfo& pair) const {
+    auto depth =
+        read_depth(pair.depth_file, camera_.depth ? *camera_.depth : camera_.color, camera_.depth_scale);
+    if (!depth) return tl::unexpected(depth.error());
+    const auto mask =
+        std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
+    if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
+    return StoredImage{"", {}, std::move(*depth)};
+  }
+
   std::string name_;
   std::string doubt_;
   Layout layout_;

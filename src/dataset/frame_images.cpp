@@ -43,26 +43,11 @@ bool channels_are_equal(const cv::Mat& image) {
   return true;
 }
 
-/// Metres to units; what is not finite, not positive or too far is no measurement.
-cv::Mat units_of(const cv::Mat& metres, double depth_scale) {
-  constexpr double kMostUnits = 65534.0;  // 65535 is none
-  cv::Mat units(metres.size(), CV_16UC1);
-  for (int v = 0; v < metres.rows; ++v) {
-    const auto* from = metres.ptr<float>(v);
-    auto* to = units.ptr<std::uint16_t>(v);
-    for (int u = 0; u < metres.cols; ++u) {
-      const double value = std::round(static_cast<double>(from[u]) * depth_scale);
-      to[u] = value >= 1.0 && value <= kMostUnits ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
-    }
-  }
-  return units;
-}
-
 /// The first image of the pairs that can be read; empty when none can.
 template <typename Name>
 cv::Mat first_image(const Layout& layout, const Name& name) {
   for (const PairInfo& pair : layout.pairs) {
-    if (auto image = read_stored_color(name(pair))) return std::move(*image);
+    if (auto image = read_stored_color(name(pair), nullptr, layout.images.get())) return std::move(*image);
   }
   return {};
 }
@@ -81,7 +66,23 @@ std::optional<double> median_of(const cv::Mat& metres) {
 
 }  // namespace
 
-core::Result<cv::Mat> read_stored_color(const std::string& name, VideoFrames* video) {
+cv::Mat depth_units(const cv::Mat& metres, double depth_scale) {
+  constexpr double kMostUnits = 65534.0;  // 65535 is none
+  cv::Mat units(metres.size(), CV_16UC1);
+  for (int v = 0; v < metres.rows; ++v) {
+    const auto* from = metres.ptr<float>(v);
+    auto* to = units.ptr<std::uint16_t>(v);
+    for (int u = 0; u < metres.cols; ++u) {
+      const double value = std::round(static_cast<double>(from[u]) * depth_scale);
+      to[u] = value >= 1.0 && value <= kMostUnits ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+    }
+  }
+  return units;
+}
+
+core::Result<cv::Mat> read_stored_color(const std::string& name, VideoFrames* video,
+                                        const ImageStore* store) {
+  if (store != nullptr) return store->image(name);
   const auto frame = video_frame_of(name);
   if (!frame || is_file(name)) return read_image(name);
   if (video != nullptr) return video->read(frame->second);
@@ -99,8 +100,8 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
 }
 
 core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole& camera, int reduction,
-                                 VideoFrames* video) {
-  auto image = read_stored_color(file, video);
+                                 VideoFrames* video, const ImageStore* store) {
+  auto image = read_stored_color(file, video, store);
   if (!image) return image;
   const bool deep = image->depth() == CV_16U && image->channels() >= 3;
   if (image->depth() != CV_8U && !deep) {
@@ -118,8 +119,9 @@ core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole&
   return image;
 }
 
-core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole& camera, double depth_scale) {
-  auto image = read_image(file);
+core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole& camera, double depth_scale,
+                                 const ImageStore* store) {
+  auto image = store != nullptr ? store->image(file) : read_image(file);
   if (!image) return image;
   if (image->type() == CV_64FC1) image->convertTo(*image, CV_32F);
   if (image->type() == CV_16UC3 && channels_are_equal(*image)) cv::extractChannel(*image, *image, 0);
@@ -130,7 +132,7 @@ core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole&
                     file, type_name(*image)));
   }
   if (auto size = check_size(file, *image, camera, "depth"); !size) return tl::unexpected(size.error());
-  return image->type() == CV_32FC1 ? units_of(*image, depth_scale) : *image;
+  return image->type() == CV_32FC1 ? depth_units(*image, depth_scale) : *image;
 }
 
 core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camera, core::Log& log) {

@@ -16,6 +16,8 @@ struct ImageFormats {
   cv::Mat (*decode)(const Bytes& file);
   /// Empty when it cannot be.
   Bytes (*encode_png)(const cv::Mat& image, int level);
+  /// Empty when it cannot be.
+  Bytes (*encode_tiff)(const cv::Mat& image);
 };
 
 }  // namespace plumbline::dataset

@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 
+#include "frame_images.hpp"
 #include "image_decoders.hpp"
 #include "image_formats.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -38,6 +41,15 @@ Decoded decode_other(const Bytes& file) {
   return image;
 }
 
+core::Result<StoredImage> stored_file(const std::string& file) {
+  auto bytes = read_bytes(file);
+  if (!bytes) return tl::unexpected(bytes.error());
+  std::string ending = std::filesystem::path(file).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return StoredImage{std::move(ending), std::move(*bytes), {}};
+}
+
 core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
   auto bytes = read_bytes(file);
   if (!bytes) return tl::unexpected(bytes.error());
@@ -55,6 +67,14 @@ core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int lev
   if (!formats) return tl::unexpected(formats.error());
   Bytes bytes = (*formats)->encode_png(image, level);
   if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the image cannot be encoded as PNG");
+  return bytes;
+}
+
+core::Result<std::vector<std::uint8_t>> encode_tiff(const cv::Mat& image) {
+  const auto& formats = core::part<ImageFormats>();
+  if (!formats) return tl::unexpected(formats.error());
+  Bytes bytes = (*formats)->encode_tiff(image);
+  if (bytes.empty()) return core::failure(core::ErrorKind::kInternal, "the image cannot be encoded as TIFF");
   return bytes;
 }
 

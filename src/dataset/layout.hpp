@@ -2,6 +2,7 @@
 #pragma once
 
 // How the pairs of a recording are found on disk, one function per layout.
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -11,8 +12,19 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/sensor/camera_file.hpp"
 
 namespace plumbline::dataset {
+
+/// Images that are in no files of their own, but in a bag. Thread-safe.
+class ImageStore {
+ public:
+  virtual ~ImageStore() = default;
+  /// As it is stored; `name` is one of those in the layout's pairs. Error (kInput): names what is wrong.
+  [[nodiscard]] virtual core::Result<cv::Mat> image(const std::string& name) const = 0;
+  /// The same without decoding, where it is stored as an image file's bytes.
+  [[nodiscard]] virtual core::Result<StoredImage> stored(const std::string& name) const = 0;
+};
 
 struct Layout {
   std::string format;
@@ -22,6 +34,9 @@ struct Layout {
   /// Folder of masks named as the depth images, 0 where there is no measurement; "": none.
   std::string confidence{};
   int color_reduction = 1;  ///< colour images are made smaller by this factor while reading
+  /// What the recording's own description says of its camera, where no camera file is named or found.
+  std::optional<sensor::CameraReading> camera{};
+  std::shared_ptr<const ImageStore> images{};  ///< where the images are; null: in files
 };
 
 struct LayoutOptions {
@@ -29,6 +44,11 @@ struct LayoutOptions {
   double fps = 30.0;  ///< for layouts without stamps
   double depth_delay_s = 0.0;
 };
+
+/// Seconds nearest to whole nanoseconds, which is what stamps of messages are.
+inline double seconds_of(std::int64_t nanoseconds) {
+  return static_cast<double>(static_cast<long double>(nanoseconds) / 1e9L);
+}
 
 /// A stamped file of a list, with its place for messages.
 struct StampedFile {

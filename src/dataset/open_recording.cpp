@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "bags/bag_recording.hpp"
 #include "depth_statistics.hpp"
 #include "frame_images.hpp"
 #include "layout.hpp"
@@ -60,6 +61,33 @@ core::Result<Layout> read_layout(const fs::path& folder, const std::string& form
         fmt::format("{}: holds no recording itself; give one of its folders: {}", folder.string(), inside));
   }
   return core::input_error(not_a_recording(folder));
+}
+
+/// Bags are recognised by their content; `--format` is about folders.
+core::Result<Layout> read_any(const fs::path& path, const OpenOptions& open, const LayoutOptions& options,
+                              core::Log& log) {
+  const bool any = open.format.empty() || open.format == "auto";
+  if (any && is_bag(path)) return read_bag(path, open.topics, options, log);
+  if (open.topics.any()) {
+    return core::usage_error(
+        fmt::format("{}: is no bag, and --topic is about topics of bags; leave it out", path.string()));
+  }
+  if (is_folder(path)) return read_layout(path, open.format, options, log);
+  return core::input_error(fmt::format(
+      "{}: is a file, and no bag (MCAP, rosbag2's .db3, ROS 1's .bag) by its content; give a bag or the "
+      "recording's folder",
+      path.string()));
+}
+
+/// Stamps are whole nanoseconds, as those of messages are, so that no copy of a recording has others.
+void round_stamps(std::vector<PairInfo>& pairs) {
+  constexpr double kMost_s = 9e9;  // beyond, nanoseconds do not fit 64 bits
+  for (PairInfo& pair : pairs) {
+    for (double* stamp : {&pair.stamp, &pair.depth_stamp}) {
+      if (std::abs(*stamp) < kMost_s)
+        *stamp = seconds_of(std::llroundl(static_cast<long double>(*stamp) * 1e9L));
+    }
+  }
 }
 
 /// Of frames with one stamp, to the microsecond that trajectories are written with, only the first is kept:
@@ -144,6 +172,15 @@ core::Result<std::string> check_depth_scale(const FrameSource& source, const std
   return what + "; correct the camera file unless the scene is like that";
 }
 
+/// A folder's name, a bag's without its endings.
+std::string name_of(const fs::path& place, const fs::path& given) {
+  const fs::path named = place.filename().empty() ? given : place;
+  if (is_folder(named)) return named.filename().string();
+  fs::path name = named.filename();
+  if (name.extension() == ".zstd") name = name.stem();
+  return name.stem().string();
+}
+
 }  // namespace
 
 core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder, const OpenOptions& options,
@@ -151,10 +188,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) {
     return core::input_error(
-        fmt::format("{}: no such folder; give the folder of a recording", folder.string()));
-  }
-  if (!fs::is_directory(folder, ignored)) {
-    return core::input_error(fmt::format("{}: is a file; give the recording's folder", folder.string()));
+        fmt::format("{}: no such folder or file; give the folder of a recording, or a bag", folder.string()));
   }
   // A missing camera must not hide that there is no recording; a layout without stamps needs the camera's
   // fps.
@@ -165,8 +199,9 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
     layout_options.fps = (*chosen)->reading.camera.fps;
     layout_options.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
   }
-  auto layout = read_layout(folder, options.format, layout_options, log);
+  auto layout = read_any(folder, options, layout_options, log);
   if (!layout) return tl::unexpected(layout.error());
+  round_stamps(layout->pairs);
   drop_same_stamps(folder.string(), layout->pairs, log);
   if (!chosen) return tl::unexpected(chosen.error());
   auto camera = complete_camera(folder, *chosen, *layout, log);
@@ -178,8 +213,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   for (PairInfo& pair : layout->pairs) pair.depth_stamp += camera->depth_delay_s;
 
   fs::path place = fs::weakly_canonical(folder, ignored);  // "." and "room/" have names too
-  if (place.filename().empty()) place = folder;
-  const std::string name = place.filename().string();
+  const std::string name = name_of(place, folder);
   auto source = make_folder_source(name, *layout, *camera);
   const auto doubt = check_depth_scale(*source, folder.string());
   if (!doubt) return tl::unexpected(doubt.error());

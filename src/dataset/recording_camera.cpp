@@ -99,7 +99,7 @@ core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& came
 template <typename Name>
 std::optional<cv::Size> image_size(const Layout& layout, const Name& name) {
   for (const PairInfo& pair : layout.pairs) {
-    if (const auto image = read_stored_color(name(pair))) return image->size();
+    if (const auto image = read_stored_color(name(pair), nullptr, layout.images.get())) return image->size();
   }
   return std::nullopt;
 }
@@ -241,6 +241,7 @@ core::Result<std::optional<ChosenCamera>> choose_camera(const fs::path& folder, 
     if (!reading) return tl::unexpected(reading.error());
     return ChosenCamera{std::move(*reading), options.camera};
   }
+  if (!is_folder(folder)) return std::nullopt;
   const auto file = find_camera_file(folder, log);
   if (!file) return tl::unexpected(file.error());
   if (!*file) return std::nullopt;
@@ -265,6 +266,8 @@ int stored_reduction(const Layout& layout, const sensor::Camera& camera) {
 core::Result<sensor::Camera> complete_camera(const fs::path& folder,
                                              const std::optional<ChosenCamera>& chosen, const Layout& layout,
                                              core::Log& log) {
+  if (!chosen && layout.camera)
+    return complete_camera(folder, ChosenCamera{*layout.camera, folder.string()}, layout, log);
   if (!chosen) return guess(folder, layout, log);
   sensor::Camera camera = chosen->reading.camera;
   if (chosen->reading.program.empty()) return camera;  // our own: complete, and checked

@@ -13,10 +13,10 @@ namespace plumbline::dataset {
 
 struct ChosenCamera {
   sensor::CameraReading reading;
-  std::string file;  ///< "" when it came with OpenOptions::known
+  std::string file;
 };
 
-/// OpenOptions::known, OpenOptions::camera, or a camera file in the folder; none when there is none of these.
+/// OpenOptions::camera, or a camera file in the folder (not of a bag); none when there is none of these.
 /// Errors are those of the file, or several files that differ.
 core::Result<std::optional<ChosenCamera>> choose_camera(const std::filesystem::path& folder,
                                                         const OpenOptions& options, core::Log& log);

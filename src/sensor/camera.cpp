@@ -187,10 +187,7 @@ const char* model_name(LensModel model) {
   return model == LensModel::kEquidistant ? "equidistant" : "pinhole";
 }
 
-}  // namespace
-
-core::Result<Camera> read_camera(const std::filesystem::path& file) {
-  auto root = core::read_yaml(file);
+core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesystem::path& file) {
   if (!root) return tl::unexpected(root.error());
 
   ConfigProblems problems;
@@ -229,6 +226,16 @@ core::Result<Camera> read_camera(const std::filesystem::path& file) {
   if (!problems.empty()) return tl::unexpected(core::to_error(problems));
   if (camera.name.empty()) camera.name = file.stem().string();
   return camera;
+}
+
+}  // namespace
+
+core::Result<Camera> read_camera(const std::filesystem::path& file) {
+  return camera_in(core::read_yaml(file), file);
+}
+
+core::Result<Camera> parse_camera(const std::string& text, const std::string& file_name) {
+  return camera_in(core::parse_yaml(text, file_name), file_name);
 }
 
 std::string to_yaml(const Camera& camera) {

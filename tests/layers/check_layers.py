@@ -27,14 +27,14 @@ LAYERS = [
 LAYER_OF = {module: height for height, layer in enumerate(LAYERS) for module in layer}
 FOLDERS = {"maps": "maps", "viz": "viz", "report": "viz/report"}  # of modules that are not below src/
 
-# A library that only one module may include or link. Both patterns match from the start of the name.
+# A library that only these modules may include or link. Both patterns match from the start of the name.
 CONFINED = [
-    ("VTK", "viz", r"vtk", r"VTK|vtk"),
-    ("Ceres", "optimize", r"ceres/", r"Ceres::|ceres\b"),
-    ("yaml-cpp", "core", r"yaml-cpp/", r"yaml-cpp"),
-    ("CycloneDDS", "net", r"dds/|ddsc/|org/eclipse/cyclonedds", r"CycloneDDS"),
-    ("SQLite", "maps", r"sqlite3", r"SQLite3?::|sqlite3\b"),
-    ("CLI11", "cli", r"CLI/", r"CLI11"),
+    ("VTK", ["viz"], r"vtk", r"VTK|vtk"),
+    ("Ceres", ["optimize"], r"ceres/", r"Ceres::|ceres\b"),
+    ("yaml-cpp", ["core"], r"yaml-cpp/", r"yaml-cpp"),
+    ("CycloneDDS", ["dataset", "net"], r"dds/|ddsc/|org/eclipse/cyclonedds", r"CycloneDDS"),
+    ("SQLite", ["dataset", "maps"], r"sqlite3", r"SQLite3?::|sqlite3\b"),
+    ("CLI11", ["cli"], r"CLI/", r"CLI11"),
 ]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
@@ -88,9 +88,9 @@ def check_include(module, bracket, path, reachable):
         return None
     if bracket == '"' and ".." in Path(path).parts:
         return f"includes {path}: only a module's own folder and public headers"
-    for library, home, header, _ in CONFINED:
-        if module != home and re.match(header, path):
-            return f"{module} includes {path}: {library} belongs to {home} only"
+    for library, homes, header, _ in CONFINED:
+        if module not in homes and re.match(header, path):
+            return f"{module} includes {path}: {library} belongs to {' and '.join(homes)} only"
     return None
 
 
@@ -114,10 +114,11 @@ def read_cmake(root, module):
         depends.add(other)
         if LAYER_OF[other] >= LAYER_OF[module]:
             problems.append(f"{where(position)}: {module} depends on {other}, which is not in a lower layer")
-    for library, home, _, target in CONFINED:
+    for library, homes, _, target in CONFINED:
         found = re.search(rf"(?<![\w:/])(?:{target})", text)
-        if module != home and found:
-            problems.append(f"{where(found.start())}: {module} links {library}, which belongs to {home} only")
+        if module not in homes and found:
+            problems.append(f"{where(found.start())}: {module} links {library}, which belongs to "
+                            f"{' and '.join(homes)} only")
     return depends, problems
 
 

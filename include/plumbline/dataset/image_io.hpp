@@ -20,7 +20,9 @@ core::Result<cv::Mat> read_image(const std::filesystem::path& file);
 /// CV_8U with 1, 3 (BGR) or 4 channels, or CV_16U with one, as the bytes of a PNG file. `level`: 0 (large and
 /// quick) to 9 (small). Thread-safe.
 core::Result<std::vector<std::uint8_t>> encode_png(const cv::Mat& image, int level);
-/// The same into a file, quickly packed; errors name the file.
+/// CV_32FC1 as the bytes of a TIFF file, without loss. Thread-safe.
+core::Result<std::vector<std::uint8_t>> encode_tiff(const cv::Mat& image);
+/// PNG into a file, quickly packed; errors name the file.
 core::Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image);
 
 }  // namespace plumbline::dataset

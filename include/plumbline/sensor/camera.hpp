@@ -69,6 +69,8 @@ struct Camera {
 /// depth_slope depth_delay [color_from_depth, depth: {width height fx fy cx cy model distortion}]). All
 /// problems are told together with file:line:column (kUsage).
 core::Result<Camera> read_camera(const std::filesystem::path& file);
+/// The same of the file's text; `file_name` is for messages.
+core::Result<Camera> parse_camera(const std::string& text, const std::string& file_name);
 
 /// The same calibration as camera.yaml text; read_camera(write) gives the same camera.
 std::string to_yaml(const Camera& camera);

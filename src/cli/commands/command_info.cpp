@@ -15,6 +15,7 @@
 
 #include "app.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/dataset/bag.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/stored_result.hpp"
@@ -145,6 +146,14 @@ core::Result<void> describe_recording(Session& session, InfoRequest& request) {
   return {};
 }
 
+/// Its topics first: they are told also where no recording can be made of them.
+core::Result<void> describe_bag(Session& session, InfoRequest& request) {
+  const auto topics = dataset::bag_to_text(request.input, request.open.topics);
+  if (!topics) return tl::unexpected<core::Error>(topics.error());
+  fmt::print("{}", *topics);
+  return describe_recording(session, request);
+}
+
 core::Result<void> info(Session& session, InfoRequest& request) {
   if (synth::is_synth_url(request.input)) return describe_recording(session, request);
   std::error_code ec;
@@ -154,6 +163,7 @@ core::Result<void> info(Session& session, InfoRequest& request) {
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
+  if (dataset::is_bag(path)) return describe_bag(session, request);
   if (!std::filesystem::is_directory(path, ec)) {
     if (!is_trajectory(path)) return describe_cloud(path);
     const auto poses = dataset::read_trajectory_file(path);
@@ -172,10 +182,11 @@ void add_info(CLI::App& app, Session& session) {
                                   [&session, request] { return info(session, *request); });
   command
       ->add_option("INPUT", request->input,
-                   "A recording, a result folder, map.db, a cloud file or synth:SCENE")
+                   "A recording, a ROS bag, a result folder, map.db, a cloud file or synth:SCENE")
       ->required();
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");
+  add_topic_option(*command, request->open);
   command->add_option("--format", request->open.format, "Layout of the recording (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
 }

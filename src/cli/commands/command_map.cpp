@@ -34,6 +34,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
   command.add_option("--camera", request.open.camera, "Shipped calibration or file")->type_name("NAME|FILE");
   command.add_option("--format", request.open.format, "Layout of INPUT (default: auto)")
       ->check(CLI::IsMember(dataset::layout_names()));
+  add_topic_option(command, request.open);
   add_time_range(command, request.open);
   command.add_option("--every", request.open.every, "Use every N-th frame")
       ->type_name("N")
@@ -57,7 +58,7 @@ void add_map(CLI::App& app, Session& session) {
                                   [&session, request, inputs] { return map(session, *request, *inputs); });
   command
       ->add_option("INPUT", *inputs,
-                   "Folder of a recording, or synth:SCENE?frames=900&texture=none&seed=3; give several, one "
+                   "Folder of a recording, a ROS bag, or synth:SCENE?frames=900&texture=none&seed=3; give several, one "
                    "per robot, to fuse them into one map")
       ->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");

@@ -31,7 +31,18 @@ Bytes encode_png(const cv::Mat& image, int level) {
   return bytes;
 }
 
+Bytes encode_tiff(const cv::Mat& image) {
+  Bytes bytes;
+  try {
+    if (!cv::imencode(".tiff", image, bytes)) bytes.clear();
+  } catch (const cv::Exception&) {
+    bytes.clear();
+  }
+  return bytes;
+}
+
 }  // namespace
 }  // namespace plumbline::dataset
 
-PLUMBLINE_PART(plumbline::dataset::ImageFormats, &plumbline::dataset::decode, &plumbline::dataset::encode_png)
+PLUMBLINE_PART(plumbline::dataset::ImageFormats, &plumbline::dataset::decode, &plumbline::dataset::encode_png,
+               &plumbline::dataset::encode_tiff)

@@ -43,6 +43,14 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   constexpr double kNoEnd_s = 1e299;
   if (request.open.to_s < kNoEnd_s) text += fmt::format("  to: {} s\n", request.open.to_s);
   text += fmt::format("  every: {}\n", request.open.every);
+  const dataset::TopicNames& topics = request.open.topics;
+  const std::pair<const char*, const std::string&> named[] = {{"color", topics.color},
+                                                              {"depth", topics.depth},
+                                                              {"info", topics.info},
+                                                              {"depth_info", topics.depth_info}};
+  for (const auto& [what, topic] : named) {
+    if (!topic.empty()) text += fmt::format("  topic_{}: {}\n", what, quoted(topic));
+  }
   if (request.feedback != nullptr) text += "  feedback: on\n";
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
   return text + to_yaml(graph);

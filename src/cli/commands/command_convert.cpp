@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline convert RECORDING OUT
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+
+#include "app.hpp"
+#include "plumbline/dataset/convert.hpp"
+#include "plumbline/pipeline/input.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+struct ConvertRequest {
+  std::string input;
+  std::filesystem::path output;
+  dataset::OpenOptions open;
+  bool replace = false;
+};
+
+core::Result<void> convert(Session& session, ConvertRequest& request) {
+  const auto pipelines = session.pipelines_folder();
+  if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
+  request.open.cameras_folder = *pipelines / "cameras";
+  Console& console = session.console();
+  const auto source =
+      pipeline::open_input(request.input, request.open, *pipelines / "scenes", session.executor(), console);
+  if (!source) return tl::unexpected<core::Error>(source.error());
+
+  const core::StopToken stop = stop_on_signals();
+  const auto told = console.counting("frames");
+  dataset::ConvertOptions options;
+  options.replace = request.replace;
+  options.stop = [&stop] { return stop.stop_requested(); };
+  options.progress = [&](std::size_t frames) { told(frames, (*source)->size()); };
+  const auto summary = dataset::convert_recording(**source, request.output, options, console);
+  console.end_progress();
+  if (!summary) return tl::unexpected<core::Error>(summary.error());
+  if (summary->stopped) console.warning("stopped: the copy ends here");
+  if (summary->unreadable > 0)
+    console.warning(fmt::format("{} frames cannot be read and are left out", summary->unreadable));
+  if (!session.quiet) fmt::print("written    {} frames to {}\n", summary->written, request.output.string());
+  return {};
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, Session& session) {
+  const auto request = std::make_shared<ConvertRequest>();
+  CLI::App* command =
+      add_command(app, session, "convert", "Write a recording as a TUM folder or an MCAP file",
+                  [&session, request] { return convert(session, *request); });
+  command->add_option("INPUT", request->input, "A recording: a folder or a ROS bag")->required();
+  command->add_option("OUT", request->output, "The new folder; an MCAP file if it ends in .mcap")->required();
+  command->add_option("--camera", request->open.camera, "Shipped calibration or file")
+      ->type_name("NAME|FILE");
+  command->add_option("--format", request->open.format, "Layout of INPUT (default: auto)")
+      ->check(CLI::IsMember(dataset::layout_names()));
+  add_topic_option(*command, request->open);
+  add_time_range(*command, request->open);
+  command->add_option("--every", request->open.every, "Use every N-th frame")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100000));
+  command->add_flag("--force", request->replace, "Replace an earlier copy");
+}
+
+}  // namespace plumbline::cli

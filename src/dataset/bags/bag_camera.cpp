@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bags/bag_camera.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "bags/images.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+using geometry::Rigid3;
+
+constexpr double kMillimetres = 1000.0;  // units per metre of ROS' 16-bit depth
+constexpr double kNothing = 1e-9;        // of a transform that only goes through quaternions
+const char* const kRealSenseImage = "/image/data";
+
+/// frame names with and without the slash that ROS 1 had in front.
+std::string frame_name(const std::string& frame) {
+  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
+}
+
+struct InfoCamera {
+  sensor::Pinhole pinhole;
+  sensor::Lens lens;
+  std::string frame;
+};
+
+/// The lens of a CameraInfo; what is wrong with it otherwise.
+tl::expected<sensor::Lens, std::string> lens_of(const CameraInfoMessage& info) {
+  sensor::Lens lens;
+  const std::string& model = info.distortion_model;
+  const bool none = std::all_of(info.d.begin(), info.d.end(), [](double k) { return k == 0.0; });
+  const bool fisheye = model == "equidistant" || model == "fisheye";
+  if (none && !fisheye) return lens;
+  if (fisheye) {
+    lens.model = sensor::LensModel::kEquidistant;
+  } else if (model != "plumb_bob" && model != "rational_polynomial" &&
+             model.find("rown") == std::string::npos && !model.empty()) {
+    return tl::unexpected(fmt::format(
+        "has the distortion model '{}' (known: plumb_bob, rational_polynomial, equidistant)", model));
+  }
+  const std::size_t most = fisheye ? 4 : lens.k.size();
+  // OpenCV's models of 12 and 14 coefficients go on with what is nearly always 0.
+  for (std::size_t i = 0; i < info.d.size(); ++i) {
+    if (!std::isfinite(info.d[i]) || (i >= most && info.d[i] != 0.0))
+      return tl::unexpected(
+          fmt::format("has {} coefficients of distortion ({} are read)", info.d.size(), most));
+    if (i < most) lens.k[i] = info.d[i];
+  }
+  return lens;
+}
+
+/// `rectified`: the image has been undistorted, the camera is that of P.
+tl::expected<InfoCamera, std::string> camera_of(const CameraInfoMessage& info, bool rectified) {
+  InfoCamera camera;
+  camera.frame = frame_name(info.header.frame_id);
+  const auto size_ok = [](std::uint32_t size) { return size > 0 && size <= 32768; };
+  if (!size_ok(info.width) || !size_ok(info.height))
+    return tl::unexpected(fmt::format("says {} x {} pixels", info.width, info.height));
+  const bool by_p = rectified && info.p[0] != 0.0;
+  const double fx = by_p ? info.p[0] : info.k[0];
+  const double fy = by_p ? info.p[5] : info.k[4];
+  const double cx = by_p ? info.p[2] : info.k[2];
+  const double cy = by_p ? info.p[6] : info.k[5];
+  camera.pinhole = {static_cast<int>(info.width), static_cast<int>(info.height), fx, fy, cx, cy};
+  if (rectified) return camera;
+  auto lens = lens_of(info);
+  if (!lens) return tl::unexpected(lens.error());
+  camera.lens = *lens;
+  return camera;
+}
+
+core::Result<std::optional<InfoCamera>> read_info(const BagSurvey& survey, const ChosenTopic& info,
+                                                  const std::string& image) {
+  if (info.topic == nullptr) return std::nullopt;
+  const auto message = survey.first(*info.topic, &MessageDecoder::camera_info);
+  if (!message) return tl::unexpected(message.error());
+  if (message->k[0] == 0.0 && message->p[0] == 0.0)
+    return std::nullopt;  // a camera that was never calibrated
+  const bool rectified = image.find("image_rect") != std::string::npos;
+  const auto camera = camera_of(*message, rectified);
+  if (camera) return *camera;
+  return core::input_error(fmt::format("{}: {} {}; name a camera file with --camera", survey.path,
+                                       info.topic->topic.name, camera.error()));
+}
+
+/// Frames and how they sit in their parents.
+class Transforms {
+ public:
+  void add(const std::vector<TransformMessage>& transforms) {
+    for (const TransformMessage& t : transforms)
+      parents_.try_emplace(frame_name(t.child), frame_name(t.parent), t.parent_from_child);
+  }
+  /// None when the frames do not hang together.
+  [[nodiscard]] std::optional<Rigid3> between(const std::string& target, const std::string& source) const {
+    const auto target_path = to_root(target);
+    const auto source_path = to_root(source);
+    for (const auto& [frame, frame_from_source] : source_path) {
+      for (const auto& [other, frame_from_target] : target_path) {
+        if (frame == other) return frame_from_target.inverse() * frame_from_source;
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  using Step = std::pair<std::string, Rigid3>;
+
+  /// The frame itself and all above it, each with frame_from_start.
+  [[nodiscard]] std::vector<Step> to_root(const std::string& start) const {
+    std::vector<Step> path{{start, Rigid3()}};
+    while (path.size() <= parents_.size()) {
+      const auto parent = parents_.find(path.back().first);
+      if (parent == parents_.end()) break;
+      path.emplace_back(parent->second.first, parent->second.second * path.back().second);
+    }
+    return path;
+  }
+
+  std::map<std::string, std::pair<std::string, Rigid3>> parents_;
+};
+
+Transforms read_all_transforms(const BagSurvey& survey) {
+  Transforms transforms;
+  for (const char* name : {"/tf_static", "/tf"}) {  // ROS 1's publishers of fixed frames use /tf
+    const SurveyedTopic* topic = survey.find(name);
+    if (topic == nullptr || topic->decoder == nullptr) continue;
+    for (const MessagePlace& place : topic->others) {
+      if (const auto message = survey.read(*topic, place, &MessageDecoder::transforms))
+        transforms.add(*message);
+    }
+  }
+  return transforms;
+}
+
+/// What RealSense's recorder has beside an image topic: "/device_0/sensor_0/Depth_0" of ".../image/data".
+std::string realsense_stream(const std::string& image) {
+  const std::size_t at = image.find(kRealSenseImage);
+  return image.rfind("/device_", 0) == 0 && at != std::string::npos ? image.substr(0, at) : "";
+}
+
+/// stream_from_reference, of ".../tf/0".
+std::optional<Rigid3> realsense_transform(const BagSurvey& survey, const std::string& stream) {
+  for (const SurveyedTopic& topic : survey.topics) {
+    if (topic.topic.name.rfind(stream + "/tf/", 0) != 0 || topic.others.empty()) continue;
+    if (const auto motion = survey.first(topic, &MessageDecoder::transform)) return *motion;
+  }
+  return std::nullopt;
+}
+
+/// Metres a unit, of the sensor's ".../option/Depth_Units/value".
+double realsense_depth_scale(const BagSurvey& survey, const std::string& stream) {
+  const std::string sensor = stream.substr(0, stream.rfind('/'));
+  for (const SurveyedTopic& topic : survey.topics) {
+    const bool units = topic.topic.name == sensor + "/option/Depth_Units/value" ||
+                       topic.topic.name == sensor + "/option/Depth Units/value";
+    if (!units || topic.others.empty()) continue;
+    const auto metres = survey.first(topic, &MessageDecoder::number);
+    if (!metres || !(*metres > 1e-7F && *metres < 1.0F)) continue;
+    // Written as a float: 0.001 is meant by the float next to it.
+    return std::round(1e6 / static_cast<double>(*metres)) / 1e6;
+  }
+  return kMillimetres;
+}
+
+std::optional<Rigid3> color_from_depth(const BagSurvey& survey, const ChosenTopics& topics,
+                                       const InfoCamera& color, const InfoCamera& depth) {
+  const std::string color_stream = realsense_stream(topics.color.topic->topic.name);
+  const std::string depth_stream = realsense_stream(topics.depth.topic->topic.name);
+  if (!color_stream.empty() && !depth_stream.empty()) {
+    const auto color_from_reference = realsense_transform(survey, color_stream);
+    const auto depth_from_reference = realsense_transform(survey, depth_stream);
+    if (color_from_reference && depth_from_reference)
+      return *color_from_reference * depth_from_reference->inverse();
+  }
+  if (!color.frame.empty() && color.frame == depth.frame) return Rigid3();
+  return read_all_transforms(survey).between(color.frame, depth.frame);
+}
+
+bool same_pixels(const sensor::Pinhole& a, const sensor::Pinhole& b) {
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx &&
+         a.cy == b.cy;
+}
+
+/// Where depth is not in colour's pixels, its own camera.
+core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics& topics,
+                                    const InfoCamera& color, const InfoCamera& depth,
+                                    sensor::CameraReading& reading) {
+  const std::string& depth_name = topics.depth.topic->topic.name;
+  const bool same = same_pixels(color.pinhole, depth.pinhole);
+  const bool by_name = depth_name.find("aligned_depth") != std::string::npos ||
+                       depth_name.find("registered") != std::string::npos;
+  if (same && (by_name || color.frame == depth.frame)) return {};
+  const auto motion = color_from_depth(survey, topics, color, depth);
+  if (!motion) {
+    return core::usage_error(
+        fmt::format("{}: {} (frame '{}') and {} (frame '{}') are of different cameras, and no transform in "
+                    "/tf_static says "
+                    "how these sit; take a depth image that is aligned to colour with --topic depth=, or "
+                    "name a camera file "
+                    "with color_from_depth with --camera",
+                    survey.path, topics.color.topic->topic.name, color.frame, depth_name, depth.frame));
+  }
+  const bool nothing_moves = motion->rotation.isIdentity(kNothing) && motion->translation.isZero(kNothing);
+  if (same && nothing_moves) return {};
+  reading.camera.color_from_depth = *motion;
+  reading.camera.depth = depth.pinhole;
+  reading.camera.depth_lens = depth.lens;
+  reading.notes.push_back("depth from " + topics.depth_info.topic->topic.name + ", brought into colour");
+  return {};
+}
+
+}  // namespace
+
+core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
+                                                              const ChosenTopics& topics, core::Log& log) {
+  const auto color = read_info(survey, topics.info, topics.color.topic->topic.name);
+  if (!color) return tl::unexpected(color.error());
+  if (!*color) {
+    log.warning(fmt::format("{}: has no CameraInfo for {}", survey.path, topics.color.topic->topic.name));
+    return std::nullopt;
+  }
+
+  sensor::CameraReading reading;
+  reading.program = "ROS";
+  reading.camera.name = topics.info.topic->topic.name;
+  reading.camera.color = (*color)->pinhole;
+  reading.camera.model = (*color)->lens.model;
+  reading.camera.distortion = (*color)->lens.k;
+  reading.camera.depth_scale = kMillimetres;
+  const std::string stream = realsense_stream(topics.depth.topic->topic.name);
+  if (!stream.empty()) reading.camera.depth_scale = realsense_depth_scale(survey, stream);
+
+  const auto depth = read_info(survey, topics.depth_info, topics.depth.topic->topic.name);
+  if (!depth) return tl::unexpected(depth.error());
+  if (*depth) {
+    if (auto added = add_depth_camera(survey, topics, **color, **depth, reading); !added)
+      return tl::unexpected(added.error());
+  }
+  if (const std::string wrong = sensor::camera_problem(reading.camera); !wrong.empty()) {
+    return core::input_error(fmt::format("{}: {}: {}; name a camera file with --camera", survey.path,
+                                         topics.info.topic->topic.name, wrong));
+  }
+  return reading;
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The camera of a bag: what its CameraInfo and its transforms say.
+#include <optional>
+
+#include "bags/topics.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/sensor/camera_file.hpp"
+
+namespace plumbline::dataset {
+
+/// None when there is no CameraInfo of colour. Where depth has a camera of its own, color_from_depth comes
+/// from /tf_static, /tf, or RealSense's own transforms. Errors (kUsage): colour and depth are of different
+/// cameras and nothing says how they sit: both are named, and the option; (kInput): numbers that make no
+/// camera.
+core::Result<std::optional<sensor::CameraReading>> bag_camera(const BagSurvey& survey,
+                                                              const ChosenTopics& topics, core::Log& log);
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A ROS bag as a list of messages, whatever file it is in. What is in the messages is read by
+// MessageDecoders (messages.hpp).
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::dataset {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// Messages larger than this are taken for damaged lengths.
+constexpr std::uint64_t kMostMessageBytes = std::uint64_t{1} << 28;
+/// So much of each message is there while a bag is scanned: a stamp and the beginning of what follows.
+constexpr std::size_t kHeadBytes = 64;
+
+struct BagTopic {
+  std::string name;
+  std::string type;      ///< "sensor_msgs/Image", without "/msg"
+  std::string encoding;  ///< of messages: "cdr", "ros1", "json", "protobuf" ...
+};
+
+/// Where a message is; what the numbers mean is the file's affair.
+struct MessagePlace {
+  std::uint64_t at = 0;
+  std::uint64_t offset = 0;
+  std::uint32_t size = 0;  ///< bytes, as stored
+  std::uint32_t file = 0;  ///< of a bag of several files
+};
+
+/// A message as a scan meets it.
+struct BagEntry {
+  std::size_t topic = 0;  ///< position in topics()
+  std::int64_t log_ns = 0;
+  MessagePlace place;
+  const std::uint8_t* head = nullptr;  ///< its first bytes, at most kHeadBytes; gone after the visit
+  std::size_t head_size = 0;
+};
+
+/// One bag. read() is thread-safe; scan() is called once, before it.
+class BagFile {
+ public:
+  using Visit = std::function<void(const BagEntry&)>;
+
+  virtual ~BagFile() = default;
+  /// Every message in the order of the file. What is damaged or cut off is left out and told by notes().
+  /// Error (kInput): nothing at all can be read.
+  virtual core::Result<void> scan(const Visit& visit) = 0;
+  /// The whole of one message. Error (kInput): names the file and the place in it.
+  [[nodiscard]] virtual core::Result<Bytes> read(const MessagePlace& place) const = 0;
+  /// All that the scan has met.
+  [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
+  /// What a reader of the map should know, one sentence each.
+  [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
+  /// The camera.yaml that `plumbline convert` puts beside the messages; "" if there is none.
+  [[nodiscard]] virtual std::string camera_yaml() const { return ""; }
+};
+
+using OpenedBag = core::Result<std::unique_ptr<BagFile>>;
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What reads and writes bags, as a part of its own (core/part.hpp): CycloneDDS, which brings OpenSSL along,
+// SQLite and libraries of compression are loaded by who opens one.
+#include "bags/bag_writer.hpp"
+#include "bags/messages.hpp"
+#include "plumbline/core/part.hpp"
+
+namespace plumbline::dataset {
+
+struct BagReaders {
+  static constexpr const char* kPart = "bags";
+  static constexpr std::uint64_t layout() {
+    return core::layout_of<BagReaders, MessageDecoder, BagEntry, BagTopic, ImageMessage, CameraInfoMessage,
+                           TransformMessage>();
+  }
+
+  /// A file of any kind; recognised by content.
+  OpenedBag (*open)(const std::filesystem::path& file);
+  const MessageDecoder& (*cdr)();
+  const MessageDecoder& (*ros1)();
+  std::unique_ptr<BagWriter> (*create_mcap)(const std::filesystem::path& file);
+};
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bags/bag_recording.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include "bags/bag_camera.hpp"
+#include "bags/images.hpp"
+#include "bags/topics.hpp"
+#include "image_decoders.hpp"
+#include "plumbline/core/numbers.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+/// One image topic, its messages by stamp.
+struct ImageList {
+  BagTopic topic;
+  const MessageDecoder* decoder = nullptr;
+  std::vector<ImageEntry> images;
+  std::string prefix;  ///< of names: "office.mcap:/camera/color/image_raw#"
+};
+
+class BagImages final : public ImageStore {
+ public:
+  BagImages(std::vector<std::shared_ptr<const BagFile>> files, ImageList color, ImageList depth)
+      : files_(std::move(files)), color_(std::move(color)), depth_(std::move(depth)) {}
+
+  [[nodiscard]] core::Result<cv::Mat> image(const std::string& name) const override {
+    const auto place = place_of(name);
+    if (!place) return tl::unexpected(place.error());
+    const MessageDecoder& decoder = *place->list->decoder;
+    MessageImage image = tl::unexpected<std::string>("");
+    if (place->list->topic.type == "sensor_msgs/Image") {
+      const auto message = decoder.image(place->bytes);
+      image = message ? image_of(*message) : tl::unexpected(message.error());
+    } else {
+      const auto message = decoder.compressed_image(place->bytes);
+      image = message ? image_of(*message) : tl::unexpected(message.error());
+    }
+    if (image) return std::move(*image);
+    return core::input_error(name + ": " + image.error());
+  }
+
+  [[nodiscard]] core::Result<StoredImage> stored(const std::string& name) const override {
+    const auto place = place_of(name);
+    if (!place) return tl::unexpected(place.error());
+    StoredImage stored;
+    if (place->list->topic.type == "sensor_msgs/CompressedImage") {
+      const auto message = place->list->decoder->compressed_image(place->bytes);
+      const bool file = message && !is_compressed_depth(message->format);
+      if (file && (is_png(message->data) || is_jpeg(message->data))) {
+        stored.ending = is_png(message->data) ? ".png" : ".jpg";
+        stored.bytes = message->data;
+        return stored;
+      }
+    }
+    auto pixels = image(name);
+    if (!pixels) return tl::unexpected(pixels.error());
+    stored.pixels = std::move(*pixels);
+    return stored;
+  }
+
+ private:
+  struct Place {
+    const ImageList* list = nullptr;
+    Bytes bytes;
+  };
+
+  [[nodiscard]] core::Result<Place> place_of(const std::string& name) const {
+    for (const ImageList* list : {&color_, &depth_}) {
+      if (name.compare(0, list->prefix.size(), list->prefix) != 0) continue;
+      std::size_t number = 0;
+      std::from_chars(name.data() + list->prefix.size(), name.data() + name.size(), number);
+      const MessagePlace& place = list->images.at(number).place;
+      auto bytes = files_.at(place.file)->read(place);
+      if (!bytes) return tl::unexpected(bytes.error());
+      return Place{list, std::move(*bytes)};
+    }
+    return core::input_error(name + ": is no image of this bag");
+  }
+
+  std::vector<std::shared_ptr<const BagFile>> files_;
+  ImageList color_;
+  ImageList depth_;
+};
+
+/// A stamp far from when its message was logged, unlike all others, is a damaged one where the message itself
+/// cannot be read; a chunk's checksum tells.
+std::size_t drop_damaged(const BagSurvey& survey, std::vector<ImageEntry>& images) {
+  constexpr double kSuspicious_ns = 60e9;
+  if (images.empty()) return 0;
+  std::vector<double> delays;
+  delays.reserve(images.size());
+  const auto delay = [](const ImageEntry& entry) {
+    return static_cast<double>(entry.log_ns) - static_cast<double>(entry.stamp_ns);
+  };
+  for (const ImageEntry& entry : images) delays.push_back(delay(entry));
+  const double usual = core::median(std::move(delays));
+  const auto damaged = [&](const ImageEntry& entry) {
+    if (std::abs(delay(entry) - usual) < kSuspicious_ns) return false;
+    return !survey.files.at(entry.place.file)->read(entry.place);
+  };
+  const auto end = std::remove_if(images.begin(), images.end(), damaged);
+  const auto dropped = static_cast<std::size_t>(images.end() - end);
+  images.erase(end, images.end());
+  return dropped;
+}
+
+ImageList list_of(const BagSurvey& survey, const SurveyedTopic& topic, core::Log& log) {
+  ImageList list;
+  list.topic = topic.topic;
+  list.decoder = topic.decoder;
+  list.images = topic.images;
+  list.prefix = fmt::format("{}:{}#", survey.path, topic.topic.name);
+  const bool stamped = std::any_of(list.images.begin(), list.images.end(),
+                                   [](const ImageEntry& entry) { return entry.stamp_ns != 0; });
+  if (!stamped) {
+    log.warning(
+        fmt::format("{}: {} has no stamps; the times of recording are taken", survey.path, topic.topic.name));
+    for (ImageEntry& entry : list.images) entry.stamp_ns = entry.log_ns;
+  }
+  if (const std::size_t dropped = drop_damaged(survey, list.images); dropped > 0)
+    log.warning(
+        fmt::format("{}: {} images of {} are damaged and left out", survey.path, dropped, topic.topic.name));
+  std::stable_sort(list.images.begin(), list.images.end(),
+                   [](const ImageEntry& a, const ImageEntry& b) { return a.stamp_ns < b.stamp_ns; });
+  return list;
+}
+
+std::vector<StampedFile> stamped(const ImageList& list) {
+  std::vector<StampedFile> files;
+  files.reserve(list.images.size());
+  for (std::size_t i = 0; i < list.images.size(); ++i) {
+    const double seconds = seconds_of(list.images[i].stamp_ns);
+    files.push_back({seconds, fmt::format("{}{}", list.prefix, i), 0});
+  }
+  return files;
+}
+
+/// The rate of colour, for a camera file made of the bag.
+double usual_fps(const std::vector<PairInfo>& pairs) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    const double step = pairs[i].stamp - pairs[i - 1].stamp;
+    if (step > 0.0) steps.push_back(step);
+  }
+  if (steps.empty()) return 30.0;
+  return std::clamp(std::round(100.0 / core::median(std::move(steps))) / 100.0, 0.01, 1000.0);
+}
+
+core::Result<std::optional<sensor::CameraReading>> camera_of_bag(const BagSurvey& survey,
+                                                                 const ChosenTopics& topics, core::Log& log) {
+  if (survey.camera_yaml.empty()) return bag_camera(survey, topics, log);
+  auto camera = sensor::parse_camera(survey.camera_yaml, survey.path);
+  if (!camera) return tl::unexpected(camera.error());
+  sensor::CameraReading reading;
+  reading.camera = std::move(*camera);
+  return reading;
+}
+
+}  // namespace
+
+core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicNames& names,
+                              const LayoutOptions& options, core::Log& log) {
+  const auto survey = survey_bag(path);
+  if (!survey) return tl::unexpected(survey.error());
+  for (const std::string& note : survey->notes) log.warning(note);
+  const auto topics = choose_topics(*survey, names);
+  if (!topics) return tl::unexpected(topics.error());
+  log.info(fmt::format("{}: colour from {}, depth from {}", survey->path, topics->color.topic->topic.name,
+                       topics->depth.topic->topic.name));
+
+  auto camera = camera_of_bag(*survey, *topics, log);
+  if (!camera) return tl::unexpected(camera.error());
+  Layout layout;
+  layout.format = survey->kind;
+  layout.camera = std::move(*camera);
+
+  ImageList color = list_of(*survey, *topics->color.topic, log);
+  ImageList depth = list_of(*survey, *topics->depth.topic, log);
+  const auto color_files = stamped(color);
+  const auto depth_files = stamped(depth);
+  const double own_delay_s = layout.camera ? layout.camera->camera.depth_delay_s : 0.0;
+  const double delay_s = options.depth_delay_s != 0.0 ? options.depth_delay_s : own_delay_s;
+  layout.pairs = pair_by_stamp(color_files, depth_files, options.max_pair_gap_s, delay_s);
+  if (layout.pairs.empty()) {
+    if (color_files.empty() || depth_files.empty())
+      return core::input_error(survey->path + ": no image of colour or depth can be read");
+    return core::input_error(
+        survey->path + ": " +
+        no_common_time(color.topic.name, color_files, depth.topic.name, depth_files, options.max_pair_gap_s));
+  }
+  if (layout.camera && survey->camera_yaml.empty()) layout.camera->camera.fps = usual_fps(layout.pairs);
+  layout.images = std::make_shared<BagImages>(survey->files, std::move(color), std::move(depth));
+  return layout;
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A bag as a recording: pairs of colour and depth by their stamps, and the camera.
+#include "bags/survey.hpp"
+#include "layout.hpp"
+
+namespace plumbline::dataset {
+
+/// Layout::images gives the images; Layout::camera is there where the bag tells it. Errors (kInput, kUsage):
+/// no bag, topics that cannot be told, no pairs.
+core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicNames& topics,
+                              const LayoutOptions& options, core::Log& log);
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A new bag, written message by message.
+#include <string>
+#include <vector>
+
+#include "bags/messages.hpp"
+
+namespace plumbline::dataset {
+
+/// What is written appears whole, with finish(), or not at all. Errors (kOutput) come out there. Memory does
+/// not grow with the messages.
+class BagWriter {
+ public:
+  virtual ~BagWriter() = default;
+  /// Logged at the message's own stamp.
+  virtual void write(const std::string& topic, const ImageMessage& message) = 0;
+  virtual void write(const std::string& topic, const CompressedImageMessage& message) = 0;
+  virtual void write(const std::string& topic, const CameraInfoMessage& message) = 0;
+  virtual void write(const std::string& topic, const std::vector<TransformMessage>& transforms,
+                     std::int64_t stamp_ns) = 0;
+  /// Kept beside the messages: what they cannot say of the camera.
+  virtual void write_camera_yaml(const std::string& text) = 0;
+  virtual core::Result<void> finish() = 0;
+};
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The messages of ROS that recordings are made of, as plain structs, and what reads and writes their bytes.
+#include <array>
+#include <cstdint>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "bags/bag_file.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::dataset {
+
+struct MessageHeader {
+  std::int64_t stamp_ns = 0;  ///< since 1970, or since whatever the camera's clock began
+  std::string frame_id;
+};
+
+/// sensor_msgs/Image
+struct ImageMessage {
+  MessageHeader header;
+  std::uint32_t height = 0;
+  std::uint32_t width = 0;
+  std::string encoding;
+  bool big_endian = false;
+  std::uint32_t step = 0;  ///< bytes of a row
+  Bytes data;
+};
+
+/// sensor_msgs/CompressedImage
+struct CompressedImageMessage {
+  MessageHeader header;
+  std::string format;
+  Bytes data;
+};
+
+/// sensor_msgs/CameraInfo
+struct CameraInfoMessage {
+  MessageHeader header;
+  std::uint32_t height = 0;
+  std::uint32_t width = 0;
+  std::string distortion_model;
+  std::vector<double> d;
+  std::array<double, 9> k{};   ///< row by row
+  std::array<double, 12> p{};  ///< of the rectified image, row by row
+};
+
+/// geometry_msgs/TransformStamped of a tf2_msgs/TFMessage
+struct TransformMessage {
+  std::string parent;
+  std::string child;
+  geometry::Rigid3 parent_from_child;
+};
+
+/// A message, or what is wrong with its bytes.
+template <typename Message>
+using DecodedMessage = tl::expected<Message, std::string>;
+
+/// Reads messages of one encoding; every length is checked before memory is taken. Thread-safe.
+struct MessageDecoder {
+  /// Of a message that begins with a std_msgs/Header; `size` may end anywhere behind it.
+  DecodedMessage<std::int64_t> (*stamp)(const std::uint8_t* head, std::size_t size);
+  DecodedMessage<ImageMessage> (*image)(const Bytes& bytes);
+  DecodedMessage<CompressedImageMessage> (*compressed_image)(const Bytes& bytes);
+  DecodedMessage<CameraInfoMessage> (*camera_info)(const Bytes& bytes);
+  DecodedMessage<std::vector<TransformMessage>> (*transforms)(const Bytes& bytes);
+  DecodedMessage<geometry::Rigid3> (*transform)(const Bytes& bytes);  ///< geometry_msgs/Transform
+  DecodedMessage<float> (*number)(const Bytes& bytes);                ///< std_msgs/Float32
+};
+
+}  // namespace plumbline::dataset

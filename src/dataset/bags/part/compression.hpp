@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// zstd, LZ4 (frames) and bzip2 in pieces, so that the beginning of something large can be looked at without
+// the rest, and nothing is allocated because a header says so.
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "bags/bag_file.hpp"
+
+namespace plumbline::dataset {
+
+enum class Compression { kNone, kZstd, kLz4, kBzip2 };
+
+/// Bytes of a compressed block, one after another.
+class Inflater {
+ public:
+  virtual ~Inflater() = default;
+  /// The next bytes, at most `size`; fewer only where the data end or are damaged.
+  virtual std::size_t get(std::uint8_t* to, std::size_t size) = 0;
+};
+
+/// Over `size` bytes that must stay; kNone copies.
+std::unique_ptr<Inflater> make_inflater(Compression compression, const std::uint8_t* data, std::size_t size);
+
+/// At most `most` bytes; empty and false where the data are damaged or hold more.
+bool inflate_all(Compression compression, const std::uint8_t* data, std::size_t size, std::uint64_t most,
+                 Bytes& to);
+
+/// Whether the bytes begin as a frame of zstd does, which no CDR does.
+bool is_zstd(const std::uint8_t* data, std::size_t size);
+
+/// A file that lasts as long as this object, and no longer than its process if its name is taken away.
+class TemporaryFile {
+ public:
+  TemporaryFile() = default;
+  ~TemporaryFile();
+  TemporaryFile(TemporaryFile&& other) noexcept;
+  TemporaryFile& operator=(TemporaryFile&& other) noexcept;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Once it has been opened by all who want it.
+  void take_name_away();
+  /// What `file`, compressed by zstd, holds; `cut` says that it ends early. Error (kInput, kOutput).
+  static core::Result<TemporaryFile> inflated(const std::filesystem::path& file, bool& cut);
+
+ private:
+  std::filesystem::path path_;  ///< "": it has no name any more
+  int descriptor_ = -1;
+};
+
+}  // namespace plumbline::dataset

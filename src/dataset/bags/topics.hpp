@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Which topics of a bag are the colour, the depth and their cameras, and why.
+#include <optional>
+#include <string>
+
+#include "bags/survey.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+
+namespace plumbline::dataset {
+
+struct ChosenTopic {
+  const SurveyedTopic* topic = nullptr;  ///< null: there is none
+  std::string why;
+  std::string encoding;  ///< of an image topic: that of its first message
+};
+
+struct ChosenTopics {
+  ChosenTopic color;
+  ChosenTopic depth;
+  ChosenTopic info;        ///< CameraInfo of colour
+  ChosenTopic depth_info;  ///< CameraInfo of depth
+};
+
+/// Names in `named` win over what is found. Error (kUsage): a topic that is not there or of another type;
+/// what is not certain: all that could be meant, and the option. Error (kInput): no colour or no depth at
+/// all.
+core::Result<ChosenTopics> choose_topics(const BagSurvey& survey, const TopicNames& named);
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a recording is copied to.
+#include <memory>
+#include <optional>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+
+namespace plumbline::dataset {
+
+class CopyTarget {
+ public:
+  virtual ~CopyTarget() = default;
+  /// `depth_ns` is the stamp of depth as it was stored, without the camera's delay. Error: kInput is about
+  /// this frame only, others end the copy.
+  virtual core::Result<void> add(std::int64_t color_ns, std::int64_t depth_ns, const StoredPair& pair) = 0;
+  virtual core::Result<void> finish(const std::optional<geometry::Trajectory>& truth) = 0;
+};
+
+/// `folder` must not be there.
+core::Result<std::unique_ptr<CopyTarget>> make_tum_target(const std::filesystem::path& folder,
+                                                          const sensor::Camera& camera);
+core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem::path& file,
+                                                           const sensor::Camera& camera, core::Log& log);
+
+/// The image's pixels, decoded where they are a file's bytes. Error (kInput): damaged.
+core::Result<cv::Mat> pixels_of(const StoredImage& image);
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "bags/bag_parts.hpp"
+#include "convert/copy_target.hpp"
+#include "frame_images.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+constexpr double kMillimetresOfMetre = 1000.0;
+const char* const kColorTopic = "/camera/color";
+const char* const kColorFrame = "camera_color_optical_frame";
+const char* const kDepthFrame = "camera_depth_optical_frame";
+
+std::string encoding_of_pixels(const cv::Mat& image) {
+  switch (image.type()) {
+    case CV_8UC1:
+      return "mono8";
+    case CV_8UC3:
+      return "bgr8";
+    case CV_8UC4:
+      return "bgra8";
+    case CV_16UC3:
+      return "bgr16";
+    case CV_16UC1:
+      return "16UC1";
+    case CV_32FC1:
+      return "32FC1";
+    default:
+      return "";
+  }
+}
+
+ImageMessage message_of(const cv::Mat& image, const MessageHeader& header, const std::string& encoding) {
+  ImageMessage message;
+  message.header = header;
+  message.width = static_cast<std::uint32_t>(image.cols);
+  message.height = static_cast<std::uint32_t>(image.rows);
+  message.encoding = encoding;
+  const std::size_t row = static_cast<std::size_t>(image.cols) * image.elemSize();
+  message.step = static_cast<std::uint32_t>(row);
+  message.data.reserve(row * static_cast<std::size_t>(image.rows));
+  for (int v = 0; v < image.rows; ++v)
+    message.data.insert(message.data.end(), image.ptr(v), image.ptr(v) + row);
+  return message;
+}
+
+CameraInfoMessage info_of(const sensor::Pinhole& camera, const sensor::Lens& lens,
+                          const MessageHeader& header) {
+  CameraInfoMessage info;
+  info.header = header;
+  info.width = static_cast<std::uint32_t>(camera.width);
+  info.height = static_cast<std::uint32_t>(camera.height);
+  const bool fisheye = lens.model == sensor::LensModel::kEquidistant;
+  const bool rational = !fisheye && (lens.k[5] != 0.0 || lens.k[6] != 0.0 || lens.k[7] != 0.0);
+  info.distortion_model = fisheye ? "equidistant" : rational ? "rational_polynomial" : "plumb_bob";
+  info.d.assign(lens.k.begin(), lens.k.begin() + (fisheye ? 4 : rational ? 8 : 5));
+  info.k = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
+  info.p = {camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
+  return info;
+}
+
+class McapTarget final : public CopyTarget {
+ public:
+  McapTarget(std::unique_ptr<BagWriter> bag, sensor::Camera camera, core::Log& log)
+      : bag_(std::move(bag)), camera_(std::move(camera)), log_(log) {
+    own_depth_camera_ = camera_.color_from_depth && camera_.depth;
+    depth_topic_ = own_depth_camera_ ? "/camera/depth" : "/camera/aligned_depth_to_color";
+  }
+
+  core::Result<void> add(std::int64_t color_ns, std::int64_t depth_ns, const StoredPair& pair) override {
+    auto depth = pixels_of(pair.depth);
+    if (!depth) return tl::unexpected(depth.error());
+    if (!begun_) begin(color_ns);
+    const MessageHeader header{color_ns, kColorFrame};
+    const auto size = write_color(header, pair.color);
+    if (!size) return tl::unexpected(size.error());
+    const sensor::Pinhole stored = camera_.color.resized(size->width, size->height);
+    bag_->write(std::string(kColorTopic) + "/camera_info", info_of(stored, camera_.lens(), header));
+
+    const MessageHeader depth_header{depth_ns, own_depth_camera_ ? kDepthFrame : kColorFrame};
+    bag_->write(depth_topic_ + (own_depth_camera_ ? "/image_rect_raw" : "/image_raw"),
+                depth_message(*depth, depth_header));
+    bag_->write(depth_topic_ + "/camera_info", own_depth_camera_
+                                                   ? info_of(*camera_.depth, camera_.depth_lens, depth_header)
+                                                   : info_of(stored, camera_.lens(), depth_header));
+    return {};
+  }
+
+  core::Result<void> finish(const std::optional<geometry::Trajectory>& /*truth*/) override {
+    bag_->write_camera_yaml(sensor::to_yaml(camera_));
+    return bag_->finish();
+  }
+
+ private:
+  void begin(std::int64_t stamp_ns) {
+    begun_ = true;
+    if (!own_depth_camera_) return;
+    bag_->write("/tf_static", {{kColorFrame, kDepthFrame, *camera_.color_from_depth}}, stamp_ns);
+  }
+
+  /// JPEG as it is, all else as pixels; the image's size.
+  core::Result<cv::Size> write_color(const MessageHeader& header, const StoredImage& image) {
+    auto pixels = pixels_of(image);
+    if (!pixels) return tl::unexpected(pixels.error());
+    const std::string topic = std::string(kColorTopic) + "/image_raw";
+    const std::string encoding = encoding_of_pixels(*pixels);
+    if (image.ending == ".jpg" || image.ending == ".jpeg") {
+      bag_->write(topic + "/compressed",
+                  CompressedImageMessage{header, "bgr8; jpeg compressed bgr8", image.bytes});
+    } else if (encoding.empty() || pixels->depth() == CV_32F || encoding == "16UC1") {
+      return core::input_error("a colour image of a kind that ROS has no name for");
+    } else {
+      bag_->write(topic, message_of(*pixels, header, encoding));
+    }
+    return pixels->size();
+  }
+
+  /// Millimetres as they are; other units as metres, which come back as they were.
+  ImageMessage depth_message(const cv::Mat& stored, const MessageHeader& header) {
+    cv::Mat depth = stored;
+    if (depth.type() == CV_16UC3) cv::extractChannel(depth, depth, 0);
+    if (depth.type() == CV_64FC1) depth.convertTo(depth, CV_32F);
+    if (depth.type() == CV_16UC1 && camera_.depth_scale == kFloatDepthScale) {
+      cv::Mat metres(depth.size(), CV_32FC1);
+      for (int v = 0; v < depth.rows; ++v) {
+        const auto* from = depth.ptr<std::uint16_t>(v);
+        auto* to = metres.ptr<float>(v);
+        for (int u = 0; u < depth.cols; ++u)
+          to[u] =
+              from[u] == 65535 ? 0.0F : static_cast<float>(from[u]) / static_cast<float>(kFloatDepthScale);
+      }
+      depth = metres;
+    }
+    const bool odd = depth.type() == CV_16UC1 && camera_.depth_scale != kMillimetresOfMetre;
+    if (odd && !told_scale_) {
+      log_.warning(
+          fmt::format("depth is written in its own units, {} a metre; other programs take 16UC1 for "
+                      "millimetres",
+                      camera_.depth_scale));
+      told_scale_ = true;
+    }
+    return message_of(depth, header, encoding_of_pixels(depth));
+  }
+
+  std::unique_ptr<BagWriter> bag_;
+  sensor::Camera camera_;
+  core::Log& log_;
+  std::string depth_topic_;
+  bool own_depth_camera_ = false;
+  bool begun_ = false;
+  bool told_scale_ = false;
+};
+
+}  // namespace
+
+core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem::path& file,
+                                                           const sensor::Camera& camera, core::Log& log) {
+  const auto& part = core::part<BagReaders>();
+  if (!part) return tl::unexpected(part.error());
+  return std::make_unique<McapTarget>((*part)->create_mcap(file), camera, log);
+}
+
+}  // namespace plumbline::dataset
