@@ -102,6 +102,16 @@ TEST_F(Start, WhoNeedsMoreLoadsThatMuchMore) {
   expect_none(formats, kPictures);
 }
 
+TEST_F(Start, OnlyWhoOpensABagLoadsWhatReadsIt) {
+  const std::vector<std::string> bags{"plumbline_bags.so", "libddsc", "liblz4", "libbz2"};
+  write_wall(path("wall"));
+  expect_none(loaded_by("info wall"), {bags[0], bags[1]});
+  const Loaded convert = loaded_by("convert wall wall.mcap -q");
+  ASSERT_EQ(convert.outcome.code, 0) << convert.outcome;
+  expect_all(convert, bags);
+  expect_none(convert, kPictures);
+}
+
 TEST_F(Start, OnlyHubAndRobotsLoadTheNetwork) {
   const std::vector<std::string> network{"plumbline_dds.so", "libddsc", "libssl"};
   expect_none(loaded_by("--version"), network);
