@@ -118,6 +118,15 @@ core::Result<StoredViews> StoredResult::views() const {
   return views_of(*reader_, poses_of(map_.map, map_.frames), map_.header.robots);
 }
 
+core::Result<FusionState> StoredResult::fusion_state() const {
+  const auto kept = reader_->attachment(kFusionAttachment);
+  if (!kept) return tl::unexpected(kept.error());
+  if (!*kept) return FusionState{};
+  auto state = fusion_state_of(**kept);
+  if (!state) return core::input_error(fmt::format("{}: {}", file_.string(), state.error().message));
+  return state;
+}
+
 core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOptions& options,
                                                     const core::Executor& executor) const {
   const auto stored = views();
@@ -125,17 +134,8 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   if (stored->size() == 0) {
     return core::input_error(fmt::format("{}: holds no clouds; map the recording again", file_.string()));
   }
-
-  FusionState state;
-  const auto kept = reader_->attachment(kFusionAttachment);
-  if (!kept) return tl::unexpected(kept.error());
-
-  if (*kept) {
-    auto read = fusion_state_of(**kept);
-    if (!read) return core::input_error(fmt::format("{}: {}", file_.string(), read.error().message));
-    state = std::move(*read);
-  }
-
+  const auto state = fusion_state();
+  if (!state) return tl::unexpected(state.error());
   cloud::FusionViews all;
   all.world_from_camera = stored->world_from_camera;
   for (const std::int32_t robot : stored->robots) {
@@ -143,7 +143,7 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   }
 
   all.read = [&](std::size_t i) { return stored->read(i); };
-  all.covariances = state.covariances_of(stored->robots, stored->stamps);
+  all.covariances = state->covariances_of(stored->robots, stored->stamps);
   auto fused = cloud::fuse_views(all, options, executor);
   if (!fused) return fused;
   if (map_.result.upright) cloud::transform(*fused->cloud, map_.result.output_from_map);

@@ -5,7 +5,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <utility>
+#include <vector>
 
 namespace plumbline::cli {
 namespace {
@@ -29,11 +31,24 @@ std::string value_name(const core::OptionSpec& spec) {
     case core::OptionType::kChoice:
       return fmt::format("{}", fmt::join(spec.choices, "|"));
     case core::OptionType::kNumbers:
-      return "[N, ...]";
+      return spec.length == 0 ? "N,N,..."
+                              : fmt::format("{}", fmt::join(std::vector<std::string>(spec.length, "N"), ","));
     case core::OptionType::kTextOrList:
       return "FILE|[...]";
   }
   return "VALUE";
+}
+
+/// "1,2 3,4" and "[1, 2, 3, 4]" alike, in brackets.
+std::string as_list(const std::string& text) {
+  if (text.empty() || text.front() == '[') return text;
+  std::string list = "[";
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool between = text[i] == ' ' && i > 0 && i + 1 < text.size() && std::isdigit(text[i - 1]) != 0 &&
+                         (std::isdigit(text[i + 1]) != 0 || text[i + 1] == '-' || text[i + 1] == '.');
+    list += between ? ',' : text[i];
+  }
+  return list + "]";
 }
 
 }  // namespace
@@ -57,7 +72,7 @@ core::Result<void> OptionFlags::apply() {
     value.kind = core::ConfigNode::Kind::kScalar;
     value.scalar = flag.as<std::string>();
     if (spec.type == core::OptionType::kNumbers) {
-      if (auto list = core::parse_yaml(value.scalar, "")) value = std::move(*list);
+      if (auto list = core::parse_yaml(as_list(value.scalar), "")) value = std::move(*list);
     }
     core::ConfigProblems found;
     table_.set(spec.key, value, "", found);
@@ -65,6 +80,14 @@ core::Result<void> OptionFlags::apply() {
   }
   if (!problems.empty()) return tl::unexpected<core::Error>(core::to_error(problems));
   return {};
+}
+
+std::set<std::string> OptionFlags::given() const {
+  std::set<std::string> keys;
+  for (const core::OptionSpec& spec : table_.specs()) {
+    if (command_->get_option(flag_name(spec.key))->count() > 0) keys.insert(spec.key);
+  }
+  return keys;
 }
 
 }  // namespace plumbline::cli

@@ -3,6 +3,8 @@
 
 // Declared options as flags of a command: `max_depth` becomes --max-depth VALUE.
 #include <CLI/CLI.hpp>
+#include <set>
+#include <string>
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/options.hpp"
@@ -21,6 +23,8 @@ class OptionFlags {
 
   /// Sets what was given on the command line; all problems at once, each naming its flag.
   core::Result<void> apply();
+  /// Keys of the options that were given on the command line.
+  [[nodiscard]] std::set<std::string> given() const;
 
  private:
   void add_flags();

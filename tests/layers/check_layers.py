@@ -19,7 +19,7 @@ LAYERS = [
     ["maps"],
     ["tracking", "places", "evaluate", "synth"],
     ["mapping"],
-    ["viz"],
+    ["viz", "exports"],
     ["pipeline", "report"],
     ["net"],
     ["cli"],

@@ -35,11 +35,12 @@ struct CloudColumns {
 /// Binary PLY: float x y z nx ny nz, uchar red green blue [, float confidence, int observations, uchar
 /// robot, float others...]; opens with colours and normals in PCL, Open3D, MeshLab and CloudCompare. Points
 /// with a NaN coordinate are left out, unknown normals written as 0 0 0. Same cloud, same bytes. A `shift`
-/// (CloudFile::shift) is added to the positions, which are doubles then. Errors (kOutput) name the file; it
-/// appears whole or not at all.
+/// (CloudFile::shift) is added to the positions, which are doubles then. `comments`: lines for the header.
+/// Errors (kOutput) name the file; it appears whole or not at all.
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
                              const CloudColumns& columns = {},
-                             const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
+                             const Eigen::Vector3d& shift = Eigen::Vector3d::Zero(),
+                             const std::vector<std::string>& comments = {});
 
 /// Binary PCD v0.7: x y z rgb normal_x normal_y normal_z curvature [, confidence, observations, robot,
 /// others]. An

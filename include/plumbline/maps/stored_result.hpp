@@ -17,6 +17,7 @@
 
 namespace plumbline::maps {
 
+struct FusionState;
 struct StoredViews;
 
 /// A map as the user named it.
@@ -58,11 +59,15 @@ class StoredResult {
   /// The cloud of each keyframe as FOLDER/<number, six digits>.ply; makes the folder. Returns how many.
   /// Errors (kOutput), (kInput): damaged.
   [[nodiscard]] core::Result<std::size_t> write_keyframe_clouds(const std::filesystem::path& folder) const;
+  /// All that have a cloud, their poses in the map's own frame; as long as this lives. Errors (kInput):
+  /// damaged.
+  [[nodiscard]] core::Result<StoredViews> views() const;
+  /// Empty where the run kept none. Errors (kInput): damaged.
+  [[nodiscard]] core::Result<FusionState> fusion_state() const;
 
  private:
   StoredResult(std::filesystem::path file, StoreReader reader, StoredMap map);
   [[nodiscard]] MapPoses poses() const;
-  [[nodiscard]] core::Result<StoredViews> views() const;
 
   std::filesystem::path file_;
   std::unique_ptr<StoreReader> reader_;

@@ -47,13 +47,13 @@ void put_columns(const CloudColumns& columns, std::size_t i, core::OutputFile& o
 }  // namespace
 
 core::Result<void> write_ply(const std::filesystem::path& file, const Cloud& cloud,
-                             const CloudColumns& columns, const Eigen::Vector3d& shift) {
+                             const CloudColumns& columns, const Eigen::Vector3d& shift,
+                             const std::vector<std::string>& comments) {
   check_columns(cloud, columns);
   core::OutputFile out(file);
-  out.write(
-      fmt::format("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\nelement vertex {}\n",
-                  count_finite(cloud)));
-
+  out.write("ply\nformat binary_little_endian 1.0\ncomment plumbline, metres\n");
+  for (const std::string& comment : comments) out.write("comment " + comment + "\n");
+  out.write(fmt::format("element vertex {}\n", count_finite(cloud)));
   const char* type = shift.isZero(0.0) ? "float" : "double";
   out.write(fmt::format("property {0} x\nproperty {0} y\nproperty {0} z\n", type));
   out.write(

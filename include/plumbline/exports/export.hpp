@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A map in the forms that other programs read.
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/exports/options.hpp"
+
+namespace plumbline::exports {
+
+/// What of a map is written.
+enum class Content { kCloud, kMesh, kTrajectory, kKeyframes, kLines };
+
+/// How a recording was read when it was mapped.
+struct RecordingName {
+  std::string input;   ///< as given to `map`
+  std::string camera;  ///< shipped name or file; empty: the recording's own
+  std::string format;  ///< "auto", or a layout
+};
+using OpenRecording =
+    std::function<core::Result<std::unique_ptr<dataset::FrameSource>>(const RecordingName&)>;
+
+struct ExportRequest {
+  std::filesystem::path input;          ///< result folder, map.db, OUT of an interrupted run, or a cloud
+  std::filesystem::path output;         ///< a file, or a folder for the forms that are one
+  std::string format;                   ///< name of a Format; empty: by the ending of `output`
+  Content content = Content::kCloud;    ///< tells forms of one ending apart
+  std::string robot;                    ///< whose map, of an interrupted run of several; empty: the only one
+  std::vector<std::string> recordings;  ///< where pictures come from, in the order of the robots; empty:
+                                        ///< where the map says that it was made from
+  OpenRecording open;  ///< null: there are no pictures
+  /// Runs work during which libraries print what nobody wants to read (Poisson's); null: just runs it.
+  std::function<void(const std::function<void()>&)> quietly = nullptr;
+  ExportOptions options;
+  bool replace = false;         ///< an earlier export's folder may be replaced
+  std::set<std::string> given;  ///< keys of options that were set: each must be one of the format's
+};
+
+struct ExportSummary {
+  std::string format;                          ///< its name
+  std::vector<std::filesystem::path> written;  ///< files, or one folder
+  std::vector<std::string> notes;              ///< whole sentences: what is missing, what was found
+};
+
+/// Tells how far the work is.
+using ExportProgress = std::function<void(std::size_t done, std::size_t total)>;
+
+/// Everything appears whole or not at all. Errors: kUsage (no such format, an option that it has not, a part
+/// of the map that is not there), kInput (the map), kOutput (cannot be written; nothing is left behind).
+core::Result<ExportSummary> write_export(const ExportRequest& request, const core::Executor& executor,
+                                         core::Log& log, const ExportProgress& progress);
+
+/// Checks format, ending and options without reading the map. Errors (kUsage).
+core::Result<void> check_export(const ExportRequest& request);
+
+/// One row of the table of formats.
+struct FormatInfo {
+  std::string name;                  ///< what --format takes
+  std::string endings;               ///< ".yaml .pgm", or "folder"
+  std::string content;               ///< "cloud", "mesh", ...: what tells forms of one ending apart
+  std::string needs;                 ///< "cloud", "map.db", "map.db, recording"
+  std::string title;                 ///< one line
+  std::string description;           ///< Markdown: what is right about it and what to do with it
+  std::vector<std::string> options;  ///< keys of ExportOptions
+};
+std::vector<FormatInfo> export_formats();
+/// docs/guide/exports.md.
+std::string exports_page();
+
+}  // namespace plumbline::exports

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "clouds/mesh.hpp"
+
+#include <fmt/format.h>
+
+#include "formats.hpp"
+#include "plumbline/cloud/mesh.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+core::Result<ExportSummary> write_mesh_file(MapSource& source, const std::filesystem::path& output) {
+  auto mesh = mesh_of(source);
+  if (!mesh) return tl::unexpected(mesh.error());
+  mesh->comments = {"plumbline, metres", source.frame_text()};
+  if (auto written = cloud::write_mesh(output, *mesh); !written) return tl::unexpected(written.error());
+  ExportSummary summary;
+  summary.written = {output};
+  summary.notes.push_back(fmt::format("{} triangles", mesh->triangles.size()));
+  return summary;
+}
+
+}  // namespace
+
+core::Result<cloud::PlyData> mesh_of(MapSource& source) {
+  const auto cloud = source.cloud();
+  if (!cloud) return tl::unexpected(cloud.error());
+  if (!(*cloud)->has_normals) {
+    return core::input_error(fmt::format(
+        "{}: a mesh needs normals, which this cloud has not; run a filter chain with normals over it first",
+        source.request().input.string()));
+  }
+  constexpr double kDefault_m = 0.02;
+  const ExportOptions& options = source.options();
+  cloud::MeshOptions mesh_options;
+  mesh_options.resolution_m = options.resolution_m > 0.0 ? options.resolution_m : kDefault_m;
+  mesh_options.reach_m = options.reach_m;
+  core::Result<cloud::PlyData> mesh;
+  const auto work = [&] { mesh = cloud::make_mesh(*(*cloud)->cloud, mesh_options); };
+  if (source.request().quietly) {
+    source.request().quietly(work);
+  } else {
+    work();
+  }
+  if (mesh) mesh->shift = {(*cloud)->shift.x(), (*cloud)->shift.y(), (*cloud)->shift.z()};
+  return mesh;
+}
+
+Format mesh_format() {
+  return {"mesh",
+          {".ply", ".obj"},
+          {Content::kMesh},
+          "",
+          "Mesh with vertex colours",
+          "Poisson's reconstruction, cut off where nothing was seen. `.obj` has the colours behind the "
+          "coordinates, "
+          "as MeshLab and Blender read them.",
+          {"voxel", "resolution", "reach"},
+          &write_mesh_file};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// PCD 0.7: PCL's own.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include "clouds/columns_text.hpp"
+#include "formats.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// PCD's text holds a colour as one number.
+core::Result<void> write_ascii_pcd(const std::filesystem::path& output, const cloud::CloudFile& file,
+                                   const std::string& frame) {
+  core::OutputFile out(output);
+  const std::size_t points = file.cloud->size();
+  out.write(
+      fmt::format("# .PCD v0.7 - Point Cloud Data file format\n# {}\nVERSION 0.7\n"
+                  "FIELDS x y z rgb normal_x normal_y normal_z\nSIZE {}\nTYPE F F F U F F F\n"
+                  "COUNT 1 1 1 1 1 1 1\nWIDTH {}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\n"
+                  "DATA ascii\n",
+                  frame, file.shift.isZero(0.0) ? "4 4 4 4 4 4 4" : "8 8 8 4 4 4 4", points, points));
+  for (const cloud::Point& p : *file.cloud) {
+    const unsigned color = (unsigned{p.r} << 16U) | (unsigned{p.g} << 8U) | unsigned{p.b};
+    const Eigen::Vector3d at = p.getVector3fMap().cast<double>() + file.shift;
+    out.write(fmt::format("{:.5f} {:.5f} {:.5f} {} {:.4f} {:.4f} {:.4f}\n", at.x(), at.y(), at.z(), color,
+                          p.normal_x, p.normal_y, p.normal_z));
+  }
+  return out.commit();
+}
+
+core::Result<ExportSummary> write_pcd_cloud(MapSource& source, const std::filesystem::path& output) {
+  const auto cloud = source.cloud();
+  if (!cloud) return tl::unexpected(cloud.error());
+  const cloud::CloudFile& file = **cloud;
+  auto written = source.options().ascii ? write_ascii_pcd(output, file, source.frame_text())
+                                        : cloud::write_pcd(output, *file.cloud, file.columns, file.shift);
+  if (!written) return tl::unexpected(written.error());
+  ExportSummary summary;
+  summary.written = {output};
+  return summary;
+}
+
+}  // namespace
+
+Format pcd_format() {
+  return {
+      "pcd",
+      {".pcd"},
+      {Content::kCloud},
+      "",
+      "Cloud as PCD",
+      "For PCL; binary, with the same columns as PLY. `--ascii` writes text: positions, colours, normals.",
+      {"voxel", "ascii"},
+      &write_pcd_cloud};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// CSV and XYZ: for tables, scripts and programs that know nothing else.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "clouds/columns_text.hpp"
+#include "formats.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+core::Result<ExportSummary> write_text_cloud(MapSource& source, const std::filesystem::path& output,
+                                             bool csv) {
+  const auto cloud = source.cloud();
+  if (!cloud) return tl::unexpected(cloud.error());
+  core::OutputFile out(output);
+  if (csv) out.write(fmt::format("{}\n", fmt::join(text_columns(**cloud), ",")));
+  put_text_rows(out, **cloud, csv ? ',' : ' ');
+  if (auto written = out.commit(); !written) return tl::unexpected(written.error());
+  ExportSummary summary;
+  summary.written = {output};
+  return summary;
+}
+
+core::Result<ExportSummary> write_csv_cloud(MapSource& source, const std::filesystem::path& output) {
+  return write_text_cloud(source, output, true);
+}
+
+core::Result<ExportSummary> write_xyz_cloud(MapSource& source, const std::filesystem::path& output) {
+  return write_text_cloud(source, output, false);
+}
+
+}  // namespace
+
+Format csv_format() {
+  return {
+      "csv",
+      {".csv"},
+      {Content::kCloud},
+      "",
+      "Cloud as a table",
+      "A header line names the columns: x, y, z, red, green, blue, the normal, and what else the map knows.",
+      {"voxel"},
+      &write_csv_cloud};
+}
+
+Format xyz_format() {
+  return {"xyz",
+          {".xyz", ".asc"},
+          {Content::kCloud},
+          "",
+          "Cloud as rows of numbers",
+          "The columns of `csv` apart by blanks, without a header: CloudCompare asks what they are.",
+          {"voxel"},
+          &write_xyz_cloud};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// docs/guide/exports.md, made from the table of formats.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "formats.hpp"
+#include "plumbline/core/option_schema.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+constexpr const char* kExportsIntroduction = R"(# Exports
+
+<!-- Made by `plumbline export --describe`; change the table in src/exports. -->
+
+`plumbline export MAP -o FILE` writes a map in the form that the next program reads. `MAP` is a result folder, the
+`map.db` of a run, also of one that was interrupted, a fused map of several robots, or, where a cloud is enough, any
+PLY or PCD file. The form follows the ending of the output, or `--format`.
+
+<!-- file: exports.sh -->
+```
+plumbline export out/room -o grid.yaml                       # for Nav2, with grid.pgm
+plumbline export out/room -o colmap                          # a COLMAP model with pictures
+plumbline export out/room -o room.las --voxel "2 cm"         # for surveyors' programs
+plumbline export out/room -o room.glb --mesh                 # for a browser
+plumbline export out/room -o path.csv --what trajectory      # the path, as EuRoC has it
+plumbline export out/room -o ground.ply --z 0,2m             # what lies up to 2 m over the floor
+```
+
+)";
+
+constexpr const char* kExportsFrame = R"(
+## One frame
+
+All exports of one map are in one frame, that of its results: metres, right-handed, z up, 0 on the floor, x along the
+walls ([dense_cloud.md](dense_cloud.md)). Grid, cloud, LAS, octree, COLMAP model and path lie on one another; GLB is
+turned to glTF's axes, as `--datum` and `--epsg` move what they move. Each file that can hold text tells its frame. Of an
+interrupted run, whose floor was not found yet, it is looked for during the export.
+
+`--datum LAT,LON,HEADING` says where the map's origin is on WGS 84 and which way its x axis looks (degrees clockwise from
+true north); the map is moved into the UTM zone there, turned by the zone's convergence and scaled as the zone is at that
+place. `--epsg N --origin E,N,H` moves it into any projected system in metres; a fourth number turns the map clockwise,
+in degrees. What was applied stands in the file's own header and, with the whole matrix, in `FILE.georeference.json`.
+
+Files are written under another name first and renamed when they are whole: a full disk leaves nothing that looks
+finished. A folder is only ever replaced (`--force`) when an earlier export made it.
+
+)";
+
+/// `--voxel, --ascii`
+std::string flags_text(const std::vector<std::string>& keys) {
+  std::vector<std::string> flags;
+  for (std::string key : keys) {
+    std::replace(key.begin(), key.end(), '_', '-');
+    flags.push_back("`--" + key + "`");
+  }
+  return fmt::format("{}", fmt::join(flags, ", "));
+}
+
+std::string endings_text(const FormatInfo& format) {
+  return format.endings == "folder" ? format.endings : "`" + format.endings + "`";
+}
+
+std::string options_text() {
+  ExportOptions options;
+  core::OptionTable table;
+  options.declare(table);
+  return core::options_as_markdown(table.specs());
+}
+
+}  // namespace
+
+std::string exports_page() {
+  std::string page = kExportsIntroduction;
+  page += "| format | output | what it is | needs besides |\n|---|---|---|---|\n";
+  const std::vector<FormatInfo> infos = export_formats();
+  for (const FormatInfo& format : infos) {
+    page += fmt::format("| [{0}](#{0}) | {1} | {2} | {3} |\n", format.name, endings_text(format),
+                        format.title, format.needs);
+  }
+  page +=
+      "\nForms of one ending are told apart by `--what trajectory|keyframes|lines` and `--mesh`. E57 is not "
+      "among "
+      "them: no library in Debian writes it; CloudCompare makes E57 of PLY and LAS.\n";
+  page += kExportsFrame;
+  page += fmt::format(
+      "## Options\n\n{} are taken by every format, the others by those that name them below. In "
+      "`exports:` of the stage `output` they are written as here, on the command line as `--dense-points "
+      "1000`.\n\n{}",
+      flags_text(common_options()), options_text());
+  for (const FormatInfo& format : infos) {
+    page += fmt::format("\n## {}\n\n{}: {}.{}\n\n{}\n", format.name, format.title, endings_text(format),
+                        format.options.empty() ? "" : " Takes " + flags_text(format.options) + ".",
+                        format.description);
+  }
+  return page;
+}
+
+}  // namespace plumbline::exports

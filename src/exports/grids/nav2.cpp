@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A grid for ROS' map_server (Nav2): NAME.yaml and NAME.pgm.
+#include <fmt/format.h>
+
+#include "formats.hpp"
+#include "grids/grid.hpp"
+#include "plumbline/core/output_file.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// Grey values that map_server reads back by the thresholds below.
+constexpr std::uint8_t kNav2Free = 254;
+constexpr std::uint8_t kNav2Occupied = 0;
+constexpr std::uint8_t kNav2Unknown = 205;  // (255 - 205) / 255 = 0.19608: just above free_thresh
+
+core::Result<void> write_pgm(const std::filesystem::path& file, const Grid& grid, const std::string& frame) {
+  core::OutputFile out(file);
+  out.write(
+      fmt::format("P5\n# {:g} m/pixel; {}\n{} {}\n255\n", grid.resolution_m, frame, grid.columns, grid.rows));
+  for (int row = grid.rows - 1; row >= 0; --row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      const GridCell cell = grid.at(column, row);
+      out.put(cell == GridCell::kFree       ? kNav2Free
+              : cell == GridCell::kOccupied ? kNav2Occupied
+                                            : kNav2Unknown);
+    }
+  }
+  return out.commit();
+}
+
+core::Result<ExportSummary> write_nav2(MapSource& source, const std::filesystem::path& output) {
+  const auto grid = make_grid(source);
+  if (!grid) return tl::unexpected(grid.error());
+  std::filesystem::path image = output;
+  std::filesystem::path yaml = output;
+  image.replace_extension(".pgm");
+  yaml.replace_extension(".yaml");
+  if (auto written = write_pgm(image, *grid, source.frame_text()); !written)
+    return tl::unexpected(written.error());
+  const auto written = core::write_file(
+      yaml, fmt::format("# {}\n# occupied: between {:g} and {:g} m over the floor\nimage: {}\nmode: trinary\n"
+                        "resolution: {:g}\norigin: [{:.6f}, {:.6f}, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
+                        "free_thresh: 0.196\n",
+                        source.frame_text(), source.options().heights[0], source.options().heights[1],
+                        image.filename().string(), grid->resolution_m, grid->origin.x(), grid->origin.y()));
+  if (!written) return tl::unexpected(written.error());
+  ExportSummary summary;
+  summary.written = {yaml, image};
+  return summary;
+}
+
+}  // namespace
+
+Format grid_format() {
+  return {"grid",
+          {".yaml", ".pgm"},
+          {Content::kCloud},
+          "map.db",
+          "Occupancy grid for Nav2",
+          "`NAME.yaml` and `NAME.pgm` for ROS' map_server, trinary. Occupied are cells with points between "
+          "`--heights` over the floor, so that neither floor nor ceiling is in it; free are the others that "
+          "cameras "
+          "saw through at these heights; the rest is unknown. Both `free_thresh: 0.196` and the grey value "
+          "205 are "
+          "chosen so that unknown stays unknown: with map_server's usual 0.25 it would load as free. The "
+          "origin is "
+          "the lower left corner in the map's frame, without a turn.",
+          {"resolution", "heights", "voxel"},
+          &write_nav2};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "grids/rays.hpp"
+#include "plumbline/core/part.hpp"
+
+namespace plumbline::exports {
+
+/// What an OctoMap is made of.
+struct OctreeWork {
+  double resolution_m = 0.05;
+  bool color = false;  ///< ColorOcTree with probabilities (.ot), else the binary OcTree (.bt)
+  const cloud::CloudFile* cloud = nullptr;
+  Eigen::AlignedBox3d box;
+  /// Hands the rays of all views, one after another, to its argument.
+  std::function<core::Result<void>(const std::function<core::Result<void>(const ViewRays&)>&)> views;
+};
+
+/// Functions of the part "octomap".
+struct OctreeFunctions {
+  static constexpr const char* kPart = "octomap";
+  static constexpr std::uint64_t layout() { return core::layout_of<OctreeFunctions, OctreeWork, ViewRays>(); }
+  /// The file's bytes.
+  core::Result<std::string> (*make)(const OctreeWork& work);
+};
+
+}  // namespace plumbline::exports

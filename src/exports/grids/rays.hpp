@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What the map's cameras saw through: the rays from a view to what it measured.
+#include <functional>
+#include <vector>
+
+#include "source/map_source.hpp"
+
+namespace plumbline::exports {
+
+/// The rays of one view, in the frame of the results.
+struct ViewRays {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3f> ends;  ///< what was measured
+};
+
+/// Calls `take` with the rays of each view of the map, in order; of each view about one ray in 6 x 6 pixels.
+/// Progress is told. Errors (kInput): no map.db, or damaged; those of `take`.
+core::Result<void> for_each_view(const MapSource& source,
+                                 const std::function<core::Result<void>(const ViewRays&)>& take);
+
+}  // namespace plumbline::exports

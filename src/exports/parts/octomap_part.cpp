@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Octrees, by liboctomap.
+#include <octomap/ColorOcTree.h>
+#include <octomap/OcTree.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <sstream>
+
+#include "grids/octree.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+octomap::point3d point3d_of(const Eigen::Vector3d& p) {
+  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+}
+
+/// What one view saw through becomes free; each cell once, however many rays crossed it.
+template <typename Tree>
+void add_free(const ViewRays& view, const Eigen::AlignedBox3d& box, Tree& tree) {
+  const double margin_m = tree.getResolution();
+  octomap::KeySet ends;
+  octomap::KeySet free;
+  octomap::KeyRay ray;
+  octomap::OcTreeKey key;
+  for (const Eigen::Vector3f& end : view.ends) {
+    const Eigen::Vector3d way = end.cast<double>() - view.origin;
+    const double length_m = way.norm();
+    if (length_m <= margin_m) continue;
+    const octomap::point3d last = point3d_of(view.origin + (1.0 - margin_m / length_m) * way);
+    if (!tree.coordToKeyChecked(last, key) || !ends.insert(key).second) continue;
+    if (!tree.computeRayKeys(point3d_of(view.origin), last, ray)) continue;
+    free.insert(ray.begin(), ray.end());
+    free.insert(key);
+  }
+  for (const octomap::OcTreeKey& cell : free) {
+    const octomap::point3d at = tree.keyToCoord(cell);
+    if (box.contains(Eigen::Vector3d(at.x(), at.y(), at.z()))) tree.updateNode(cell, false, true);
+  }
+}
+
+/// The cloud's cells are occupied, whatever rays that grazed them say.
+template <typename Tree, typename Color>
+void add_occupied(const cloud::CloudFile& file, Tree& tree, const Color& color) {
+  for (const cloud::Point& p : *file.cloud) {
+    octomap::OcTreeKey key;
+    const Eigen::Vector3d at = p.getVector3fMap().cast<double>() + file.shift;
+    if (!tree.coordToKeyChecked(point3d_of(at), key)) continue;
+    tree.setNodeValue(key, tree.getClampingThresMaxLog(), true);
+    color(tree, key, p);
+  }
+}
+
+template <typename Tree, typename Color>
+core::Result<void> fill(const OctreeWork& work, Tree& tree, const Color& color) {
+  auto seen = work.views([&](const ViewRays& view) -> core::Result<void> {
+    add_free(view, work.box, tree);
+    return {};
+  });
+  if (!seen) return seen;
+  add_occupied(*work.cloud, tree, color);
+  tree.updateInnerOccupancy();
+  tree.prune();
+  return {};
+}
+
+core::Result<std::string> make_octree(const OctreeWork& work) {
+  std::ostringstream bytes;
+  if (work.color) {
+    octomap::ColorOcTree tree(work.resolution_m);
+    const auto paint = [](octomap::ColorOcTree& to, const octomap::OcTreeKey& key, const cloud::Point& p) {
+      to.averageNodeColor(key, p.r, p.g, p.b);
+    };
+    if (auto filled = fill(work, tree, paint); !filled) return tl::unexpected(filled.error());
+    tree.write(bytes);
+  } else {
+    octomap::OcTree tree(work.resolution_m);
+    const auto nothing = [](octomap::OcTree&, const octomap::OcTreeKey&, const cloud::Point&) {};
+    if (auto filled = fill(work, tree, nothing); !filled) return tl::unexpected(filled.error());
+    tree.writeBinary(bytes);
+  }
+  return bytes.str();
+}
+
+}  // namespace
+}  // namespace plumbline::exports
+
+namespace px = plumbline::exports;
+PLUMBLINE_PART(px::OctreeFunctions, &px::make_octree)

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Coordinate systems, by PROJ.
+#include <fmt/format.h>
+#include <proj.h>
+
+#include <cmath>
+#include <memory>
+
+#include "source/georeference.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+struct FreeContext {
+  void operator()(PJ_CONTEXT* context) const { proj_context_destroy(context); }
+};
+struct FreePj {
+  void operator()(PJ* pj) const { proj_destroy(pj); }
+};
+using Context = std::unique_ptr<PJ_CONTEXT, FreeContext>;
+using Pj = std::unique_ptr<PJ, FreePj>;
+
+Context quiet_context() {
+  Context context(proj_context_create());
+  proj_log_level(context.get(), PJ_LOG_NONE);
+  proj_context_set_enable_network(context.get(), 0);
+  return context;
+}
+
+/// Whether both axes are in metres.
+bool in_metres(PJ_CONTEXT* context, const PJ* system) {
+  const Pj axes(proj_crs_get_coordinate_system(context, system));
+  double factor = 0.0;
+  return axes &&
+         proj_cs_get_axis_info(context, axes.get(), 0, nullptr, nullptr, nullptr, &factor, nullptr, nullptr,
+                               nullptr) != 0 &&
+         factor == 1.0;
+}
+
+core::Result<void> describe_system(int epsg, Georeference& reference) {
+  const Context context = quiet_context();
+  const Pj system(proj_create(context.get(), fmt::format("EPSG:{}", epsg).c_str()));
+  if (!system) return core::usage_error(fmt::format("EPSG:{}: PROJ knows no such coordinate system", epsg));
+  if (proj_get_type(system.get()) != PJ_TYPE_PROJECTED_CRS || !in_metres(context.get(), system.get())) {
+    return core::usage_error(fmt::format(
+        "EPSG:{} ({}): is no projected coordinate system in metres; choose one such as that of the "
+        "UTM zone, 32601 to 32760",
+        epsg, proj_get_name(system.get())));
+  }
+  const char* const options[] = {"MULTILINE=NO", nullptr};
+  const char* text = proj_as_wkt(context.get(), system.get(), PJ_WKT1_GDAL, options);
+  if (text == nullptr)
+    return core::usage_error(fmt::format("EPSG:{}: cannot be told as well-known text", epsg));
+  reference.name = proj_get_name(system.get());
+  reference.wkt = text;
+  return {};
+}
+
+core::Result<void> place_map(double latitude, double longitude, double heading, Georeference& reference) {
+  constexpr double kStep = 1e-4;  // degrees: about 11 m
+  constexpr double kRadians = M_PI / 180.0;
+  const Context context = quiet_context();
+  const Pj given(proj_create_crs_to_crs(context.get(), "EPSG:4326",
+                                        fmt::format("EPSG:{}", reference.epsg).c_str(), nullptr));
+  const Pj from_degrees(given ? proj_normalize_for_visualization(context.get(), given.get()) : nullptr);
+  const Pj globe(proj_create(context.get(), "EPSG:4326"));
+  const auto fail = [&] {
+    return core::usage_error(
+        fmt::format("--datum: EPSG:{} does not cover {} {}", reference.epsg, latitude, longitude));
+  };
+  if (!from_degrees || !globe) return fail();
+
+  // Grid direction of true north, and how long a true metre is.
+  const PJ_COORD here = proj_trans(from_degrees.get(), PJ_FWD, proj_coord(longitude, latitude, 0.0, 0.0));
+  const PJ_COORD north =
+      proj_trans(from_degrees.get(), PJ_FWD, proj_coord(longitude, latitude + kStep, 0.0, 0.0));
+  const double true_m =
+      proj_lp_dist(globe.get(), proj_coord(longitude * kRadians, latitude * kRadians, 0.0, 0.0),
+                   proj_coord(longitude * kRadians, (latitude + kStep) * kRadians, 0.0, 0.0));
+  const double east_m = north.xy.x - here.xy.x;
+  const double north_m = north.xy.y - here.xy.y;
+  if (!std::isfinite(here.xy.x + here.xy.y + east_m + north_m) || !(true_m > 0.0)) return fail();
+  reference.origin = {here.xy.x, here.xy.y, 0.0};
+  reference.scale = std::hypot(east_m, north_m) / true_m;
+  reference.turn = std::atan2(north_m, east_m) - heading * kRadians;
+  return {};
+}
+
+}  // namespace
+}  // namespace plumbline::exports
+
+namespace px = plumbline::exports;
+PLUMBLINE_PART(px::ProjFunctions, &px::describe_system, &px::place_map)

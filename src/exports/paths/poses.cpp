@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// poses.csv: poses with their covariances, for filters and other maps.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "formats.hpp"
+#include "paths/robot_files.hpp"
+#include "plumbline/maps/fusion_state.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+constexpr const char* kPosesAxes[6] = {"x", "y", "z", "rx", "ry", "rz"};
+
+/// From that of (rho, phi) in Exp(rho, phi) camera_from_world to that of the body's position and of small
+/// turns about the world's axes.
+geometry::Matrix6d in_world(const geometry::Matrix6d& covariance, const geometry::Rigid3& world_from_camera,
+                            const geometry::Rigid3& camera_from_body) {
+  const Eigen::Matrix3d& turn = world_from_camera.rotation;
+  const Eigen::Vector3d arm = turn * camera_from_body.translation;
+  geometry::Matrix6d change = geometry::Matrix6d::Zero();
+  change.topLeftCorner<3, 3>() = -turn;
+  change.bottomRightCorner<3, 3>() = -turn;
+  change.topRightCorner<3, 3>() = geometry::skew(arm) * turn;  // -(phi x arm)
+  return change * covariance * change.transpose();
+}
+
+core::Result<ExportSummary> write_poses(MapSource& source, const std::filesystem::path& output) {
+  const auto store = source.store("the covariance of poses");
+  if (!store) return tl::unexpected(store.error());
+  const auto body_from_camera = body_from_camera_of(source.options());
+  if (!body_from_camera) return tl::unexpected(body_from_camera.error());
+  const geometry::Rigid3 camera_from_body = body_from_camera->inverse();
+  const auto poses = source.poses(source.request().content == Content::kKeyframes);
+  if (!poses) return tl::unexpected(poses.error());
+  const auto state = (*store)->fusion_state();
+  if (!state) return tl::unexpected(state.error());
+  std::vector<std::int32_t> robots;
+  std::vector<double> stamps;
+  for (const ExportPose& pose : *poses) {
+    robots.push_back(pose.robot);
+    stamps.push_back(pose.stamp);
+  }
+  const std::vector<geometry::Matrix6d> covariances = state->covariances_of(robots, stamps);
+
+  core::OutputFile out(output);
+  out.write(
+      fmt::format("# {}\n# covariance of position (m) and of turns about the world's axes (rad), beside the "
+                  "first keyframe\n",
+                  source.frame_text()));
+  std::string head = "robot,keyframe,stamp,x,y,z,qx,qy,qz,qw";
+  for (int r = 0; r < 6; ++r) {
+    for (int c = r; c < 6; ++c) head += fmt::format(",cov_{}_{}", kPosesAxes[r], kPosesAxes[c]);
+  }
+  out.write(head + "\n");
+  for (std::size_t i = 0; i < poses->size(); ++i) {
+    const ExportPose& pose = (*poses)[i];
+    const geometry::Rigid3 body = pose.world_from_camera * camera_from_body;
+    const Eigen::Quaterniond q = body.quaternion();
+    std::string row = fmt::format(
+        "{},{},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}", pose.robot_name,
+        pose.keyframe.valid() ? std::to_string(pose.keyframe.index) : "", pose.stamp, body.translation.x(),
+        body.translation.y(), body.translation.z(), q.x(), q.y(), q.z(), q.w());
+    if (covariances.empty()) {
+      row += std::string(21, ',');
+    } else {
+      const geometry::Matrix6d world = in_world(covariances[i], pose.world_from_camera, camera_from_body);
+      for (int r = 0; r < 6; ++r) {
+        for (int c = r; c < 6; ++c) row += fmt::format(",{:.6e}", world(r, c));
+      }
+    }
+    out.write(row + "\n");
+  }
+  if (auto written = out.commit(); !written) return tl::unexpected(written.error());
+  ExportSummary summary;
+  summary.written = {output};
+  if (covariances.empty()) {
+    summary.notes.emplace_back(
+        "the map holds no covariances, so their columns are empty: it was interrupted, or made without the "
+        "stage refine");
+  }
+  return summary;
+}
+
+}  // namespace
+
+Format poses_format() {
+  return {"poses",
+          {"poses.csv"},
+          {Content::kTrajectory, Content::kKeyframes},
+          "map.db",
+          "Poses with covariance",
+          "Robot, keyframe number, stamp, position, quaternion, and the upper triangle of the 6 x 6 "
+          "covariance of "
+          "position (m) and small turns about the world's axes (rad): the order of ROS' "
+          "`PoseWithCovariance`. Frames between keyframes have that of the keyframe before. Choose it by the "
+          "name `poses.csv` or with `--format poses`; `--what keyframes` writes keyframes only.",
+          {"body"},
+          &write_poses};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Paths of several robots: in one file, or in a folder with one each.
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/output_file.hpp"
+#include "source/map_source.hpp"
+
+namespace plumbline::exports {
+
+/// How a format writes the paths of robots, each in order of time, into one file.
+using WritePaths = std::function<void(core::OutputFile&, const std::vector<std::vector<ExportPose>>&)>;
+
+/// The selected poses, by robot; of the body where --body is given. Errors (kUsage): no such body; those of
+/// MapSource::poses.
+core::Result<std::vector<std::vector<ExportPose>>> paths_of(const MapSource& source);
+/// body_from_camera of --body; the identity without. Errors (kUsage).
+core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options);
+
+/// `output` as one file; without an ending as a folder with ROBOT<ending> for each robot.
+core::Result<ExportSummary> write_robot_files(const MapSource& source, const std::filesystem::path& output,
+                                              const std::string& ending, const WritePaths& write);
+/// A comment line that names the robot, where there are several.
+std::string robot_comment(const std::vector<ExportPose>& path);
+
+}  // namespace plumbline::exports

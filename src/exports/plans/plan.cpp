@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A floor plan, or a vertical section: SVG, PDF, DXF.
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "formats.hpp"
+#include "plans/drawing.hpp"
+#include "plans/walls.hpp"
+#include "source/georeference.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+constexpr double kPlanText_m = 0.14;
+
+/// The layers of a plan, by their numbers in the drawing.
+struct PlanLayers {
+  std::size_t grid, rooms, path, walls, doors, dimensions;
+  explicit PlanLayers(Drawing& drawing)
+      : grid(drawing.add_layer({"grid", "#d0d0d0", 8, 0.1})),
+        rooms(drawing.add_layer({"rooms", "#3a6ea5", 5, 0.15})),
+        path(drawing.add_layer({"path", "#c08020", 30, 0.15})),
+        walls(drawing.add_layer({"walls", "#000000", 7, 0.6})),
+        doors(drawing.add_layer({"doors", "#b03030", 1, 0.25})),
+        dimensions(drawing.add_layer({"dimensions", "#505050", 3, 0.13})) {}
+};
+
+/// The wall's pieces between its openings.
+std::vector<std::pair<double, double>> solid_pieces(const WallLine& wall) {
+  std::vector<std::pair<double, double>> pieces;
+  double from = wall.s0;
+  for (const WallOpening& opening : wall.openings) {
+    if (opening.s0 > from) pieces.emplace_back(from, opening.s0);
+    from = std::max(from, opening.s1);
+  }
+  if (wall.s1 > from) pieces.emplace_back(from, wall.s1);
+  return pieces;
+}
+
+/// So that text is read from below or from the right.
+double readable(double angle) {
+  while (angle > M_PI / 2.0 + 1e-3) angle -= M_PI;
+  while (angle <= -M_PI / 2.0 + 1e-3) angle += M_PI;
+  return angle;
+}
+
+void draw_walls(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
+  constexpr double kDimensioned_m = 1.0;
+  constexpr double kBeside_m = 0.16;
+  for (const WallLine& wall : plan.walls) {
+    for (const auto& [a, b] : solid_pieces(wall)) drawing.line(layers.walls, wall.at(a), wall.at(b));
+    if (wall.length() < kDimensioned_m) continue;
+    DrawnText text;
+    text.layer = layers.dimensions;
+    text.at = wall.at(0.5 * (wall.s0 + wall.s1)) + kBeside_m * wall.normal;
+    text.height_m = kPlanText_m;
+    text.angle_rad = readable(std::atan2(wall.along().y(), wall.along().x()));
+    text.text = fmt::format("{:.2f}", wall.length());
+    drawing.texts.push_back(text);
+    for (const double s : {wall.s0, wall.s1})  // where the length is measured
+      drawing.line(layers.dimensions, wall.at(s), wall.at(s) + 1.6 * kBeside_m * wall.normal);
+  }
+}
+
+void draw_doors(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
+  for (const WallDoor& door : plan.doors) {
+    drawing.line(layers.doors, 0.5 * (door.jambs[0] + door.far_jambs[0]),
+                 0.5 * (door.jambs[1] + door.far_jambs[1]));
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (door.jambs[k] != door.far_jambs[k]) drawing.line(layers.walls, door.jambs[k], door.far_jambs[k]);
+    }
+  }
+}
+
+void draw_rooms(const WallPlan& plan, const PlanLayers& layers, Drawing& drawing) {
+  int number = 0;
+  for (const WallRoom& room : plan.rooms) {
+    DrawnText text;
+    text.layer = layers.rooms;
+    text.at = room.label;
+    text.height_m = 1.4 * kPlanText_m;
+    text.text = fmt::format("{}: {:.2f} m2", ++number, room.area_m2);
+    drawing.texts.push_back(text);
+  }
+}
+
+/// The selected part of the cameras' paths, thinned; those are left out that only a cloud is known of.
+void draw_path(const MapSource& source, std::size_t layer, Drawing& drawing) {
+  constexpr double kStep_m = 0.05;
+  const auto poses = source.poses(false);
+  if (!poses) return;
+  std::int32_t robot = -1;
+  for (const ExportPose& pose : *poses) {
+    const Eigen::Vector2d at = pose.world_from_camera.translation.head<2>();
+    if (robot != pose.robot) {
+      drawing.lines.push_back({layer, {at}, false, false});
+      robot = pose.robot;
+    } else if ((at - drawing.lines.back().points.back()).norm() > kStep_m) {
+      drawing.lines.back().points.push_back(at);
+    }
+  }
+  const auto single = [&](const DrawnLine& line) { return line.layer == layer && line.points.size() < 2; };
+  drawing.lines.erase(std::remove_if(drawing.lines.begin(), drawing.lines.end(), single),
+                      drawing.lines.end());
+}
+
+/// A line each metre, and a scale bar below.
+void draw_grid(std::size_t layer, std::size_t bar_layer, Drawing& drawing) {
+  const auto [low, high] = drawing.bounds();
+  const Eigen::Array2d from = low.array().floor();
+  const Eigen::Array2d to = high.array().ceil();
+  std::vector<DrawnLine> lines;
+  for (double x = from.x(); x <= to.x() + 0.5; x += 1.0)
+    lines.push_back({layer, {{x, from.y()}, {x, to.y()}}, false, false});
+  for (double y = from.y(); y <= to.y() + 0.5; y += 1.0)
+    lines.push_back({layer, {{from.x(), y}, {to.x(), y}}, false, false});
+  drawing.lines.insert(drawing.lines.begin(), lines.begin(), lines.end());
+  const double bar_m = to.x() - from.x() >= 5.0 ? 5.0 : 1.0;
+  const double y = from.y() - 0.45;
+  constexpr double kTick_m = 0.12;
+  drawing.line(bar_layer, {from.x(), y}, {from.x() + bar_m, y});
+  for (double x = 0.0; x <= bar_m; x += 1.0)
+    drawing.line(bar_layer, {from.x() + x, y}, {from.x() + x, y + kTick_m});
+  drawing.texts.push_back(
+      {bar_layer, {from.x() + bar_m + 0.4, y + 0.05}, kPlanText_m, 0.0, fmt::format("{:g} m", bar_m)});
+}
+
+core::Result<Drawing> plan_drawing(MapSource& source, ExportSummary& summary) {
+  const auto plan = find_walls(source);
+  if (!plan) return tl::unexpected(plan.error());
+  Drawing drawing;
+  const PlanLayers layers(drawing);
+  draw_walls(*plan, layers, drawing);
+  draw_doors(*plan, layers, drawing);
+  draw_rooms(*plan, layers, drawing);
+  draw_path(source, layers.path, drawing);
+  draw_grid(layers.grid, layers.dimensions, drawing);
+  drawing.title = fmt::format("{}: plan at {:g} m", source.name(), source.options().cut_m);
+  summary.notes.push_back(fmt::format("{} walls, {} doors, {} closed rooms", plan->walls.size(),
+                                      plan->doors.size(), plan->rooms.size()));
+  if (!plan->rays_known) {
+    summary.notes.emplace_back(
+        "without map.db it is not known what cameras saw through: only doors below a lintel are found");
+  }
+  return drawing;
+}
+
+/// What a vertical cut shows: the cells, 2 cm wide, that points of the cloud near it fall into.
+core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary) {
+  constexpr double kHalfThick_m = 0.03;
+  constexpr double kCell_m = 0.02;
+  const std::vector<double>& line = source.options().section;
+  if (line.size() != 4) return core::usage_error("--section: takes two places seen from above, x,y,x,y");
+  const Eigen::Vector2d from(line[0], line[1]);
+  const Eigen::Vector2d to(line[2], line[3]);
+  const double length = (to - from).norm();
+  if (length < kCell_m) return core::usage_error("--section: its two places are one");
+  const auto cloud = source.cloud();
+  if (!cloud) return tl::unexpected(cloud.error());
+  const Eigen::Vector2d along = (to - from) / length;
+  const Eigen::Vector2d across(-along.y(), along.x());
+  std::set<std::pair<long, long>> cells;  // by row, then column
+  for (const cloud::Point& p : *(*cloud)->cloud) {
+    const Eigen::Vector3d at = p.getVector3fMap().cast<double>() + (*cloud)->shift;
+    const Eigen::Vector2d way = at.head<2>() - from;
+    const double s = along.dot(way);
+    if (s < 0.0 || s > length || std::abs(across.dot(way)) > kHalfThick_m) continue;
+    cells.emplace(std::lround(std::floor(at.z() / kCell_m)), std::lround(std::floor(s / kCell_m)));
+  }
+  if (cells.empty()) {
+    return core::input_error(
+        fmt::format("{}: the section meets no point of the cloud", source.request().output.string()));
+  }
+  Drawing drawing;
+  const std::size_t grid = drawing.add_layer({"grid", "#d0d0d0", 8, 0.1});
+  const std::size_t section = drawing.add_layer({"section", "#000000", 7, 0.1});
+  const std::size_t dimensions = drawing.add_layer({"dimensions", "#505050", 3, 0.13});
+  for (auto cell = cells.begin(); cell != cells.end();) {  // neighbours in a row as one
+    auto last = cell;
+    auto next = std::next(cell);
+    while (next != cells.end() && next->first == last->first && next->second == last->second + 1)
+      last = next++;
+    const double z0 = static_cast<double>(cell->first) * kCell_m;
+    const double s0 = static_cast<double>(cell->second) * kCell_m;
+    const double s1 = static_cast<double>(last->second + 1) * kCell_m;
+    drawing.lines.push_back(
+        {section, {{s0, z0}, {s1, z0}, {s1, z0 + kCell_m}, {s0, z0 + kCell_m}}, true, true});
+    cell = next;
+  }
+  draw_grid(grid, dimensions, drawing);
+  drawing.title = fmt::format("{}: section from {:g},{:g} to {:g},{:g}", source.name(), line[0], line[1],
+                              line[2], line[3]);
+  summary.notes.push_back(fmt::format("a section {:.2f} m long", length));
+  return drawing;
+}
+
+core::Result<ExportSummary> write_plan(MapSource& source, const std::filesystem::path& output) {
+  const auto reference = georeference_of(source.options());
+  if (!reference) return tl::unexpected(reference.error());
+  const bool section = !source.options().section.empty();
+  const std::string ending = output.extension().string();
+  if (*reference && (ending != ".dxf" || section)) {
+    return core::usage_error(
+        fmt::format("{}: only a plan as .dxf is moved into world coordinates; leave --datum and "
+                    "--epsg out",
+                    output.string()));
+  }
+  ExportSummary summary;
+  auto drawing = section ? section_drawing(source, summary) : plan_drawing(source, summary);
+  if (!drawing) return tl::unexpected(drawing.error());
+  drawing->notes.push_back(section ? "x along the section, y up; metres" : source.frame_text());
+  core::Result<void> written;
+  if (ending == ".svg") {
+    written = write_svg(output, *drawing);
+  } else if (ending == ".pdf") {
+    written = write_pdf(output, *drawing);
+  } else if (*reference) {
+    const Georeference& world = **reference;
+    drawing->notes = {fmt::format("frame: {} (EPSG:{}); x east, y north, metres", world.name, world.epsg)};
+    written = write_dxf(output, *drawing, world.linear().topLeftCorner<2, 2>(), world.origin.head<2>());
+    if (written) written = write_georeference(output, world);
+  } else {
+    written = write_dxf(output, *drawing);
+  }
+  if (!written) return tl::unexpected(written.error());
+  summary.written = {output};
+  return summary;
+}
+
+}  // namespace
+
+Format plan_format() {
+  return {"plan",
+          {".svg", ".pdf", ".dxf"},
+          {Content::kCloud},
+          "",
+          "Floor plan or section for architects",
+          "Walls at `--cut` over the floor as lines, fitted to the wall planes that `plumbline evaluate "
+          "cloud` finds "
+          "and joined at corners, both sides of a wall where both were seen; furniture is left out. Doors "
+          "are where "
+          "cameras looked through a wall (without `map.db`: what lies below a lintel); closed doors are "
+          "wall. Walls over "
+          "1 m have their length, closed rooms their area; a grid of metres, a scale bar, the paths. SVG and "
+          "PDF are "
+          "in a round scale that the file tells; DXF (R2000) is in metres with the layers grid, rooms, path, "
+          "walls, "
+          "doors, dimensions. `--section x,y,x,y` draws what a vertical cut along that line meets instead.",
+          {"cut", "section", "voxel", "datum", "epsg", "origin"},
+          &write_plan};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plans/wall_raster.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace plumbline::exports {
+
+WallRaster::WallRaster(const Eigen::Vector2d& normal, double offset_m, double first_s, double last_s,
+                       double floor_m)
+    : normal_(normal),
+      along_(-normal.y(), normal.x()),
+      offset_m_(offset_m),
+      first_s_(first_s),
+      floor_m_(floor_m),
+      columns_(std::max(1, static_cast<int>(std::ceil((last_s - first_s) / kWidth_m)) + 1)),
+      surface_(static_cast<std::size_t>(columns_) * kRows, 0),
+      rays_(surface_.size(), 0) {}
+
+int WallRaster::column_of(double s) const {
+  return std::clamp(static_cast<int>(std::floor((s - first_s_) / kWidth_m)), 0, columns_ - 1);
+}
+
+void WallRaster::add_surface(const Eigen::Vector3d& place) {
+  const double s = along_.dot(place.head<2>());
+  const int row = static_cast<int>(std::floor((place.z() - floor_m_) / kHeight_m));
+  const int column = static_cast<int>(std::floor((s - first_s_) / kWidth_m));
+  if (row < 0 || row >= kRows || column < 0 || column >= columns_) return;
+  surface_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] = 1;
+}
+
+void WallRaster::add_rays(const ViewRays& rays) {
+  constexpr double kBehind_m = 0.08;  // further than noise
+  const double origin = normal_.dot(rays.origin.head<2>()) - offset_m_;
+  for (const Eigen::Vector3f& end_f : rays.ends) {
+    const Eigen::Vector3d end = end_f.cast<double>();
+    const double reached = normal_.dot(end.head<2>()) - offset_m_;
+    const bool through =
+        (origin > kBehind_m && reached < -kBehind_m) || (origin < -kBehind_m && reached > kBehind_m);
+    if (!through) continue;
+    const Eigen::Vector3d at = rays.origin + origin / (origin - reached) * (end - rays.origin);
+    const int row = static_cast<int>(std::floor((at.z() - floor_m_) / kHeight_m));
+    const int column = static_cast<int>(std::floor((along_.dot(at.head<2>()) - first_s_) / kWidth_m));
+    if (row < 0 || row >= kRows || column < 0 || column >= columns_) continue;
+    rays_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] = 1;
+  }
+}
+
+double WallRaster::share(const std::vector<std::uint8_t>& cells, int column, double low_m,
+                         double high_m) const {
+  const int low = std::clamp(static_cast<int>(std::floor(low_m / kHeight_m)), 0, kRows - 1);
+  const int high = std::clamp(static_cast<int>(std::ceil(high_m / kHeight_m)), low + 1, kRows);
+  int marked = 0;
+  for (int row = low; row < high; ++row)
+    marked += cells[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)];
+  return static_cast<double>(marked) / (high - low);
+}
+
+double WallRaster::top(int column) const {
+  for (int row = kRows - 1; row >= 0; --row) {
+    if (surface_[static_cast<std::size_t>(column) * kRows + static_cast<std::size_t>(row)] != 0)
+      return (row + 1) * kHeight_m;
+  }
+  return 0.0;
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Walls as an architect draws them: straight lines from corner to corner, with the doors in them.
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "source/map_source.hpp"
+
+namespace plumbline::exports {
+
+/// A way through a wall, from s0 to s1 along its line, metres.
+struct WallOpening {
+  double s0 = 0.0;
+  double s1 = 0.0;
+};
+
+/// One side of a wall, seen from above: places p with normal . p = offset, from s0 to s1 along its direction.
+struct WallLine {
+  Eigen::Vector2d normal = Eigen::Vector2d::UnitX();  ///< unit, towards who sees the wall
+  double offset_m = 0.0;
+  double s0 = 0.0;
+  double s1 = 0.0;
+  double top_m = 0.0;                   ///< that was seen of it, over the floor
+  std::vector<WallOpening> openings;    ///< in order, apart
+  std::array<int, 2> corner{-1, -1};    ///< the line that its first and its last end meet; -1: none
+  std::array<int, 2> corner_end{0, 0};  ///< which end of that line; 2: somewhere along it
+
+  [[nodiscard]] Eigen::Vector2d along() const { return {-normal.y(), normal.x()}; }
+  [[nodiscard]] Eigen::Vector2d at(double s) const { return offset_m * normal + s * along(); }
+  [[nodiscard]] double length() const { return s1 - s0; }
+};
+
+/// A door, with both sides of its wall where both were seen.
+struct WallDoor {
+  std::array<Eigen::Vector2d, 2> jambs;      ///< on the one side
+  std::array<Eigen::Vector2d, 2> far_jambs;  ///< on the other; equal where it was not seen
+  double width_m = 0.0;
+};
+
+/// A room whose walls meet all round.
+struct WallRoom {
+  std::vector<Eigen::Vector2d> outline;  ///< counter-clockwise
+  double area_m2 = 0.0;                  ///< less what stands in it from floor to ceiling
+  Eigen::Vector2d label = Eigen::Vector2d::Zero();
+};
+
+struct WallPlan {
+  std::vector<WallLine> walls;
+  std::vector<WallDoor> doors;
+  std::vector<WallRoom> rooms;
+  bool rays_known = false;  ///< else doors are those below a lintel only
+};
+
+/// Finds the walls of the selected part of a map at --cut over its floor. Errors (kInput): no normals, no
+/// walls.
+core::Result<WallPlan> find_walls(MapSource& source);
+
+// Steps of it.
+
+/// Sides of walls that the cloud shows, without openings and corners.
+std::vector<WallLine> wall_sides(const cloud::CloudFile& file, double floor_m, double cut_m,
+                                 const core::Executor& executor);
+/// Lets ends meet where lines cross.
+void join_corners(std::vector<WallLine>& walls);
+std::vector<WallDoor> doors_of(const std::vector<WallLine>& walls);
+std::vector<WallRoom> rooms_of(const std::vector<WallLine>& walls);
+
+}  // namespace plumbline::exports

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "source/export_folder.hpp"
+
+#include <system_error>
+
+namespace plumbline::exports {
+namespace {
+
+bool is_export(const std::filesystem::path& folder) {
+  std::error_code ec;
+  return std::filesystem::is_regular_file(folder / kExportNote, ec);
+}
+
+}  // namespace
+
+core::Result<maps::OutputFolder> prepare_export(const std::filesystem::path& folder, bool replace) {
+  return maps::OutputFolder::prepare(folder, replace, false, &is_export);
+}
+
+}  // namespace plumbline::exports

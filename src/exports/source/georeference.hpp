@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Where on Earth a map lies.
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "plumbline/core/part.hpp"
+#include "plumbline/exports/options.hpp"
+
+namespace plumbline::cloud {
+struct CloudFile;
+}
+
+namespace plumbline::exports {
+
+/// From the map's frame into a projected coordinate system: east = x, north = y, up = z; metres.
+struct Georeference {
+  int epsg = 0;
+  std::string name;  ///< of the system
+  std::string wkt;   ///< OGC well-known text, version 1, as LAS wants it
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double turn = 0.0;   ///< of the map's x axis from east, radians, counter-clockwise
+  double scale = 1.0;  ///< of the projection at the origin; heights stay
+
+  [[nodiscard]] Eigen::Matrix3d linear() const;
+  Eigen::Vector3d operator*(const Eigen::Vector3d& map) const { return origin + linear() * map; }
+};
+
+/// What a coordinate system says of itself and of one place (functions of the part "proj").
+struct ProjFunctions {
+  static constexpr const char* kPart = "proj";
+  static constexpr std::uint64_t layout() { return core::layout_of<ProjFunctions, Georeference>(); }
+  /// Name and text of EPSG:`epsg`. Errors (kUsage): unknown, not projected, not in metres.
+  core::Result<void> (*describe)(int epsg, Georeference& reference);
+  /// Origin, turn and scale of a map whose origin is at (latitude, longitude) and whose x axis has this
+  /// heading, all degrees. Errors (kUsage): the system does not cover it.
+  core::Result<void> (*place)(double latitude, double longitude, double heading, Georeference& reference);
+};
+
+/// What --datum or --epsg with --origin ask for; none: neither was given. Errors (kUsage).
+core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options);
+
+/// The cloud in world coordinates; its large part is its shift.
+cloud::CloudFile to_world(const cloud::CloudFile& file, const Georeference& reference);
+/// FILE.georeference.json: what was applied.
+core::Result<void> write_georeference(const std::filesystem::path& file, const Georeference& reference);
+
+}  // namespace plumbline::exports

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What formats are written from: one map, or one cloud, in one frame. Each piece is read when it is first
+// asked for.
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/cloud/cloud_io.hpp"
+#include "plumbline/exports/export.hpp"
+#include "plumbline/maps/stored_result.hpp"
+#include "plumbline/maps/stored_views.hpp"
+
+namespace plumbline::exports {
+
+/// A camera's pose in the frame of the results.
+struct ExportPose {
+  std::int32_t robot = 0;
+  std::string robot_name;     ///< empty: of the only robot
+  core::KeyframeId keyframe;  ///< invalid: a frame between keyframes, or not known
+  double stamp = 0.0;         ///< seconds
+  geometry::Rigid3 world_from_camera;
+};
+
+class MapSource {
+ public:
+  /// Opens the map and settles frame and selection. Errors: kInput; kUsage for a selection that is none.
+  static core::Result<MapSource> open(const ExportRequest& request, const core::Executor& executor,
+                                      core::Log& log, const ExportProgress& progress);
+
+  [[nodiscard]] const ExportRequest& request() const { return *request_; }
+  [[nodiscard]] const ExportOptions& options() const { return request_->options; }
+  [[nodiscard]] const core::Executor& executor() const { return *executor_; }
+  [[nodiscard]] core::Log& log() const { return *log_; }
+  void progress(std::size_t done, std::size_t total) const {
+    if (*progress_) (*progress_)(done, total);
+  }
+  /// The name of what is exported, for titles.
+  [[nodiscard]] std::string name() const;
+
+  /// The map's store, for what only it holds; `what`: "free space" and the like, for the message. Errors
+  /// (kInput): there is none, with the way out.
+  [[nodiscard]] core::Result<const maps::StoredResult*> store(const std::string& what) const;
+  [[nodiscard]] bool has_store() const { return store_.has_value(); }
+  [[nodiscard]] const maps::MapPlace& place() const { return place_; }
+  /// From the map's own frame into that of everything that is exported.
+  [[nodiscard]] const geometry::Rigid3& world_from_map() const { return world_from_map_; }
+  /// z is up. Errors (kInput): it is not, with the way out; `what` asks for it.
+  [[nodiscard]] core::Result<void> need_upright(const std::string& what) const;
+  /// What the frame is, one line for files that hold text.
+  [[nodiscard]] std::string frame_text() const;
+
+  /// The dense cloud in that frame, as far as it was selected, without points that are not finite. Errors
+  /// (kInput): there is none; nothing is left.
+  core::Result<const cloud::CloudFile*> cloud();
+  /// Tracked frames, by robot, then time; or of keyframes only. Errors (kInput): there are none.
+  [[nodiscard]] core::Result<std::vector<ExportPose>> poses(bool keyframes_only) const;
+  /// Robots that have more than one name between them.
+  [[nodiscard]] const std::vector<maps::RobotInfo>& robots() const { return robots_; }
+
+  /// Height of the floor of the selected storey, 0 where the map stands on its floor.
+  [[nodiscard]] double floor_m() const { return floor_m_; }
+  /// Whether a place was selected.
+  [[nodiscard]] bool selects(const Eigen::Vector3d& place) const { return selected_.contains(place); }
+  [[nodiscard]] const Eigen::AlignedBox3d& selected() const { return selected_; }
+
+ private:
+  MapSource() = default;
+  core::Result<void> open_map();
+  core::Result<void> level_interrupted();
+  core::Result<void> select();
+  core::Result<cloud::CloudFile> read_cloud() const;
+  core::Result<const cloud::CloudFile*> whole_cloud();
+  [[nodiscard]] core::Result<std::vector<ExportPose>> stored_poses(bool keyframes_only) const;
+  [[nodiscard]] core::Result<std::vector<ExportPose>> written_poses(bool keyframes_only) const;
+
+  const ExportRequest* request_ = nullptr;
+  const core::Executor* executor_ = nullptr;
+  core::Log* log_ = nullptr;
+  const ExportProgress* progress_ = nullptr;
+  bool cloud_only_ = false;  ///< the input is a cloud
+  maps::MapPlace place_;
+  std::optional<maps::StoredResult> store_;
+  std::vector<maps::RobotInfo> robots_;
+  geometry::Rigid3 world_from_map_;
+  bool upright_ = false;
+  std::optional<cloud::CloudFile> whole_;
+  double whole_voxel_m_ = 0.0;  ///< that it was laid down in; 0: as the run did
+  std::optional<cloud::CloudFile> chosen_;
+  Eigen::AlignedBox3d selected_;
+  double floor_m_ = 0.0;
+};
+
+/// Heights of the floors, lowest first: what faces up and is wide. Empty: none is.
+std::vector<double> floor_heights(const cloud::Cloud& cloud);
+
+}  // namespace plumbline::exports

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The pictures that a map was made of, from its recordings.
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "plumbline/sensor/frame.hpp"
+#include "source/map_source.hpp"
+
+namespace plumbline::exports {
+
+/// One recording for each robot. Frames are rectified as the map's latest version of the camera wants it:
+/// into the pinhole of RobotInfo::camera.
+class Pictures {
+ public:
+  /// Of the request's recordings, or those the map was made from. Errors (kInput): gone, or not told.
+  static core::Result<Pictures> open(const MapSource& source);
+
+  /// Number of the frame with this stamp in the robot's recording; none: it has none.
+  [[nodiscard]] std::optional<std::size_t> find(std::int32_t robot, double stamp) const;
+  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::int32_t robot, std::size_t frame) const;
+
+ private:
+  struct Recording {
+    std::unique_ptr<dataset::FrameSource> given;
+    std::unique_ptr<dataset::FrameSource> corrected;  ///< null: `given` is right
+    std::vector<std::pair<double, std::size_t>> stamps;
+  };
+  std::map<std::int32_t, Recording> by_robot_;
+};
+
+/// A picture of a model: who took it where, and what it is called.
+struct Picture {
+  ExportPose pose;
+  std::string name;                  ///< "000001", several robots "r0_000001"
+  std::optional<std::size_t> frame;  ///< in the recording; none: there is no picture
+};
+
+/// Which poses a model of pictures has: the keyframes; with --every tracked frames besides; with --sharpest
+/// the sharpest frame near each keyframe. `pictures` may be null. In order, numbered from 1.
+core::Result<std::vector<Picture>> pictures_of(const MapSource& source, const Pictures* pictures);
+
+/// The recordings, or null with a note that says why.
+std::unique_ptr<Pictures> open_pictures(const MapSource& source, ExportSummary& summary);
+
+}  // namespace plumbline::exports
