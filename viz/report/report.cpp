@@ -64,6 +64,7 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
       "Plumbline report: " + data->name, head_html(*data),
       {{"pictures", "The map", std::move(*pictures)},
        {"path", "The path", path_html(*data)},
+       {"exports", "Exports", exports_html(*data)},
        {"tracking", "Tracking over time", tracking_html(*data)},
        {"loops", "Loops", loops_html(*data)},
        {"merges", "Merges of robots' maps", merges_html(*data)},

@@ -15,6 +15,8 @@ std::string head_html(const ReportData& data);
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
 /// The paths from above, over the plan of the cloud.
 std::string path_html(const ReportData& data);
+/// Exports that lie in the folder.
+std::string exports_html(const ReportData& data);
 std::string tracking_html(const ReportData& data);
 std::string loops_html(const ReportData& data);
 std::string merges_html(const ReportData& data);

@@ -31,6 +31,10 @@ namespace plumbline::dataset {
 class FrameSource;
 }
 
+namespace plumbline::exports {
+struct ExportRequest;
+}
+
 namespace plumbline::mapping {
 class OtherMapsInbox;
 }
@@ -180,6 +184,9 @@ class Stage {
   /// After the last frame, in graph order; reads and writes the ports of Rate::kEnd. Stages that export and
   /// do not need one another finish side by side.
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
+  /// Asked after check: what is to be made of the result folder once everything else in it is written, in the
+  /// forms of plumbline export; outputs are named below it. Null: nothing.
+  [[nodiscard]] virtual const std::vector<exports::ExportRequest>* exports() const { return nullptr; }
   /// Adds what this stage knows about the run.
   virtual void summarise(RunSummary& /*summary*/) const {}
 };

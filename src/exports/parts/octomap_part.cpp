@@ -65,6 +65,14 @@ core::Result<void> fill(const OctreeWork& work, Tree& tree, const Color& color) 
   return {};
 }
 
+/// The text before a tree's data; liboctomap's own writers print what they do.
+template <typename Tree>
+void put_head(const char* first_line, const OctreeWork& work, const Tree& tree, std::ostream& out) {
+  out << first_line << "\n# (feel free to add / change comments, but leave the first line as it is!)\n# "
+      << work.frame << "\nid " << tree.getTreeType() << "\nsize " << tree.size() << "\nres "
+      << tree.getResolution() << "\ndata\n";
+}
+
 core::Result<std::string> make_octree(const OctreeWork& work) {
   std::ostringstream bytes;
   if (work.color) {
@@ -73,12 +81,16 @@ core::Result<std::string> make_octree(const OctreeWork& work) {
       to.averageNodeColor(key, p.r, p.g, p.b);
     };
     if (auto filled = fill(work, tree, paint); !filled) return tl::unexpected(filled.error());
-    tree.write(bytes);
+    put_head("# Octomap OcTree file", work, tree, bytes);
+    tree.writeData(bytes);
   } else {
     octomap::OcTree tree(work.resolution_m);
     const auto nothing = [](octomap::OcTree&, const octomap::OcTreeKey&, const cloud::Point&) {};
     if (auto filled = fill(work, tree, nothing); !filled) return tl::unexpected(filled.error());
-    tree.writeBinary(bytes);
+    tree.toMaxLikelihood();
+    tree.prune();
+    put_head("# Octomap OcTree binary file", work, tree, bytes);
+    tree.writeBinaryData(bytes);
   }
   return bytes.str();
 }

@@ -63,18 +63,32 @@ class ColorCells {
   std::unordered_map<std::uint64_t, Cell> cells_;
 };
 
-/// Mean distance between where a point is seen and where it is projected.
-double mean_error_px(const MapSource& source, const maps::Map& map, const std::vector<Picture>& pictures,
-                     const ModelPoint& point) {
+/// How far a picture shows a point from where it is projected.
+double distance_px(const MapSource& source, const maps::Map& map, const ExportPose& pose, int feature,
+                   const Eigen::Vector3d& position) {
+  const auto& seen = map.keyframe(pose.keyframe).features->points[static_cast<std::size_t>(feature)];
+  const Eigen::Vector3d at = pose.world_from_camera.inverse() * position;
+  return (pinhole_of(source, pose.robot).project(at) - seen.pixel.cast<double>()).norm();
+}
+
+/// The sights that fit; what the map's adjustment holds for outliers, other programs would take at their
+/// word.
+void keep_what_fits(const MapSource& source, const maps::Map& map, const std::vector<Picture>& pictures,
+                    ModelPoint& point) {
+  constexpr double kMost_px = 3.0;  // in the picture of the corner's octave
+  constexpr double kOctave = 1.2;
+  std::vector<ModelPoint::Sight> fitting;
   double sum = 0.0;
   for (const ModelPoint::Sight& sight : point.track) {
     const ExportPose& pose = pictures[sight.picture].pose;
-    const auto& feature =
-        map.keyframe(pose.keyframe).features->points[static_cast<std::size_t>(sight.feature)];
-    const Eigen::Vector3d at = pose.world_from_camera.inverse() * point.position;
-    sum += (pinhole_of(source, pose.robot).project(at) - feature.pixel.cast<double>()).norm();
+    const auto& seen = map.keyframe(pose.keyframe).features->points[static_cast<std::size_t>(sight.feature)];
+    const double off = distance_px(source, map, pose, sight.feature, point.position);
+    if (off > kMost_px * std::pow(kOctave, seen.octave)) continue;
+    fitting.push_back(sight);
+    sum += off;
   }
-  return point.track.empty() ? 0.0 : sum / static_cast<double>(point.track.size());
+  point.track = std::move(fitting);
+  point.error_px = point.track.empty() ? 0.0 : sum / static_cast<double>(point.track.size());
 }
 
 cv::Mat in_millimetres(const cv::Mat& depth_m) {
@@ -118,9 +132,11 @@ core::Result<std::vector<ModelPoint>> landmark_points(MapSource& source,
       const auto picture = picture_of.find(observation.keyframe);
       if (picture != picture_of.end()) point.track.push_back({picture->second, observation.feature});
     }
-    if (point.track.size() < 2) point.track.clear();
+    const bool seen = point.track.size() >= 2;  // else the model has not enough of its keyframes
+    keep_what_fits(source, map, pictures, point);
+    if (seen && point.track.size() < 2) continue;
+    if (!seen) point.track.clear();
     point.color = colors.at(point.position);
-    point.error_px = mean_error_px(source, map, pictures, point);
     points.push_back(std::move(point));
   }
   return points;

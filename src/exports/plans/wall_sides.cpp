@@ -64,7 +64,7 @@ double wall_height(const evaluate::SurfaceSamples& samples, double floor_m) {
   if (samples.points.empty()) return kMost_m;
   std::vector<float> heights;
   for (const auto& p : samples.points) heights.push_back(p.z());
-  const auto high = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * 97 / 100);
+  const auto high = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * 98 / 100);
   std::nth_element(heights.begin(), high, heights.end());
   return std::min(kMost_m, static_cast<double>(*high) - floor_m - kBelowTop_m);
 }
@@ -138,17 +138,28 @@ std::vector<std::pair<int, int>> filled_runs(const WallRaster& raster) {
   return runs;
 }
 
-bool is_wall(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
-  constexpr double kLeastShare = 0.4;
-  int high = 0;
-  double at_cut = 0.0;
-  for (int c = run.first; c <= run.second; ++c) {
-    if (raster.top(c) >= need_m) ++high;
-    at_cut += raster.seen(c, std::max(0.0, cut_m - 0.6), cut_m + 0.6);
-  }
+/// How much of a run looks like a wall.
+struct RunLook {
+  double high = 0.0;    ///< share of its columns that reach where furniture does not
+  double at_cut = 0.0;  ///< share of the cells around the cut that show surface
+};
+
+RunLook look_of(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
+  RunLook look;
   const int columns = run.second - run.first + 1;
-  return columns * WallRaster::kWidth_m >= kShortestWall_m && high >= kLeastShare * columns &&
-         at_cut > 0.1 * columns;
+  for (int c = run.first; c <= run.second; ++c) {
+    if (raster.top(c) >= need_m) look.high += 1.0 / columns;
+    look.at_cut += raster.seen(c, std::max(0.0, cut_m - 0.6), cut_m + 0.6) / columns;
+  }
+  return look;
+}
+
+bool is_wall(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
+  constexpr double kLeastHigh = 0.3;
+  constexpr double kLeastAtCut = 0.1;
+  const RunLook look = look_of(raster, run, need_m, cut_m);
+  return (run.second - run.first + 1) * WallRaster::kWidth_m >= kShortestWall_m && look.high >= kLeastHigh &&
+         look.at_cut > kLeastAtCut;
 }
 
 /// The walls on one plane.

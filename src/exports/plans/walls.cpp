@@ -122,6 +122,30 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters,
   }
 }
 
+/// Whether two sides lie on one line, one behind the other.
+bool in_line(const WallLine& a, const WallLine& b) {
+  constexpr double kSameLine_m = 0.03;
+  return a.normal.dot(b.normal) > 0.998 &&
+         std::abs(a.normal.dot(b.at(0.5 * (b.s0 + b.s1))) - a.offset_m) < kSameLine_m;
+}
+
+/// Door leaves and pieces of furniture: short ones that neither meet walls at both ends nor go on along a
+/// line.
+void drop_loose_pieces(std::vector<WallLine>& walls) {
+  constexpr double kShort_m = 1.2;
+  std::vector<WallLine> joined = walls;
+  join_corners(joined);
+  std::vector<WallLine> kept;
+  for (std::size_t i = 0; i < walls.size(); ++i) {
+    const bool met = joined[i].corner[0] >= 0 && joined[i].corner[1] >= 0;
+    const bool goes_on = std::any_of(walls.begin(), walls.end(), [&](const WallLine& other) {
+      return &other != &walls[i] && other.length() >= 0.5 * kShort_m && in_line(walls[i], other);
+    });
+    if (walls[i].length() >= kShort_m || met || goes_on) kept.push_back(walls[i]);
+  }
+  walls = std::move(kept);
+}
+
 }  // namespace
 
 void join_corners(std::vector<WallLine>& walls) {
@@ -231,6 +255,7 @@ core::Result<WallPlan> find_walls(MapSource& source) {
     return core::input_error(fmt::format("{}: no wall is seen at {:g} m over the floor; choose another --cut",
                                          source.request().input.string(), cut_m));
   }
+  drop_loose_pieces(plan.walls);
   join_corners(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, **cloud, floor_m);
   if (source.has_store()) {

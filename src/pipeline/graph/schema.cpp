@@ -4,6 +4,7 @@
 #include "plumbline/cloud/filter_schema.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "plumbline/pipeline/reference.hpp"
+#include "stages/exports_option.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -110,6 +111,7 @@ Json definitions(const StageRegistry& registry) {
     all["stage." + type->name] = stage_body(*type, true);
     all["change." + type->name] = stage_body(*type, false);
   }
+  all["exports"] = exports_definition();
   all["stage"] = stage_rule(registry, true);
   all["change"] = stage_rule(registry, false);
   return all;
@@ -143,6 +145,7 @@ std::string stage_schema(const StageType& type, const StageRegistry& registry) {
   schema.update(stage_body(type, true));
   Json filters = cloud::filter_definitions(registry.filters());
   if (schema["properties"].contains("filters")) schema["definitions"] = std::move(filters);
+  if (schema["properties"].contains("exports")) schema["definitions"]["exports"] = exports_definition();
   return schema.dump(2) + "\n";
 }
 

@@ -200,7 +200,7 @@ class MapRun {
     RunSummary summary = summary_of(*report);
     if (auto ok = write_timing(output_->path() / "timing.csv", *report, summary.parts, *source_); !ok)
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
-    if (auto ok = commit_result(summary, *output_, began); !ok)
+    if (auto ok = commit_result(summary, *output_, began, graph_, request_, context); !ok)
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
     if (debug_) {
       if (auto committed = debug_->commit(); !committed) return tl::unexpected(committed.error());

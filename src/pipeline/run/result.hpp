@@ -18,7 +18,9 @@ core::Result<Graph> load_pipeline(const RunRequest& request);
 RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,
                           const core::Executor& executor);
 
-/// Judges the result, writes summary.json and makes the folder the result. Errors: kOutput.
-core::Result<void> commit_result(RunSummary& summary, maps::OutputFolder& output, RunClock::time_point began);
+/// Judges the result, writes summary.json and what the stages export, and makes the folder the result. An
+/// export that cannot be made is told as a warning: the map is there without it. Errors: kOutput.
+core::Result<void> commit_result(RunSummary& summary, maps::OutputFolder& output, RunClock::time_point began,
+                                 const Graph& graph, const RunRequest& request, const RunContext& context);
 
 }  // namespace plumbline::pipeline

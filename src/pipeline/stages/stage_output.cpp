@@ -18,6 +18,7 @@
 #include "plumbline/maps/line_export.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "plumbline/viz/snapshot.hpp"
+#include "stages/exports_option.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -38,10 +39,12 @@ class OutputStage : public Stage {
                "Pictures in snapshots/: any of iso top bottom front back left right; empty: none");
     table.integer("width", width_px_, {64, 8192}, "px", "Width of the pictures");
     table.integer("height", height_px_, {64, 8192}, "px", "Height of the pictures");
+    exports_.declare(table);
   }
 
   void check(const CheckContext& /*context*/, const core::ConfigMark& mark, const std::string& path,
              core::ConfigProblems& problems) override {
+    exports_.check(path, problems);
     std::istringstream words(views_);
     std::vector<std::string> names;
     for (const viz::View view : kViews) names.push_back(viz::view_name(view));
@@ -63,7 +66,12 @@ class OutputStage : public Stage {
     if (lines_) files.emplace_back("lines.ply");
     if (levels_ > 0) files.emplace_back("levels/map_*mm.ply");
     for (const viz::View view : chosen_) files.push_back("snapshots/" + viz::view_name(view) + ".png");
+    for (const std::string& file : exports_.files()) files.push_back(file);
     return files;
+  }
+
+  [[nodiscard]] const std::vector<exports::ExportRequest>* exports() const override {
+    return &exports_.requests();
   }
 
   core::Result<void> start(const RunContext& context) override {
@@ -266,6 +274,7 @@ class OutputStage : public Stage {
   int levels_ = 0;
   bool lines_ = true;
   std::string views_ = "iso top front";
+  ExportsOption exports_;
   int width_px_ = 1600;
   int height_px_ = 1200;
   std::vector<viz::View> chosen_;

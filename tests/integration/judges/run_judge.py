@@ -1,0 +1,370 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Has programs that others wrote judge what plumbline exports: run_judge.py PROGRAM WORK CASE [OCTREE_PROBE]
+
+The cases share one map, which the first one makes in WORK. Exit code 77: the judge is not installed
+(scripts/install-deps --judges).
+"""
+import fcntl
+import json
+import math
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+JUDGES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "plumbline/judges/node_modules"
+SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's modules are its
+FRAMES = 120
+
+
+class Absent(Exception):
+    """A judge is not installed."""
+
+
+def need(program):
+    if shutil.which(program) is None:
+        raise Absent(f"{program} is not installed")
+    return program
+
+
+def need_npm(package):
+    if not (JUDGES / package).is_dir():
+        raise Absent(f"npm's {package} is not in {JUDGES}")
+
+
+def run(*command, **more):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, **more)
+    if done.returncode != 0:
+        raise AssertionError(f"{' '.join(map(str, command))}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
+
+
+def node(script, *arguments):
+    need("node")
+    return run("node", HERE / script, *arguments, env={**os.environ, "JUDGES": str(JUDGES)})
+
+
+def check(condition, message):
+    if not condition:
+        raise AssertionError(message)
+
+
+class Case:
+    def __init__(self, program, work):
+        self.program = program
+        self.work = work
+        work.mkdir(parents=True, exist_ok=True)
+        self.map = work / "room"
+        with open(work / "lock", "w") as lock:  # cases may run side by side
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not (self.map / "summary.json").is_file():
+                shutil.rmtree(self.map, ignore_errors=True)
+                run(program, "map", f"synth:room?frames={FRAMES}&width=320&height=240", "-o", self.map, "-q")
+
+    def export(self, name, *options):
+        """The file or folder, made anew."""
+        out = self.work / name
+        if out.is_dir():
+            shutil.rmtree(out)
+        elif out.exists():
+            out.unlink()
+        run(self.program, "export", self.map, "-o", out, *options)
+        return out
+
+
+def read_colmap(folder):
+    """The model as the format's page tells, sharing nothing with the exporter: cameras, images, points."""
+    def unpacker(file):
+        data = (folder / file).read_bytes()
+        at = 0
+
+        def take(form):
+            nonlocal at
+            values = struct.unpack_from("<" + form, data, at)
+            at += struct.calcsize("<" + form)
+            return values if len(values) > 1 else values[0]
+
+        def text():
+            nonlocal at
+            end = data.index(b"\0", at)
+            value = data[at:end].decode()
+            at = end + 1
+            return value
+        return take, text
+    take, _ = unpacker("cameras.bin")
+    cameras = {}
+    for _ in range(take("Q")):
+        number, model, width, height = take("IiQQ")
+        check(model == 1, "the camera is no PINHOLE")
+        cameras[number] = (width, height, take("4d"))
+    take, text = unpacker("images.bin")
+    images = {}
+    for _ in range(take("Q")):
+        number = take("I")
+        pose = take("7d")
+        camera = take("I")
+        name = text()
+        spots = [take("ddQ") for _ in range(take("Q"))]
+        images[number] = (pose, camera, name, spots)
+    take, _ = unpacker("points3D.bin")
+    points = {}
+    for _ in range(take("Q")):
+        number = take("Q")
+        place = take("ddd")
+        color = take("BBB")
+        error = take("d")
+        track = [take("II") for _ in range(take("Q"))]
+        points[number] = (place, color, error, track)
+    return cameras, images, points
+
+
+def rotate(q, p):
+    w, x, y, z = q
+    return (
+        (1 - 2 * (y * y + z * z)) * p[0] + 2 * (x * y - w * z) * p[1] + 2 * (x * z + w * y) * p[2],
+        2 * (x * y + w * z) * p[0] + (1 - 2 * (x * x + z * z)) * p[1] + 2 * (y * z - w * x) * p[2],
+        2 * (x * z - w * y) * p[0] + 2 * (y * z + w * x) * p[1] + (1 - 2 * (x * x + y * y)) * p[2],
+    )
+
+
+def residuals(cameras, images, points):
+    for place, _, _, track in points.values():
+        for image, index in track:
+            pose, camera, _, spots = images[image]
+            at = [a + b for a, b in zip(rotate(pose[:4], place), pose[4:])]
+            fx, fy, cx, cy = cameras[camera][2]
+            x, y, point = spots[index]
+            yield fx * at[0] / at[2] + cx - x, fy * at[1] / at[2] + cy - y
+
+
+def case_colmap(case):
+    need("colmap")
+    model = case.export("colmap", "--force")
+    cameras, images, points = read_colmap(model / "sparse/0")
+    check(len(images) >= 3 and len(points) > 100, f"{len(images)} images, {len(points)} points")
+    for image, (_, _, name, spots) in images.items():
+        check((model / "images" / name).is_file(), f"there is no picture {name}")
+        for index, (_, _, point) in enumerate(spots):
+            check(point == 2**64 - 1 or (image, index) in [tuple(t) for t in points[point][3]], "a track is not whole")
+    rest = list(residuals(cameras, images, points))
+    mean = [sum(r[k] for r in rest) / len(rest) for k in range(2)]
+    rms = math.sqrt(sum(x * x + y * y for x, y in rest) / len(rest))
+    print(f"{len(images)} images, {len(points)} points, {len(rest)} sights: mean residual "
+          f"{mean[0]:+.4f} {mean[1]:+.4f} px, RMS {rms:.4f} px")
+    check(abs(mean[0]) < 0.05 and abs(mean[1]) < 0.05, "residuals are not around 0: half a pixel?")
+    check(rms < 3.0, "the points are not where the pictures show them")
+    out = case.work / "adjusted"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir()
+    said = run("colmap", "bundle_adjuster", "--input_path", model / "sparse/0", "--output_path", out,
+               "--BundleAdjustment.refine_focal_length", 0, "--BundleAdjustment.refine_principal_point", 0,
+               "--BundleAdjustment.refine_extra_params", 0, "--BundleAdjustment.refine_extrinsics", 0,
+               "--BundleAdjustment.max_num_iterations", 1, env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+    initial = float(re.search(r"Initial cost\s*:\s*([0-9.]+)", said).group(1))
+    print(f"colmap begins at {initial} px")
+    # It tells sqrt(cost / residuals); the cost is half the sum of squares, and a sight has two residuals.
+    expected = math.sqrt(sum(x * x + y * y for x, y in rest) / (4.0 * len(rest)))
+    check(abs(initial - expected) < 0.02, f"colmap begins at {initial} px, we recompute {expected:.4f} px")
+
+
+def case_colmap_text(case):
+    need("colmap")
+    binary = case.export("colmap_binary", "--format", "colmap")
+    text = case.export("colmap_text", "--format", "colmap", "--text", "on")
+    out = case.work / "converted"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir()
+    run("colmap", "model_converter", "--input_path", text / "sparse/0", "--output_path", out, "--output_type", "BIN",
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
+    a, b = read_colmap(binary / "sparse/0"), read_colmap(out)
+    check(sorted(a[2]) == sorted(b[2]) and sorted(a[1]) == sorted(b[1]), "text and binary model differ")
+    for number, (place, color, _, track) in a[2].items():
+        check(color == b[2][number][1] and sorted(track) == sorted(b[2][number][3]), "a point differs")
+        check(max(abs(x - y) for x, y in zip(place, b[2][number][0])) < 1e-6, "a point lies elsewhere")
+
+
+def case_triangulate(case):
+    """COLMAP's own features triangulate at our poses."""
+    need("colmap")
+    model = case.export("colmap_triangulate", "--format", "colmap", "--every", "12")
+    env = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    database = model / "database.db"
+    _, images, _ = read_colmap(model / "sparse/0")
+    cameras = read_colmap(model / "sparse/0")[0]
+    fx, fy, cx, cy = cameras[1][2]
+    run("colmap", "feature_extractor", "--database_path", database, "--image_path", model / "images",
+        "--ImageReader.camera_model", "PINHOLE", "--ImageReader.single_camera", 1,
+        "--ImageReader.camera_params", f"{fx},{fy},{cx},{cy}", "--SiftExtraction.use_gpu", 0, env=env)
+    run("colmap", "exhaustive_matcher", "--database_path", database, "--SiftMatching.use_gpu", 0, env=env)
+    out = case.work / "triangulated"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir()
+    run("colmap", "point_triangulator", "--database_path", database, "--image_path", model / "images",
+        "--input_path", model / "sparse/0", "--output_path", out, "--clear_points", 1, env=env)
+    cameras, images, points = read_colmap(out)
+    rest = list(residuals(cameras, images, points))
+    rms = math.sqrt(sum(x * x + y * y for x, y in rest) / max(1, len(rest)))
+    print(f"{len(images)} images, {len(points)} points triangulated, RMS {rms:.3f} px")
+    check(len(points) > 100 and rms < 1.5, "COLMAP cannot triangulate at these poses")
+
+
+def case_nerfstudio(case):
+    folder = case.export("nerf", "--format", "nerfstudio")
+    data = json.loads((folder / "transforms.json").read_text())
+    cameras, images, points = read_colmap(case.export("colmap_for_nerf", "--format", "colmap") / "sparse/0")
+    by_name = {name: (pose, spots) for pose, _, name, spots in images.values()}
+    check(len(data["frames"]) == len(images), "not as many frames as COLMAP's model has")
+    worst = 0.0
+    for frame in data["frames"]:
+        check((folder / frame["file_path"]).is_file() and (folder / frame["depth_file_path"]).is_file(), "no picture")
+        m = frame["transform_matrix"]
+        _, spots = by_name[Path(frame["file_path"]).name]
+        pose = by_name[Path(frame["file_path"]).name][0]
+        for x, y, point in spots:
+            if point == 2**64 - 1:
+                continue
+            place = points[point][0]
+            way = [place[k] - m[k][3] for k in range(3)]
+            local = [sum(m[r][c] * way[r] for r in range(3)) for c in range(3)]  # x right, y up, z backwards
+            u = data["fl_x"] * local[0] / -local[2] + data["cx"]
+            v = data["fl_y"] * -local[1] / -local[2] + data["cy"]
+            at = [a + b for a, b in zip(rotate(pose[:4], place), pose[4:])]
+            fx, fy, cx, cy = cameras[1][2]
+            worst = max(worst, abs(u - (fx * at[0] / at[2] + cx)), abs(v - (fy * at[1] / at[2] + cy)))
+    print(f"{len(data['frames'])} frames; projections differ from COLMAP's by {worst:.2e} px at most")
+    check(worst < 0.1, "axes or pixels are not OpenGL's")
+    check(data["applied_transform"] == [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], "applied_transform")
+
+
+def case_las(case):
+    need_npm("copc")
+    las = case.export("room.las", "--datum", "52.5,13.4,30")
+    ply = case.export("for_las.ply", "--datum", "52.5,13.4,30")
+    print(node("judge_las.mjs", las, ply).strip())
+    check((case.work / "room.las.georeference.json").is_file(), "what was applied stands nowhere")
+
+
+def case_glb(case):
+    need_npm("gltf-validator")
+    for name, options in (("points.glb", ()), ("mesh.glb", ("--mesh", "--resolution", "0.05"))):
+        print(name, node("judge_glb.mjs", case.export(name, *options)).strip())
+
+
+def case_f3d(case):
+    need("f3d")
+    glb = case.export("f3d.glb", "--mesh", "--resolution", "0.05")
+    png = case.work / "f3d.png"
+    png.unlink(missing_ok=True)
+    # Without a display it may not draw at all; then it is no judge here.
+    done = subprocess.run(["f3d", str(glb), "--output", str(png), "--resolution", "320,240"], capture_output=True, text=True)
+    if not png.is_file():
+        raise Absent("f3d draws nothing here: " + (done.stderr or done.stdout)[:200])
+    check(png.stat().st_size > 5000, "f3d's picture is empty")
+
+
+def case_octomap(case, probe):
+    need("convert_octree")
+    tree = case.export("room.bt")
+    colored = case.export("room.ot")
+    for source, target in ((tree, "again.ot"), (case.work / "again.ot", "again.bt"), (colored, "colored.bt")):
+        run("convert_octree", source, case.work / target)
+    check((case.work / "again.bt").read_bytes().split(b"data\n", 1)[1] == tree.read_bytes().split(b"data\n", 1)[1],
+          "convert_octree gives other bytes back")
+    rows = [line.split() for line in (case.map / "trajectory.txt").read_text().splitlines() if line[0] != "#"]
+    camera = [float(v) for v in rows[len(rows) // 2][1:4]]
+    ply = case.export("for_octomap.xyz").read_text().splitlines()
+    wall = [float(v) for v in ply[len(ply) // 2].split()[:3]]
+    for file in (tree, colored):
+        print(run(probe, file, *camera, *wall).strip())
+
+
+def case_grid(case):
+    yaml = case.export("room.yaml")
+    keys = dict(line.split(": ", 1) for line in yaml.read_text().splitlines() if not line.startswith("#"))
+    check(keys["negate"] == "0" and keys["occupied_thresh"] == "0.65" and keys["free_thresh"] == "0.196", "thresholds")
+    data = (case.work / keys["image"]).read_bytes()
+    head = re.match(rb"P5\n(?:#[^\n]*\n)*(\d+) (\d+)\n255\n", data)
+    width, height = int(head.group(1)), int(head.group(2))
+    pixels = data[head.end():]
+    check(len(pixels) == width * height, "the image is cut off")
+    resolution = float(keys["resolution"])
+    x0, y0 = [float(v) for v in keys["origin"].strip("[]").split(",")][:2]
+
+    def cell(x, y):  # as map_server reads it
+        column, row = int((x - x0) / resolution), height - 1 - int((y - y0) / resolution)
+        occupancy = (255 - pixels[row * width + column]) / 255.0
+        return "occupied" if occupancy > 0.65 else "free" if occupancy < 0.196 else "unknown"
+    counts = {}
+    for p in pixels:
+        counts[p] = counts.get(p, 0) + 1
+    check(set(counts) == {0, 205, 254}, f"grey values {counts}")
+    rows = [line.split() for line in (case.map / "trajectory.txt").read_text().splitlines() if line[0] != "#"]
+    path = {cell(float(r[1]), float(r[2])): 0 for r in rows}
+    free = sum(cell(float(r[1]), float(r[2])) == "free" for r in rows)
+    print(f"{width} x {height} cells: {counts}; {free} of {len(rows)} places of the path are free ({sorted(path)})")
+    check(free >= 0.9 * len(rows), "the camera went through cells that are not free")
+
+
+def case_plan(case):
+    need("rsvg-convert")
+    svg = case.export("room.svg")
+    png = case.work / "room.png"
+    run("rsvg-convert", "-w", 800, svg, "-o", png)
+    check(png.stat().st_size > 3000, "librsvg draws nothing")
+    check(svg.read_text().count("<path") > 5, "the plan is empty")
+    need("pdftotext")
+    pdf = case.export("room.pdf")
+    check("m2" in run("pdftotext", pdf, "-") or "." in run("pdftotext", pdf, "-"), "the PDF has no text")
+    section = case.export("section.svg", "--section", "0,-2 0,2")
+    run("rsvg-convert", "-w", 400, section, "-o", case.work / "section.png")
+
+
+def case_dxf(case):
+    if subprocess.run([SYSTEM_PYTHON, "-c", "import ezdxf"], capture_output=True).returncode != 0:
+        raise Absent("python3-ezdxf is not installed")
+    print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("room.dxf")).strip())
+    print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("world.dxf", "--datum", "52.5,13.4,30")).strip())
+
+
+def case_proj(case):
+    need("cs2cs")
+    las = case.export("proj.las", "--datum", "52.5,13.4,30")
+    applied = json.loads((case.work / "proj.las.georeference.json").read_text())
+    said = subprocess.run(["cs2cs", "-f", "%.4f", "EPSG:4326", f"EPSG:{applied['epsg']}"], input="52.5 13.4 0\n",
+                          capture_output=True, text=True).stdout.split()
+    off = max(abs(float(said[k]) - applied["origin"][k]) for k in range(2))
+    print(f"EPSG:{applied['epsg']}: the origin is {off:.4f} m from where cs2cs puts it; scale {applied['scale']:.6f}")
+    check(off < 0.001, "the origin is elsewhere")
+    # A point 100 m along x, which heads 30 degrees east of north.
+    a = math.radians(30)
+    lat = 52.5 + math.cos(a) * 100 / 111267.0
+    lon = 13.4 + math.sin(a) * 100 / (111320.0 * math.cos(math.radians(52.5)) * 1.00205)
+    there = subprocess.run(["cs2cs", "-f", "%.4f", "EPSG:4326", f"EPSG:{applied['epsg']}"], input=f"{lat} {lon} 0\n",
+                           capture_output=True, text=True).stdout.split()
+    ours = [applied["origin"][k] + 100 * applied["linear"][k][0] for k in range(2)]
+    off = math.dist(ours, [float(there[0]), float(there[1])])
+    print(f"100 m along x: {off:.3f} m off (the sphere's degree here is good to that)")
+    check(off < 0.5, "the heading is wrong")
+    check(las.stat().st_size > 1000, "the LAS is empty")
+
+
+def main():
+    program, work, name = sys.argv[1], Path(sys.argv[2]), sys.argv[3]
+    try:
+        globals()["case_" + name](Case(program, work), *sys.argv[4:])
+    except Absent as absent:
+        print(f"skipped: {absent}; scripts/install-deps --judges installs it")
+        return 77
+    except AssertionError as wrong:
+        print(f"wrong: {wrong}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline export and `exports:` as users meet them. Programs of others judge the files in judges/.
+#include <cmath>
+#include <sstream>
+#include <vector>
+
+#include "plumbline/dataset/trajectory_io.hpp"
+#include "program.hpp"
+
+namespace plumbline::integration {
+namespace {
+
+constexpr const char* kRecording = "\"synth:room?frames=60&width=320&height=240\"";
+
+class Exports : public ProgramTest {};
+
+/// Rows of numbers that are no comments.
+std::vector<std::vector<double>> rows_of(const fs::path& file) {
+  std::vector<std::vector<double>> rows;
+  std::ifstream stream(file);
+  for (std::string line; std::getline(stream, line);) {
+    if (line.empty() || line.front() == '#' || std::isalpha(line.front()) != 0) continue;
+    for (char& c : line) c = c == ',' ? ' ' : c;
+    std::istringstream words(line);
+    rows.emplace_back();
+    for (double value = 0.0; words >> value;) rows.back().push_back(value);
+  }
+  return rows;
+}
+
+TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
+  const Outcome mapped =
+      run(std::string("map ") + kRecording +
+          " -o out -q --set 'output.exports=[grid.yaml, room.las, {file: model, format: colmap}]'");
+  ASSERT_EQ(mapped.code, 0) << mapped;
+  for (const char* file : {"out/grid.yaml", "out/grid.pgm", "out/room.las", "out/model/sparse/0/points3D.bin",
+                           "out/model/images/000001.png"})
+    EXPECT_TRUE(fs::exists(path(file))) << file;
+
+  ASSERT_EQ(run("report out").code, 0);
+  EXPECT_NE(slurp(path("out/report.html")).find("<a href=\"room.las\">"), std::string::npos);
+
+  // One path in four forms.
+  for (const char* options :
+       {"-o tum.txt --what trajectory", "-o all.kitti", "-o euroc.csv --what trajectory", "-o poses.csv",
+        "-o each --what trajectory --format tum"}) {
+    const Outcome outcome = run(std::string("export out ") + options);
+    ASSERT_EQ(outcome.code, 0) << options << outcome;
+  }
+  const auto tum = dataset::read_trajectory(path("tum.txt"));
+  ASSERT_TRUE(tum);
+  const auto kitti = rows_of(path("all.kitti"));
+  const auto euroc = rows_of(path("euroc.csv"));
+  std::ifstream poses(path("poses.csv"));
+  ASSERT_EQ(kitti.size(), tum->size());
+  ASSERT_EQ(euroc.size(), tum->size());
+  EXPECT_TRUE(fs::exists(path("each/out.txt")));
+  for (std::size_t i = 0; i < tum->size(); ++i) {
+    const auto& pose = (*tum)[i];
+    for (int k = 0; k < 3; ++k) {
+      const auto axis = static_cast<std::size_t>(k);
+      EXPECT_NEAR(kitti[i][4 * axis + 3], pose.world_from_camera.translation[k], 1e-6);
+      EXPECT_NEAR(euroc[i][1 + axis], pose.world_from_camera.translation[k], 1e-6);
+      EXPECT_NEAR(kitti[i][4 * axis], pose.world_from_camera.rotation(k, 0), 1e-6);
+    }
+    EXPECT_NEAR(euroc[i][0], pose.stamp * 1e9, 2e3);
+  }
+  EXPECT_NE(slurp(path("poses.csv")).find("cov_x_x,cov_x_y"), std::string::npos);
+
+  // The body that carries the camera 10 cm ahead of itself.
+  ASSERT_EQ(run("export out -o body.txt --what trajectory --body 0,0,0.1,0,0,0,1").code, 0);
+  const auto body = dataset::read_trajectory(path("body.txt"));
+  ASSERT_TRUE(body);
+  const Eigen::Vector3d off =
+      (*body)[3].world_from_camera.translation - (*tum)[3].world_from_camera * Eigen::Vector3d(0, 0, -0.1);
+  EXPECT_LT(off.norm(), 1e-6);
+
+
+  // What cannot be.
+  const Outcome full = run("export out -o full.las", "ulimit -f 16; trap '' XFSZ; ");
+  EXPECT_EQ(full.code, 5) << full;
+  EXPECT_FALSE(fs::exists(path("full.las")));
+  const Outcome full_folder = run("export out -o full", "ulimit -f 16; trap '' XFSZ; ");
+  EXPECT_EQ(full_folder.code, 5) << full_folder;
+  EXPECT_FALSE(fs::exists(path("full")));
+  EXPECT_EQ(run("export out -o out/model").code, 2) << "an earlier export is not replaced unasked";
+  EXPECT_EQ(run("export out -o out/model --force").code, 0);
+  EXPECT_EQ(run("export out -o out --force").code, 2) << "a result is no export";
+  const Outcome gone = run("export out -o poses_only --recording nowhere");
+  EXPECT_EQ(gone.code, 0) << gone;
+  EXPECT_TRUE(gone.told("poses only, without pictures")) << gone;
+  EXPECT_TRUE(fs::exists(path("poses_only/sparse/0/images.bin")));
+  const Outcome robots = run("export out -o twice --recording a --recording b");
+  EXPECT_TRUE(robots.told("2 given, the map is of 1 robot")) << robots;
+
+  // Without its store a map has neither free space nor tracks.
+  fs::remove(path("out/map.db"));
+  const Outcome grid = run("export out -o late.yaml");
+  EXPECT_EQ(grid.code, 3) << grid;
+  EXPECT_TRUE(grid.told("no map.db")) << grid;
+  EXPECT_EQ(run("export out -o late.las").code, 0);
+}
+
+TEST_F(Exports, WrongListsAreToldBeforeTheRun) {
+  const Outcome wrong =
+      run(std::string("map ") + kRecording +
+          " -o out -q --set 'output.exports=[grid.e57, {file: plan.svg, heights: [0 m, 1 m]}, ../up.las]'");
+  EXPECT_EQ(wrong.code, 2) << wrong;
+  EXPECT_TRUE(wrong.told("grid.e57")) << wrong;
+  EXPECT_TRUE(wrong.told("--heights: means nothing to plan")) << wrong;
+  EXPECT_TRUE(wrong.told("below the result folder")) << wrong;
+  EXPECT_FALSE(fs::exists(path("out")));
+}
+
+}  // namespace
+}  // namespace plumbline::integration

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <regex>
+#include <set>
+
+#include "exports/export_test.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// Two rooms of 4 x 3 m and 2.5 x 3 m seen from inside, a wall of 12 cm with a door of 0.9 m between them, a
+/// cupboard.
+class ExportPlan : public ExportTest {
+ protected:
+  static constexpr float kStep_m = 0.02F;
+
+  void add_wall(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float low, float high) {
+    const Eigen::Vector2f along = (to - from).normalized();
+    const Eigen::Vector3f normal(-along.y(), along.x(), 0.0F);  // on the left
+    for (float s = 0.5F * kStep_m; s < (to - from).norm(); s += kStep_m) {
+      for (float z = low + 0.5F * kStep_m; z < high; z += kStep_m) {
+        const Eigen::Vector2f at = from + s * along;
+        cloud_.push_back(point(at.x(), at.y(), z, normal));
+      }
+    }
+  }
+  /// Counter-clockwise, so that normals look inwards; `door`: in the wall at x1 or x0, from y 1 to 1.9.
+  void add_room(float x0, float x1, bool door_right, bool door_left) {
+    constexpr float kTop_m = 2.6F;
+    constexpr float kLintel_m = 2.05F;
+    add_wall({x0, 0}, {x1, 0}, 0, kTop_m);
+    add_wall({x1, 3}, {x0, 3}, 0, kTop_m);
+    const auto side = [&](float x, float a, float b, bool door) {
+      const float sign = b > a ? 1.0F : -1.0F;
+      if (!door) return add_wall({x, a}, {x, b}, 0, kTop_m);
+      const float first = sign > 0 ? 1.0F : 1.9F;
+      add_wall({x, a}, {x, first}, 0, kTop_m);
+      add_wall({x, first}, {x, first + sign * 0.9F}, kLintel_m, kTop_m);
+      add_wall({x, first + sign * 0.9F}, {x, b}, 0, kTop_m);
+    };
+    side(x1, 0, 3, door_right);
+    side(x0, 3, 0, door_left);
+  }
+  void SetUp() override {
+    add_room(0, 4, true, false);
+    add_room(4.12F, 6.62F, false, true);
+    add_wall({1.8F, 0.5F}, {0.6F, 0.5F}, 0, 1.1F);  // the front of something low
+    ASSERT_TRUE(cloud::write_ply(path("cloud.ply"), cloud_));
+  }
+  [[nodiscard]] static std::multiset<std::string> texts(const std::string& dxf) {
+    std::multiset<std::string> found;
+    const std::regex text("AcDbText\n 10\n[^A]*?\n  1\n([^\n]*)\n");
+    for (std::sregex_iterator it(dxf.begin(), dxf.end(), text), end; it != end; ++it) found.insert((*it)[1]);
+    return found;
+  }
+  static std::size_t count(const std::string& text, const std::string& what) {
+    std::size_t n = 0;
+    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+    return n;
+  }
+
+ private:
+  cloud::Cloud cloud_;
+};
+
+TEST_F(ExportPlan, FindsWallsDoorsAndRooms) {
+  const auto summary = write(request("plan.dxf"));
+  ASSERT_TRUE(summary) << summary.error().message;
+  ASSERT_FALSE(summary->notes.empty());
+  EXPECT_EQ(summary->notes.front(), "8 walls, 1 doors, 2 closed rooms");
+  const std::multiset<std::string> found = texts(bytes("plan.dxf"));
+  EXPECT_EQ(found.count("4.00"), 2U);
+  EXPECT_EQ(found.count("3.00"), 4U);
+  EXPECT_EQ(found.count("2.50"), 2U);
+  EXPECT_EQ(found.count("1: 12.00 m2"), 1U);
+  EXPECT_EQ(found.count("2: 7.50 m2"), 1U);
+}
+
+TEST_F(ExportPlan, ACutAboveTheDoorMeetsItsLintel) {
+  ExportRequest wanted = request("plan.svg");
+  wanted.options.cut_m = 2.35;
+  wanted.given = {"cut"};
+  const auto summary = write(wanted);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->notes.front(), "8 walls, 0 doors, 2 closed rooms");
+}
+
+TEST_F(ExportPlan, SameCloudSameBytes) {
+  for (const char* form : {"svg", "pdf", "dxf"}) {
+    ASSERT_TRUE(write(request(std::string("a.") + form)));
+    ASSERT_TRUE(write(request(std::string("b.") + form)));
+    EXPECT_EQ(bytes(std::string("a.") + form), bytes(std::string("b.") + form)) << form;
+    EXPECT_GT(bytes(std::string("a.") + form).size(), 2000U) << form;
+  }
+}
+
+TEST_F(ExportPlan, ASectionShowsWhatItMeets) {
+  ExportRequest wanted = request("section.svg");
+  wanted.options.section = {-1.0, 2.5, 5.0, 2.5};
+  wanted.given = {"section"};
+  ASSERT_TRUE(write(wanted));
+  EXPECT_GT(count(bytes("section.svg"), "fill=\"#000000\""), 100U) << "cells of three walls";
+  wanted.options.section = {10.0, 10.0, 11.0, 10.0};
+  EXPECT_FALSE(write(wanted));
+}
+
+TEST_F(ExportPlan, WithoutWallsItSaysSo) {
+  ExportRequest wanted = request("plan.svg");
+  wanted.options.box = {0.5, 0.4, 0.0, 2.0, 0.6, 3.0};
+  wanted.given = {"box"};
+  const auto nothing = write(wanted);
+  ASSERT_FALSE(nothing);
+  EXPECT_NE(nothing.error().message.find("no wall"), std::string::npos) << nothing.error().message;
+}
+
+}  // namespace
+}  // namespace plumbline::exports
