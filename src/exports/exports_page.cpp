@@ -19,8 +19,7 @@ constexpr const char* kExportsIntroduction = R"(# Exports
 `map.db` of a run, also of one that was interrupted, a fused map of several robots, or, where a cloud is enough, any
 PLY or PCD file. The form follows the ending of the output, or `--format`.
 
-<!-- file: exports.sh -->
-```
+```sh
 plumbline export out/room -o grid.yaml                       # for Nav2, with grid.pgm
 plumbline export out/room -o colmap                          # a COLMAP model with pictures
 plumbline export out/room -o room.las --voxel "2 cm"         # for surveyors' programs
@@ -32,6 +31,23 @@ plumbline export out/room -o ground.ply --z 0,2m             # what lies up to 2
 )";
 
 constexpr const char* kExportsFrame = R"(
+## At the end of a run
+
+The stage `output` takes a list, so that `map`, `fuse` and the hub write exports into the result folder, and the report
+shows plans and links the rest:
+
+```yaml
+  output:
+    type: output
+    inputs: {map: refine, cloud: fuse}
+    exports:
+      - grid.yaml
+      - plan.svg
+      - {file: model, format: colmap, sharpest: on}
+```
+
+What cannot be made, a plan without walls for instance, is told as a warning; the map is there without it.
+
 ## One frame
 
 All exports of one map are in one frame, that of its results: metres, right-handed, z up, 0 on the floor, x along the

@@ -132,7 +132,7 @@ bool in_line(const WallLine& a, const WallLine& b) {
 /// Door leaves and pieces of furniture: short ones that neither meet walls at both ends nor go on along a
 /// line.
 void drop_loose_pieces(std::vector<WallLine>& walls) {
-  constexpr double kShort_m = 1.2;
+  constexpr double kShort_m = 1.5;
   std::vector<WallLine> joined = walls;
   join_corners(joined);
   std::vector<WallLine> kept;

@@ -310,6 +310,67 @@ def case_grid(case):
     check(free >= 0.9 * len(rows), "the camera went through cells that are not free")
 
 
+def dxf_walls(file):
+    """Ends of the lines of the layer walls, from the pairs of group code and value."""
+    lines = file.read_text().splitlines()
+    pairs = [(int(code), value) for code, value in zip(lines[::2], lines[1::2])]
+    walls, entity = [], None
+    for code, value in pairs:
+        if code == 0:
+            if entity and entity.get("type") == "LINE" and entity.get(8) == "walls":
+                walls.append(((float(entity[10]), float(entity[20])), (float(entity[11]), float(entity[21]))))
+            entity = {"type": value}
+        elif entity is not None:
+            entity[code] = value
+    return walls
+
+
+def case_frame(case):
+    """Cloud, plan, grid, GLB and COLMAP of one map lie on one another."""
+    cloud = [[float(v) for v in line.split()[:3]] for line in case.export("frame.xyz").read_text().splitlines()]
+    # GLB: the same points in the same order, y up.
+    glb = case.export("frame.glb").read_bytes()
+    length = struct.unpack_from("<I", glb, 12)[0]
+    count = json.loads(glb[20:20 + length])["accessors"][0]["count"]
+    check(count == len(cloud), "GLB and cloud have not as many points")
+    for i in range(0, count, 997):
+        x, y, z = struct.unpack_from("<3f", glb, 28 + length + 12 * i)
+        check(math.dist((x, -z, y), cloud[i]) < 1e-4, f"point {i} of the GLB lies elsewhere")
+    # Plan: the points beside each of its walls lie on it.
+    walls = [w for w in dxf_walls(case.export("frame.dxf")) if math.dist(*w) > 0.5]
+    check(len(walls) >= 3, f"{len(walls)} walls in the plan")
+    for a, b in walls:
+        way = math.dist(a, b)
+        t = ((b[0] - a[0]) / way, (b[1] - a[1]) / way)
+        off = sorted((p[1] - a[1]) * t[0] - (p[0] - a[0]) * t[1] for p in cloud
+                     if 0.3 < p[2] < 2.2 and 0.05 < (p[0] - a[0]) * t[0] + (p[1] - a[1]) * t[1] < way - 0.05
+                     and abs((p[1] - a[1]) * t[0] - (p[0] - a[0]) * t[1]) < 0.02)
+        if len(off) > 200:
+            check(abs(off[len(off) // 2]) < 0.005, f"the wall {a} {b} is {off[len(off) // 2]} m beside the cloud's")
+    # Grid: where the plan has a wall, so has the grid, within a cell.
+    yaml = case.export("frame.yaml")
+    keys = dict(line.split(": ", 1) for line in yaml.read_text().splitlines() if not line.startswith("#"))
+    data = (case.work / keys["image"]).read_bytes()
+    head = re.match(rb"P5\n(?:#[^\n]*\n)*(\d+) (\d+)\n255\n", data)
+    width, height = int(head.group(1)), int(head.group(2))
+    x0, y0 = [float(v) for v in keys["origin"].strip("[]").split(",")][:2]
+
+    def occupied(x, y):
+        column, row = int((x - x0) / 0.05), height - 1 - int((y - y0) / 0.05)
+        return any(data[head.end() + (row + i) * width + column + j] == 0
+                   for i in (-1, 0, 1) for j in (-1, 0, 1) if 0 <= row + i < height and 0 <= column + j < width)
+    along = [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for a, b in walls for s in (0.1, 0.3, 0.5, 0.7, 0.9)]
+    share = sum(occupied(*p) for p in along) / len(along)
+    # COLMAP: its points lie on the cloud's surfaces.
+    cells = {tuple(math.floor(v / 0.05) for v in p) for p in cloud}
+    points = read_colmap(case.export("frame_colmap", "--format", "colmap") / "sparse/0")[2]
+    near = sum(any((x + i, y + j, z + k) in cells for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1))
+               for x, y, z in (tuple(math.floor(v / 0.05) for v in p[0]) for p in points.values())) / len(points)
+    print(f"{len(walls)} walls within 5 mm of the cloud; {100 * share:.0f} % of their places occupied in the grid; "
+          f"{100 * near:.0f} % of COLMAP's points within a cell of the cloud")
+    check(share > 0.9 and near > 0.9, "they do not lie on one another")
+
+
 def case_plan(case):
     need("rsvg-convert")
     svg = case.export("room.svg")
