@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <nlohmann/json.hpp>
 
+#include "graph/export_entry.hpp"
 #include "plumbline/cloud/filter_schema.hpp"
 #include "plumbline/core/option_schema.hpp"
 #include "plumbline/pipeline/reference.hpp"
-#include "stages/exports_option.hpp"
 
 namespace plumbline::pipeline {
 namespace {

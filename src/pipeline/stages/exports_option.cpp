@@ -3,29 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
-#include "plumbline/core/option_schema.hpp"
+#include "graph/export_entry.hpp"
 
 namespace plumbline::pipeline {
 namespace {
 
 using Kind = core::ConfigNode::Kind;
-using Json = nlohmann::ordered_json;
-
-/// What of an entry is not an option of the format.
-struct EntryWords {
-  std::string file;
-  std::string format;
-  std::string what = "cloud";
-
-  void declare(core::OptionTable& table) {
-    table.text("file", file, "File or folder below the result folder");
-    table.text("format", format, "A format of plumbline export; empty: by the file's ending");
-    table.choice("what", what, {"cloud", "mesh", "trajectory", "keyframes", "lines"},
-                 "What of the map is written, where the ending does not tell");
-  }
-};
 
 exports::Content content_of(const std::string& what) {
   if (what == "mesh") return exports::Content::kMesh;
@@ -44,7 +27,7 @@ bool leaves_folder(const std::filesystem::path& file) {
 void ExportsOption::add(const core::ConfigNode& entry, const std::string& path,
                         core::ConfigProblems& problems) {
   exports::ExportRequest request;
-  EntryWords words;
+  ExportEntry words;
   core::OptionTable table;
   words.declare(table);
   const std::size_t own = table.specs().size();
@@ -95,20 +78,6 @@ std::vector<std::string> ExportsOption::files() const {
     if (ending == ".pgm") files.push_back(file.replace_extension(".yaml").generic_string());
   }
   return files;
-}
-
-Json exports_definition() {
-  EntryWords words;
-  exports::ExportOptions options;
-  core::OptionTable table;
-  words.declare(table);
-  options.declare(table);
-  Json entry = {{"type", "object"},
-                {"additionalProperties", false},
-                {"required", Json::array({"file"})},
-                {"properties", core::options_schema(table.specs())}};
-  return {{"type", "array"},
-          {"items", {{"anyOf", Json::array({Json{{"type", "string"}}, std::move(entry)})}}}};
 }
 
 }  // namespace plumbline::pipeline

@@ -2,7 +2,6 @@
 #pragma once
 
 // The option `exports` of the stage output: forms that other programs read, written when the result is there.
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -31,8 +30,5 @@ class ExportsOption {
   core::ConfigNode value_;
   std::vector<exports::ExportRequest> requests_;
 };
-
-/// "exports" of a schema's definitions.
-nlohmann::ordered_json exports_definition();
 
 }  // namespace plumbline::pipeline
