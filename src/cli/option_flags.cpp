@@ -44,8 +44,10 @@ std::string as_list(const std::string& text) {
   if (text.empty() || text.front() == '[') return text;
   std::string list = "[";
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool between = text[i] == ' ' && i > 0 && i + 1 < text.size() && std::isdigit(text[i - 1]) != 0 &&
-                         (std::isdigit(text[i + 1]) != 0 || text[i + 1] == '-' || text[i + 1] == '.');
+    const bool between = text[i] == ' ' && i > 0 && i + 1 < text.size() &&
+                         std::isdigit(static_cast<unsigned char>(text[i - 1])) != 0 &&
+                         (std::isdigit(static_cast<unsigned char>(text[i + 1])) != 0 || text[i + 1] == '-' ||
+                          text[i + 1] == '.');
     list += between ? ',' : text[i];
   }
   return list + "]";

@@ -186,7 +186,7 @@ class Stage {
   virtual core::Result<void> finish(StageIo& /*io*/) { return {}; }
   /// Asked after check: what is to be made of the result folder once everything else in it is written, in the
   /// forms of plumbline export; outputs are named below it. Null: nothing.
-  [[nodiscard]] virtual const std::vector<exports::ExportRequest>* exports() const { return nullptr; }
+  [[nodiscard]] virtual const std::vector<exports::ExportRequest>* wanted_exports() const { return nullptr; }
   /// Adds what this stage knows about the run.
   virtual void summarise(RunSummary& /*summary*/) const {}
 };

@@ -134,7 +134,8 @@ void add_export(CLI::App& app, Session& session) {
   command
       ->add_option("--recording", request.recordings,
                    "Where pictures come from, one for each robot (default: what the map was made from)")
-      ->type_name("INPUT");
+      ->type_name("INPUT")
+      ->allow_extra_args(false);
   CLI::Option* what = command->add_option("--what", state->what, "What to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));
   CLI::Option* trajectory =

@@ -251,11 +251,11 @@ core::Result<WallPlan> find_walls(MapSource& source) {
   const double cut_m = source.options().cut_m;
   WallPlan plan;
   plan.walls = wall_sides(**cloud, floor_m, cut_m, source.executor());
+  drop_loose_pieces(plan.walls);
   if (plan.walls.empty()) {
     return core::input_error(fmt::format("{}: no wall is seen at {:g} m over the floor; choose another --cut",
                                          source.request().input.string(), cut_m));
   }
-  drop_loose_pieces(plan.walls);
   join_corners(plan.walls);
   std::vector<WallRaster> rasters = rasters_of(plan.walls, **cloud, floor_m);
   if (source.has_store()) {

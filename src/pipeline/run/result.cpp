@@ -49,8 +49,8 @@ exports::OpenRecording recording_opener(const RunRequest& request, const RunCont
 core::Result<void> write_exports(const std::filesystem::path& folder, const Graph& graph,
                                  const RunRequest& request, const RunContext& context) {
   for (const Node& node : graph.nodes) {
-    if (node.stage->exports() == nullptr) continue;
-    for (exports::ExportRequest wanted : *node.stage->exports()) {
+    if (node.stage->wanted_exports() == nullptr) continue;
+    for (exports::ExportRequest wanted : *node.stage->wanted_exports()) {
       const std::string name = wanted.output.string();
       wanted.input = folder;
       wanted.output = folder / wanted.output;

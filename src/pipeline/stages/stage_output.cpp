@@ -70,7 +70,7 @@ class OutputStage : public Stage {
     return files;
   }
 
-  [[nodiscard]] const std::vector<exports::ExportRequest>* exports() const override {
+  [[nodiscard]] const std::vector<exports::ExportRequest>* wanted_exports() const override {
     return &exports_.requests();
   }
 
