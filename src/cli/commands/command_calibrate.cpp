@@ -156,6 +156,7 @@ void add_calibrate(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->output, "camera.yaml to write")->type_name("FILE");
   command->add_option("--camera", request->open.camera, "Shipped calibration or file to start from")
       ->type_name("NAME|FILE");
+  add_topic_option(*command, request->open);
   add_time_range(*command, request->open);
   command->add_option("--views", request->options.views, "Largest number of keyframes and frames to adjust")
       ->check(CLI::Range(16, 2000));
