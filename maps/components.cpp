@@ -81,6 +81,7 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
   const auto is_inside = [&](const auto& landmark) {
     return !landmark.observations.empty() && inside.count(landmark.observations.front().keyframe) != 0;
   };
+
   const geometry::Rigid3 old_from_new_world = new_from_old_world.inverse();
   for (const KeyframeId id : inside) map.set_pose(id, map.camera_from_world(id) * old_from_new_world);
 

@@ -136,6 +136,7 @@ core::Result<cloud::FusedCloud> StoredResult::fused(const cloud::DenseFusionOpti
   }
   const auto state = fusion_state();
   if (!state) return tl::unexpected(state.error());
+
   cloud::FusionViews all;
   all.world_from_camera = stored->world_from_camera;
   for (const std::int32_t robot : stored->robots) {

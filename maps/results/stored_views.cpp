@@ -45,6 +45,7 @@ core::Result<StoredViews> views_of(const StoreReader& reader, const MapPoses& ma
   views.cameras = CameraHistory(robots);
 
   const std::map<std::int32_t, geometry::Trajectory> paths = by_robot(map);
+
   const auto add = [&](core::KeyframeId keyframe, FrameId frame, double stamp,
                        const geometry::Rigid3& world_from_camera) {
     views.keyframes.push_back(keyframe);

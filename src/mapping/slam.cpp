@@ -181,6 +181,7 @@ bool Slam::believes_place(const sensor::RgbdFrame& frame, const Features& featur
         relocalisation_.passes(map_, lost, frame, *features, tracker_.reference(), track.camera_from_world);
   }
   probation_.reset();
+  last_track_.relocalised = stands;
   if (!stands) tracker_.take_back(lost_frames);
   return stands;
 }

@@ -3,6 +3,7 @@
 // it.
 #include <csignal>
 #include <cstdio>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -205,6 +206,16 @@ TEST_F(ResumeCommand, OnlyTheSameRunIsGoneOnWith) {
   EXPECT_TRUE(fresh.told("beginning with the first frame")) << fresh;
 }
 
+/// The rows of a trajectory; comments above them differ.
+std::string poses(const fs::path& file) {
+  std::istringstream lines(slurp(file));
+  std::string rows;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind('#', 0) != 0) rows += line + "\n";
+  }
+  return rows;
+}
+
 TEST_F(ResumeCommand, ResultsComeFromTheStoreAsWell) {
   ASSERT_EQ(run(std::string("map wall -o out --threads 1") + kCheap).code, 0);
   ASSERT_EQ(run(std::string("map wall -o other --threads 3") + kCheap).code, 0);
@@ -218,7 +229,7 @@ TEST_F(ResumeCommand, ResultsComeFromTheStoreAsWell) {
   ASSERT_EQ(run("export out -o map.ply").code, 0);
   EXPECT_TRUE(slurp(path("map.ply")) == cloud) << "the same cloud in every bit";
   ASSERT_EQ(run("export out --trajectory -o trajectory.txt").code, 0);
-  EXPECT_EQ(slurp(path("trajectory.txt")), slurp(path("other/trajectory.txt")));
+  EXPECT_EQ(poses(path("trajectory.txt")), poses(path("other/trajectory.txt")));
   ASSERT_EQ(run("export out --lines -o lines.ply").code, 0);
   EXPECT_TRUE(slurp(path("lines.ply")) == slurp(path("other/lines.ply")));
   ASSERT_EQ(run("export out --voxel 5cm -o coarse.ply").code, 0);
@@ -227,7 +238,7 @@ TEST_F(ResumeCommand, ResultsComeFromTheStoreAsWell) {
   EXPECT_TRUE(fs::exists(path("clouds/000000.ply")));
   ASSERT_EQ(run("render out/map.db -o picture.png --size 160x120 --lines").code, 0);
   EXPECT_GT(fs::file_size(path("picture.png")), 1000U);
-  EXPECT_EQ(run("export out -o map.ply --voxel 0").code, 2);
+  EXPECT_EQ(run("export out -o map.ply --voxel -1").code, 2);
   EXPECT_EQ(run("export out").code, 2);
 }
 

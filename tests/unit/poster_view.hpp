@@ -32,6 +32,7 @@ inline core::KeyframeId add_view(maps::Map& map, const cv::Mat& poster, const ge
   keyframe->features = features;
   keyframe->surface = tracking::sample_surface(frame.depth, kTestCamera, {});
   const core::KeyframeId id = map.add_keyframe(keyframe, believed);
+  map.attach(id);
   for (std::size_t i = 0; i < features->points.size(); ++i) {
     const features::PointFeature& f = features->points[i];
     if (!(f.depth > 0.0F)) continue;

@@ -58,12 +58,14 @@ std::string exports_html(const ReportData& data) {
   }
   std::sort(files.begin(), files.end());
   if (files.empty()) return {};
+
   std::string pictures;
   std::string links;
   for (const fs::path& file : files) {
     const std::string name = viz::markup_text(file.filename().string());
     links += fmt::format("<li><a href=\"{0}\">{0}</a>: {1}</li>\n", name, viz::markup_text(form_of(file)));
     if (file.extension() != ".svg") continue;
+
     const std::string bytes = read_bytes(file);
     if (bytes.find("</svg>") == std::string::npos) continue;  // not whole
     pictures += fmt::format(

@@ -58,7 +58,8 @@ Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidenc
       } else {
         anchor_from_part[merge->a] = anchor_from_part[merge->b] * merge->alignment.a_from_b.inverse();
       }
-      layout.ties.push_back(tie_of(*merge, *parts[has_a ? merge->b : merge->a].map));
+      if (!merge->pairs.empty())
+        layout.ties.push_back(tie_of(*merge, *parts[has_a ? merge->b : merge->a].map));
       grown = true;
       break;  // the best merge that is left, again
     }

@@ -73,6 +73,7 @@ World swing(const sensor::Camera& truth, int keyframes, int corners) {
     keyframe->stamp = stamp;
     keyframe->features = features;
     ids.push_back(world.map.add_keyframe(keyframe, pose_at(stamp)));
+    world.map.attach(ids.back());
     for (const double beside : {-0.03, 0.0, 0.03}) {
       world.frames.push_back(
           {stamp + beside, ids.back(), pose_at(stamp + beside) * pose_at(stamp).inverse(), true, {}, 0.0});

@@ -66,6 +66,7 @@ struct SmallMap {
     keyframe->turn_rate = turn_rate;
     keyframe->features = features;
     map.add_keyframe(keyframe, truth.back());
+    map.attach(keyframe->id);
   }
 };
 

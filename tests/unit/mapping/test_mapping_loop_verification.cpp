@@ -96,6 +96,7 @@ struct Ring {
       picture->descriptors.resize(static_cast<std::size_t>(features));
       keyframe->features = picture;
       map.add_keyframe(keyframe, believed);
+      map.attach(keyframe->id);
       pose = step * pose;
       believed = wrong_step * believed;
     }

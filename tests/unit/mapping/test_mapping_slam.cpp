@@ -295,10 +295,12 @@ TEST(Slam, LostWhileCoveredAndFoundAgainAtAKnownPlace) {
     options.loops.enabled = loops;
     const SlamRun result = run(world.shots, 1, options);
     for (std::size_t i = 0; i < 30; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
-    for (std::size_t i = 30; i < 45; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kLost) << i;
-    for (std::size_t i = 45; i < 51; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
-    EXPECT_TRUE(result.reports[45].relocalised) << "carried back while covered: only the picture can tell";
-    EXPECT_EQ(result.trajectory.size(), 36U);
+    const std::size_t believed = loops ? 49 : 45;  // on probation until then
+    for (std::size_t i = 30; i < believed; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kLost) << i;
+    for (std::size_t i = believed; i < 51; ++i) EXPECT_EQ(result.reports[i].state, TrackState::kTracked) << i;
+    EXPECT_TRUE(result.reports[believed].relocalised)
+        << "carried back while covered: only the picture can tell";
+    EXPECT_EQ(result.trajectory.size(), loops ? 32U : 36U);
     EXPECT_LT(ate(result.trajectory, world.truth), 0.005);
   }
 }
@@ -312,7 +314,8 @@ TEST(Slam, FoundFarAwayIsNotBelievedWithoutVerification) {
   options.loops.verify.min_inliers = 10000;  // nothing passes
   const SlamRun result = run(world.shots, 1, options);
   ASSERT_GT(carried.norm(), 0.6) << "near by, nothing has to pass";
-  EXPECT_EQ(result.reports[45].state, TrackState::kLost);
+  EXPECT_FALSE(result.reports[45].relocalised);
+  EXPECT_EQ(result.reports[45].component, result.reports[45].keyframe) << "it begins a second component";
 }
 
 TEST(Slam, NothingButBlackFramesGiveNoTrajectory) {
