@@ -75,7 +75,6 @@ TEST_F(Exports, AllPathsAreOneAndRunsWriteTheirExports) {
       (*body)[3].world_from_camera.translation - (*tum)[3].world_from_camera * Eigen::Vector3d(0, 0, -0.1);
   EXPECT_LT(off.norm(), 1e-6);
 
-
   // What cannot be.
   const Outcome full = run("export out -o full.las", "ulimit -f 16; trap '' XFSZ; ");
   EXPECT_EQ(full.code, 5) << full;

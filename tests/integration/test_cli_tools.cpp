@@ -84,10 +84,14 @@ TEST_F(Tools, ExportsCloudPathAndLines) {
   EXPECT_EQ(points("c.pcd"), points("out/map.ply"));
   EXPECT_EQ(points("c.ply"), points("out/map.ply"));
   EXPECT_EQ(run("export out --what trajectory -o t.txt").code, 0);
-  EXPECT_EQ(slurp(path("t.txt")), slurp(path("out/trajectory.txt")));
+  const auto rows = [&](const char* file) {  // comments above them differ
+    const std::string text = slurp(path(file));
+    return text.substr(text.find("\n10."));
+  };
+  EXPECT_EQ(rows("t.txt"), rows("out/trajectory.txt"));
   EXPECT_EQ(run("export out --what keyframes -o k.ply").code, 0);
   EXPECT_EQ(run("export out --what lines -o l.ply").code, 0);
-  EXPECT_EQ(run("export out -o c.obj").code, 2);
+  EXPECT_EQ(run("export out -o c.obj").code, 0);  // a mesh
   EXPECT_EQ(run("export wall -o c.ply").code, 3);
   EXPECT_EQ(run("export out/map.ply -o again.pcd").code, 0);  // a cloud by itself
   EXPECT_EQ(points("again.pcd"), points("out/map.ply"));

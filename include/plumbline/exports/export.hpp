@@ -37,7 +37,7 @@ struct ExportRequest {
   std::string robot;                    ///< whose map, of an interrupted run of several; empty: the only one
   std::vector<std::string> recordings;  ///< where pictures come from, in the order of the robots; empty:
                                         ///< where the map says that it was made from
-  OpenRecording open;  ///< null: there are no pictures
+  OpenRecording open;                   ///< null: there are no pictures
   /// Runs work during which libraries print what nobody wants to read (Poisson's); null: just runs it.
   std::function<void(const std::function<void()>&)> quietly = nullptr;
   ExportOptions options;

@@ -129,7 +129,9 @@ void add_export(CLI::App& app, Session& session) {
       ->add_option("--keyframes", state->keyframes,
                    "Write the cloud of every keyframe as DIR/<number>.ply, from map.db")
       ->type_name("DIR");
-  command->add_option("--robot", request.robot, "Robot whose map to use, for an interrupted run of several robots")
+  command
+      ->add_option("--robot", request.robot,
+                   "Robot whose map to use, for an interrupted run of several robots")
       ->type_name("NAME");
   command
       ->add_option("--recording", request.recordings,

@@ -58,7 +58,8 @@ void add_map(CLI::App& app, Session& session) {
                                   [&session, request, inputs] { return map(session, *request, *inputs); });
   command
       ->add_option("INPUT", *inputs,
-                   "Folder of a recording, a ROS bag, or synth:SCENE?frames=900&texture=none&seed=3; give several, one "
+                   "Folder of a recording, a ROS bag, or synth:SCENE?frames=900&texture=none&seed=3; give "
+                   "several, one "
                    "per robot, to fuse them into one map")
       ->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");

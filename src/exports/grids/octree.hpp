@@ -13,7 +13,7 @@ namespace plumbline::exports {
 struct OctreeWork {
   double resolution_m = 0.05;
   bool color = false;  ///< ColorOcTree with probabilities (.ot), else the binary OcTree (.bt)
-  std::string frame;  ///< for the file's comment, one line
+  std::string frame;   ///< for the file's comment, one line
   const cloud::CloudFile* cloud = nullptr;
   Eigen::AlignedBox3d box;
   /// Hands the rays of all views, one after another, to its argument.

@@ -83,7 +83,8 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   if (!report) return tl::unexpected(report.error());
   RunSummary summary = summary_of_run(*graph, *report, request, executor);
   summary.input = context.input;
-  if (auto ok = commit_result(summary, *output, began, *graph, request, context); !ok) return tl::unexpected(ok.error());
+  if (auto ok = commit_result(summary, *output, began, *graph, request, context); !ok)
+    return tl::unexpected(ok.error());
   return summary;
 }
 

@@ -19,7 +19,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 JUDGES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "plumbline/judges/node_modules"
 SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's modules are its
-FRAMES = 120
+FRAMES = 300
 
 
 class Absent(Exception):

@@ -56,6 +56,7 @@ class Rule : public testing::Test {
   }
   static tracking::TrackResult track(const Rigid3& pose, std::size_t points, std::size_t lines) {
     tracking::TrackResult track;
+    track.min_eigenvalue = 1e6;
     track.state = tracking::TrackState::kTracked;
     track.reference = {0, 0};
     track.camera_from_world = pose;
