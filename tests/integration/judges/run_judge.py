@@ -19,7 +19,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 JUDGES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "plumbline/judges/node_modules"
 SYSTEM_PYTHON = "/usr/bin/python3"  # Debian's modules are its
-FRAMES = 300
+FRAMES = 200
 
 
 class Absent(Exception):
@@ -381,7 +381,7 @@ def case_plan(case):
     need("pdftotext")
     pdf = case.export("room.pdf")
     check("m2" in run("pdftotext", pdf, "-") or "." in run("pdftotext", pdf, "-"), "the PDF has no text")
-    section = case.export("section.svg", "--section", "0,-2 0,2")
+    section = case.export("section.svg", "--section", "-3,-6 3,6")
     run("rsvg-convert", "-w", 400, section, "-o", case.work / "section.png")
 
 
