@@ -163,7 +163,7 @@ double realsense_depth_scale(const BagSurvey& survey, const std::string& stream)
     const auto metres = survey.first(topic, &MessageDecoder::number);
     if (!metres || !(*metres > 1e-7F && *metres < 1.0F)) continue;
     // Written as a float: 0.001 is meant by the float next to it.
-    return std::round(1e6 / static_cast<double>(*metres)) / 1e6;
+    return std::round(100.0 / static_cast<double>(*metres)) / 100.0;
   }
   return kMillimetres;
 }
