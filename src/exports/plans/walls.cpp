@@ -87,6 +87,20 @@ std::vector<WallOpening> openings_between(const WallRaster& raster, double s0, d
   return openings;
 }
 
+/// An opening up to where its wall begins: leaves and frames reach a little into it.
+WallOpening widened(const WallRaster& raster, WallOpening opening, const Cut& cut) {
+  int a = raster.column_of(opening.s0);
+  int b = raster.column_of(opening.s1);
+  while (a > 0 && open_column(raster, a - 1, cut) && raster.start_of(b) - raster.start_of(a) < kWidestDoor_m)
+    --a;
+  while (b + 1 < raster.columns() && open_column(raster, b, cut) &&
+         raster.start_of(b) - raster.start_of(a) < kWidestDoor_m)
+    ++b;
+  opening.s0 = std::min(opening.s0, raster.start_of(a));
+  opening.s1 = std::max(opening.s1, raster.start_of(b));
+  return opening;
+}
+
 /// Joins what lies behind one another on one line and was only hidden, or is a door without a lintel that was
 /// seen.
 void bridge_gaps(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters, const Cut& cut) {
@@ -105,7 +119,7 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters,
       const int last = rasters[i].column_of(from);
       const bool crossed = is_passage(rasters[i], first, last, {cut.low_m, cut.high_m, true});
       if (crossed && gap < kNarrowestDoor_m) continue;
-      if (crossed || !cut.rays_known) a.openings.push_back({a.s1, from});
+      if (crossed || !cut.rays_known) a.openings.push_back(widened(rasters[i], {a.s1, from}, cut));
       const double to = a.along().dot(b.at(b.s1));
       for (const WallOpening& o : b.openings)
         a.openings.push_back({a.along().dot(b.at(o.s0)), a.along().dot(b.at(o.s1))});
@@ -129,19 +143,25 @@ bool in_line(const WallLine& a, const WallLine& b) {
          std::abs(a.normal.dot(b.at(0.5 * (b.s0 + b.s1))) - a.offset_m) < kSameLine_m;
 }
 
-/// Door leaves and pieces of furniture: short ones that neither meet walls at both ends nor go on along a
-/// line.
+/// Door leaves and pieces of furniture: short ones that do not meet walls at both ends, or one at a right
+/// angle, nor go on along a line.
 void drop_loose_pieces(std::vector<WallLine>& walls) {
   constexpr double kShort_m = 1.5;
+  constexpr double kSquare = 0.05;  // cosine: within 3 degrees
   std::vector<WallLine> joined = walls;
   join_corners(joined);
   std::vector<WallLine> kept;
   for (std::size_t i = 0; i < walls.size(); ++i) {
     const bool met = joined[i].corner[0] >= 0 && joined[i].corner[1] >= 0;
+    const bool square = std::any_of(joined[i].corner.begin(), joined[i].corner.end(), [&](int other) {
+      return other >= 0 &&
+             std::abs(joined[i].normal.dot(joined[static_cast<std::size_t>(other)].normal)) < kSquare &&
+             joined[static_cast<std::size_t>(other)].length() >= kShort_m;
+    });
     const bool goes_on = std::any_of(walls.begin(), walls.end(), [&](const WallLine& other) {
       return &other != &walls[i] && other.length() >= 0.5 * kShort_m && in_line(walls[i], other);
     });
-    if (walls[i].length() >= kShort_m || met || goes_on) kept.push_back(walls[i]);
+    if (walls[i].length() >= kShort_m || met || square || goes_on) kept.push_back(walls[i]);
   }
   walls = std::move(kept);
 }
