@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
 
 #include "frame_images.hpp"
@@ -16,6 +17,7 @@ class FolderSource final : public FrameSource {
       : name_(std::move(name)),
         layout_(std::move(layout)),
         camera_(std::move(camera)),
+        rectified_(rectified),
         rectifier_(camera_, rectified) {
     if (!layout_.video.empty()) video_ = std::make_unique<VideoFrames>(layout_.video);
   }
@@ -26,42 +28,51 @@ class FolderSource final : public FrameSource {
   [[nodiscard]] std::size_t size() const override { return layout_.pairs.size(); }
   [[nodiscard]] PairInfo info(std::size_t index) const override { return layout_.pairs.at(index); }
   [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return layout_.truth; }
+  [[nodiscard]] bool truth_is_odometry() const override { return layout_.truth_is_odometry; }
   [[nodiscard]] std::string doubt() const override { return doubt_; }
   void set_doubt(std::string doubt) { doubt_ = std::move(doubt); }
 
   [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
     Layout layout = layout_;
     for (PairInfo& pair : layout.pairs) pair.depth_stamp += better.depth_delay_s - camera_.depth_delay_s;
-    auto source = std::make_unique<FolderSource>(name_, std::move(layout), better, camera_.color);
+    auto source = std::make_unique<FolderSource>(name_, std::move(layout), better, rectified_);
     source->set_doubt(doubt_);
     return source;
   }
 
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
     const PairInfo& pair = layout_.pairs.at(index);
-    auto color = read_color(pair.color_file, camera_.color, layout_.color_reduction, video_.get(),
-                            layout_.images.get());
+    auto color = read_color(layout_, pair.color_file, camera_.color, video_.get());
     if (!color) return tl::unexpected(color.error());
-    auto depth = read_depth(pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
-                            camera_.depth_scale, layout_.images.get());
+    auto depth = read_depth(layout_, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
+                            camera_.depth_scale);
     if (!depth) return tl::unexpected(depth.error());
     if (!layout_.confidence.empty()) {
       const auto mask =
           std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
       if (auto masked = mask_depth(mask.string(), *depth); !masked) return tl::unexpected(masked.error());
     }
+    std::optional<sensor::Rectifier> own;
+    if (pair.camera >= 0) own.emplace(camera_of(pair), rectified_);
+    const sensor::Rectifier& rectifier = own ? *own : rectifier_;
     sensor::RgbdFrame frame;
     frame.index = static_cast<std::int64_t>(index);
     frame.stamp = pair.stamp;
     frame.depth_stamp = pair.depth_stamp;
-    frame.color = rectifier_.color(*color);
+    frame.color = rectifier.color(*color);
     cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
-    frame.depth = rectifier_.depth(*depth);
+    frame.depth = rectifier.depth(*depth);
+    if (layout_.gives_odometry && layout_.truth)
+      frame.odometry = geometry::pose_at(*layout_.truth, pair.stamp, kNearestPose_s);
     return frame;
   }
 
   [[nodiscard]] core::Result<StoredPair> stored(std::size_t index) const override {
     const PairInfo& pair = layout_.pairs.at(index);
+    if (pair.camera >= 0) {
+      return core::usage_error(
+          name_ + ": each of its images has a camera of its own, which no copy could say; map it as it is");
+    }
     auto color = stored_image(pair.color_file);
     if (!color) return tl::unexpected(color.error());
     auto depth = layout_.confidence.empty() ? stored_image(pair.depth_file) : masked_depth(pair);
@@ -70,10 +81,27 @@ class FolderSource final : public FrameSource {
   }
 
  private:
+  static constexpr double kNearestPose_s = 0.02;
+
+  /// The camera that took a pair, where each has one of its own (a lens that focuses): what the recording's
+  /// turned out to be more or less than nominal, so is it.
+  [[nodiscard]] sensor::Camera camera_of(const PairInfo& pair) const {
+    sensor::Camera camera = camera_;
+    const sensor::Pinhole stored = layout_.frame_cameras.at(static_cast<std::size_t>(pair.camera));
+    sensor::Pinhole color = stored.resized(rectified_.width, rectified_.height);
+    color.fx *= camera_.color.fx / rectified_.fx;
+    color.fy *= camera_.color.fy / rectified_.fy;
+    color.cx += camera_.color.cx - rectified_.cx;
+    color.cy += camera_.color.cy - rectified_.cy;
+    camera.color = color;
+    if (camera.depth) camera.depth = stored.resized(camera.depth->width, camera.depth->height);
+    return camera;
+  }
+
   [[nodiscard]] core::Result<StoredImage> stored_image(const std::string& name) const {
     if (layout_.images) return layout_.images->stored(name);
-    if (video_frame_of(name) && !is_file(name)) {
-      auto pixels = read_stored_color(name, video_.get());
+    if (!is_file(name)) {  // in a film, or packed with all others
+      auto pixels = read_stored(layout_, name, video_.get());
       if (!pixels) return tl::unexpected(pixels.error());
       return StoredImage{"", {}, std::move(*pixels)};
     }
@@ -82,8 +110,8 @@ class FolderSource final : public FrameSource {
 
   /// A copy has no masks: what they take out is taken out.
   [[nodiscard]] core::Result<StoredImage> masked_depth(const PairInfo& pair) const {
-    auto depth =
-        read_depth(pair.depth_file, camera_.depth ? *camera_.depth : camera_.color, camera_.depth_scale);
+    auto depth = read_depth(layout_, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
+                            camera_.depth_scale);
     if (!depth) return tl::unexpected(depth.error());
     const auto mask =
         std::filesystem::path(layout_.confidence) / std::filesystem::path(pair.depth_file).filename();
@@ -95,6 +123,7 @@ class FolderSource final : public FrameSource {
   std::string doubt_;
   Layout layout_;
   sensor::Camera camera_;
+  sensor::Pinhole rectified_;  ///< of the images that are given
   sensor::Rectifier rectifier_;
   std::unique_ptr<VideoFrames> video_;  ///< which locks itself: frames are read side by side
 };

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "azure_kinect.hpp"
 #include "layout.hpp"
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/dataset/image_io.hpp"
@@ -47,7 +48,7 @@ bool channels_are_equal(const cv::Mat& image) {
 template <typename Name>
 cv::Mat first_image(const Layout& layout, const Name& name) {
   for (const PairInfo& pair : layout.pairs) {
-    if (auto image = read_stored_color(name(pair), nullptr, layout.images.get())) return std::move(*image);
+    if (auto image = read_stored(layout, name(pair))) return std::move(*image);
   }
   return {};
 }
@@ -80,9 +81,11 @@ cv::Mat depth_units(const cv::Mat& metres, double depth_scale) {
   return units;
 }
 
-core::Result<cv::Mat> read_stored_color(const std::string& name, VideoFrames* video,
-                                        const ImageStore* store) {
-  if (store != nullptr) return store->image(name);
+core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name, VideoFrames* video) {
+  if (layout.images != nullptr) return layout.images->image(name);
+  if (layout.packed != nullptr) {
+    if (auto packed = layout.packed->read(name)) return std::move(*packed);
+  }
   const auto frame = video_frame_of(name);
   if (!frame || is_file(name)) return read_image(name);
   if (video != nullptr) return video->read(frame->second);
@@ -99,9 +102,10 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   return {};
 }
 
-core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole& camera, int reduction,
-                                 VideoFrames* video, const ImageStore* store) {
-  auto image = read_stored_color(file, video, store);
+core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+                                 VideoFrames* video) {
+  const int reduction = layout.color_reduction;
+  auto image = read_stored(layout, file, video);
   if (!image) return image;
   const bool deep = image->depth() == CV_16U && image->channels() >= 3;
   if (image->depth() != CV_8U && !deep) {
@@ -119,9 +123,9 @@ core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole&
   return image;
 }
 
-core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole& camera, double depth_scale,
-                                 const ImageStore* store) {
-  auto image = store != nullptr ? store->image(file) : read_image(file);
+core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+                                 double depth_scale) {
+  auto image = read_stored(layout, file);
   if (!image) return image;
   if (image->type() == CV_64FC1) image->convertTo(*image, CV_32F);
   if (image->type() == CV_16UC3 && channels_are_equal(*image)) cv::extractChannel(*image, *image, 0);

@@ -15,29 +15,29 @@ namespace plumbline::dataset {
 
 struct Layout;
 class VideoFrames;
-class ImageStore;
 
 /// Of depth that is stored as floats, metres: what a unit of the 16-bit image is that it becomes. 0.2 mm, up
 /// to 13.1 m.
 inline constexpr double kFloatDepthScale = 5000.0;
 
-/// The image of a file, or of a frame of a video (video_frame_name), or of `store`, where there is one.
-core::Result<cv::Mat> read_stored_color(const std::string& name, VideoFrames* video = nullptr,
-                                        const ImageStore* store = nullptr);
+/// The image of a file, of a frame of a video (video_frame_name), of the file that a layout's images are
+/// packed in, or of a bag.
+core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name,
+                                  VideoFrames* video = nullptr);
 
 /// A file's bytes, undecoded. Error (kInput): cannot be read.
 core::Result<StoredImage> stored_file(const std::string& file);
 
-/// CV_8UC3, BGR, of the camera's size; stored `reduction` times as large. Grey, transparent and 16-bit images
-/// are converted. Error (kInput): names the file and what is wrong.
-core::Result<cv::Mat> read_color(const std::string& file, const sensor::Pinhole& camera, int reduction,
-                                 VideoFrames* video = nullptr, const ImageStore* store = nullptr);
+/// CV_8UC3, BGR, of the camera's size; stored Layout::color_reduction times as large. Grey, transparent and
+/// 16-bit images are converted. Error (kInput): names the file and what is wrong.
+core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+                                 VideoFrames* video = nullptr);
 
 /// CV_16UC1 of the camera's size, in units of 1 / depth_scale metres; 0 is no measurement. Images of 16 bits
 /// with one channel are taken as they are, those with three equal channels too; floats are metres and rounded
 /// to units.
-core::Result<cv::Mat> read_depth(const std::string& file, const sensor::Pinhole& camera, double depth_scale,
-                                 const ImageStore* store = nullptr);
+core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+                                 double depth_scale);
 
 /// Metres of CV_32FC1 as units of 1 / depth_scale metres; what is not finite, not positive or too far is 0.
 cv::Mat depth_units(const cv::Mat& metres, double depth_scale);

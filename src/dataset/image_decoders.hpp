@@ -24,5 +24,9 @@ Decoded decode_png(const Bytes& file);
 /// libjpeg with lost data taken as an error: it would otherwise fill what is missing with grey.
 Decoded decode_jpeg(const Bytes& file);
 Decoded decode_other(const Bytes& file);
+/// NumPy's .npy: an array of two dimensions, or three of which one is 1, of float32 (CV_32FC1), float64
+/// (CV_64FC1) or uint16 (CV_16UC1) in little endian, row by row.
+bool is_npy(const Bytes& file);
+Decoded decode_npy(const Bytes& file);
 
 }  // namespace plumbline::dataset

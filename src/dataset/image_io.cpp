@@ -57,6 +57,7 @@ core::Result<cv::Mat> read_image(const std::filesystem::path& file) {
     return core::input_error(fmt::format("{}: truncated or damaged: empty file", file.string()));
   Decoded image = is_png(*bytes)    ? decode_png(*bytes)
                   : is_jpeg(*bytes) ? decode_jpeg(*bytes)
+                  : is_npy(*bytes)  ? decode_npy(*bytes)
                                     : decode_other(*bytes);
   if (image) return std::move(*image);
   return core::input_error(fmt::format("{}: truncated or damaged: {}", file.string(), image.error()));

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@
 #include "plumbline/sensor/camera_file.hpp"
 
 namespace plumbline::dataset {
+
+class AzureKinectFile;
 
 /// Images that are in no files of their own, but in a bag. Thread-safe.
 class ImageStore {
@@ -36,6 +39,11 @@ struct Layout {
   int color_reduction = 1;  ///< colour images are made smaller by this factor while reading
   /// What the recording's own description says of its camera, where no camera file is named or found.
   std::optional<sensor::CameraReading> camera{};
+  /// The pinhole of each pair (PairInfo::camera) for its stored colour image, where they differ.
+  std::vector<sensor::Pinhole> frame_cameras{};
+  std::shared_ptr<AzureKinectFile> packed{};   ///< the file that all images are in; null: each has its own
+  bool truth_is_odometry = false;              ///< the recorder's own poses, known while recording
+  bool gives_odometry = false;                 ///< frames have them
   std::shared_ptr<const ImageStore> images{};  ///< where the images are; null: in files
 };
 
@@ -61,7 +69,7 @@ struct StampedFile {
 std::unique_ptr<FrameSource> make_folder_source(std::string name, Layout layout, sensor::Camera camera,
                                                 std::string doubt = "");
 
-/// One layout: src/dataset/layouts has a source for each.
+/// One layout: src/dataset/layouts has a source for each. Of some a recording is a file.
 struct LayoutFormat {
   const char* name;        ///< of --format
   const char* program;     ///< whose it is, for messages
@@ -78,7 +86,11 @@ const LayoutFormat& seven_scenes_layout();
 const LayoutFormat& replica_layout();
 const LayoutFormat& scannet_layout();
 const LayoutFormat& stray_layout();
+const LayoutFormat& polycam_layout();
+const LayoutFormat& record3d_layout();
+const LayoutFormat& tartanair_layout();
 const LayoutFormat& redwood_layout();
+const LayoutFormat& azure_kinect_layout();
 
 /// In the order in which they are asked.
 const std::vector<const LayoutFormat*>& layout_formats();
@@ -88,10 +100,21 @@ const LayoutFormat* layout_of(const std::filesystem::path& folder);
 
 /// What to say of a folder that is no recording: what is there, and which layout is nearest.
 std::string not_a_recording(const std::filesystem::path& folder);
+/// What to say of a file that is none: what it is, where that can be told, and the way out.
+std::string not_a_recording_file(const std::filesystem::path& file);
 
 /// Whether the path is a folder, or a file; false when it cannot be told.
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
+
+/// A JSON file of at most 64 MB; null when it cannot be read or is no JSON.
+nlohmann::json read_json_file(const std::filesystem::path& file);
+/// The number there; none when it is none, or not finite.
+std::optional<double> json_number(const nlohmann::json& object, const char* key);
+
+/// world_from_camera from what Apple's ARKit calls the camera's transform: there y points up and the camera
+/// looks along -z, in the world as in the camera. Here the world's z points up.
+geometry::Rigid3 from_arkit(const geometry::Rigid3& transform);
 
 /// The groups of digits of a name, left to right.
 std::vector<long long> numbers_of(const std::string& name);

@@ -33,7 +33,6 @@ std::string recordings_inside(const fs::path& folder) {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const fs::path& path = entry.path();
-    if (!fs::is_directory(path, ignored)) continue;
     if (layout_of(path) != nullptr) found.push_back(path.string());
   }
   std::sort(found.begin(), found.end());
@@ -72,11 +71,8 @@ core::Result<Layout> read_any(const fs::path& path, const OpenOptions& open, con
     return core::usage_error(
         fmt::format("{}: is no bag, and --topic is about topics of bags; leave it out", path.string()));
   }
-  if (is_folder(path)) return read_layout(path, open.format, options, log);
-  return core::input_error(fmt::format(
-      "{}: is a file, and no bag (MCAP, rosbag2's .db3, ROS 1's .bag) by its content; give a bag or the "
-      "recording's folder",
-      path.string()));
+  if (!is_folder(path) && layout_of(path) == nullptr) return core::input_error(not_a_recording_file(path));
+  return read_layout(path, open.format, options, log);
 }
 
 /// Stamps are whole nanoseconds, as those of messages are, so that no copy of a recording has others.
@@ -207,6 +203,7 @@ core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder
   auto camera = complete_camera(folder, *chosen, *layout, log);
   if (!camera) return tl::unexpected(camera.error());
   layout->color_reduction = stored_reduction(*layout, *camera);
+  layout->gives_odometry = layout->truth_is_odometry && options.poses == PoseUse::kPrior;
   if (auto kinds = check_image_kinds(*layout, *camera, log); !kinds) return tl::unexpected(kinds.error());
   if (auto selected = select(options, folder.string(), layout->pairs); !selected)
     return tl::unexpected(selected.error());

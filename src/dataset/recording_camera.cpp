@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "frame_images.hpp"
+#include "plumbline/dataset/summary.hpp"
 
 namespace plumbline::dataset {
 namespace {
@@ -99,7 +101,7 @@ core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& came
 template <typename Name>
 std::optional<cv::Size> image_size(const Layout& layout, const Name& name) {
   for (const PairInfo& pair : layout.pairs) {
-    if (const auto image = read_stored_color(name(pair), nullptr, layout.images.get())) return image->size();
+    if (const auto image = read_stored(layout, name(pair))) return image->size();
   }
   return std::nullopt;
 }
@@ -160,8 +162,9 @@ std::string distortion_text(const sensor::Camera& camera) {
 std::string understood(const ChosenCamera& chosen, const sensor::Camera& camera, const Layout& layout) {
   const sensor::CameraReading& reading = chosen.reading;
   const sensor::Pinhole& p = camera.color;
-  std::string text = fmt::format("{}: camera file of {}: fx {:g} fy {:g} cx {:g} cy {:g}, {}", chosen.file,
-                                 reading.program, p.fx, p.fy, p.cx, p.cy, distortion_text(camera));
+  std::string text = fmt::format("{}: camera{} of {}: fx {:g} fy {:g} cx {:g} cy {:g}, {}", chosen.file,
+                                 chosen.of_layout ? "" : " file", reading.program, p.fx, p.fy, p.cx, p.cy,
+                                 distortion_text(camera));
   text +=
       fmt::format("; size {}x{} {}", p.width, p.height, reading.has_size ? "(file)" : "(from the images)");
   text += fmt::format(
@@ -195,8 +198,7 @@ core::Result<cv::Size> size_in(const Layout& layout, bool depth) {
                                        depth ? "depth" : "colour"));
 }
 
-/// Sizes that the camera file does not say, from the images. A phone's one calibration is for both of its
-/// sizes.
+/// Sizes that the camera file does not say, from the images.
 core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, sensor::Camera& camera) {
   if (!chosen.reading.has_size) {
     const auto size = size_in(layout, false);
@@ -204,17 +206,53 @@ core::Result<void> add_sizes(const ChosenCamera& chosen, const Layout& layout, s
     camera.color.width = size->width;
     camera.color.height = size->height;
   }
-  const bool one_for_both = layout.format == "stray";
-  if (!one_for_both && !(camera.depth && camera.depth->width == 0)) return {};
+  if (!camera.depth || camera.depth->width != 0) return {};
   const auto size = size_in(layout, true);
   if (!size) return tl::unexpected(size.error());
-  if (one_for_both) {
-    camera.depth = camera.color.resized(size->width, size->height);
-    camera.color_from_depth = geometry::Rigid3();
-  }
   camera.depth->width = size->width;
   camera.depth->height = size->height;
   return {};
+}
+
+/// The size that most of a few images have, spread over the recording; none when none can be read.
+std::optional<cv::Size> usual_size(const Layout& layout, bool depth) {
+  constexpr std::size_t kLookedAt = 5;
+  std::vector<cv::Size> sizes;
+  for (const std::size_t i : spread(layout.pairs.size(), kLookedAt)) {
+    const auto image = read_stored(layout, depth ? layout.pairs[i].depth_file : layout.pairs[i].color_file);
+    if (image) sizes.push_back(image->size());
+  }
+  const auto count = [&](const cv::Size& size) { return std::count(sizes.begin(), sizes.end(), size); };
+  const auto most = std::max_element(sizes.begin(), sizes.end(),
+                                     [&](const auto& a, const auto& b) { return count(a) < count(b); });
+  return most == sizes.end() ? std::nullopt : std::optional(*most);
+}
+
+/// Where colour and depth have two sizes of one shape and the camera is that of one of them, it is scaled to
+/// the other.
+void share_calibration(const Layout& layout, sensor::Camera& camera) {
+  constexpr double kSameShape = 0.01;
+  if (camera.depth) return;
+  const auto color = usual_size(layout, false);
+  const auto depth = usual_size(layout, true);
+  if (!color || !depth || *color == *depth) return;
+  const double shape = static_cast<double>(color->width) * depth->height;
+  if (std::abs(static_cast<double>(depth->width) * color->height / shape - 1.0) > kSameShape) return;
+  const cv::Size own(camera.color.width, camera.color.height);
+  if (own != *color && own != *depth) return;
+  const sensor::Pinhole pinhole = camera.color;
+  camera.color = pinhole.resized(color->width, color->height);
+  camera.depth = pinhole.resized(depth->width, depth->height);
+  camera.depth_lens = camera.lens();
+  camera.color_from_depth = geometry::Rigid3();
+}
+
+/// A camera that the layout says may be that of images of another size.
+void scale_to_images(const Layout& layout, sensor::Camera& camera) {
+  const auto color = usual_size(layout, false);
+  if (!color || color->width == camera.color.width) return;
+  if (color->width * camera.color.height != color->height * camera.color.width) return;
+  camera.color = camera.color.resized(color->width, color->height);
 }
 
 core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout, core::Log& log) {
@@ -225,10 +263,16 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
         "(shipped: tum_fr1, tum_fr2, tum_fr3, icl_nuim, seven_scenes; or a file, also of another program)",
         folder.string()));
   }
-  log.warning(
-      fmt::format("{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: a "
-                  "guess; put a camera.yaml there or name one with --camera",
-                  folder.string(), camera->name, camera->color.fx));
+  std::string text = fmt::format(
+      "{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: a "
+      "guess; put a camera.yaml there or name one with --camera",
+      folder.string(), camera->name, camera->color.fx);
+  if (layout.format == "7scenes") {
+    text +=
+        "; 7-Scenes as it is published has depth that is not registered to colour: --camera seven_scenes "
+        "registers it";
+  }
+  log.warning(text);
   return *camera;
 }
 
@@ -263,19 +307,26 @@ int stored_reduction(const Layout& layout, const sensor::Camera& camera) {
   return whole ? std::max(factor, 1) : 1;
 }
 
-core::Result<sensor::Camera> complete_camera(const fs::path& folder,
-                                             const std::optional<ChosenCamera>& chosen, const Layout& layout,
-                                             core::Log& log) {
-  if (!chosen && layout.camera)
-    return complete_camera(folder, ChosenCamera{*layout.camera, folder.string()}, layout, log);
+core::Result<sensor::Camera> complete_camera(const fs::path& folder, const std::optional<ChosenCamera>& given,
+                                             Layout& layout, core::Log& log) {
+  std::optional<ChosenCamera> chosen = given;
+  if (!chosen && layout.camera) chosen = ChosenCamera{*layout.camera, folder.string(), true};
   if (!chosen) return guess(folder, layout, log);
+  if (!chosen->of_layout) {
+    layout.frame_cameras.clear();
+    for (PairInfo& pair : layout.pairs) pair.camera = -1;
+  }
   sensor::Camera camera = chosen->reading.camera;
-  if (chosen->reading.program.empty()) return camera;  // our own: complete, and checked
-  if (auto sized = add_sizes(*chosen, layout, camera); !sized) return tl::unexpected(sized.error());
-  if (!chosen->reading.has_depth_scale) camera.depth_scale = usual_depth_scale(layout);
-  if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
-    return core::usage_error(fmt::format("{}: {}", chosen->file, wrong));
-  log.info(understood(*chosen, camera, layout));
+  const bool foreign = !chosen->reading.program.empty();  // our own is complete, and checked
+  if (foreign) {
+    if (auto sized = add_sizes(*chosen, layout, camera); !sized) return tl::unexpected(sized.error());
+    if (!chosen->reading.has_depth_scale) camera.depth_scale = usual_depth_scale(layout);
+    if (chosen->of_layout) scale_to_images(layout, camera);
+    if (const std::string wrong = sensor::camera_problem(camera); !wrong.empty())
+      return core::usage_error(fmt::format("{}: {}", chosen->file, wrong));
+  }
+  share_calibration(layout, camera);
+  if (foreign) log.info(understood(*chosen, camera, layout));
 
   const int full_width = camera.color.width;
   reduce_color(camera);

@@ -57,7 +57,11 @@ std::string to_text(const FrameSource& source) {
   }
   if (read < sampled.size())
     text += fmt::format("unreadable: {} of {} sampled frames\n", sampled.size() - read, sampled.size());
-  return text + fmt::format("truth: {}\n", source.truth() ? "yes" : "no");
+  const auto truth = source.truth();
+  if (!truth) return text + "truth: no\n";
+  return text + (source.truth_is_odometry()
+                     ? fmt::format("poses: {} of the recorder's own odometry\n", truth->size())
+                     : std::string("truth: yes\n"));
 }
 
 }  // namespace plumbline::dataset

@@ -6,11 +6,13 @@
 namespace plumbline::tracking {
 
 geometry::Rigid3 MotionModel::predict(double stamp) const {
+  if (knows_odometry()) return odometry_->inverse() * *last_odometry_ * camera_from_world_;
   return motion_within(std::clamp(stamp - stamp_, 0.0, 0.2)) * camera_from_world_;
 }
 
 bool MotionModel::reliable(double stamp) const {
   constexpr double kLonger = 1.5;
+  if (continuous() && knows_odometry()) return true;
   return continuous() && steps_ >= 2 && stamp - stamp_ < kLonger * step_s_;
 }
 
@@ -36,6 +38,7 @@ void MotionModel::update(double stamp, const TrackResult& result) {
   stamp_ = stamp;
   camera_from_world_ = result.camera_from_world;
   valid_ = true;
+  last_odometry_ = odometry_;
 }
 
 void MotionModel::lost() {

@@ -56,6 +56,7 @@ Tracker::Tracker(const TrackerOptions& options, const sensor::Pinhole& camera)
     : options_(options), camera_(camera) {}
 
 TrackResult Tracker::track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features) {
+  motion_.set_odometry(frame.odometry);
   if (map.keyframe_count() == 0) return initialise(frame, features);
   const Features synced = synchronised(frame, features, motion_.velocity());
   const bool outdated = motion_.outdated();

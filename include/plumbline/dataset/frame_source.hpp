@@ -24,6 +24,7 @@ struct PairInfo {
   double depth_stamp = 0.0;  ///< seconds; the camera's depth_delay_s is in it
   std::string color_file;    ///< for messages; empty when there is no file
   std::string depth_file;
+  int camera = -1;  ///< position among Layout::frame_cameras; -1: the recording's camera
 };
 
 /// An image as a recording has it: the bytes of a file, or pixels.
@@ -64,6 +65,15 @@ class FrameSource {
   [[nodiscard]] virtual std::string doubt() const { return ""; }
   /// Truth that comes with the recording, if any.
   [[nodiscard]] virtual std::optional<geometry::Trajectory> truth() const = 0;
+  /// Whether truth() is what the recorder's own odometry said.
+  [[nodiscard]] virtual bool truth_is_odometry() const { return false; }
+};
+
+/// What poses are used for that come with a recording.
+enum class PoseUse {
+  kPrior,   ///< frames have those of the recorder's own odometry (a phone's): RgbdFrame::odometry
+  kGiven,   ///< they are taken as they are: the pipeline has no tracking
+  kIgnore,  ///< for nothing but comparison: truth() has them all the same
 };
 
 /// Topics of a bag; "" is found by itself.
@@ -85,6 +95,7 @@ struct OpenOptions {
   double from_s = 0.0;           ///< seconds after the first pair
   double to_s = 1e300;           ///< seconds after the first pair
   int every = 1;                 ///< every n-th pair
+  PoseUse poses = PoseUse::kPrior;
   TopicNames topics;             ///< of bags
 };
 

@@ -45,6 +45,8 @@ struct RunSummary {
     std::size_t read = 0;        ///< decoded
     std::size_t resumed = 0;     ///< of these, by the run that this one went on from
     std::size_t unreadable = 0;  ///< skipped
+    std::size_t odometry =
+        0;  ///< with a pose of the recorder's own odometry, from which they were looked for
     std::size_t tracked = 0;
     std::size_t lost = 0;  ///< read but not tracked
     std::size_t longest_loss = 0;

@@ -4,6 +4,9 @@
 // One RGB-D observation.
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "plumbline/geometry/rigid3.hpp"
 
 namespace plumbline::sensor {
 
@@ -16,6 +19,8 @@ struct RgbdFrame {
   cv::Mat color;             ///< CV_8UC3, BGR
   cv::Mat gray;              ///< CV_8UC1
   cv::Mat depth;             ///< CV_32FC1, metres along z, 0 = no measurement
+  /// world_from_camera by the recorder's own odometry (a phone's), in a world of its own; none: not known.
+  std::optional<geometry::Rigid3> odometry{};
 };
 
 }  // namespace plumbline::sensor

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Constant velocity on SE(3): where the camera is expected at a time, and how far that may be believed.
+// Constant velocity on SE(3), or the recorder's own odometry: where the camera is expected at a time, and how
+// far that may be believed.
 #include <algorithm>
+#include <optional>
 
 #include "plumbline/geometry/rigid3.hpp"
 
@@ -12,7 +14,11 @@ struct TrackResult;
 
 class MotionModel {
  public:
-  /// camera_from_world at a time, at most 0.2 s after the last pose.
+  /// What the recorder's odometry says of the frame that is looked for next, world_from_camera in a world of
+  /// its own; none: it says nothing.
+  void set_odometry(const std::optional<geometry::Rigid3>& pose) { odometry_ = pose; }
+  /// camera_from_world at a time: by odometry, from the last tracked frame on, or else by velocity, at most
+  /// 0.2 s after the last pose.
   [[nodiscard]] geometry::Rigid3 predict(double stamp) const;
   /// The motion of camera_from_world within `dt` seconds.
   [[nodiscard]] geometry::Rigid3 motion_within(double dt) const { return geometry::exp_se3(velocity_ * dt); }
@@ -36,14 +42,18 @@ class MotionModel {
   /// The velocity is known, and no frame is missing since.
   [[nodiscard]] bool reliable(double stamp) const;
   /// After a while without a pose the last one says little: surfaces near it fit by chance.
-  [[nodiscard]] bool outdated() const { return lost_frames_ >= 5; }
   [[nodiscard]] int lost_frames() const { return lost_frames_; }
+  [[nodiscard]] bool outdated() const { return lost_frames_ >= (knows_odometry() ? 60 : 5); }
   /// After some more it says nothing.
-  [[nodiscard]] bool expired() const { return lost_frames_ >= 30; }
+  [[nodiscard]] bool expired() const { return lost_frames_ >= (knows_odometry() ? 300 : 30); }
   /// Of the search for features around their prediction.
   [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
   /// Whether it may still hold alone what no measurement does.
-  [[nodiscard]] bool may_dead_reckon() const { return continuous() && dead_reckoning_s_ < 2.5; }
+  [[nodiscard]] bool may_dead_reckon() const {
+    return continuous() && dead_reckoning_s_ < (knows_odometry() ? 20.0 : 2.5);
+  }
+  /// Odometry tells the way from the last tracked frame to the one that is looked for.
+  [[nodiscard]] bool knows_odometry() const { return valid_ && odometry_ && last_odometry_; }
   /// Measurements have contradicted it since surfaces have been all but alone.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
@@ -65,6 +75,8 @@ class MotionModel {
   int lost_frames_ = 0;
   double dead_reckoning_s_ = 0.0;  ///< how long it has held what no measurement does
   bool contradicted_ = false;
+  std::optional<geometry::Rigid3> odometry_;       ///< of the frame that is looked for
+  std::optional<geometry::Rigid3> last_odometry_;  ///< of the last tracked frame
 };
 
 }  // namespace plumbline::tracking

@@ -2,6 +2,7 @@
 // plumbline map INPUT -o OUT
 #include <fmt/format.h>
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@ namespace plumbline::cli {
 namespace {
 
 int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs) {
+  const bool as_given = request.open.poses == dataset::PoseUse::kGiven;
+  if (as_given && request.pipeline == pipeline::MapRequest().pipeline) request.pipeline = "known_poses";
   request.input = inputs.front();
   request.others.assign(inputs.begin() + 1, inputs.end());
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
@@ -40,6 +43,16 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
 
+  const std::map<std::string, dataset::PoseUse> uses = {{"prior", dataset::PoseUse::kPrior},
+                                                        {"given", dataset::PoseUse::kGiven},
+                                                        {"ignore", dataset::PoseUse::kIgnore}};
+  command
+      .add_option("--poses", request.open.poses,
+                  "Poses that come with a recording: prior lets a phone's odometry start each frame's search "
+                  "(default), given maps with the recording's poses as they are, ignore leaves them out")
+      ->type_name("prior|given|ignore")
+      ->transform(CLI::CheckedTransformer(uses));
+
   command
       .add_option("--pace", request.pace_hz,
                   "Play recordings at this rate, like a live camera (default: as fast as possible)")
@@ -58,9 +71,8 @@ void add_map(CLI::App& app, Session& session) {
                                   [&session, request, inputs] { return map(session, *request, *inputs); });
   command
       ->add_option("INPUT", *inputs,
-                   "Folder of a recording, a ROS bag, or synth:SCENE?frames=900&texture=none&seed=3; give "
-                   "several, one "
-                   "per robot, to fuse them into one map")
+                   "A recording (docs/guide/inputs.md), or synth:SCENE?frames=900&texture=none&seed=3; give "
+                   "several, one per robot, to fuse them into one map")
       ->required();
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
   add_map_options(*command, session, *request);

@@ -5,6 +5,7 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <deque>
 #include <sstream>
 
 #include "filters/pcl_functions.hpp"
@@ -181,13 +182,51 @@ std::uint32_t packed_color(double value) {
   return fits ? static_cast<std::uint32_t>(static_cast<std::int64_t>(value)) : 0U;
 }
 
+/// The numbers of ascii data one after the other, separated by blanks or, as PDAL reads them, commas.
+class PcdWords {
+ public:
+  PcdWords(ByteReader& reader, std::uint64_t a_point) : reader_(reader), a_point_(a_point) {}
+
+  /// False at the end of the file.
+  bool next(std::string& word) {
+    if (pieces_.empty() && !read_pieces()) return false;
+    word = std::move(pieces_.front());
+    pieces_.pop_front();
+    return true;
+  }
+  /// "1,5": commas that separate no points.
+  [[nodiscard]] bool decimal_comma() const { return decimal_comma_; }
+
+ private:
+  bool read_pieces() {
+    std::string text;
+    if (!reader_.word(text) && text.empty()) return false;
+    if (text.size() > 1 && text.back() == ',') text.pop_back();
+    for (std::size_t begin = 0; begin <= text.size();) {
+      const std::size_t end = std::min(text.find(',', begin), text.size());
+      pieces_.push_back(text.substr(begin, end - begin));
+      begin = end + 1;
+    }
+    decimal_comma_ = pieces_.size() > 1 && pieces_.size() != a_point_;
+    return true;
+  }
+
+  ByteReader& reader_;
+  std::uint64_t a_point_;  ///< numbers that a point has
+  std::deque<std::string> pieces_;
+  bool decimal_comma_ = false;
+};
+
 std::string read_ascii(ByteReader& reader, const PcdHeader& header, CloudBuilder& builder) {
+  PcdWords words(reader, header.elements);
   std::string word;
   for (std::uint64_t row = 0; row < header.points; ++row) {
     for (std::size_t f = 0; f < header.fields.size(); ++f) {
       const PcdField& field = header.fields[f];
       for (std::uint64_t k = 0; k < field.count; ++k) {
-        if (!reader.word(word) && word.empty()) return truncated(row, header.points);
+        if (!words.next(word)) return truncated(row, header.points);
+        if (words.decimal_comma())
+          return fmt::format("point {}: decimal comma; write numbers with a point", row + 1);
         const auto value = parse_number(word);
         if (!value) return fmt::format("point {}: '{}' is not a number", row + 1, word);
 

@@ -4,17 +4,24 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 #include <system_error>
 
 #include "convert/copy_target.hpp"
 #include "image_decoders.hpp"
+#include "layout.hpp"
 
 namespace plumbline::dataset {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::int64_t nanoseconds(double seconds) { return std::llroundl(static_cast<long double>(seconds) * 1e9L); }
+/// Whole microseconds where these are the same stamp: of seconds since 1970 a double keeps no more.
+std::int64_t nanoseconds(double seconds) {
+  const std::int64_t rounded = 1000 * std::llroundl(static_cast<long double>(seconds) * 1e6L);
+  if (seconds_of(rounded) == seconds) return rounded;
+  return std::llroundl(static_cast<long double>(seconds) * 1e9L);
+}
 
 /// What stands at `out` must be a copy of before, and may be replaced.
 core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
@@ -91,7 +98,9 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
 
   auto summary = copy_frames(source, **target, options);
   core::Result<void> done;
-  if (summary) done = (*target)->finish(source.truth());
+  const bool odometry = source.truth_is_odometry();
+  if (odometry) log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
+  if (summary) done = (*target)->finish(odometry ? std::nullopt : source.truth());
   if (summary && done && !file) done = put_in_place(folder, out);
   if (!summary || !done) {
     if (!file) fs::remove_all(folder, ignored);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "layout.hpp"
 #include "plumbline/core/numbers.hpp"
@@ -18,7 +20,7 @@ bool is_image(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".exr"}) {
+  for (const char* known : {".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".exr", ".npy"}) {
     if (extension == known) return true;
   }
   return false;
@@ -34,6 +36,31 @@ bool is_folder(const fs::path& path) {
 bool is_file(const fs::path& path) {
   std::error_code ignored;
   return fs::is_regular_file(path, ignored);
+}
+
+nlohmann::json read_json_file(const fs::path& file) {
+  constexpr std::uintmax_t kMost = 64'000'000;
+  std::error_code problem;
+  const std::uintmax_t size = fs::file_size(file, problem);
+  if (problem || size > kMost) return nullptr;
+  std::ifstream stream(file, std::ios::binary);
+  nlohmann::json read = nlohmann::json::parse(stream, nullptr, false);
+  return read.is_discarded() ? nlohmann::json(nullptr) : read;
+}
+
+std::optional<double> json_number(const nlohmann::json& object, const char* key) {
+  const auto found = object.is_object() ? object.find(key) : object.end();
+  if (found == object.end() || !found->is_number()) return std::nullopt;
+  const auto value = found->get<double>();
+  return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+geometry::Rigid3 from_arkit(const geometry::Rigid3& transform) {
+  Eigen::Matrix3d world;  // x y z of the one world are x -z y of the other
+  world << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  const Eigen::Matrix3d camera = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  return geometry::Rigid3(world, Eigen::Vector3d::Zero()) * transform *
+         geometry::Rigid3(camera, Eigen::Vector3d::Zero());
 }
 
 std::vector<long long> numbers_of(const std::string& name) {

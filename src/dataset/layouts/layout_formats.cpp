@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <fstream>
 #include <map>
 
 #include "layout.hpp"
@@ -81,9 +83,10 @@ std::string nearest_layout(const fs::path& folder) {
 }  // namespace
 
 const std::vector<const LayoutFormat*>& layout_formats() {
-  static const std::vector<const LayoutFormat*> formats = {&tum_layout(),     &seven_scenes_layout(),
-                                                           &replica_layout(), &scannet_layout(),
-                                                           &stray_layout(),   &redwood_layout()};
+  static const std::vector<const LayoutFormat*> formats = {
+      &tum_layout(),     &seven_scenes_layout(), &replica_layout(),  &scannet_layout(),
+      &stray_layout(),   &polycam_layout(),      &record3d_layout(), &tartanair_layout(),
+      &redwood_layout(), &azure_kinect_layout()};
   return formats;
 }
 
@@ -98,6 +101,24 @@ const LayoutFormat* layout_of(const fs::path& folder) {
     if (format->recognises(folder)) return format;
   }
   return nullptr;
+}
+
+std::string not_a_recording_file(const fs::path& file) {
+  std::array<char, 4> magic{};
+  std::ifstream(file, std::ios::binary).read(magic.data(), magic.size());
+  const bool zip = magic == std::array<char, 4>{'P', 'K', '\x03', '\x04'};
+  if (file.extension() == ".r3d") {
+    return fmt::format(
+        "{}: is a recording of Record3D, whose depth is packed with LZFSE, which is not read; export it on "
+        "the "
+        "phone as 'EXR + JPG sequence' and give that folder",
+        file.string());
+  }
+  if (zip) return fmt::format("{}: is an archive; unpack it and give the recording's folder", file.string());
+  return fmt::format(
+      "{}: is a file, and no bag (MCAP, rosbag2's .db3, ROS 1's .bag) by its content; give a bag or the "
+      "recording's folder",
+      file.string());
 }
 
 std::string not_a_recording(const fs::path& folder) {

@@ -43,6 +43,7 @@ core::Result<Layout> read_stray(const fs::path& folder, const LayoutOptions& /*o
                     folder.string(), *frames, rows));
   }
   layout.truth = std::move(odometry->poses);
+  layout.truth_is_odometry = true;
   return layout;
 }
 

@@ -29,6 +29,20 @@ core::Result<double> read_stamp(const std::string& list, const TextLine& line, s
       fmt::format("{}:{}: '{}' is no time in seconds", list, line.number, line.words[word]));
 }
 
+/// "1300000000,066667 rgb/1.png": commas separate words here, so that the stamp falls in two.
+core::Result<void> no_decimal_comma(const fs::path& list) {
+  auto lines = read_raw_lines(list);
+  if (!lines) return {};
+  for (const RawLine& line : *lines) {
+    if (line.text.empty() || line.text[0] == '#') continue;
+    if (core::has_decimal_comma(split_words(line.text, " \t\r\n;\v\f"))) {
+      return core::input_error(
+          fmt::format("{}:{}: decimal comma; write stamps with a point", list.string(), line.number));
+    }
+  }
+  return {};
+}
+
 /// Sorts by stamp and drops files whose stamp came before; says so.
 void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, core::Log& log) {
   if (!std::is_sorted(files.begin(), files.end(), kByStamp)) {
@@ -46,6 +60,7 @@ void sort_and_unique(const std::string& list, std::vector<StampedFile>& files, c
 
 /// "stamp file" per line.
 core::Result<std::vector<StampedFile>> read_list(const fs::path& list, core::Log& log) {
+  if (auto plain = no_decimal_comma(list); !plain) return tl::unexpected(plain.error());
   auto lines = read_lines(list);
   if (!lines) return tl::unexpected(lines.error());
   std::vector<StampedFile> files;
@@ -101,6 +116,7 @@ bool depth_first(const std::string& first, const std::string& second) {
 
 /// "stamp file stamp file" per line. Every image is used once; the pairs are trusted, however far apart.
 core::Result<std::vector<PairInfo>> read_associations(const fs::path& list, core::Log& log) {
+  if (auto plain = no_decimal_comma(list); !plain) return tl::unexpected(plain.error());
   auto lines = read_lines(list);
   if (!lines) return tl::unexpected(lines.error());
   std::vector<StampedFile> color;

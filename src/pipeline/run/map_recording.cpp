@@ -52,6 +52,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
     if (!topic.empty()) text += fmt::format("  topic_{}: {}\n", what, quoted(topic));
   }
   if (request.feedback != nullptr) text += "  feedback: on\n";
+  if (request.open.poses == dataset::PoseUse::kIgnore) text += "  poses: ignore\n";
   if (threads > 0) text += fmt::format("  threads: {}\n", threads);
   return text + to_yaml(graph);
 }
@@ -128,6 +129,14 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
   if (!request.debug_video.empty() && !tracks(graph)) {
     return core::usage_error(fmt::format(
         "{}: has no track stage whose work could be drawn; leave out --debug-video", graph.file.string()));
+  }
+  const bool takes_poses = std::any_of(graph.nodes.begin(), graph.nodes.end(),
+                                       [](const Node& node) { return node.type->name == "poses"; });
+  if (request.open.poses == dataset::PoseUse::kGiven && !takes_poses) {
+    return core::usage_error(
+        fmt::format("{}: has no stage 'poses' that takes poses as they are given; leave out --poses given, "
+                    "or the pipeline",
+                    graph.file.string()));
   }
   if (graph.source().type->name == "maps") {
     return core::usage_error(

@@ -158,10 +158,15 @@ Json path_of(const RunSummary& summary) {
 }
 
 Json frames_of(const RunSummary::Frames& frames) {
-  return {{"available", frames.available},       {"read", frames.read},
-          {"resumed", frames.resumed},           {"unreadable", frames.unreadable},
-          {"tracked", frames.tracked},           {"lost", frames.lost},
-          {"longest_loss", frames.longest_loss}, {"tracked_percent", rounded(frames.tracked_percent())}};
+  return {{"available", frames.available},
+          {"read", frames.read},
+          {"resumed", frames.resumed},
+          {"unreadable", frames.unreadable},
+          {"odometry", frames.odometry},
+          {"tracked", frames.tracked},
+          {"lost", frames.lost},
+          {"longest_loss", frames.longest_loss},
+          {"tracked_percent", rounded(frames.tracked_percent())}};
 }
 
 Json loops_of(const RunSummary& summary) {
@@ -334,6 +339,10 @@ std::string to_text(const RunSummary& s) {
   }
   text += fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable\n", s.frames.read,
                       s.frames.tracked, s.frames.tracked_percent(), s.frames.unreadable);
+  if (s.frames.odometry > 0) {
+    text += fmt::format("poses      of the recorder's own odometry started the search in {} frames\n",
+                        s.frames.odometry);
+  }
   text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n", s.keyframes, s.points,
                       s.lines, s.loops.accepted);
   text += fmt::format("cloud      {} points, {:g} mm voxels\n", s.cloud_points, s.voxel_m * 1000.0);

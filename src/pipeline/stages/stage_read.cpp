@@ -44,6 +44,7 @@ class ReadStage : public Stage {
       return {};
     }
     ++read_;
+    if (frame->odometry) ++odometry_;
     io.output<sensor::RgbdFrame>("frame", std::make_shared<sensor::RgbdFrame>(std::move(*frame)));
     return {};
   }
@@ -67,6 +68,7 @@ class ReadStage : public Stage {
     summary.frames.read = read_;
     summary.frames.resumed = resumed_;
     summary.frames.unreadable = unreadable_;
+    summary.frames.odometry = odometry_;
   }
 
  private:
@@ -75,6 +77,7 @@ class ReadStage : public Stage {
   std::size_t resumed_ = 0;
   std::atomic<std::size_t> read_{0};
   std::atomic<std::size_t> unreadable_{0};
+  std::atomic<std::size_t> odometry_{0};
 };
 
 }  // namespace

@@ -297,6 +297,51 @@ TEST(CloudIo, EveryTruncationIsAnErrorThatNamesTheFile) {
   }
 }
 
+/// In the manner of the files that PDAL and PCL test themselves with.
+TEST(CloudIo, WhatPdalAndPclTestThemselvesWith) {
+  const auto points = [](const std::string& name, const std::string& text) -> std::size_t {
+    const auto read = read_cloud(spill(name, text), LargeCoordinates::kShifted);
+    EXPECT_TRUE(read) << text << (read ? "" : read.error().message);
+    return read ? read->cloud->size() : 0;
+  };
+  const std::string utm =
+      "VERSION 0.7\nFIELDS X Y Z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
+      "VIEWPOINT 0.0 0.0 0.0 1.0 0.0 0.0 0.0\nPOINTS 2\nDATA ascii\n";
+  EXPECT_EQ(points("a.ply",
+                   "ply \nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                   "property float z \nend_header\n-1 0 0\n 0 1 0\n 1 0 0 \n"),
+            3U);
+  EXPECT_EQ(points("a.ply",
+                   "ply\nformat ascii 1.0\ncomment VCGLIB generated\nelement vertex 1\nproperty float x\n"
+                   "property float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+                   "property char blue\nproperty int omg\nelement face 0\n"
+                   "property list uchar int vertex_indices\nend_header\n-2.6 -13.1 0.006 63 200 64 1234\n"),
+            1U);
+  EXPECT_EQ(points("a.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 4\nproperty float64 x\nproperty float64 y\n"
+                   "property float64 z\nelement face 2\nproperty list uint8 uint32 vertex_indices\n"
+                   "end_header\n1 1 0\n2 1 0\n1 2 0\n2 2 2\n3 0 1 2\n3 1 2 3\n"),
+            4U);
+  for (const char* separator : {" ", "\t", ",", ", "}) {
+    const std::string s = separator;
+    const std::string rows =
+        "289814.15" + s + "4320978.61" + s + "170.76\n289814.64" + s + "4320978.84" + s + "170.76\n";
+    const auto read = read_cloud(spill("a.pcd", utm + rows), LargeCoordinates::kShifted);
+    ASSERT_TRUE(read) << "'" << s << "' " << read.error().message;
+    ASSERT_EQ(read->cloud->size(), 2U);
+    EXPECT_NEAR((*read->cloud)[1].y + read->shift.y(), 4320978.84, 1e-4) << "'" << s << "'";
+  }
+  EXPECT_EQ(points("a.pcd",
+                   "# .PCD v.5 - Point Cloud Data file format\nVERSION .5\nFIELDS x y z intensity\n"
+                   "SIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n"
+                   "-1.05 -0.75 1.5 0\n-1.06 -0.76 1.5 0.0002"),
+            2U);
+  EXPECT_EQ(points("a.pcd",
+                   "VERSION 0.7\nFIELDS x y z _\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 4\nWIDTH 2\n"
+                   "HEIGHT 1\nPOINTS 2\nDATA ascii\n1 2 3 0 0 0 0\n4 5 6 0 0 0 0\n"),
+            2U);
+}
+
 TEST(CloudIo, BrokenFilesSayWhatIsWrong) {
   const std::string fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
   const std::vector<std::array<std::string, 3>> cases = {
@@ -305,6 +350,7 @@ TEST(CloudIo, BrokenFilesSayWhatIsWrong) {
       {"a.pcd", fields + "POINTS 4000000000\nDATA binary_compressed\nabcdefgh", "header promises"},
       {"a.pcd", fields + "WIDTH 3\nHEIGHT 2\nPOINTS 5\nDATA ascii\n", "is not POINTS 5"},
       {"a.pcd", fields + "POINTS 1\nDATA ascii\n1 2 three\n", "'three' is not a number"},
+      {"a.pcd", fields + "POINTS 1\nDATA ascii\n1,5 2,5 3,5\n", "decimal comma"},
       {"a.pcd", fields + "POINTS 1\nDATA zip\n1 2 3\n", "'zip'"},
       {"a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", "no x, y and z"},
       {"a.pcd", "FIELDS x y z\nSIZE 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", "fewer entries"},
