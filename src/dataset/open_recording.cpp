@@ -13,6 +13,7 @@
 #include "frame_images.hpp"
 #include "layout.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "recording_camera.hpp"
 
@@ -178,6 +179,32 @@ std::string name_of(const fs::path& place, const fs::path& given) {
 }
 
 }  // namespace
+
+bool is_recording_file(const fs::path& file) {
+  return is_file(file) && (layout_of(file) != nullptr || file.extension() == ".r3d");
+}
+
+core::Result<TrajectoryReading> recording_poses(const fs::path& folder, core::Log& log) {
+  const auto chosen = choose_camera(folder, {}, log);
+  LayoutOptions options;
+  if (chosen && *chosen) options.fps = (*chosen)->reading.camera.fps;
+  auto layout = read_layout(folder, "auto", options, log);
+  if (!layout) return tl::unexpected(layout.error());
+  if (!layout->truth || layout->truth->empty()) {
+    return core::input_error(
+        fmt::format("{}: is a recording ({}) without poses", folder.string(), layout->format));
+  }
+  TrajectoryReading reading;
+  reading.poses = std::move(*layout->truth);
+  reading.format = layout->format;
+  for (const geometry::StampedPose& pose : reading.poses) reading.rows.push_back(pose.stamp);
+  if (layout->truth_is_odometry) {
+    reading.notes.push_back(
+        fmt::format("the {} poses to compare with are those of the recorder's own odometry, no truth",
+                    reading.poses.size()));
+  }
+  return reading;
+}
 
 core::Result<std::unique_ptr<FrameSource>> open_recording(const fs::path& folder, const OpenOptions& options,
                                                           core::Log& log) {

@@ -11,6 +11,7 @@
 #include "app.hpp"
 #include "option_flags.hpp"
 #include "paths.hpp"
+#include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/evaluate/trajectory.hpp"
 #include "plumbline/viz/trajectory_plots.hpp"
@@ -70,8 +71,13 @@ tl::unexpected<core::Error> about(const fs::path& file, core::Error error) {
 core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryRequest& request,
                                                                Console& console) {
   const std::vector<fs::path> estimates(request.files.begin(), std::prev(request.files.end()));
-  const fs::path truth_file = file_in(request.files.back(), "groundtruth.txt");
-  const auto truth = dataset::read_trajectory_file(truth_file);
+  const fs::path& given = request.files.back();
+  const fs::path in_folder = file_in(given, "groundtruth.txt");
+  std::error_code ignored;
+  const bool by_layout = fs::is_directory(given, ignored) && !fs::exists(in_folder, ignored);
+  const fs::path& truth_file = by_layout ? given : in_folder;
+  const auto truth =
+      by_layout ? dataset::recording_poses(given, console) : dataset::read_trajectory_file(truth_file);
   if (!truth) return tl::unexpected<core::Error>(truth.error());
 
   for (const std::string& note : truth->notes)
@@ -139,7 +145,7 @@ void add_trajectory(CLI::App& group, Session& session) {
   command
       ->add_option("EST... GT", request->files,
                    "One or more estimates (TUM, EuRoC or KITTI format, or result folders), then the true "
-                   "poses (the same formats, or a recording with groundtruth.txt)")
+                   "poses (the same formats, or a recording)")
       ->required()
       ->expected(2, CLI::detail::expected_max_vector_size);
 

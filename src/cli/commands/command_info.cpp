@@ -16,6 +16,7 @@
 #include "app.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/dataset/bag.hpp"
+#include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/stored_result.hpp"
@@ -164,7 +165,7 @@ core::Result<void> info(Session& session, InfoRequest& request) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
   if (dataset::is_bag(path)) return describe_bag(session, request);
-  if (!std::filesystem::is_directory(path, ec)) {
+  if (!std::filesystem::is_directory(path, ec) && !dataset::is_recording_file(path)) {
     if (!is_trajectory(path)) return describe_cloud(path);
     const auto poses = dataset::read_trajectory_file(path);
     if (!poses) return tl::unexpected<core::Error>(poses.error());

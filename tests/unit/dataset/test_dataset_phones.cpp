@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "plumbline/dataset/image_io.hpp"
+#include "plumbline/dataset/recording_poses.hpp"
 #include "test_dataset_world.hpp"
 
 namespace plumbline::dataset {
@@ -151,6 +152,10 @@ TEST_F(Polycam, EachFrameHasItsCameraAndItsPose) {
   ASSERT_TRUE((*source)->truth());
   expect_arkit_pose((*(*source)->truth())[2].world_from_camera);
   EXPECT_TRUE((*source)->truth_is_odometry());
+  const auto poses = recording_poses(folder_, log_);
+  ASSERT_TRUE(poses) << poses.error().message;
+  EXPECT_EQ(poses->poses.size(), 3U);
+  EXPECT_THAT(poses->notes, testing::ElementsAre(HasSubstr("odometry")));
   const auto frame = (*source)->read(2);
   ASSERT_TRUE(frame) << frame.error().message;
   ASSERT_TRUE(frame->odometry);
@@ -257,6 +262,8 @@ TEST_F(Record3d, ItsOwnFileIsRefusedWithTheWayOut) {
               AllOf(HasSubstr("room.r3d"), HasSubstr("LZFSE"), HasSubstr("EXR + JPG")));
   write_text("room.zip", "PK\x03\x04");
   EXPECT_THAT(open_recording(folder_ / "room.zip", {}, log_).error().message, HasSubstr("unpack it"));
+  EXPECT_TRUE(is_recording_file(folder_ / "room.r3d"));
+  EXPECT_FALSE(is_recording_file(folder_ / "room.zip"));
 }
 
 class TwoSizes : public RecordingTest {

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What can be told of a recording without looking at its images.
+#include <filesystem>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/trajectory_io.hpp"
+
+namespace plumbline::dataset {
+
+/// Whether a file is a recording that open_recording takes, or refuses with the way out (.r3d).
+bool is_recording_file(const std::filesystem::path& file);
+
+/// The poses that a recording's folder holds, in whatever layout: truth, or the recorder's own odometry.
+/// Error (kInput): no recording, or one without poses.
+core::Result<TrajectoryReading> recording_poses(const std::filesystem::path& folder, core::Log& log);
+
+}  // namespace plumbline::dataset
