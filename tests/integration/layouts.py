@@ -202,7 +202,7 @@ def two_sizes(rec, d):
 
 
 def fisheye(rec, d):
-    k = np.array([[400.0, 0, 321], [0, 401.0, 238], [0, 0, 1]])
+    k = rec.k * [[0.83], [0.835], [1]] + [[0, 0, 0.17 * rec.k[0, 2] + 1.5], [0, 0, 0.165 * rec.k[1, 2] - 1.5], [0, 0, 0]]
     bend = np.array([-0.02, 0.003, -0.001, 0.0002])
     maps = lens_maps(rec, k, rec.size, lambda rays: cv2.fisheye.undistortPoints(rays, np.eye(3), bend))
     tum_lists(rec, d, lambda i: seen(rec.color(i), maps, False), lambda i: seen(rec.millimetres(i), maps, True),

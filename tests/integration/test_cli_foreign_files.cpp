@@ -112,12 +112,45 @@ TEST_F(ForeignRecordings, CameraOfAnotherProgramIsUnderstoodAndTold) {
                "320x240 (from the images); depth scale 5000 (file)"))
       << ran;
   write("fisheye.yaml",
+        "%YAML:1.0\nCamera.type: \"Omnidirectional\"\nCamera.fx: 262.5\nCamera.fy: 262.5\nCamera.cx: 160\n"
+        "Camera.cy: 120\n");
+  const auto refused = run("map wall --camera fisheye.yaml -o none");
+  EXPECT_EQ(refused.code, 2) << refused;
+  EXPECT_TRUE(refused.told("omnidirectional")) << refused;
+  EXPECT_TRUE(refused.told("  fx: 262.5\n")) << refused;
+
+  write("fisheye.yaml",
         "%YAML:1.0\nCamera.type: \"KannalaBrandt8\"\nCamera.fx: 262.5\nCamera.fy: 262.5\nCamera.cx: 160\n"
         "Camera.cy: 120\n");
   const auto fisheye = run("map wall --camera fisheye.yaml -o out --to 0.2 --force");
   EXPECT_EQ(fisheye.code, 0) << fisheye;
   EXPECT_TRUE(fisheye.told("fx 262.5 fy 262.5 cx 160 cy 120, equidistant (fisheye) k1 0 k2 0 k3 0 k4 0"))
       << fisheye;
+}
+
+TEST_F(ForeignRecordings, PosesAreTakenAsGiven) {
+  write_wall(path("wall"));
+  std::string truth;
+  for (int f = 0; f < 8; ++f) truth += words({10.0 + f / 30.0, 0.01 * f, 0, 0, 0, 0, 0, 1}, " ") + "\n";
+  write("wall/groundtruth.txt", truth);
+  const auto ran = run("map wall -o out --poses given");
+  EXPECT_EQ(ran.code, 0) << ran;
+  const auto error = run("evaluate trajectory out wall --json");
+  ASSERT_EQ(error.code, 0) << error;
+  EXPECT_LT(nlohmann::json::parse(error.out, nullptr, false)["ate_m"]["max"], 1e-9) << error;
+  const auto other = run("map wall -o other --poses given -p fast");
+  EXPECT_EQ(other.code, 2) << other;
+  EXPECT_TRUE(other.told("has no stage 'poses'")) << other;
+  EXPECT_EQ(run("map wall -o other --poses maybe").code, 2);
+}
+
+TEST_F(ForeignRecordings, RecordingsOfRecord3dAreRefusedWithTheWayOut) {
+  write("room.r3d", "PK\x03\x04");
+  for (const char* command : {"info room.r3d", "map room.r3d -o out"}) {
+    const auto ran = run(command);
+    EXPECT_EQ(ran.code, 3) << ran;
+    EXPECT_TRUE(ran.told("EXR + JPG sequence")) << ran;
+  }
 }
 
 TEST_F(ForeignRecordings, DepthInAnUnlikelyUnitIsNotTrusted) {
