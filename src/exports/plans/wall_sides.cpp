@@ -155,7 +155,7 @@ RunLook look_of(const WallRaster& raster, const std::pair<int, int>& run, double
 }
 
 bool is_wall(const WallRaster& raster, const std::pair<int, int>& run, double need_m, double cut_m) {
-  constexpr double kLeastHigh = 0.3;
+  constexpr double kLeastHigh = 0.2;
   constexpr double kLeastAtCut = 0.1;
   const RunLook look = look_of(raster, run, need_m, cut_m);
   return (run.second - run.first + 1) * WallRaster::kWidth_m >= kShortestWall_m && look.high >= kLeastHigh &&
