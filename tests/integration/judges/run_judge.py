@@ -260,11 +260,8 @@ def case_f3d(case):
     glb = case.export("f3d.glb", "--mesh", "--resolution", "0.05")
     png = case.work / "f3d.png"
     png.unlink(missing_ok=True)
-    # Without a display it may not draw at all; then it is no judge here.
-    done = subprocess.run(["f3d", str(glb), "--output", str(png), "--resolution", "320,240"], capture_output=True, text=True)
-    if not png.is_file():
-        raise Absent("f3d draws nothing here: " + (done.stderr or done.stdout)[:200])
-    check(png.stat().st_size > 5000, "f3d's picture is empty")
+    run(need("xvfb-run"), "-a", "f3d", glb, "--output", png, "--resolution", "320,240")  # it wants a display
+    check(png.is_file() and png.stat().st_size > 8000, "f3d's picture is empty")
 
 
 def case_octomap(case, probe):
@@ -361,14 +358,14 @@ def case_frame(case):
                    for i in (-1, 0, 1) for j in (-1, 0, 1) if 0 <= row + i < height and 0 <= column + j < width)
     along = [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for a, b in walls for s in (0.1, 0.3, 0.5, 0.7, 0.9)]
     share = sum(occupied(*p) for p in along) / len(along)
-    # COLMAP: its points lie on the cloud's surfaces.
+    # COLMAP: its points lie on the cloud's surfaces, but for some beyond the reach of depth.
     cells = {tuple(math.floor(v / 0.05) for v in p) for p in cloud}
     points = read_colmap(case.export("frame_colmap", "--format", "colmap") / "sparse/0")[2]
     near = sum(any((x + i, y + j, z + k) in cells for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1))
                for x, y, z in (tuple(math.floor(v / 0.05) for v in p[0]) for p in points.values())) / len(points)
     print(f"{len(walls)} walls within 5 mm of the cloud; {100 * share:.0f} % of their places occupied in the grid; "
           f"{100 * near:.0f} % of COLMAP's points within a cell of the cloud")
-    check(share > 0.9 and near > 0.9, "they do not lie on one another")
+    check(share > 0.9 and near > 0.8, "they do not lie on one another")
 
 
 def case_plan(case):
@@ -381,7 +378,11 @@ def case_plan(case):
     need("pdftotext")
     pdf = case.export("room.pdf")
     check("m2" in run("pdftotext", pdf, "-") or "." in run("pdftotext", pdf, "-"), "the PDF has no text")
-    section = case.export("section.svg", "--section", "-3,-6 3,6")
+    cloud = [[float(v) for v in line.split()[:3]] for line in case.export("for_plan.xyz").read_text().splitlines()]
+    low, high = (pick(p[0] for p in cloud) for pick in (min, max))
+    middle = sorted(p[1] for p in cloud)[len(cloud) // 2]
+    section = case.export("section.svg", "--section", f"{low - 0.1},{middle} {high + 0.1},{middle}")
+    check(section.read_text().count("<path") > 50, "the section is empty")
     run("rsvg-convert", "-w", 400, section, "-o", case.work / "section.png")
 
 
