@@ -31,6 +31,27 @@ plumbline export out/room -o ground.ply --z 0,2m             # what lies up to 2
 )";
 
 constexpr const char* kExportsFrame = R"(
+![Grid of a generated office](pictures/grid.png)
+
+*The grid of a generated office that two robots filmed in part: black is in the way, white is free, grey was not seen.*
+
+![Plan of a generated office](pictures/plan.png)
+
+*The plan of the same map: walls that were seen up to where furniture ends, with three doors (red) and the paths.*
+
+For a map of 1.5 million points (a generated office, 181 keyframes, 826 views) on two cores:
+
+| export | seconds | size |
+|---|---|---|
+| `.ply` | 0.6 | 58 MB |
+| `.las` | 0.9 | 66 MB |
+| `.glb` | 0.7 | 29 MB |
+| `.yaml` with `.pgm` | 2.5 | 50 kB |
+| `.svg`, `.pdf`, `.dxf` | 1.7 to 2.4 | 12 to 36 kB |
+| `.bt`, `.ot` | 10 | 0.2 MB, 4.1 MB |
+| mesh as `.obj`, `.glb` | 54, 63 | 124 MB, 42 MB |
+| COLMAP, nerfstudio (181 pictures) | 7, 9 | 71 MB, 86 MB |
+
 ## At the end of a run
 
 The stage `output` takes a list, so that `map`, `fuse` and the hub write exports into the result folder, and the report
