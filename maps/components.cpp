@@ -100,6 +100,46 @@ void move_component(Map& map, KeyframeId root, const geometry::Rigid3& new_from_
   }
 }
 
+void split_component(Map& map, KeyframeId first) {
+  const KeyframeId root = root_of(map, first);
+  if (root == first) return;
+  const std::set<KeyframeId> all = members(map, root);
+  const auto is_later = [&](KeyframeId id) { return id.robot == first.robot && !(id < first); };
+
+  // The tree: what hangs on the other side hangs on the new root, or on the old one.
+  map.detach(first);
+  for (const KeyframeId id : all) {
+    const KeyframeId parent = map.parent(id);
+    if (id == first || !parent.valid() || is_later(parent) == is_later(id)) continue;
+    map.set_parent(id, is_later(id) ? first : root);
+  }
+
+  // Landmarks stay with those who saw them first.
+  for (const KeyframeId id : all) {
+    if (!is_later(id)) continue;
+    const auto is_other = [&](const Observation& o) { return !is_later(o.keyframe); };
+    for (const core::PointId point : map.points_seen_by({id})) {
+      const auto& seen = std::as_const(map).point(point).observations;
+      if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(point, id);
+    }
+    for (const core::LineId line : map.lines_seen_by({id})) {
+      const auto& seen = std::as_const(map).line(line).observations;
+      if (std::any_of(seen.begin(), seen.end(), is_other)) map.unobserve(line, id);
+    }
+  }
+
+  const auto is_between = [&](const KeyframeEdge& e) { return is_later(e.a) != is_later(e.b); };
+  std::vector<LoopEdge> loops = map.loops();
+  loops.erase(std::remove_if(loops.begin(), loops.end(), is_between), loops.end());
+  map.set_loops(std::move(loops));
+  const std::map<std::uint64_t, SurfaceEdge> edges = map.edges();
+  for (auto [number, edge] : edges) {
+    if (!is_between(edge) || all.count(edge.a) == 0) continue;
+    edge.information.setZero();
+    map.replace_edge(number, edge);
+  }
+}
+
 std::vector<FramePose> frames_in(const Map& map, std::vector<FramePose> frames) {
   for (FramePose& frame : frames)
     frame.tracked = frame.tracked && frame.reference.valid() && map.has_keyframe(frame.reference);

@@ -72,6 +72,13 @@ Json json_of(const TrajectoryReport& r) {
   out["alignment"] = json_of(r.truth_from_estimate);
   out["alignment"]["type"] = name_of(r.align);
   out["warnings"] = r.warnings;
+
+  for (const ComponentReport& c : r.components) {
+    out["components"].push_back({{"name", c.name},
+                                 {"poses", c.poses},
+                                 {"percent", c.percent ? Json(*c.percent) : Json(nullptr)},
+                                 {"ate_m", json_of(c.ate_m)}});
+  }
   return out;
 }
 
@@ -157,6 +164,11 @@ std::string to_text(const TrajectoryReport& r) {
   }
 
   out += fmt::format("SSE {:.6f} m^2\n", r.ate_m.sse);
+  for (const ComponentReport& c : r.components) {
+    const std::string share = c.percent ? fmt::format(", {:.1f} % of the frames", *c.percent) : "";
+    out += fmt::format("apart from it: component {}, {} poses{}, ATE rmse {:.6f} m by itself\n", c.name,
+                       c.poses, share, c.ate_m.rmse);
+  }
   for (const std::string& warning : r.warnings) out += "warning: " + warning + "\n";
   return out;
 }

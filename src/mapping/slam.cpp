@@ -182,6 +182,7 @@ bool Slam::believes_place(const sensor::RgbdFrame& frame, const Features& featur
   }
   probation_.reset();
   last_track_.relocalised = stands;
+  found_again_ = found_again_ || stands;
   if (!stands) tracker_.take_back(lost_frames);
   return stands;
 }
@@ -222,6 +223,7 @@ void Slam::insert_keyframe(const sensor::RgbdFrame& frame, const Features& featu
   new_keyframes_.push_back(std::move(made));
   tracker_.add_keyframe(id, frame, last_track_);
   mapper_.refine(map_, id);
+  if (std::exchange(found_again_, false)) relocalised_.push_back(id);
   set_reference(id);
   report.keyframe = report.reference = id;
 
@@ -291,7 +293,9 @@ void Slam::connect_keyframes() {
 /// frame is tracked against the map as it is then, whatever the clock says.
 void Slam::close_loops(core::KeyframeId keyframe) {
   if (!options_.loops.enabled) return;
+  const std::size_t disputes = closer_.disputes().size();
   const std::vector<Loop> loops = closer_.detect(map_, keyframe);
+  if (closer_.disputes().size() > disputes && give_way()) return;
   if (loops.empty()) return;
   commit_bundles();
   const core::KeyframeId reference = tracker_.reference();
@@ -301,6 +305,32 @@ void Slam::close_loops(core::KeyframeId keyframe) {
   for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
   if (!closer_.close(map_, edges)) return;
   tracker_.map_changed(map_, reference, camera_from_reference * map_.camera_from_world(reference));
+}
+
+bool Slam::give_way() {
+  if (!options_.components) return false;
+  const LoopDispute dispute = closer_.disputes().back();
+  const auto lies_between = [&](core::KeyframeId first) {
+    return map_.has_keyframe(first) &&
+           std::all_of(dispute.loops.begin(), dispute.loops.end(), [&](const Loop& loop) {
+             return loop.match < first && !(loop.query < first) &&
+                    maps::root_of(map_, loop.match) == maps::root_of(map_, first) &&
+                    maps::root_of(map_, loop.query) == maps::root_of(map_, first);
+           });
+  };
+  const auto found = std::find_if(relocalised_.rbegin(), relocalised_.rend(), lies_between);
+  if (found == relocalised_.rend()) return false;
+
+  // The two are joined again where the loops say.
+  commit_bundles();
+  maps::split_component(map_, *found);
+  joiner_.add(map_, dispute.loops);
+  relocalised_.erase(std::next(found).base());
+  closer_.settle_dispute();
+  closer_.clear_pending();
+  ++taken_back_;
+  tracker_.map_changed(map_, tracker_.reference(), tracker_.camera_from_world());
+  return true;
 }
 
 /// The component that began later moves into the frame of the other one. Nothing is changed when the pose

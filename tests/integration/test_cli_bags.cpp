@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ROS bags, as a user meets them. Bags that other programs wrote: bags/run_bags.py.
+#include <sstream>
 #include <string>
 
 #include "program.hpp"
@@ -54,9 +55,18 @@ TEST_F(CliBags, PartOfABagIsAPartOfTheRecording) {
   const std::string part = " --from 0.1 --to 0.4 --every 2";
   ASSERT_EQ(run("convert wall part -q" + part).code, 0);
   ASSERT_EQ(run("convert wall.mcap part_of_bag -q" + part).code, 0);
-  const std::string list = slurp(path("part/associations.txt"));
-  EXPECT_GT(list.size(), 100U);
-  EXPECT_EQ(list, slurp(path("part_of_bag/associations.txt")));
+  // A bag holds depth as metres, which a folder keeps as TIFF.
+  const auto stamps = [&](const char* file) {
+    std::istringstream words(slurp(path(file)));
+    std::string kept;
+    for (std::string word; words >> word;) {
+      if (word.find('/') == std::string::npos) kept += word + " ";
+    }
+    return kept;
+  };
+  const std::string list = stamps("part/associations.txt");
+  EXPECT_GT(list.size(), 40U);
+  EXPECT_EQ(list, stamps("part_of_bag/associations.txt"));
 }
 
 TEST_F(CliBags, WhatIsNoBagIsRefused) {

@@ -131,7 +131,7 @@ TEST_F(ForeignRecordings, CameraOfAnotherProgramIsUnderstoodAndTold) {
 TEST_F(ForeignRecordings, PosesAreTakenAsGiven) {
   write_wall(path("wall"));
   std::string truth;
-  for (int f = 0; f < 8; ++f) truth += words({10.0 + f / 30.0, 0.01 * f, 0, 0, 0, 0, 0, 1}, " ") + "\n";
+  for (int f = 0; f < 12; ++f) truth += words({10.0 + f / 30.0, 0.01 * f, 0, 0, 0, 0, 0, 1}, " ") + "\n";
   write("wall/groundtruth.txt", truth);
   const auto ran = run("map wall -o out --poses given");
   EXPECT_EQ(ran.code, 0) << ran;

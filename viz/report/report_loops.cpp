@@ -128,6 +128,22 @@ std::string sigma_text(const Json& s) {
                 "{/refine/sigma_position_m/p90:1 mm} for 90 % of them");
 }
 
+/// Loops that agree with one another against the path.
+std::string disputes_html(const ReportData& data) {
+  JsonTable table({{">loops that agree", "{/loops}"},
+                   {">keyframe", "{/query}"},
+                   {">beside keyframe", "{/match}"},
+                   {">points", "{/points}"},
+                   {">lines", "{/lines}"},
+                   {">off", "{/correction_m:2 m}"},
+                   {">after", "{/path_m:1 m}"}});
+  for (const Json& dispute : list_at(data.summary, "/loops/disputes")) table.row(dispute, {}, "bad");
+  return "<h3>Against the path</h3>\n" + table.html() +
+         note(
+             "These loops are more than drift explains, and agree with one another: the path is wrong "
+             "between the two keyframes, or two places look alike.");
+}
+
 std::string closings_html(const ReportData& data) {
   const Json& list = list_at(data.summary, "/loops/list");
   if (data.fused_afterwards && list.empty()) return {};  // closed when each map was made
@@ -150,6 +166,7 @@ std::string closings_html(const ReportData& data) {
       paragraph(filled(data.summary,
                        "{/loops/candidates} candidates, {/loops/verified} verified; loops moved the map "
                        "{/loops/accepted} times; the pose graph took {/loops/rejected} for wrong."));
+  if (!list_at(data.summary, "/loops/disputes").empty()) out += disputes_html(data);
   if (closed.rows() > 0) out += "<h3>Closed</h3>\n" + closed.html();
 
   HtmlTable why("why candidates were refused|>times");

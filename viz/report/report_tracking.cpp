@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "plumbline/core/numbers.hpp"
+#include "report_fill.hpp"
 #include "report_sections.hpp"
 
 namespace plumbline::report {
@@ -137,9 +139,34 @@ class RobotCharts {
       }
     }
 
+    for (viz::SvgLine& component : components()) chart.lines.push_back(std::move(component));
     if (!found.x.empty()) chart.dots.push_back(found);
     chart.dots.push_back(keyframes);
     return svg_chart(chart);
+  }
+
+  /// When each component of the map was tracked in, while there was more than one.
+  [[nodiscard]] std::vector<viz::SvgLine> components() const {
+    std::map<int, viz::SvgLine> lines;
+    const std::size_t column = table_.column("component");
+    for (std::size_t i = 0; i < frames_.rows.size(); ++i) {
+      const double root = table_.number(frames_.rows[i], column);
+      for (auto& [other, line] : lines) {
+        line.x.push_back(frames_.time_s[i]);
+        line.y.push_back(other == root ? 0.5 : kNaN);
+      }
+      if (!(root >= 0.0) || lines.count(static_cast<int>(root)) != 0) continue;
+      viz::SvgLine& line = lines[static_cast<int>(root)];
+      line.label = lines.size() == 1 ? "first map" : fmt::format("map of keyframe {:.0f}", root);
+      line.kind = fmt::format("k{}", (lines.size() - 1) % 8);
+      line.x.push_back(frames_.time_s[i]);
+      line.y.push_back(0.5);
+    }
+
+    std::vector<viz::SvgLine> drawn;
+    if (lines.size() < 2) return drawn;
+    for (auto& [root, line] : lines) drawn.push_back(std::move(line));
+    return drawn;
   }
 
   [[nodiscard]] std::string chart(const std::string& title, const std::string& y_label,
@@ -171,6 +198,38 @@ class RobotCharts {
 
 }  // namespace
 
+/// Maps that were begun when tracking was lost, and what became of them; empty: there was none.
+static std::string components_html(const ReportData& data) {
+  const auto& list = list_at(data.summary, "/components/list");
+  JsonTable table({{"map", "{/name:text}"},
+                   {">frames", "{/frames}"},
+                   {">keyframes", "{/keyframes}"},
+                   {"", ""},
+                   {"why not", "{/why_not:text}"}});
+  for (const auto& component : list) {
+    const bool joined = flag_at(component, "/joined");
+    const double after = number_at(component, "/joined_s");
+    const std::string when = !joined        ? "apart"
+                             : after >= 0.0 ? fmt::format("joined after {:.1f} s, {:.0f} keyframes agree",
+                                                          after, number_at(component, "/agreeing_keyframes"))
+                                            : "joined at the end";
+    table.row(component,
+              {text_at(component, "/name"), count_text(number_at(component, "/frames")),
+               count_text(number_at(component, "/keyframes")), when},
+              joined ? "yes" : "bad");
+  }
+  const double dropped = number_at(data.summary, "/components/dropped");
+  if (table.rows() == 0 && !(dropped > 0.0)) return {};
+
+  std::string out = "<h3>Maps begun when tracking was lost</h3>\n";
+  if (table.rows() > 0) out += table.html();
+  if (dropped > 0.0)
+    out += note(filled(data.summary,
+                       "{/components/dropped} of fewer than five keyframes were dropped; their "
+                       "{/components/dropped_frames} frames have no pose."));
+  return out;
+}
+
 std::string tracking_html(const ReportData& data) {
   if (data.frames.empty()) return {};
   RobotTable summary;
@@ -181,7 +240,7 @@ std::string tracking_html(const ReportData& data) {
     charts += robot.draw();
     robot.report(summary);
   }
-  return summary.html() +
+  return summary.html() + components_html(data) +
          note(
              "Rms of the residuals that fit, in standard deviations of the noise model: near 1 when it is "
              "right. Rotations count by what they move 2 m away.") +

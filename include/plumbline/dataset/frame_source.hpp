@@ -96,7 +96,7 @@ struct OpenOptions {
   double to_s = 1e300;           ///< seconds after the first pair
   int every = 1;                 ///< every n-th pair
   PoseUse poses = PoseUse::kPrior;
-  TopicNames topics;             ///< of bags
+  TopicNames topics;  ///< of bags
 };
 
 /// "auto", and the layouts that open_recording knows.

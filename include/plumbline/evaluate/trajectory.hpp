@@ -47,6 +47,14 @@ struct RelativeError {
   Statistics rotation_deg;   ///< angle of rot E
 };
 
+/// A component of a result that is not part of its main trajectory: aligned with the truth by itself.
+struct ComponentReport {
+  std::string name;
+  std::size_t poses = 0;
+  std::optional<double> percent;  ///< of all frames; none: their number is not known
+  Statistics ate_m;               ///< zero when too few poses have truth
+};
+
 struct TrajectoryReport {
   TrajectoryAlignment align = TrajectoryAlignment::kSe3;
   geometry::Rigid3 truth_from_estimate;
@@ -67,9 +75,10 @@ struct TrajectoryReport {
   /// From the first listed frame (without a list: from the first truth pose) to the first pose, >= 0. None
   /// when a list was given and none of its frames has a pose.
   std::optional<double> first_pose_s;
-  std::vector<PoseError> poses;       ///< matched poses, by time
-  geometry::Trajectory truth;         ///< the whole truth, for drawing
-  std::vector<std::string> warnings;  ///< one sentence each
+  std::vector<ComponentReport> components;  ///< of a result folder that has any, by name
+  std::vector<PoseError> poses;             ///< matched poses, by time
+  geometry::Trajectory truth;               ///< the whole truth, for drawing
+  std::vector<std::string> warnings;        ///< one sentence each
 };
 
 /// `frame_stamps`: stamps of the recording's colour frames (seconds), empty when unknown.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "plumbline/core/executor.hpp"
+#include "plumbline/mapping/loop_closer.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "plumbline/maps/map.hpp"
 #include "plumbline/places/recogniser.hpp"
@@ -35,6 +36,8 @@ class ComponentJoiner {
   /// is certain; none while it is not.
   std::optional<ComponentOverlap> look_up(const maps::Map& map, core::KeyframeId keyframe,
                                           const places::Database& places);
+  /// Pairs of keyframes of different components that were verified elsewhere; look_up() decides about them.
+  void add(const maps::Map& map, const std::vector<Loop>& verified);
   /// The component of root `b` became part of that of root `a`.
   void joined(core::KeyframeId a, core::KeyframeId b);
 

@@ -73,9 +73,18 @@ struct LoopTrial {
   std::string refused;     ///< why it is no loop; empty: it passed
 };
 
+/// Loops that were verified, agree with one another and are more than drift explains: the path is wrong
+/// somewhere between, or places look alike.
+struct LoopDispute {
+  std::vector<Loop> loops;
+  LoopTrial strongest;  ///< of the loops, the one with most landmarks
+};
+
 /// Verified loops that wait for others to agree with them.
 class PendingLoops {
  public:
+  /// A verified loop waits for another one for so many keyframes.
+  explicit PendingLoops(int patience = 6) : patience_(patience) {}
   /// Adds those of `keyframe`, which is new in the queries' map. The largest consistent set of the loops
   /// found lately, with `keyframe` in it, when it holds enough keyframes and no other set comes near; then
   /// none is left waiting.
@@ -83,6 +92,7 @@ class PendingLoops {
                             const std::vector<Loop>& verified, const LoopOptions& options);
 
  private:
+  int patience_;
   std::vector<Loop> waiting_;
 };
 
@@ -119,7 +129,7 @@ class LoopCloser {
   bool close(maps::Map& map, const std::vector<PoseEdge>& edges);
 
   /// Drops loops that wait for others to agree with them: they were measured with another camera.
-  void clear_pending() { pending_ = {}; }
+  void clear_pending();
 
   /// As an edge of the pose graph: where the query lies relative to the match.
   static PoseEdge to_edge(const Loop& loop);
@@ -132,11 +142,18 @@ class LoopCloser {
   [[nodiscard]] const LoopCounts& counts() const { return counts_; }
   /// Every candidate that was verified so far.
   [[nodiscard]] const std::vector<LoopTrial>& trials() const { return trials_; }
+  /// What spoke against the path, in the order in which enough loops agreed.
+  [[nodiscard]] const std::vector<LoopDispute>& disputes() const { return disputes_; }
+  /// The path gave way to the newest dispute.
+  void settle_dispute() { disputes_.pop_back(); }
   [[nodiscard]] const places::Database& database() const { return database_; }
 
  private:
+  static constexpr int kDisputePatience = 20;  ///< keyframes
+
   [[nodiscard]] std::vector<Loop> verify(const maps::Map& map, core::KeyframeId keyframe,
                                          const std::vector<places::Candidate>& candidates);
+  void note_dispute(const maps::Map& map, core::KeyframeId keyframe, const std::vector<Loop>& far);
   void note_verdict(const PoseEdge& edge, const std::string& refused);
   void measure_correction(const maps::Map& map, LoopTrial& trial) const;
   [[nodiscard]] std::string judge(const maps::Map& map, LoopTrial& trial) const;
@@ -148,6 +165,8 @@ class LoopCloser {
   places::Recogniser recogniser_;
   core::KeyframeId last_;  ///< the keyframe before
   PendingLoops pending_;
+  PendingLoops pending_disputes_{kDisputePatience};
+  std::vector<LoopDispute> disputes_;
   std::shared_ptr<InterRobotLoops> others_;  ///< null: none are used
   LoopCounts counts_;
   std::vector<LoopTrial> trials_;

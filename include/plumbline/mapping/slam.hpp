@@ -104,6 +104,10 @@ class Slam {
   /// All components (maps/components.hpp).
   [[nodiscard]] const maps::Map& map() const { return map_; }
   [[nodiscard]] const std::vector<ComponentJoin>& joins() const { return joins_; }
+  /// Loops that agree against the path and have no relocalisation between them that could give way.
+  [[nodiscard]] const std::vector<LoopDispute>& disputes() const { return closer_.disputes(); }
+  /// Relocalisations that were taken back because loops agreed against them.
+  [[nodiscard]] int taken_back() const { return taken_back_; }
   [[nodiscard]] const LoopCounts& loop_counts() const { return closer_.counts(); }
   /// Bundles and loops that would have torn the map, and were not put into it.
   [[nodiscard]] int refused() const { return bundle_.refused() + closer_.counts().refused; }
@@ -132,6 +136,9 @@ class Slam {
   void connect_keyframes();
   void commit_bundles();
   void close_loops(core::KeyframeId keyframe);
+  /// Whether a relocalisation gave way to the newest dispute: what came after it is a component of its own
+  /// now.
+  bool give_way();
 
   [[nodiscard]] std::shared_ptr<const maps::SeenPoints> seen_points() const;
 
@@ -162,6 +169,9 @@ class Slam {
     int frames = 0;       ///< since it was found
   };
   std::optional<Probation> probation_;
+  bool found_again_ = false;                   ///< and no keyframe made since
+  std::vector<core::KeyframeId> relocalised_;  ///< the first keyframe after each time, ascending
+  int taken_back_ = 0;
   std::int64_t frame_count_ = 0;  ///< logical time
   FrameTrajectory frames_;
 };

@@ -24,6 +24,11 @@ namespace plumbline::maps {
 /// The keyframes, points and lines of the component with this root move by new_from_old of their world.
 void move_component(Map& map, core::KeyframeId root, const geometry::Rigid3& new_from_old_world);
 
+/// Cuts the component of `first` in two: `first` becomes the root of what its robot made from then on, in
+/// which the other keyframes' landmarks are no longer seen, and nothing connects it with the rest: loops
+/// between the two are gone, and other edges say nothing. Nothing happens when `first` is a root.
+void split_component(Map& map, core::KeyframeId first);
+
 /// All of the robots' frames, of which those whose reference keyframe is not in `map` are not tracked:
 /// numbers of frames (FrameId) stay.
 [[nodiscard]] std::vector<FramePose> frames_in(const Map& map, std::vector<FramePose> frames);

@@ -190,6 +190,7 @@ class Map {
   /// Hangs a new keyframe on the one that shares most with it; if none does, on the robot's last one before
   /// it.
   void attach(KeyframeId id);
+  void detach(KeyframeId child);                         ///< it hangs on nothing: a component's root
   void set_parent(KeyframeId child, KeyframeId parent);  ///< std::invalid_argument: would be a cycle
   [[nodiscard]] KeyframeId parent(KeyframeId id) const {
     return keyframes_.at(id).parent;
@@ -277,7 +278,6 @@ class Map {
   IdMap<LineId, MapLine>& landmarks(LineId /*kind*/) { return lines_; }
   void share(const std::vector<Observation>& others, KeyframeId keyframe, int change);
   void erase_patches(KeyframeId id);
-  void detach(KeyframeId child);
   void restore_tree(const MapParts& parts);
 
   IdMap<KeyframeId, KeyframeEntry> keyframes_;

@@ -65,8 +65,10 @@ struct RunSummary {
   struct Loops {
     std::size_t candidates = 0;
     std::size_t verified = 0;
-    std::size_t accepted = 0;  ///< times that loops moved the map
-    std::size_t rejected = 0;  ///< of the verified, taken for wrong by the pose graph
+    std::size_t accepted = 0;    ///< times that loops moved the map
+    std::size_t rejected = 0;    ///< of the verified, taken for wrong by the pose graph
+    std::size_t taken_back = 0;  ///< relocalisations that gave way to loops that agreed against them
+    std::vector<mapping::LoopDispute> disputes;  ///< loops that agree against the path
     std::vector<mapping::LoopTrial> trials;
   } loops;
   /// What maps of other robots were used for.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -68,6 +69,41 @@ tl::unexpected<core::Error> about(const fs::path& file, core::Error error) {
   return tl::unexpected<core::Error>(std::move(error));
 }
 
+/// Frames of the run that wrote a result folder; 0: not known.
+std::size_t frames_of(const fs::path& result) {
+  std::ifstream table(result / "frames.csv");
+  std::size_t lines = 0;
+  for (std::string line; std::getline(table, line);) ++lines;
+  return lines > 0 ? lines - 1 : 0;
+}
+
+/// Components of a result that never joined its map, each measured by itself.
+std::vector<evaluate::ComponentReport> measure_components(const fs::path& result,
+                                                          const geometry::Trajectory& truth,
+                                                          const evaluate::TrajectoryOptions& options) {
+  std::error_code ignored;
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(result / "components", ignored))
+    folders.push_back(entry.path());
+  std::sort(folders.begin(), folders.end());
+
+  const std::size_t frames = frames_of(result);
+  std::vector<evaluate::ComponentReport> components;
+  for (const fs::path& folder : folders) {
+    const auto way = dataset::read_trajectory(folder / "trajectory.txt");
+    if (!way) continue;
+    evaluate::ComponentReport component;
+    component.name = folder.filename().string();
+    component.poses = way->size();
+    if (frames > 0)
+      component.percent = 100.0 * static_cast<double>(way->size()) / static_cast<double>(frames);
+    if (const auto measured = evaluate::evaluate_trajectory(*way, truth, options))
+      component.ate_m = measured->ate_m;
+    components.push_back(std::move(component));
+  }
+  return components;
+}
+
 core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryRequest& request,
                                                                Console& console) {
   const std::vector<fs::path> estimates(request.files.begin(), std::prev(request.files.end()));
@@ -105,6 +141,7 @@ core::Result<std::vector<evaluate::NamedReport>> measure_paths(const TrajectoryR
     auto report =
         evaluate::evaluate_trajectory(estimate->poses, fitting_truth.poses, request.options, stamps);
     if (!report) return about(file, report.error());
+    report->components = measure_components(estimates[i], fitting_truth.poses, request.options);
     reports.push_back({names[i], std::move(*report)});
   }
 

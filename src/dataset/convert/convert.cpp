@@ -99,7 +99,8 @@ core::Result<ConvertSummary> convert_recording(const FrameSource& source, const 
   auto summary = copy_frames(source, **target, options);
   core::Result<void> done;
   const bool odometry = source.truth_is_odometry();
-  if (odometry) log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
+  if (odometry)
+    log.warning("the poses that the recorder kept are not in the copy: it is tracked without them");
   if (summary) done = (*target)->finish(odometry ? std::nullopt : source.truth());
   if (summary && done && !file) done = put_in_place(folder, out);
   if (!summary || !done) {

@@ -18,7 +18,7 @@ using geometry::Rigid3;
 
 constexpr int kRelated = 5;             // shared landmarks: the same surroundings, not a loop
 constexpr std::size_t kAroundLoop = 8;  // keyframes on each side whose landmarks are compared
-constexpr int kPatience = 6;            // keyframes that a verified loop waits for another one
+constexpr int kDisputing = 5;           // keyframes whose loops agree against the path
 
 /// The query's pose in the world, as the loop says.
 Rigid3 world_from_query(const maps::Map& map, const Loop& loop) {
@@ -51,6 +51,7 @@ PoseEdge LoopCloser::to_edge(const Loop& loop) {
 std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
                                      const std::vector<places::Candidate>& candidates) {
   std::vector<Loop> verified;
+  std::vector<Loop> far;
   for (const places::Candidate& candidate : candidates) {
     if (candidate.in_a_row < options_.places.consistent) continue;
     ++counts_.candidates;
@@ -62,11 +63,37 @@ std::vector<Loop> LoopCloser::verify(const maps::Map& map, KeyframeId keyframe,
         verify_place({&map, keyframe, camera_}, {&map, candidate.keyframe, camera_}, options_.verify, seed);
     trial.refused = judge(map, trial);
     trials_.push_back(trial);
-    if (!trial.refused.empty()) continue;
+    if (!trial.refused.empty()) {
+      if (trial.loop.evidence.accepted) far.push_back(std::move(trial.loop));
+      continue;
+    }
     ++counts_.verified;
     verified.push_back(std::move(trial.loop));
   }
+  note_dispute(map, keyframe, far);
   return verified;
+}
+
+/// One loop that drift does not explain is another place that looks the same. Many that agree with one
+/// another and with nothing else are evidence against the path.
+void LoopCloser::note_dispute(const maps::Map& map, KeyframeId keyframe, const std::vector<Loop>& far) {
+  LoopOptions options = options_;
+  options.agreeing = kDisputing;
+  LoopDispute dispute;
+  dispute.loops = pending_disputes_.confirm(map, map, keyframe, far, options);
+  if (dispute.loops.empty()) return;
+
+  const auto landmarks = [](const Loop& l) { return l.evidence.points + 2 * l.evidence.lines; };
+  dispute.strongest.loop =
+      *std::max_element(dispute.loops.begin(), dispute.loops.end(),
+                        [&](const Loop& x, const Loop& y) { return landmarks(x) < landmarks(y); });
+  dispute.strongest.refused = judge(map, dispute.strongest);
+  disputes_.push_back(std::move(dispute));
+}
+
+void LoopCloser::clear_pending() {
+  pending_ = PendingLoops();
+  pending_disputes_ = PendingLoops(kDisputePatience);
 }
 
 /// How far closing the loop would move the query, and the way in which drift may have grown that far.
@@ -108,7 +135,7 @@ std::vector<Loop> PendingLoops::confirm(const maps::Map& matches, const maps::Ma
                                         KeyframeId keyframe, const std::vector<Loop>& verified,
                                         const LoopOptions& options) {
   const auto gone = [&](const Loop& l) {
-    return keyframe.index - l.query.index > kPatience || !queries.has_keyframe(l.query) ||
+    return keyframe.index - l.query.index > patience_ || !queries.has_keyframe(l.query) ||
            !matches.has_keyframe(l.match);
   };
   waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), gone), waiting_.end());

@@ -53,6 +53,15 @@ std::optional<ComponentOverlap> ComponentJoiner::look_up(const maps::Map& map, K
   return std::nullopt;
 }
 
+void ComponentJoiner::add(const maps::Map& map, const std::vector<Loop>& verified) {
+  for (const Loop& loop : verified) {
+    const KeyframeId one = maps::root_of(map, loop.query);
+    const KeyframeId other = maps::root_of(map, loop.match);
+    if (one != other)
+      pairs_[std::minmax(one, other)].verified.push_back({loop.query, loop.match, loop.evidence});
+  }
+}
+
 void ComponentJoiner::joined(KeyframeId a, KeyframeId b) {
   std::map<Roots, Pairs> renamed;
   for (auto& [roots, pairs] : pairs_) {

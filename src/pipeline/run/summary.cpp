@@ -44,6 +44,35 @@ Json trials_of(const RunSummary& summary) {
   return list;
 }
 
+Json disputes_of(const RunSummary& summary) {
+  Json list = Json::array();
+  for (const mapping::LoopDispute& dispute : summary.loops.disputes) {
+    const mapping::LoopTrial& strongest = dispute.strongest;
+    list.push_back({{"loops", dispute.loops.size()},
+                    {"query", strongest.loop.query.index},
+                    {"match", strongest.loop.match.index},
+                    {"points", strongest.loop.evidence.points},
+                    {"lines", strongest.loop.evidence.lines},
+                    {"correction_m", rounded(strongest.correction_m)},
+                    {"correction_rad", rounded(strongest.correction_rad)},
+                    {"path_m", rounded(strongest.path_m)}});
+  }
+  return list;
+}
+
+/// The loops that speak against the path, in words; there is at least one such dispute.
+std::string dispute_text(const RunSummary& summary) {
+  const mapping::LoopDispute& worst = *std::max_element(
+      summary.loops.disputes.begin(), summary.loops.disputes.end(),
+      [](const auto& x, const auto& y) { return x.strongest.correction_m < y.strongest.correction_m; });
+  const mapping::LoopTrial& loop = worst.strongest;
+  return fmt::format(
+      "{} loops agree that keyframe {} lies {:.2f} m from where the map has it, beside keyframe {}; that is "
+      "more "
+      "than drift explains on {:.1f} m: the path is wrong between them, or two places look alike",
+      worst.loops.size(), loop.loop.query.index, loop.correction_m, loop.loop.match.index, loop.path_m);
+}
+
 Json robots_of(const RunSummary& summary) {
   Json list = Json::array();
   for (const RunSummary::Robot& robot : summary.robots)
@@ -174,6 +203,8 @@ Json loops_of(const RunSummary& summary) {
           {"verified", summary.loops.verified},
           {"accepted", summary.loops.accepted},
           {"rejected", summary.loops.rejected},
+          {"relocalisations_taken_back", summary.loops.taken_back},
+          {"disputes", disputes_of(summary)},
           {"list", trials_of(summary)}};
 }
 
@@ -266,6 +297,8 @@ void judge(RunSummary& summary) {
     summary.reason = apart;
   } else if (!summary.path.check.tears.empty()) {
     summary.reason = torn_text(summary.path.check);
+  } else if (!summary.loops.disputes.empty()) {
+    summary.reason = dispute_text(summary);
   } else if (all > 0 && summary.voxel_m > 0.0 && summary.cloud_points == 0) {
     const std::string of_map = left_out_of_map_text(summary);
     const std::string without = of_map.empty() ? left_out_text(summary) : of_map;

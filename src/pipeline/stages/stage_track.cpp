@@ -77,7 +77,9 @@ class TrackStage : public Stage {
     refine_camera(io.frame(), number);
     mapping::Slam& slam = *slams_[number];
     const std::size_t poses = slam.frame_poses().size();
+    const int taken_back = slam.taken_back();
     const mapping::FrameReport report = slam.process(*frame, features);
+    if (slam.taken_back() > taken_back) revisions_[number] = {};  // edges changed that the store has already
     rows_.push_back({io.frame(), tracking::to_string(report.state),
                      several() ? robot.name + "," + row_columns(report) : row_columns(report)});
     if (report.keyframe.valid()) ++causes_[report.decision.cause];
@@ -154,6 +156,9 @@ class TrackStage : public Stage {
       summary.loops.verified += static_cast<std::size_t>(loops.verified);
       summary.loops.accepted += static_cast<std::size_t>(loops.accepted);
       summary.loops.rejected += static_cast<std::size_t>(loops.rejected);
+      summary.loops.taken_back += static_cast<std::size_t>(slam.taken_back());
+      const auto& disputes = slam.disputes();
+      summary.loops.disputes.insert(summary.loops.disputes.end(), disputes.begin(), disputes.end());
       const auto& trials = slam.loop_trials();
       summary.loops.trials.insert(summary.loops.trials.end(), trials.begin(), trials.end());
       summary.feedback.relocalised += static_cast<std::size_t>(loops.located);

@@ -110,5 +110,31 @@ TEST(LoopGuards, OneKeyframeAloneIsNotBelieved) {
   EXPECT_FALSE(gallery.visit(5, 0.1).empty());
 }
 
+// One loop that drift does not explain may be another place; loops of five keyframes that agree are evidence.
+TEST(LoopGuards, LoopsThatAgreeAgainstThePathAreADispute) {
+  Gallery gallery(options_for_few());
+  for (const auto& [poster, metres] : {std::pair{5U, 0.0}, {6U, 3.0}, {7U, 6.0}, {8U, 3.0}}) {
+    gallery.visit(poster, metres);
+  }
+  EXPECT_TRUE(gallery.visit(5, 0.9).empty());
+  EXPECT_TRUE(gallery.visit(6, 3.9).empty());
+  EXPECT_TRUE(gallery.closer().disputes().empty()) << "of four keyframes";
+  EXPECT_TRUE(gallery.visit(7, 6.9).empty());
+  ASSERT_EQ(gallery.closer().disputes().size(), 1U);
+  const LoopDispute& dispute = gallery.closer().disputes().front();
+  EXPECT_GE(dispute.loops.size(), 5U);
+  EXPECT_NEAR(dispute.strongest.correction_m, 0.9, 0.05);
+}
+
+TEST(LoopGuards, LoopsThatSayDifferentThingsAreNone) {
+  Gallery gallery(options_for_few());
+  for (const auto& [poster, metres] : {std::pair{5U, 0.0}, {6U, 3.0}, {7U, 6.0}, {8U, 3.0}}) {
+    gallery.visit(poster, metres);
+  }
+  for (const auto& [poster, metres] : {std::pair{5U, 0.9}, {6U, 4.9}, {7U, 9.0}})
+    gallery.visit(poster, metres);
+  EXPECT_TRUE(gallery.closer().disputes().empty());
+}
+
 }  // namespace
 }  // namespace plumbline::mapping

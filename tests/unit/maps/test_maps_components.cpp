@@ -90,5 +90,35 @@ TEST(Components, FramesKeepTheirNumbersAndTheLargerOneIsMain) {
   for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].tracked, i == 0 || i == 2) << i;
 }
 
+TEST(Components, OneIsCutInTwo) {
+  LandmarkWorld world(3, 12, 4);
+  std::vector<core::KeyframeId> keyframes;
+  for (int i = 0; i < 6; ++i) keyframes.push_back(world.add_keyframe(tests::looking_from(0.1 * i)));
+  const std::vector<core::KeyframeId> late(keyframes.begin() + 3, keyframes.end());
+  for (std::size_t i = 0; i < 12; ++i) world.add_point(i, i < 6 ? keyframes : late);
+  for (std::size_t i = 0; i < 4; ++i) world.add_line(i, i < 2 ? keyframes : late);
+  Map& map = world.map;
+  SurfaceEdge edge;
+  edge.a = keyframes[2];
+  edge.b = keyframes[3];
+  edge.information.setIdentity();
+  map.add_edge(edge);
+  map.set_loops({{keyframes[0], keyframes[5], {}, edge.information},
+                 {keyframes[0], keyframes[2], {}, edge.information}});
+
+  split_component(map, keyframes[3]);
+  EXPECT_EQ(roots(map), (std::vector<core::KeyframeId>{keyframes[0], keyframes[3]}));
+  EXPECT_EQ(root_of(map, keyframes[5]), keyframes[3]);
+  for (const core::KeyframeId id : late) EXPECT_EQ(map.points_seen_by({id}).size(), 6U);
+  EXPECT_EQ(map.points_seen_by({keyframes[0]}).size(), 6U);
+  EXPECT_EQ(component(map, keyframes[3]).line_count(), 2U);
+  ASSERT_EQ(map.loops().size(), 1U);
+  EXPECT_EQ(map.loops().front().b, keyframes[2]);
+  EXPECT_TRUE(map.edges().begin()->second.information.isZero());
+
+  split_component(map, keyframes[3]);
+  EXPECT_EQ(roots(map).size(), 2U);
+}
+
 }  // namespace
 }  // namespace plumbline::maps
