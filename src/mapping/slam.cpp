@@ -41,6 +41,14 @@ static bool can_start_map(const sensor::RgbdFrame& frame) {
          cv::countNonZero(frame.depth > 0) > kMinMeasured * static_cast<double>(frame.depth.total());
 }
 
+/// A frame that is about to be lost, in a turn that is too fast, has a pose that is known to centimetres
+/// only: it is as good as lost. Where nothing but the motion model holds a direction there is no better pose.
+static bool is_well_held(const tracking::TrackResult& track) {
+  constexpr double kLeast = 1e4;  // a standard deviation of 1 cm in the weakest direction
+  const bool is_first = track.min_eigenvalue == 0.0;
+  return is_first || track.degenerate_directions > 0 || track.min_eigenvalue >= kLeast;
+}
+
 /// A frame that begins a component must show what the next ones can be tracked by: not the dark, a hand or a
 /// bare wall.
 static bool can_begin_component(const sensor::RgbdFrame& frame, const features::FrameFeatures& features) {
@@ -121,7 +129,9 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   // Section 3.2: the frame's pose; a lost frame is looked for in the maps of other robots, too.
   const int lost_before = tracker_.lost_frames();
   last_track_ = tracker_.track(map_, frame, features);
-  if (!believes_place(frame, features, lost_before)) last_track_.state = tracking::TrackState::kLost;
+  const bool believed = believes_place(frame, features, lost_before);
+  const bool tracked = last_track_.state == tracking::TrackState::kTracked;
+  if (!believed || (tracked && !is_well_held(last_track_))) last_track_.state = tracking::TrackState::kLost;
   const tracking::TrackResult& track = last_track_;
   if (tracker_.astray()) {
     const auto place = closer_.locate(frame, features, options_.mapper.surface);
@@ -302,6 +312,7 @@ void Slam::close_loops(core::KeyframeId keyframe) {
   const Rigid3 camera_from_reference =
       tracker_.camera_from_world() * map_.camera_from_world(reference).inverse();
   std::vector<PoseEdge> edges;
+  edges.reserve(loops.size());
   for (const Loop& loop : loops) edges.push_back(LoopCloser::to_edge(loop));
   if (!closer_.close(map_, edges)) return;
   tracker_.map_changed(map_, reference, camera_from_reference * map_.camera_from_world(reference));

@@ -40,6 +40,7 @@ std::string estimate_name(const fs::path& file) {
 /// Names of all estimates; where two would be alike, the paths as they were given.
 std::vector<std::string> estimate_names(const std::vector<fs::path>& given) {
   std::vector<std::string> names;
+  names.reserve(given.size());
   for (const fs::path& path : given) names.push_back(estimate_name(file_in(path, "trajectory.txt")));
   std::vector<std::string> result = names;
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -15,14 +15,6 @@ constexpr int kDepthIsBack = 50;     // corners with depth
 constexpr double kWellWithin = 0.8;  // of the limits: else the next frame would ask again
 constexpr int kFewNormals = 10;      // landmarks: fewer say nothing about cones
 
-/// A frame that is about to be lost, in a turn that is too fast, has a pose that is known to centimetres
-/// only: as a keyframe it would keep them. Where nothing but the motion model holds a direction there is no
-/// better frame.
-bool is_well_held(const tracking::TrackResult& track) {
-  constexpr double kLeast = 1e4;  // a standard deviation of 1 cm in the weakest direction
-  return track.degenerate_directions > 0 || track.min_eigenvalue >= kLeast;
-}
-
 struct ViewOverlap {
   double overlap = 1.0;
   double depth = 2.0;  ///< median, metres
@@ -203,7 +195,7 @@ KeyframeDecision KeyframeRule::decide(const maps::Map& map, const tracking::Trac
   d.cone = cone_terms(map, track, mapper_idle);
   const bool by_cones = knows_cones();
   const bool wants = by_cones ? d.cone.candidate && d.cone.fires : plain_wants(d);
-  d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants) && is_well_held(track);
+  d.wanted = d.frames_since >= options_.min_frames && (d.urgent || wants);
   if (d.wanted && !d.urgent) d.reuse = reusable_keyframe(map, track);
   if (d.reuse.valid()) d.wanted = false;
   if (d.wanted)

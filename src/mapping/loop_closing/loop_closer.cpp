@@ -196,8 +196,7 @@ std::optional<Rigid3> LoopCloser::locate(const sensor::RgbdFrame& frame,
                                          const std::shared_ptr<const features::FrameFeatures>& features,
                                          const tracking::SurfaceSamplerOptions& surface) {
   if (others_ == nullptr) return std::nullopt;
-  const std::optional<Rigid3> found =
-      others_->locate(database_, image_map(frame, features, camera_, surface));
+  std::optional<Rigid3> found = others_->locate(database_, image_map(frame, features, camera_, surface));
   if (found) ++counts_.located;
   return found;
 }
