@@ -69,7 +69,7 @@ core::Result<void> Session::equip(pipeline::RunRequest& request) const {
 int Session::finish(const core::Result<pipeline::RunSummary>& summary, const std::filesystem::path& output) {
   console().end_progress();
   if (!summary) return fail(summary.error());
-  if (!quiet) fmt::print("{}written    {}\n", pipeline::to_text(*summary), output.string());
+  if (!quiet) fmt::print("{}written    {}\n", summary->text, output.string());
   if (summary->reason.empty()) return 0;
   console().warning("the result is not trustworthy: " + summary->reason);
   return static_cast<int>(core::ErrorKind::kUntrustworthy);

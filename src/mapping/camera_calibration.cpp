@@ -393,4 +393,14 @@ core::Result<CameraCalibration> calibrate_camera(const std::vector<CalibrationRu
   return result;
 }
 
+std::vector<CameraFinding> findings_between(const sensor::Camera& given, const sensor::Camera& found) {
+  std::vector<CameraFinding> findings;
+  const std::vector<CameraNumber> after = numbers_of(found);
+  for (const CameraNumber& n : numbers_of(given)) {
+    const double value = after[findings.size()].value;
+    findings.push_back({n.name, n.value, value, 0.0, 0.0, value != n.value});
+  }
+  return findings;
+}
+
 }  // namespace plumbline::mapping

@@ -25,6 +25,8 @@ LAYERS = [
     ["cli"],
 ]
 LAYER_OF = {module: height for height, layer in enumerate(LAYERS) for module in layer}
+# Folders of a module that must not see another one: who runs a graph knows no stage.
+BLIND = {"pipeline": [("run", "stages"), ("graph", "stages")]}
 FOLDERS = {"maps": "maps", "viz": "viz", "report": "viz/report"}  # of modules that are not below src/
 
 # A library that only these modules may include or link. Both patterns match from the start of the name.
@@ -160,8 +162,9 @@ def check_subfolders(root, module):
             if folder and other != folder and (home / other).is_dir() and other:
                 sees.setdefault(folder, set()).add(other)
                 at[folder, other] = f"{file.relative_to(root)}:{number}"
+    blind = [f"{at[a, b]}: {a} includes {b}, which it must not know" for a, b in BLIND.get(module, []) if (a, b) in at]
     seen = closure({name: sees.get(name, set()) for name in set(sees) | {o for s in sees.values() for o in s}})
-    return [f"{where}: {a} includes {b}, which includes {a}" for (a, b), where in at.items() if a in seen[b]]
+    return blind + [f"{where}: {a} includes {b}, which includes {a}" for (a, b), where in at.items() if a in seen[b]]
 
 
 def check_folders(root):

@@ -88,6 +88,11 @@ class CheckLayers(unittest.TestCase):
         self.write("src/mapping/one/a.hpp", SPDX_CPP + '#include "two/b.hpp"\n')
         self.assertEqual(len(self.problems()), 2)
 
+    def test_runner_that_knows_a_stage(self):
+        self.write("src/pipeline/stages/a.hpp", SPDX_CPP)
+        self.write("src/pipeline/run/b.cpp", SPDX_CPP + '#include "stages/a.hpp"\n')
+        self.assertEqual(self.problems(), ["src/pipeline/run/b.cpp:2: run includes stages, which it must not know"])
+
     def test_confined_libraries(self):
         self.assert_found("VTK belongs to viz", "#include <vtkActor.h>", "src/pipeline/a.cpp")
         self.setUp()

@@ -4,6 +4,7 @@
 // What comes of robots that meet while they map: lines in the log (Fig. 3 of the paper), and for each meeting
 // a folder meetings/0001_A_B with poses, evidence and a picture of the maps in one frame. Previews: the
 // finished maps have the last word.
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -11,10 +12,19 @@
 
 #include "plumbline/core/log.hpp"
 #include "plumbline/mapping/merge_server.hpp"
-#include "plumbline/pipeline/summary.hpp"
 #include "plumbline/viz/scene.hpp"
 
 namespace plumbline::pipeline {
+
+/// Two robots that met while they mapped, or a meeting that was taken back.
+struct Meeting {
+  int number = 0;  ///< from 1 on
+  std::string a;
+  std::string b;
+  double time_s = 0.0;     ///< of the recordings
+  std::int64_t frame = 0;  ///< of the run
+  bool taken_back = false;
+};
 
 class MeetingLog {
  public:
@@ -27,7 +37,7 @@ class MeetingLog {
                           const std::string& when, double time_s);
   /// Pictures of all meetings, map.png in their folders; when there is time. Errors (kOutput): as note().
   core::Result<void> draw();
-  [[nodiscard]] const std::vector<RunSummary::Meeting>& meetings() const { return meetings_; }
+  [[nodiscard]] const std::vector<Meeting>& meetings() const { return meetings_; }
 
  private:
   core::Result<void> write(const mapping::MeetingEvent& event, const std::vector<std::string>& names,
@@ -35,7 +45,7 @@ class MeetingLog {
 
   std::filesystem::path output_;
   core::Log* log_;
-  std::vector<RunSummary::Meeting> meetings_;
+  std::vector<Meeting> meetings_;
   std::vector<std::pair<std::filesystem::path, viz::Scene>> pictures_;
 };
 

@@ -22,15 +22,6 @@ struct RunRequest {
   bool replace = false;                                      ///< replace an earlier result
 };
 
-/// Times of one stage, milliseconds.
-struct StageTiming {
-  std::string name;
-  std::vector<float> frame_ms;  ///< one per frame; NaN = the stage had nothing to do
-  double finish_ms = 0.0;
-
-  [[nodiscard]] double quantile_ms(double q) const;  ///< over the frames it worked on; 0 when there are none
-};
-
 struct RunReport {
   std::size_t frames = 0;  ///< that went through the graph
   std::size_t frames_available = 0;
@@ -46,7 +37,7 @@ struct RunReport {
 /// Called in frame order, from one thread at a time.
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
-/// With a pace (RunContext::pace_hz) frame n of a recording is handed out no earlier than n / pace_hz seconds
+/// With a pace (`pace_hz` > 0) frame n of a recording is handed out no earlier than n / pace_hz seconds
 /// after the first frame, as a live camera would; several recordings are played together. Only when things
 /// happen depends on it.
 ///
@@ -56,6 +47,7 @@ using Progress = std::function<void(std::size_t done, std::size_t total)>;
 /// context's stop token says so (stages still finish) or when a stage fails: then the error of the earliest
 /// such frame is returned and no stage finishes. A run that goes on from another begins with the frame after
 /// the last one of that; the report counts those, too, but has no times of them.
-core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress);
+core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress,
+                                  double pace_hz = 0.0);
 
 }  // namespace plumbline::pipeline

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <stdexcept>
 #include <string>
 #include <typeindex>
@@ -48,7 +49,6 @@ class StoredMaps;
 namespace plumbline::pipeline {
 
 struct ResumedRun;
-struct RunSummary;
 class RobotRecordings;
 
 /// How often a port carries a value.
@@ -122,27 +122,67 @@ class StageIo {
 /// Frames under way side by side, at most, whatever the number of threads.
 constexpr std::size_t kMostUnderWay = 64;
 
-/// What a run lends to its stages; outlives them.
-struct RunContext {
+/// What a run reads.
+struct RunInput {
   const dataset::FrameSource* source = nullptr;          ///< what a read stage reads; null: there is none
-  const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
+  const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
   std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any
+  std::string text;    ///< what is mapped, as text that another recording does not give
+};
+
+/// What is kept in map.db.
+struct RunStore {
+  std::string configuration;  ///< the effective one, YAML; the same for any number of threads
+  bool keeps_map = false;     ///< some stage keeps_map
+  bool keeps_clouds = false;  ///< and it gets the clouds that are to be laid down
+};
+
+/// What reaches into the tracking of a run.
+struct TrackingHooks {
+  std::filesystem::path debug_folder;                       ///< where its pictures go; empty: nowhere
+  std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
+  std::function<void(maps::Map&)>
+      alter_map;  ///< for tests: changes the map when tracking has ended; may be empty
+};
+
+/// What a run lends to its stages; outlives them.
+struct RunContext {
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;
   core::StopToken stop;
   std::filesystem::path output_folder;  ///< where sinks write
-  std::filesystem::path debug_folder;   ///< where the tracker's pictures go; empty: nowhere
-  std::string configuration;            ///< the effective one, YAML; the same for any number of threads
-  std::string input;                    ///< what is mapped, as text that another recording does not give
-  double pace_hz = 0.0;                 ///< frames of each recording a second, at most; 0: no matter
-  bool keeps_map = false;               ///< some stage keeps_map
-  bool keeps_clouds = false;            ///< and it gets the clouds that are to be laid down
-  std::function<void(maps::Map&)>
-      alter_map;                        ///< for tests: changes the map when tracking has ended; may be empty
+  RunInput input;
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
-  std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
+  RunStore store;
+  TrackingHooks hooks;
+};
+
+/// Why a result must not be trusted.
+struct Doubt {
+  /// The gravest first: of several the first one is told, and what is lost together with what is apart.
+  enum class About {
+    kLostFrames,
+    kComponents,
+    kTornMap,
+    kDisputedLoops,
+    kEmptyCloud,
+    kUnconnectedMaps,
+    kRecording,
+    kCamera
+  };
+  About about = About::kLostFrames;
+  std::string text;
+};
+
+/// Times of one stage, milliseconds.
+struct StageTiming {
+  std::string name;
+  std::vector<float> frame_ms;  ///< one per frame; NaN = the stage had nothing to do
+  double finish_ms = 0.0;
+
+  [[nodiscard]] double quantile_ms(double q) const;  ///< over the frames it worked on; 0 when there are none
 };
 
 /// What a stage may look at while the graph is checked.
@@ -157,7 +197,7 @@ struct CheckContext {
   [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 
-/// Life of a stage: constructed, declare, check, start, process once a frame, finish, summarise.
+/// Life of a stage: constructed, declare, check, start, process once a frame, finish, report, doubts.
 class Stage {
  public:
   virtual ~Stage() = default;
@@ -187,8 +227,22 @@ class Stage {
   /// Asked after check: what is to be made of the result folder once everything else in it is written, in the
   /// forms of plumbline export; outputs are named below it. Null: nothing.
   [[nodiscard]] virtual const std::vector<exports::ExportRequest>* wanted_exports() const { return nullptr; }
-  /// Adds what this stage knows about the run.
-  virtual void summarise(RunSummary& /*summary*/) const {}
+  /// Fills in what this stage knows in the sections of summary.json; in graph order.
+  virtual void report(nlohmann::ordered_json& /*summary*/) const {}
+  /// Adds why the result must not be trusted, as far as this stage knows. `summary`: what all have reported.
+  virtual void doubt(const nlohmann::ordered_json& /*summary*/, std::vector<Doubt>& /*doubts*/) const {}
+  /// Times of parts of this stage's work, named "stage.part".
+  [[nodiscard]] virtual std::vector<StageTiming> parts() const { return {}; }
+  /// Asked before the run: it draws what it sees of each frame (TrackingHooks::debug_folder).
+  [[nodiscard]] virtual bool draws_frames() const { return false; }
+  /// Asked before the run: it can go on from an earlier one (RunContext::resumed).
+  [[nodiscard]] virtual bool resumes() const { return false; }
+  /// Asked before the run: poses that come with the recording are taken as they are.
+  [[nodiscard]] virtual bool takes_given_poses() const { return false; }
+  /// Asked before the run: it begins with finished maps (RunInput::stored_maps).
+  [[nodiscard]] virtual bool reads_maps() const { return false; }
+  /// Asked before the run: clouds wait for it in a store until their poses are final.
+  [[nodiscard]] virtual bool lays_clouds_down() const { return false; }
 };
 
 enum class Mode {

@@ -74,13 +74,12 @@ nlohmann::json json_of(const std::vector<RobotTraffic>& traffic) {
 
 /// Adds the network's traffic, the meetings and the reason to the summary of the fusion.
 core::Result<void> add_network(const fs::path& file, const std::vector<RobotTraffic>& traffic,
-                               const std::vector<pipeline::RunSummary::Meeting>& meetings,
-                               const std::string& reason) {
+                               const std::vector<pipeline::Meeting>& meetings, const std::string& reason) {
   std::ifstream in(file);
   auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
   if (summary.is_discarded()) return core::output_error(file.string() + ": cannot be read again");
   summary["network"] = json_of(traffic);
-  for (const pipeline::RunSummary::Meeting& m : meetings) {
+  for (const pipeline::Meeting& m : meetings) {
     summary["meetings"].push_back(
         {{"number", m.number}, {"a", m.a}, {"b", m.b}, {"log", m.frame}, {"taken_back", m.taken_back}});
   }

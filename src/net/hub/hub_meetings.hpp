@@ -34,9 +34,7 @@ class HubMeetings {
   void finish();
   /// Pose of a robot in the frame that it shares with others; empty: it met nobody.
   [[nodiscard]] SharedFrame frame(const std::string& robot) const;
-  [[nodiscard]] const std::vector<pipeline::RunSummary::Meeting>& meetings() const {
-    return reported_.meetings();
-  }
+  [[nodiscard]] const std::vector<pipeline::Meeting>& meetings() const { return reported_.meetings(); }
 
  private:
   /// A robot with at least one entry.

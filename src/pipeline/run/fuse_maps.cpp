@@ -6,8 +6,8 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
 #include "plumbline/maps/stored_maps.hpp"
+#include "results/waiting_clouds.hpp"
 #include "run/result.hpp"
-#include "stages/waiting_clouds.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -33,7 +33,7 @@ std::string names_of(const maps::StoredMaps& maps) {
 core::Result<Graph> load_fusion(const FuseRequest& request) {
   auto graph = load_pipeline(request);
   if (!graph) return graph;
-  if (graph->source().type->name == "maps") return graph;
+  if (graph->source().stage->reads_maps()) return graph;
   return core::usage_error(fmt::format(
       "{}: begins with a {} stage; finished maps are fused by a pipeline that begins with a maps stage",
       graph->file.string(), graph->source().type->name));
@@ -51,13 +51,13 @@ core::Result<std::unique_ptr<maps::StoredMaps>> open_maps(const FuseRequest& req
 RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, const Graph& graph,
                       const std::filesystem::path& folder) {
   RunContext context;
-  context.stored_maps = &maps;
-  context.robots = &maps.robots();
-  context.keeps_clouds = keeps_clouds(graph);
-  context.anchor = request.anchor;
   context.output_folder = folder;
-  context.configuration = config_text(request, maps, graph);
-  context.input = names_of(maps);
+  context.input.stored_maps = &maps;
+  context.input.robots = &maps.robots();
+  context.input.anchor = request.anchor;
+  context.input.text = names_of(maps);
+  context.store.configuration = config_text(request, maps, graph);
+  context.store.keeps_clouds = keeps_clouds(graph);
   return context;
 }
 
@@ -77,13 +77,12 @@ core::Result<RunSummary> fuse_stored_maps(const FuseRequest& request, const core
   context.executor = &executor;
   context.log = &log;
   context.stop = stop;
-  if (auto ok = core::write_file(output->path() / "config.yaml", context.configuration); !ok)
+  if (auto ok = core::write_file(output->path() / "config.yaml", context.store.configuration); !ok)
     return tl::unexpected(ok.error());
   const auto report = run_graph(*graph, context, progress);
   if (!report) return tl::unexpected(report.error());
-  RunSummary summary = summary_of_run(*graph, *report, request, executor);
-  summary.input = context.input;
-  if (auto ok = commit_result(summary, *output, began, *graph, request, context); !ok)
+  RunSummary summary = summary_of_run(*graph, *report, request, context.input.text, 0.0, began, executor);
+  if (auto ok = commit_result(summary, *output, *graph, request, context); !ok)
     return tl::unexpected(ok.error());
   return summary;
 }

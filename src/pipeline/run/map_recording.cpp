@@ -17,11 +17,12 @@
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
+#include "results/debug_video.hpp"
+#include "results/resumed_run.hpp"
+#include "results/waiting_clouds.hpp"
+#include "robots/camera_refinement.hpp"
 #include "run/result.hpp"
-#include "stages/camera_refinement.hpp"
-#include "stages/debug_video.hpp"
-#include "stages/resumed_run.hpp"
-#include "stages/waiting_clouds.hpp"
+#include "run/run_summary.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -114,31 +115,25 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
   return std::make_unique<RobotRecordings>(std::move(all));
 }
 
-bool tracks(const Graph& graph) {
+template <typename Question>
+bool any_stage(const Graph& graph, Question question) {
   return std::any_of(graph.nodes.begin(), graph.nodes.end(),
-                     [](const Node& node) { return node.type->name == "track"; });
-}
-
-bool keeps_map(const Graph& graph) {
-  return std::any_of(graph.nodes.begin(), graph.nodes.end(),
-                     [](const Node& node) { return node.stage->keeps_map(); });
+                     [&](const Node& node) { return (node.stage.get()->*question)(); });
 }
 
 /// Whether the pipeline can do what is asked of it.
 core::Result<void> fits(const Graph& graph, const MapRequest& request) {
-  if (!request.debug_video.empty() && !tracks(graph)) {
+  if (!request.debug_video.empty() && !any_stage(graph, &Stage::draws_frames)) {
     return core::usage_error(fmt::format(
         "{}: has no track stage whose work could be drawn; leave out --debug-video", graph.file.string()));
   }
-  const bool takes_poses = std::any_of(graph.nodes.begin(), graph.nodes.end(),
-                                       [](const Node& node) { return node.type->name == "poses"; });
-  if (request.open.poses == dataset::PoseUse::kGiven && !takes_poses) {
+  if (request.open.poses == dataset::PoseUse::kGiven && !any_stage(graph, &Stage::takes_given_poses)) {
     return core::usage_error(
         fmt::format("{}: has no stage 'poses' that takes poses as they are given; leave out --poses given, "
                     "or the pipeline",
                     graph.file.string()));
   }
-  if (graph.source().type->name == "maps") {
+  if (graph.source().stage->reads_maps()) {
     return core::usage_error(
         fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));
   }
@@ -147,7 +142,7 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
 
 core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
   if (!request.resume) return {};
-  if (!keeps_map(graph) || !tracks(graph)) {
+  if (!any_stage(graph, &Stage::keeps_map) || !any_stage(graph, &Stage::resumes)) {
     return core::usage_error(fmt::format(
         "{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave out --resume",
         graph.file.string()));
@@ -204,12 +199,15 @@ class MapRun {
     if (auto ok = write_cameras(output_->path(), source_->robots(), cameras); !ok)
       return tl::unexpected(ok.error());
     if (request_.prepared) request_.prepared(output_->path());
-    const auto report = run_graph(graph_, context, progress);
+    const auto report = run_graph(graph_, context, progress, request_.pace_hz);
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
-    RunSummary summary = summary_of(*report);
-    if (auto ok = write_timing(output_->path() / "timing.csv", *report, summary.parts, *source_); !ok)
+
+    std::string input = request_.input;
+    for (const std::string& other : request_.others) input += " " + other;
+    RunSummary summary = summary_of_run(graph_, *report, request_, input, request_.pace_hz, began, executor_);
+    if (auto ok = write_timing(output_->path() / "timing.csv", graph_, *report, *source_); !ok)
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
-    if (auto ok = commit_result(summary, *output_, began, graph_, request_, context); !ok)
+    if (auto ok = commit_result(summary, *output_, graph_, request_, context); !ok)
       return tl::unexpected(with_what_is_kept(ok.error(), *output_));
     if (debug_) {
       if (auto committed = debug_->commit(); !committed) return tl::unexpected(committed.error());
@@ -242,31 +240,22 @@ class MapRun {
 
   RunContext context_of(const core::StopToken& stop) {
     RunContext context;
-    context.source = source_.get();
-    context.recordings = source_.get();
-    context.robots = &source_->robots();
     context.executor = &executor_;
     context.log = &log_;
     context.stop = stop;
     context.output_folder = output_->path();
-    if (debug_) context.debug_folder = debug_->path();
-    context.configuration = config_text(request_, graph_, 0);
-    context.input = input_text(*source_);
-    context.pace_hz = request_.pace_hz;
-    context.keeps_map = keeps_map(graph_);
-    context.keeps_clouds = keeps_clouds(graph_);
-    context.alter_map = request_.alter_map;
-    context.feedback = request_.feedback;
+    context.input.source = source_.get();
+    context.input.recordings = source_.get();
+    context.input.robots = &source_->robots();
+    context.input.text = input_text(*source_);
     if (resumed_) context.resumed = &*resumed_;
+    context.store.configuration = config_text(request_, graph_, 0);
+    context.store.keeps_map = any_stage(graph_, &Stage::keeps_map);
+    context.store.keeps_clouds = keeps_clouds(graph_);
+    if (debug_) context.hooks.debug_folder = debug_->path();
+    context.hooks.feedback = request_.feedback;
+    context.hooks.alter_map = request_.alter_map;
     return context;
-  }
-
-  [[nodiscard]] RunSummary summary_of(const RunReport& report) const {
-    RunSummary summary = summary_of_run(graph_, report, request_, executor_);
-    summary.input = request_.input;
-    for (const std::string& other : request_.others) summary.input += " " + other;
-    summary.pace_hz = request_.pace_hz;
-    return summary;
   }
 
   const MapRequest& request_;

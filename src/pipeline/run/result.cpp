@@ -6,6 +6,7 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/exports/export.hpp"
 #include "plumbline/pipeline/input.hpp"
+#include "run/run_summary.hpp"
 
 namespace plumbline::pipeline {
 
@@ -19,18 +20,15 @@ core::Result<Graph> load_pipeline(const RunRequest& request) {
 }
 
 RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,
+                          const std::string& input, double pace_hz, RunClock::time_point began,
                           const core::Executor& executor) {
-  RunSummary summary;
-  summary.pipeline = request.pipeline;
-  summary.threads = executor.threads();
-  summary.stopped = report.stopped;
-  summary.frames.available = report.frames_available;
-  summary.map_s = report.map_s;
-  summary.behind_s = report.behind_s;
-  summary.export_s = report.export_s;
-  summary.stages = report.stages;
-  for (const Node& node : graph.nodes) node.stage->summarise(summary);
-  return summary;
+  RunFacts facts;
+  facts.input = input;
+  facts.pipeline = request.pipeline;
+  facts.pace_hz = pace_hz;
+  facts.wall_s = std::chrono::duration<double>(RunClock::now() - began).count();
+  facts.threads = executor.threads();
+  return summary_of(graph, report, facts);
 }
 
 namespace {
@@ -70,12 +68,9 @@ core::Result<void> write_exports(const std::filesystem::path& folder, const Grap
 
 }  // namespace
 
-core::Result<void> commit_result(RunSummary& summary, maps::OutputFolder& output, RunClock::time_point began,
-                                 const Graph& graph, const RunRequest& request, const RunContext& context) {
-  judge(summary);
-  summary.peak_rss_mb = peak_rss_mb();
-  summary.wall_s = std::chrono::duration<double>(RunClock::now() - began).count();
-  if (auto ok = write_summary(output.path() / "summary.json", summary); !ok) return ok;
+core::Result<void> commit_result(const RunSummary& summary, maps::OutputFolder& output, const Graph& graph,
+                                 const RunRequest& request, const RunContext& context) {
+  if (auto ok = core::write_file(output.path() / "summary.json", summary.json); !ok) return ok;
   if (auto ok = write_exports(output.path(), graph, request, context); !ok) return ok;
   return output.commit();
 }

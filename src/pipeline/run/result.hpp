@@ -3,8 +3,10 @@
 
 // How `map` and `fuse` begin and end: a pipeline that is checked whole, a result folder with summary.json.
 #include <chrono>
+#include <string>
 
 #include "plumbline/maps/output_folder.hpp"
+#include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
 
 namespace plumbline::pipeline {
@@ -14,13 +16,14 @@ using RunClock = std::chrono::steady_clock;
 /// The pipeline that is asked for. Errors: kUsage.
 core::Result<Graph> load_pipeline(const RunRequest& request);
 
-/// What the stages know about the run.
+/// What the stages report. `began`: the whole run, so far.
 RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,
+                          const std::string& input, double pace_hz, RunClock::time_point began,
                           const core::Executor& executor);
 
-/// Judges the result, writes summary.json and what the stages export, and makes the folder the result. An
+/// Writes summary.json and what the stages export, and makes the folder the result. An
 /// export that cannot be made is told as a warning: the map is there without it. Errors: kOutput.
-core::Result<void> commit_result(RunSummary& summary, maps::OutputFolder& output, RunClock::time_point began,
-                                 const Graph& graph, const RunRequest& request, const RunContext& context);
+core::Result<void> commit_result(const RunSummary& summary, maps::OutputFolder& output, const Graph& graph,
+                                 const RunRequest& request, const RunContext& context);
 
 }  // namespace plumbline::pipeline

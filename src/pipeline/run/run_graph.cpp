@@ -14,8 +14,8 @@
 #include "plumbline/core/numbers.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
+#include "results/resumed_run.hpp"
 #include "run/pace.hpp"
-#include "stages/resumed_run.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -74,8 +74,12 @@ void give_back_memory() {
 
 class Runner {
  public:
-  Runner(Graph& graph, const RunContext& context, const Progress& progress)
-      : graph_(graph), context_(context), progress_(progress), last_use_(graph.nodes.size()) {
+  Runner(Graph& graph, const RunContext& context, const Progress& progress, double pace_hz)
+      : graph_(graph),
+        context_(context),
+        progress_(progress),
+        pace_hz_(pace_hz),
+        last_use_(graph.nodes.size()) {
     for (std::size_t n = 0; n < graph_.nodes.size(); ++n) {
       last_use_[n] = n;
       for (const auto& input : graph_.nodes[n].inputs) {
@@ -96,7 +100,7 @@ class Runner {
     report_.rss_mb = unknown;
     skip_done();
     const auto start = Clock::now();
-    pace_.emplace(context_.pace_hz, started_, context_.recordings);
+    pace_.emplace(pace_hz_, started_, context_.input.recordings);
     // A pipeline ends when the next frame is not due yet, and another one begins with that: whoever waits for
     // a frame keeps no thread from what else there is to do.
     while (!ended()) {
@@ -260,6 +264,7 @@ class Runner {
   Graph& graph_;
   const RunContext& context_;
   const Progress& progress_;
+  double pace_hz_;
   std::vector<std::size_t> last_use_;  ///< [node]: the last node that reads from it
   FirstFailure failure_;
   std::size_t total_ = 0;
@@ -274,8 +279,9 @@ double StageTiming::quantile_ms(double q) const {
   return static_cast<double>(core::quantile(frame_ms, q, 0.0F));
 }
 
-core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress) {
-  return Runner(graph, context, progress).run();
+core::Result<RunReport> run_graph(Graph& graph, const RunContext& context, const Progress& progress,
+                                  double pace_hz) {
+  return Runner(graph, context, progress, pace_hz).run();
 }
 
 }  // namespace plumbline::pipeline

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
-
-#include "plumbline/pipeline/summary.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -26,19 +23,6 @@ void register_stages(StageRegistry& registry) {
   registry.add_tap(map_tap());
   registry.add_tap(maps_tap());
   registry.add_tap(cloud_tap());
-}
-
-void count_frames(const std::vector<FrameRow>& rows, RunSummary& summary) {
-  std::size_t loss = 0;
-  for (const FrameRow& row : rows) {
-    if (row.state == "tracked") {
-      ++summary.frames.tracked;
-      loss = 0;
-    } else {
-      ++summary.frames.lost;
-      summary.frames.longest_loss = std::max(summary.frames.longest_loss, ++loss);
-    }
-  }
 }
 
 }  // namespace plumbline::pipeline

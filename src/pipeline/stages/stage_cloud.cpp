@@ -4,9 +4,11 @@
 #include <atomic>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "options/chain_option.hpp"
 #include "plumbline/cloud/compact_cloud.hpp"
 #include "plumbline/cloud/free_space.hpp"
 #include "plumbline/cloud/keyframe_cloud.hpp"
@@ -14,9 +16,8 @@
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
-#include "plumbline/pipeline/summary.hpp"
-#include "stages/chain_option.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -46,11 +47,13 @@ class LeftOut {
       by_filter_[i] += report.points_in - std::min(report.points_in, report.points_out);
     }
   }
-  void report(const cloud::FilterChain& chain, RunSummary& summary) const {
-    summary.measured_points = measured_;
-    summary.left_out = {{"depth_limits", by_depth_}};
+  void report(const cloud::FilterChain& chain, Json& cloud) const {
+    if (measured_ == 0) return;
+    cloud["measured"] = measured_.load();
+    std::vector<std::pair<std::string, std::size_t>> left_out{{"depth_limits", by_depth_.load()}};
     const std::vector<std::string> types = chain.types();
-    for (std::size_t i = 0; i < by_filter_.size(); ++i) summary.left_out.push_back({types[i], by_filter_[i]});
+    for (std::size_t i = 0; i < by_filter_.size(); ++i) left_out.emplace_back(types[i], by_filter_[i].load());
+    cloud["left_out"] = left_out_section(left_out);
   }
 
  private:
@@ -75,7 +78,7 @@ class CloudStage : public Stage {
   }
   [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
   core::Result<void> start(const RunContext& context) override {
-    recordings_ = context.recordings;
+    recordings_ = context.input.recordings;
     left_out_.start(filters_.chain().size());
     return {};
   }
@@ -113,7 +116,7 @@ class CloudStage : public Stage {
     io.output<KeyframeCloud>("cloud", result);
     return {};
   }
-  void summarise(RunSummary& summary) const override { left_out_.report(filters_.chain(), summary); }
+  void report(Json& summary) const override { left_out_.report(filters_.chain(), summary["cloud"]); }
 
  private:
   core::Result<cloud::CloudPtr> filtered(const sensor::RgbdFrame& frame, const sensor::Pinhole& camera,

@@ -15,7 +15,7 @@ class FeaturesStage : public Stage {
  public:
   void declare(core::OptionTable& table) override { options_.declare(table); }
   core::Result<void> start(const RunContext& context) override {
-    recordings_ = context.recordings;
+    recordings_ = context.input.recordings;
     for (const RobotInfo& robot : recordings_->robots()) {
       extractors_.push_back(std::make_unique<features::FeatureExtractor>(options_, robot.camera.color));
     }

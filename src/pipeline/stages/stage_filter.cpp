@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "plumbline/pipeline/summary.hpp"
-#include "stages/chain_option.hpp"
+#include "options/chain_option.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -45,9 +45,12 @@ class FilterStage : public Stage {
     io.output<DenseCloud>("cloud", dense);
     return {};
   }
-  void summarise(RunSummary& summary) const override {
-    add_left_out(reports_, summary);
-    summary.cloud_points = points_;
+  void report(Json& summary) const override {
+    report_left_out_of_map(reports_, summary["cloud"]);
+    summary["cloud"]["points"] = points_;
+  }
+  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
+    doubt_empty_cloud(summary, doubts);
   }
 
  private:

@@ -11,16 +11,16 @@
 #include <utility>
 #include <vector>
 
+#include "options/chain_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/cloud/transform.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/stored_maps.hpp"
-#include "plumbline/pipeline/summary.hpp"
-#include "stages/chain_option.hpp"
+#include "results/up_frame.hpp"
+#include "results/waiting_clouds.hpp"
 #include "stages/stages.hpp"
-#include "stages/up_frame.hpp"
-#include "stages/waiting_clouds.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -81,14 +81,19 @@ class FuseStage : public Stage {
     return {};
   }
 
-  void summarise(RunSummary& summary) const override {
-    add_left_out(report_.filters, summary);
-    summary.cloud_points = report_.points;
-    summary.voxel_m = options_.voxels.voxel_m;
-    summary.cloud_sigma_m = report_.sigma;
-    summary.up = report_.frame.up;
-    summary.yaw = report_.frame.yaw;
-    summary.output_from_map = report_.frame.output_from_map;
+  [[nodiscard]] bool lays_clouds_down() const override { return true; }
+  void report(Json& summary) const override {
+    Json& cloud = summary["cloud"];
+    cloud["points"] = report_.points;
+    cloud["voxel_m"] = options_.voxels.voxel_m;
+    report_left_out_of_map(report_.filters, cloud);
+    if (report_.sigma.median > 0.0) cloud["sigma_m"] = section_of(report_.sigma);
+    summary["frame"] = {{"up", report_.frame.up},
+                        {"yaw", report_.frame.yaw},
+                        {"output_from_map", rows(report_.frame.output_from_map)}};
+  }
+  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
+    doubt_empty_cloud(summary, doubts);
   }
 
  private:
@@ -163,7 +168,7 @@ class FuseStage : public Stage {
   [[nodiscard]] std::vector<sensor::Pinhole> cameras_of(const maps::StoredViews& views) const {
     std::vector<sensor::Pinhole> cameras;
     for (const std::int32_t robot : views.robots) {
-      cameras.push_back(maps::camera_of(*context_->robots, robot).color);
+      cameras.push_back(maps::camera_of(*context_->input.robots, robot).color);
     }
     return cameras;
   }
@@ -171,8 +176,9 @@ class FuseStage : public Stage {
   /// Of finished maps, what cannot be used is reported with the name of its own file.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
-    if (cloud || context_->stored_maps == nullptr) return cloud;
-    return tl::unexpected(context_->stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
+    if (cloud || context_->input.stored_maps == nullptr) return cloud;
+    return tl::unexpected(
+        context_->input.stored_maps->damaged(views.keyframes[i], views.frames[i], cloud.error()));
   }
 
   const RunContext* context_ = nullptr;

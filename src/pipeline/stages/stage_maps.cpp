@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "plumbline/maps/stored_maps.hpp"
-#include "stages/robot_components.hpp"
+#include "robots/robot_components.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -13,13 +13,14 @@ namespace {
 class MapsStage : public Stage {
  public:
   core::Result<void> start(const RunContext& context) override {
-    maps_ = context.stored_maps;
+    maps_ = context.input.stored_maps;
     if (maps_ == nullptr) {
       return core::usage_error("a pipeline that begins with finished maps is run by plumbline fuse");
     }
     return {};
   }
   [[nodiscard]] std::size_t frames() const override { return maps_->clouds().size(); }
+  [[nodiscard]] bool reads_maps() const override { return true; }
 
   /// Surfaces are wanted at once; clouds wait where they are until they are laid down.
   core::Result<void> process(StageIo& io) override {

@@ -16,9 +16,10 @@
 #include "plumbline/maps/stored_maps.hpp"
 #include "plumbline/pipeline/meeting_log.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
-#include "plumbline/pipeline/summary.hpp"
-#include "stages/robot_merge.hpp"
+#include "robots/robot_components.hpp"
+#include "robots/robot_merge.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -29,7 +30,7 @@ constexpr const char* kMeetings = "meetings";
 class LiveMeetings {
  public:
   LiveMeetings(const mapping::MapFusionOptions& options, int lag, const RunContext& context)
-      : recordings_(*context.recordings),
+      : recordings_(*context.input.recordings),
         server_(options, lag, *context.executor),
         log_(context.output_folder, *context.log) {
     for (const RobotInfo& robot : recordings_.robots()) {
@@ -52,9 +53,20 @@ class LiveMeetings {
     return pictures ? log_.draw() : core::Result<void>();
   }
 
-  [[nodiscard]] const std::vector<RunSummary::Meeting>& meetings() const { return log_.meetings(); }
+  [[nodiscard]] Json section() const {
+    Json list = Json::array();
+    for (const Meeting& meeting : log_.meetings()) {
+      list.push_back({{"number", meeting.number},
+                      {"a", meeting.a},
+                      {"b", meeting.b},
+                      {"time_s", rounded(meeting.time_s)},
+                      {"frame", meeting.frame},
+                      {"taken_back", meeting.taken_back}});
+    }
+    return list;
+  }
   /// When robots that were merged in the end met, and when they could have.
-  void date(RunSummary::Merge& merge) const {
+  void date(RobotMerge& merge) const {
     const auto when = met_s_.find({merge.evidence.a, merge.evidence.b});
     if (when != met_s_.end()) merge.time_s = when->second;
     merge.evident_s = mapping::evident_s(merge.evidence, made_s_);
@@ -96,7 +108,7 @@ class MergeStage : public Stage {
 
   core::Result<void> start(const RunContext& context) override {
     context_ = &context;
-    if (context.recordings != nullptr && context.recordings->robots().size() > 1 && online_)
+    if (context.input.recordings != nullptr && context.input.recordings->robots().size() > 1 && online_)
       live_.emplace(options_, lag_, context);
     return {};
   }
@@ -110,7 +122,8 @@ class MergeStage : public Stage {
     if (live_) {
       if (auto finished = live_->finish(pictures_); !finished) return finished;
     }
-    if (maps->maps.size() == 1 && maps->maps.front().robots.size() == 1 && context_->stored_maps == nullptr) {
+    if (maps->maps.size() == 1 && maps->maps.front().robots.size() == 1 &&
+        context_->input.stored_maps == nullptr) {
       merged_.map = std::make_shared<MapResult>();
       merged_.map->map = maps->maps.front().map;
       merged_.map->frame_poses = maps->maps.front().frame_poses;
@@ -126,28 +139,37 @@ class MergeStage : public Stage {
     return {};
   }
 
-  void summarise(RunSummary& summary) const override {
+  void report(Json& summary) const override {
     const MapResult& result = *merged_.map;
-    summary.keyframes = result.map->keyframe_count();
-    summary.points = result.map->point_count();
-    summary.lines = result.lines.size();
-    summary.merges = merged_.merges;
-    if (live_) summary.meetings = live_->meetings();
-    summary.unconnected = merged_.unconnected;
-    summary.components.insert(summary.components.end(), components_.begin(), components_.end());
-    summary.path.refused += merged_.refused;
-    if (context_->stored_maps == nullptr) return;
-    for (const maps::FramePose& frame : result.frame_poses)
-      ++(frame.tracked ? summary.frames.tracked : summary.frames.lost);
-    summary.frames.read = summary.frames.available = result.frame_poses.size();
+    summary["keyframes"] = result.map->keyframe_count();
+    summary["landmarks"] = {{"points", result.map->point_count()}, {"lines", result.lines.size()}};
+    for (const RobotMerge& merge : merged_.merges) summary["merges"].push_back(section_of(merge));
+    if (live_) summary["meetings"] = live_->section();
+    for (const ComponentFate& component : components_)
+      summary["components"]["list"].push_back(section_of(component));
+    add(summary["path"]["refused_adjustments"], merged_.refused);
+    if (context_->input.stored_maps != nullptr) report_stored_frames(result, summary["frames"]);
+  }
+  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
+    if (context_->input.stored_maps != nullptr) doubt_lost_frames(summary, doubts);
+    doubt_components_apart(summary, doubts);
+    if (!merged_.unconnected.empty()) doubts.push_back({Doubt::About::kUnconnectedMaps, merged_.unconnected});
   }
 
  private:
+  /// Nobody reads frames of finished maps: their poses tell them.
+  static void report_stored_frames(const MapResult& result, Json& frames) {
+    const auto tracked = std::count_if(result.frame_poses.begin(), result.frame_poses.end(),
+                                       [](const auto& frame) { return frame.tracked; });
+    frames["read"] = frames["available"] = result.frame_poses.size();
+    frames["tracked"] = tracked;
+    frames["lost"] = result.frame_poses.size() - static_cast<std::size_t>(tracked);
+  }
   /// What became of the components that were not joined while their robot mapped.
   void note_components(const std::vector<RobotMap>& parts) {
     for (const RobotMap& part : parts) {
       if (!part.component) continue;
-      RunSummary::Component component;
+      ComponentFate component;
       component.name = part.name;
       component.keyframes = part.map->keyframe_count();
       component.frames = static_cast<std::size_t>(std::count_if(
@@ -155,7 +177,7 @@ class MergeStage : public Stage {
       const auto& apart = merged_.map->apart;
       component.joined = std::none_of(apart.begin(), apart.end(),
                                       [&](const auto& other) { return other->name == part.name; });
-      for (const RunSummary::Merge& merge : merged_.merges) {
+      for (const RobotMerge& merge : merged_.merges) {
         if (merge.a != part.name && merge.b != part.name) continue;
         component.agreeing = std::max(component.agreeing, merge.evidence.consistency.agreeing);
         const std::string& other = merge.a == part.name ? merge.b : merge.a;
@@ -168,10 +190,11 @@ class MergeStage : public Stage {
   }
   void merge(const std::vector<RobotMap>& maps) {
     std::size_t anchor = maps.size();
-    if (!context_->anchor.empty()) anchor = *context_->stored_maps->find_part(context_->anchor);
+    if (!context_->input.anchor.empty())
+      anchor = *context_->input.stored_maps->find_part(context_->input.anchor);
     merged_ = merge_robots(maps, anchor, options_, *context_->executor, *context_->log);
     if (!live_) return;
-    for (RunSummary::Merge& merge : merged_.merges) live_->date(merge);
+    for (RobotMerge& merge : merged_.merges) live_->date(merge);
   }
 
   const RunContext* context_ = nullptr;
@@ -181,7 +204,7 @@ class MergeStage : public Stage {
   int lag_ = 10;
   std::optional<LiveMeetings> live_;
   MergedRobots merged_;
-  std::vector<RunSummary::Component> components_;
+  std::vector<ComponentFate> components_;
 };
 
 }  // namespace

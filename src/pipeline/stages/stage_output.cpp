@@ -9,6 +9,7 @@
 #include <sstream>
 #include <vector>
 
+#include "options/exports_option.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/cloud/dense_fusion.hpp"
 #include "plumbline/core/output_file.hpp"
@@ -16,10 +17,9 @@
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
-#include "plumbline/pipeline/summary.hpp"
 #include "plumbline/viz/snapshot.hpp"
-#include "stages/exports_option.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -109,7 +109,32 @@ class OutputStage : public Stage {
     return drawn;
   }
 
-  void summarise(RunSummary& summary) const override { summary.path.check = path_; }
+  void report(Json& summary) const override {
+    Json& path = summary["path"];
+    path["largest_step_m"] = rounded(path_.largest_m);
+    path["largest_step_rad"] = rounded(path_.largest_rad);
+    for (const maps::PathStep& step : path_.tears) {
+      path["tears"].push_back({{"stamp", step.stamp},
+                               {"robot", step.to.robot},
+                               {"from_keyframe", step.from.index},
+                               {"to_keyframe", step.to.index},
+                               {"off_m", rounded(step.off_m)},
+                               {"off_rad", rounded(step.off_rad)}});
+    }
+  }
+
+  void doubt(const Json& /*summary*/, std::vector<Doubt>& doubts) const override {
+    if (path_.tears.empty()) return;
+    const auto& worst = *std::max_element(path_.tears.begin(), path_.tears.end(),
+                                          [](const auto& a, const auto& b) { return a.off_m < b.off_m; });
+    doubts.push_back(
+        {Doubt::About::kTornMap,
+         fmt::format(
+             "the map is torn: at {:.3f} s, between keyframes {} and {}, the path jumps by {:.1f} cm "
+             "and {:.1f} degrees that the tracker did not see{}",
+             worst.stamp, worst.from.index, worst.to.index, 100.0 * worst.off_m, worst.off_rad * 180.0 / M_PI,
+             path_.tears.size() > 1 ? fmt::format("; {} such places in all", path_.tears.size()) : "")});
+  }
 
  private:
   /// Poses and lines in the output's frame.
@@ -223,7 +248,7 @@ class OutputStage : public Stage {
     if (auto made = core::make_folder(folder); !made) return made;
     viz::Scene scene;
     scene.cloud = dense.cloud;
-    scene.title = context_->source != nullptr ? context_->source->name() : "fused maps";
+    scene.title = context_->input.source != nullptr ? context_->input.source->name() : "fused maps";
     if (map.robots.size() < 2) {
       viz::CameraPath path;
       path.trajectory = map.trajectory;

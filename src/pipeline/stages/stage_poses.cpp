@@ -10,8 +10,8 @@
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
-#include "plumbline/pipeline/summary.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -29,7 +29,7 @@ class PosesStage : public Stage {
   }
 
   core::Result<void> start(const RunContext& context) override {
-    recordings_ = context.recordings;
+    recordings_ = context.input.recordings;
     ways_.resize(recordings_->robots().size());
     if (several() && !file_.empty() && file_.find(kRobot) == std::string::npos) {
       return core::usage_error(fmt::format(
@@ -80,13 +80,17 @@ class PosesStage : public Stage {
     return {};
   }
 
-  void summarise(RunSummary& summary) const override {
-    count_frames(map_.frames, summary);
-    summary.keyframes = map_.keyframes.size();
+  [[nodiscard]] bool takes_given_poses() const override { return true; }
+  void report(Json& summary) const override {
+    report_frames(map_.frames, summary["frames"]);
+    summary["keyframes"] = map_.keyframes.size();
     for (const RobotInfo& robot : map_.robots) {
       const Way& way = ways_[static_cast<std::size_t>(robot.number)];
-      summary.robots.push_back({robot.name, static_cast<std::size_t>(way.keyframes)});
+      summary["robots"].push_back({{"name", robot.name}, {"keyframes", way.keyframes}});
     }
+  }
+  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
+    doubt_lost_frames(summary, doubts);
   }
 
  private:

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "plumbline/dataset/frame_source.hpp"
-#include "plumbline/pipeline/summary.hpp"
-#include "stages/resumed_run.hpp"
+#include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -18,7 +18,7 @@ constexpr std::size_t kReportedOneByOne = 5;
 class ReadStage : public Stage {
  public:
   core::Result<void> start(const RunContext& context) override {
-    source_ = context.source;
+    source_ = context.input.source;
     log_ = context.log;
     if (source_ == nullptr || source_->size() == 0) return core::input_error("the recording has no frames");
     if (context.resumed != nullptr) {
@@ -63,12 +63,16 @@ class ReadStage : public Stage {
     return {};
   }
 
-  void summarise(RunSummary& summary) const override {
-    summary.input_doubt = source_->doubt();
-    summary.frames.read = read_;
-    summary.frames.resumed = resumed_;
-    summary.frames.unreadable = unreadable_;
-    summary.frames.odometry = odometry_;
+  void report(Json& summary) const override {
+    Json& frames = summary["frames"];
+    frames["read"] = read_.load();
+    frames["resumed"] = resumed_;
+    frames["unreadable"] = unreadable_.load();
+    frames["odometry"] = odometry_.load();
+  }
+  void doubt(const Json& /*summary*/, std::vector<Doubt>& doubts) const override {
+    if (const std::string doubt = source_->doubt(); !doubt.empty())
+      doubts.push_back({Doubt::About::kRecording, doubt});
   }
 
  private:

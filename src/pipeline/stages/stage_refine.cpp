@@ -8,12 +8,21 @@
 
 #include "plumbline/mapping/refinement.hpp"
 #include "plumbline/maps/camera_history.hpp"
-#include "plumbline/pipeline/summary.hpp"
-#include "stages/resumed_run.hpp"
+#include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 namespace {
+
+Json fits_section(const optimize::BundleFits& fits) {
+  Json all = Json::object();
+  for (const auto& [name, fit] :
+       {std::pair{"points", fits.points}, std::pair{"lines", fits.lines}, std::pair{"edges", fits.edges}}) {
+    if (fit.all > 0) all[name] = {{"all", fit.all}, {"fitting", fit.fitting}, {"rms", rounded(fit.rms)}};
+  }
+  return all;
+}
 
 class RefineStage : public Stage {
  public:
@@ -21,7 +30,7 @@ class RefineStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     executor_ = context.executor;
     log_ = context.log;
-    for (const RobotInfo& robot : *context.robots) cameras_[robot.number] = robot.camera.color;
+    for (const RobotInfo& robot : *context.input.robots) cameras_[robot.number] = robot.camera.color;
     return context.resumed != nullptr ? read_surfaces(*context.resumed) : core::Result<void>();
   }
   /// Only a coarse surface of each keyframe stays.
@@ -50,16 +59,25 @@ class RefineStage : public Stage {
     return {};
   }
 
-  void summarise(RunSummary& summary) const override {
-    summary.refine = summary_;
-    summary.path.refused += summary_.refused;
+  void report(Json& summary) const override {
     std::vector<double> position, rotation;
     for (const mapping::KeyframeAccuracy& keyframe : result_->accuracy) {
       position.push_back(keyframe.sigma_position_m());
       rotation.push_back(keyframe.sigma_rotation_rad());
     }
-    summary.sigma_position_m = sigma_of(position);
-    summary.sigma_rotation_rad = sigma_of(rotation);
+
+    add(summary["path"]["refused_adjustments"], summary_.refused);
+    summary["refine"] = {{"local_maps", summary_.local_maps},
+                         {"tried", summary_.tried},
+                         {"accepted", summary_.accepted},
+                         {"rejected", summary_.rejected},
+                         {"mean_rms", rounded(summary_.mean_rms)},
+                         {"mean_shift_m", rounded(summary_.mean_shift_m)},
+                         {"max_shift_m", rounded(summary_.max_shift_m)},
+                         {"sigma_position_m", section_of(sigma_of(position))},
+                         {"sigma_rotation_rad", section_of(sigma_of(rotation))},
+                         {"before", fits_section(summary_.before)},
+                         {"after", fits_section(summary_.after)}};
   }
 
  private:

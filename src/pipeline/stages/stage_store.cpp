@@ -9,7 +9,7 @@
 #include "plumbline/core/version.hpp"
 #include "plumbline/maps/fusion_state.hpp"
 #include "plumbline/maps/store.hpp"
-#include "stages/resumed_run.hpp"
+#include "results/resumed_run.hpp"
 #include "stages/stages.hpp"
 
 namespace plumbline::pipeline {
@@ -31,12 +31,13 @@ class StoreStage : public Stage {
     if (!enabled_) return {};
     if (context.resumed != nullptr) return take(maps::StoreWriter::resume(context.resumed->store));
     maps::StoreHeader header;
-    header.robots = *context.robots;
-    header.configuration = context.configuration;
-    header.input = context.input;
+    header.robots = *context.input.robots;
+    header.configuration = context.store.configuration;
+    header.input = context.input.text;
     header.program_version = core::version();
     // What is fused of finished maps is begun again, whatever ends it.
-    const auto use = context.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
+    const auto use =
+        context.input.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
     return take(maps::StoreWriter::create(context.output_folder / maps::kStoreFile, header, use));
   }
 

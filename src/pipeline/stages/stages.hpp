@@ -10,13 +10,7 @@
 #include "plumbline/pipeline/data.hpp"
 #include "plumbline/pipeline/stage.hpp"
 
-namespace plumbline::mapping {
-struct FrameReport;
-}
-
 namespace plumbline::pipeline {
-
-struct RunSummary;
 
 /// The type of the stages that T is.
 template <typename T>
@@ -52,12 +46,5 @@ StageType keyframe_cloud_tap();
 StageType map_tap();
 StageType maps_tap();
 StageType cloud_tap();
-
-/// Counts tracked and lost frames and the longest run of lost ones.
-void count_frames(const std::vector<FrameRow>& rows, RunSummary& summary);
-
-/// What frames.csv says of a tracked frame, and the names of these columns, comma-separated.
-std::string row_columns(const mapping::FrameReport& report);
-extern const char* const kRowColumns;
 
 }  // namespace plumbline::pipeline

@@ -22,7 +22,7 @@ class FrameTap : public Tap {
 
   core::Result<void> start(const RunContext& context) override {
     if (auto made = Tap::start(context); !made) return made;
-    sensor::Camera camera = context.source->camera();
+    sensor::Camera camera = context.input.source->camera();
     camera.model = sensor::LensModel::kRadialTangential;  // frames are rectified and registered
     camera.distortion = {};
     camera.depth_lens = {};

@@ -42,9 +42,8 @@ PaceOutcome run(double hz, int frames, const Progress& progress = {}, const core
   context.executor = &executor;
   context.log = log.get();
   context.stop = stop;
-  context.pace_hz = hz;
   const Clock::time_point start = Clock::now();
-  const auto report = run_graph(*graph, context, progress);
+  const auto report = run_graph(*graph, context, progress, hz);
   EXPECT_TRUE(report) << report.error().message;
   return {*report, bench.collected, seconds_since(start)};
 }

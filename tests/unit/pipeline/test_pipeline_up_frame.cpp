@@ -9,7 +9,7 @@
 #include <memory>
 #include <random>
 
-#include "../../../src/pipeline/stages/up_frame.hpp"
+#include "../../../src/pipeline/results/up_frame.hpp"
 
 namespace plumbline::pipeline {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/up_frame.hpp"
+#include "results/up_frame.hpp"
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/camera_refinement.hpp"
+#include "robots/camera_refinement.hpp"
 
 #include <fmt/format.h>
 
@@ -49,6 +49,21 @@ void keep_earlier(const std::vector<mapping::CameraFinding>& earlier,
 
 }  // namespace
 
+Json section_of(const CameraReport& camera) {
+  Json numbers = Json::array();
+  for (const mapping::CameraFinding& f : camera.findings) {
+    numbers.push_back({{"name", f.name},
+                       {"given", f.given},
+                       {"found", f.found},
+                       {"sigma", f.sigma},
+                       {"gain", rounded(f.gain)},
+                       {"used", f.used}});
+  }
+  return {{"robot", camera.robot}, {"gain", rounded(camera.gain)},    {"numbers", numbers},
+          {"asked", camera.asked}, {"from_frame", camera.from_frame}, {"note", camera.note},
+          {"doubt", camera.doubt}};
+}
+
 CameraRefinement::CameraRefinement(const RobotInfo& robot) : robot_(robot), camera_(robot.camera) {
   report_.robot = robot.name;
 }
@@ -89,6 +104,13 @@ bool CameraRefinement::ask(const maps::Map& map, const std::vector<maps::FramePo
       fmt::format("{}: the camera is better with {}: held-out parts of the recording fit {:.1f} % better",
                   robot_.name, found_text(report_.findings), 100.0 * report_.gain));
   return true;
+}
+
+void CameraRefinement::restore(const sensor::Camera& camera, std::size_t from_frame) {
+  camera_ = camera;
+  report_.findings = mapping::findings_between(robot_.camera, camera);
+  report_.from_frame = from_frame;
+  report_.note = "found before the run was interrupted";
 }
 
 core::Result<void> write_cameras(const std::filesystem::path& folder, const std::vector<RobotInfo>& robots,

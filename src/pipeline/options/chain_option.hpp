@@ -31,7 +31,7 @@ class ChainOption {
   cloud::FilterChain chain_;
 };
 
-/// Adds what filters took from the merged cloud to what the run tells.
-void add_left_out(const std::vector<cloud::FilterReport>& reports, RunSummary& summary);
+/// Adds what filters took from the merged cloud to the section `cloud`.
+void report_left_out_of_map(const std::vector<cloud::FilterReport>& reports, nlohmann::ordered_json& cloud);
 
 }  // namespace plumbline::pipeline

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/waiting_clouds.hpp"
+#include "results/waiting_clouds.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@ namespace plumbline::pipeline {
 bool keeps_clouds(const Graph& graph) {
   std::set<std::pair<std::size_t, std::size_t>> kept, wanted;
   for (const Node& node : graph.nodes) {
-    if (!node.stage->keeps_map() && node.type->name != "fuse") continue;
+    if (!node.stage->keeps_map() && !node.stage->lays_clouds_down()) continue;
     for (std::size_t i = 0; i < node.inputs.size(); ++i) {
       if (!node.inputs[i] || !(node.type->inputs[i].type == keyframe_cloud_port())) continue;
       (node.stage->keeps_map() ? kept : wanted).insert({node.inputs[i]->node, node.inputs[i]->port});
@@ -24,7 +24,7 @@ bool keeps_clouds(const Graph& graph) {
 core::Result<WaitingClouds> WaitingClouds::create(const RunContext& context) {
   WaitingClouds clouds;
   clouds.file_ = context.output_folder / maps::kStoreFile;
-  if (context.keeps_clouds) return clouds;
+  if (context.store.keeps_clouds) return clouds;
   std::error_code ignored;
   for (int i = 1; std::filesystem::exists(clouds.file_, ignored) || i == 1; ++i) {
     clouds.file_ = context.output_folder / fmt::format(".clouds-{}.db", i);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/resumed_run.hpp"
+#include "results/resumed_run.hpp"
 
 #include <fmt/format.h>
 

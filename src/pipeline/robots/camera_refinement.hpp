@@ -4,15 +4,30 @@
 // Whether a robot's camera is what its file says: asked of the robot's own map while it grows and once more
 // when it is finished. What is found is used from there on, and the map is made anew for it
 // (Slam::recalibrate).
+#include <cstddef>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "plumbline/core/executor.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/mapping/camera_calibration.hpp"
 #include "plumbline/pipeline/data.hpp"
-#include "plumbline/pipeline/summary.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
+
+/// What a robot's own map told about its camera.
+struct CameraReport {
+  std::string robot;
+  std::vector<mapping::CameraFinding> findings;
+  double gain = 0.0;           ///< by which share parts of the map fit better that it was not found from
+  std::string note;            ///< why nothing was found; empty: it was looked for
+  std::string doubt;           ///< why the camera must not be trusted; empty: nothing speaks against it
+  int asked = 0;               ///< times; the second time of a map made with what was found the first time
+  std::size_t from_frame = 0;  ///< what was found is used from this frame on; 0: from the first
+};
+Json section_of(const CameraReport& camera);
 
 /// One robot's camera.
 class CameraRefinement {
@@ -25,16 +40,16 @@ class CameraRefinement {
 
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
   /// What was found by all questions so far, against what was given.
-  [[nodiscard]] const RunSummary::Camera& report() const { return report_; }
+  [[nodiscard]] const CameraReport& report() const { return report_; }
   /// What camera() has from this frame of the run on; 0: from the first one on.
   void used_from(std::size_t frame) { report_.from_frame = frame; }
-  /// A run that goes on knows this camera already.
-  void restore(const sensor::Camera& camera) { camera_ = camera; }
+  /// A run that goes on knows this camera already, which an earlier one has found.
+  void restore(const sensor::Camera& camera, std::size_t from_frame);
 
  private:
   RobotInfo robot_;
   sensor::Camera camera_;
-  RunSummary::Camera report_;
+  CameraReport report_;
 };
 
 /// Writes OUT/camera.yaml, of several robots OUT/robots/NAME/camera.yaml. `cameras`: by robot.

@@ -8,7 +8,7 @@
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/viz/snapshot.hpp"
-#include "run/summary_json.hpp"
+#include "robots/robot_merge.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -52,7 +52,7 @@ viz::Scene scene_of(const mapping::FusedMap& preview, const std::vector<std::str
   return scene;
 }
 
-std::string text_of(const RunSummary::Meeting& meeting, const MeetingEvent& event,
+std::string text_of(const Meeting& meeting, const MeetingEvent& event,
                     const std::vector<std::string>& names) {
   Json robots = Json::array();
   for (std::size_t i = 0; i < event.preview->parts.size(); ++i) {
@@ -70,7 +70,7 @@ std::string text_of(const RunSummary::Meeting& meeting, const MeetingEvent& even
       {"frame_of", names[event.preview->parts.front()]},
       {"robots", robots},
       {"pairs_refused_by_graph", event.preview->rejected},
-      {"evidence", merge_of({meeting.a, meeting.b, -1.0, -1.0, event.evidence})}};
+      {"evidence", section_of(RobotMerge{meeting.a, meeting.b, -1.0, -1.0, event.evidence})}};
   if (meeting.time_s >= 0.0) json["time_s"] = meeting.time_s;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -113,7 +113,7 @@ core::Result<void> MeetingLog::note(const MeetingEvent& event, const std::vector
 
 core::Result<void> MeetingLog::write(const MeetingEvent& event, const std::vector<std::string>& names,
                                      const std::string& when) {
-  const RunSummary::Meeting& meeting = meetings_.back();
+  const Meeting& meeting = meetings_.back();
   const std::filesystem::path folder =
       output_ / "meetings" / fmt::format("{:04}_{}_{}", meeting.number, meeting.a, meeting.b);
   if (auto made = core::make_folder(folder); !made) return made;

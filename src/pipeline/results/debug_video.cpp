@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/debug_video.hpp"
+#include "results/debug_video.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/robot_components.hpp"
+#include "robots/robot_components.hpp"
 
 #include <fmt/format.h>
 
@@ -52,6 +52,44 @@ std::vector<maps::FramePose> frames_of(const std::vector<const RobotMap*>& parts
     }
   }
   return all;
+}
+
+Json section_of(const ComponentFate& component) {
+  Json section = {{"name", component.name},
+                  {"frames", component.frames},
+                  {"keyframes", component.keyframes},
+                  {"joined", component.joined}};
+  if (component.joined) {
+    section["joined_s"] = component.joined_s < 0.0 ? Json() : Json(rounded(component.joined_s));
+    section["agreeing_keyframes"] = component.agreeing;
+  } else {
+    section["why_not"] = component.why_not;
+  }
+  return section;
+}
+
+void doubt_components_apart(const Json& summary, std::vector<Doubt>& doubts) {
+  std::size_t apart = 0;
+  double frames = 0.0;
+  std::string names;
+  for (const Json& component : summary.at("components").at("list")) {
+    if (component.at("joined").get<bool>()) continue;
+    ++apart;
+    frames += component.at("frames").get<double>();
+    names += (names.empty() ? "" : ", ") + component.at("name").get<std::string>();
+  }
+  if (apart == 0) return;
+
+  const Json& all = summary.at("frames");
+  const double read = all.at("read").get<double>() + all.at("unreadable").get<double>();
+  const double percent = read > 0.0 ? 100.0 * frames / read : 0.0;
+  const std::string which =
+      apart == 1 ? "a second map that shares" : fmt::format("{} more maps that share", apart);
+  doubts.push_back(
+      {Doubt::About::kComponents,
+       fmt::format(
+           "{:.0f} % of the frames form {} no place with the first: film a place of both (components/: {})",
+           percent, which, names)});
 }
 
 }  // namespace plumbline::pipeline

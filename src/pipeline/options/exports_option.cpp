@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/exports_option.hpp"
+#include "options/exports_option.hpp"
 
 #include <fmt/format.h>
 

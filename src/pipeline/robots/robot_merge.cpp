@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/robot_merge.hpp"
+#include "robots/robot_merge.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
-#include "stages/robot_components.hpp"
+#include "robots/robot_components.hpp"
 
 namespace plumbline::pipeline {
 namespace {
@@ -28,7 +29,7 @@ std::size_t largest_group(const std::vector<RobotMap>& parts, const std::vector<
   return static_cast<std::size_t>(std::max_element(keyframes.begin(), keyframes.end()) - keyframes.begin());
 }
 
-void report(const RunSummary::Merge& merge, core::Log& log) {
+void report(const RobotMerge& merge, core::Log& log) {
   const mapping::MergeEvidence& e = merge.evidence;
   const std::string tried =
       fmt::format("{} pairs of keyframes look alike, {} were tried, {} show the same place", e.candidates,
@@ -43,7 +44,7 @@ void report(const RunSummary::Merge& merge, core::Log& log) {
 }
 
 std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::size_t>& used,
-                     const std::vector<RunSummary::Merge>& merges) {
+                     const std::vector<RobotMerge>& merges) {
   std::string names;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (parts[p].component || std::binary_search(used.begin(), used.end(), p)) continue;
@@ -52,7 +53,7 @@ std::string left_out(const std::vector<RobotMap>& parts, const std::vector<std::
   if (names.empty()) return {};
   std::string text = fmt::format("{} of {} maps do not connect and are left out: {}",
                                  parts.size() - used.size(), parts.size(), names);
-  for (const RunSummary::Merge& merge : merges) {
+  for (const RobotMerge& merge : merges) {
     const mapping::MergeEvidence& e = merge.evidence;
     if (e.accepted) continue;
     text += fmt::format("; {} with {}: {} ({} look-alikes, {} tried, {} verified)", merge.b, merge.a,
@@ -78,7 +79,66 @@ std::vector<std::shared_ptr<const MapResult>> components_apart(const std::vector
   return apart;
 }
 
+Json laid(const mapping::OverlayFit& fit) {
+  return {{"expected", fit.expected},
+          {"matched", fit.matched},
+          {"chance", rounded(fit.chance)},
+          {"seen_through", fit.contradicted}};
+}
+
+/// Standard deviations, the whole matrix, and where the maps lie.
+void add_alignment(const mapping::Alignment& alignment, Json& entry) {
+  Json sigma = Json::array();
+  Json covariance = Json::array();
+  for (int row = 0; row < 6; ++row) {
+    sigma.push_back(rounded(std::sqrt(alignment.covariance(row, row))));
+    Json line = Json::array();
+    for (int column = 0; column < 6; ++column) line.push_back(alignment.covariance(row, column));
+    covariance.push_back(line);
+  }
+  entry["sigma"] = sigma;
+  entry["covariance"] = covariance;
+  entry["a_from_b"] = rows(alignment.a_from_b);
+}
+
 }  // namespace
+
+Json section_of(const RobotMerge& merge) {
+  const mapping::MergeEvidence& e = merge.evidence;
+  const mapping::PairTotals totals = e.totals();
+  Json refused = Json::object();
+  for (const auto& [why, count] : e.refused_pairs) refused[why] = count;
+  Json entry = {{"a", merge.a},
+                {"b", merge.b},
+                {"accepted", e.accepted},
+                {"reason", e.refused},
+                {"candidates", e.candidates},
+                {"tried", e.tried},
+                {"verified", e.consistency.verified},
+                {"refused", refused},
+                {"agreeing", e.consistency.agreeing},
+                {"alternative", e.ambiguity.alternative},
+                {"overlay", laid(e.ambiguity.overlap)},
+                {"expected", e.validation.expected},
+                {"confirmed", e.validation.confirmed},
+                {"pairs", e.pairs.size()},
+                {"rejected", e.rejected},
+                {"matches", totals.matches},
+                {"inliers", totals.inliers},
+                {"rms", rounded(totals.rms_px)},
+                {"overlap", rounded(totals.overlap)},
+                {"span_m", rounded(e.consistency.span_m)},
+                {"span_rad", rounded(e.consistency.span_rad)},
+                {"spread_m", rounded(e.alignment.spread_m)}};
+  if (e.ambiguity.alternative_m > 0.0) {
+    entry["alternative_m"] = rounded(e.ambiguity.alternative_m);
+    entry["alternative_overlay"] = laid(e.ambiguity.alternative_overlap);
+  }
+  if (e.accepted) add_alignment(e.alignment, entry);
+  if (merge.time_s >= 0.0) entry["time_s"] = rounded(merge.time_s);
+  if (merge.evident_s >= 0.0) entry["evident_s"] = rounded(merge.evident_s);
+  return entry;
+}
 
 MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor,
                           const mapping::MapFusionOptions& options, const core::Executor& executor,

@@ -9,13 +9,25 @@
 #include "plumbline/core/log.hpp"
 #include "plumbline/mapping/map_fusion.hpp"
 #include "plumbline/pipeline/data.hpp"
-#include "plumbline/pipeline/summary.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 
+/// Two maps that were held against each other.
+struct RobotMerge {
+  std::string a;
+  std::string b;
+  double time_s = -1.0;  ///< of the recordings, when it happened while mapping; negative: afterwards
+  /// When the fifth keyframe of those that agree was there on both sides, or the last of fewer; negative:
+  /// not known.
+  double evident_s = -1.0;
+  mapping::MergeEvidence evidence;
+};
+Json section_of(const RobotMerge& merge);
+
 struct MergedRobots {
   std::shared_ptr<MapResult> map;  ///< with the components that stay apart
-  std::vector<RunSummary::Merge> merges;
+  std::vector<RobotMerge> merges;
   std::string unconnected;  ///< which maps are left out and what was tried; empty: none
   std::size_t refused = 0;  ///< adjustments that would have torn a map
 };

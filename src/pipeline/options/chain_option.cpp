@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "stages/chain_option.hpp"
+#include "options/chain_option.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "graph/graph_parts.hpp"
-#include "plumbline/pipeline/summary.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 
@@ -51,10 +51,10 @@ std::vector<std::string> ChainOption::files() const {
   return files;
 }
 
-void add_left_out(const std::vector<cloud::FilterReport>& reports, RunSummary& summary) {
+void report_left_out_of_map(const std::vector<cloud::FilterReport>& reports, Json& cloud) {
   for (const cloud::FilterReport& report : reports) {
     const std::size_t points = report.points_in - std::min(report.points_in, report.points_out);
-    summary.left_out_of_map.push_back({report.type, points});
+    cloud["left_out_of_map"].push_back({{"by", report.type}, {"points", points}});
   }
 }
 

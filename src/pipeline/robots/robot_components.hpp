@@ -3,9 +3,11 @@
 
 // The components of robots' maps (maps/components.hpp) as maps of their own.
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "plumbline/pipeline/data.hpp"
+#include "summary/sections.hpp"
 
 namespace plumbline::pipeline {
 
@@ -22,5 +24,20 @@ RobotComponents components_of(const RobotMap& whole);
 /// The maps of components put together again, one frame list for all: of several components with a robot in
 /// common each frame is that of the component in which it is tracked.
 std::vector<maps::FramePose> frames_of(const std::vector<const RobotMap*>& parts);
+
+/// What became of a component.
+struct ComponentFate {
+  std::string name;        ///< of its folder, or of the robot and the keyframe that began it
+  std::size_t frames = 0;  ///< tracked in it
+  std::size_t keyframes = 0;
+  bool joined = false;     ///< it is part of the result
+  double joined_s = -1.0;  ///< of the recording, when that was found out while mapping; negative: at the end
+  int agreeing = 0;        ///< keyframes that say so
+  std::string why_not;     ///< empty: joined
+};
+Json section_of(const ComponentFate& component);
+
+/// Components that are not part of the result.
+void doubt_components_apart(const Json& summary, std::vector<Doubt>& doubts);
 
 }  // namespace plumbline::pipeline

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "results/frame_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+namespace plumbline::pipeline {
+namespace {
+
+using Report = mapping::FrameReport;
+
+struct Column {
+  const char* name;
+  std::string (*text)(const Report&);
+};
+
+std::string number(int value) { return std::to_string(value); }
+std::string flag(bool value) { return value ? "1" : "0"; }
+std::string fine(double value) { return fmt::format("{:.4f}", value); }
+std::string degrees(double value) { return fmt::format("{:.2f}", value); }
+
+/// The share of the bundle's cost that is left.
+double cost_ratio(const mapping::BundleReport& bundle) {
+  return bundle.summary.initial_cost > 0.0 ? bundle.summary.final_cost / bundle.summary.initial_cost : 1.0;
+}
+
+const std::array kColumns{
+    Column{"stamp", [](const Report& r) { return fmt::format("{:.6f}", r.stamp); }},  // seconds
+    Column{"reference", [](const Report& r) { return number(r.reference.index); }},
+    Column{"keyframe", [](const Report& r) { return number(r.keyframe.index); }},
+    Column{"component", [](const Report& r) { return number(r.component.index); }},
+    Column{"relocalised", [](const Report& r) { return flag(r.relocalised); }},
+
+    // Residuals that fit, and their rms in standard deviations.
+    Column{"points", [](const Report& r) { return number(r.points.inliers); }},
+    Column{"points_rms", [](const Report& r) { return fine(r.points.rms); }},
+    Column{"lines", [](const Report& r) { return number(r.lines.inliers); }},
+    Column{"lines_rms", [](const Report& r) { return fine(r.lines.rms); }},
+    Column{"surface", [](const Report& r) { return number(r.surface.inliers); }},
+    Column{"surface_rms", [](const Report& r) { return fine(r.surface.rms); }},
+    Column{"photometric", [](const Report& r) { return number(r.photometric.inliers); }},
+    Column{"photometric_rms", [](const Report& r) { return fine(r.photometric.rms); }},
+    Column{"min_eigenvalue", [](const Report& r) { return fmt::format("{:.6g}", r.min_eigenvalue); }},
+    Column{"weak_directions", [](const Report& r) { return number(r.degenerate_directions); }},
+
+    // Whether a keyframe is wanted.
+    Column{"frames_since_keyframe", [](const Report& r) { return number(r.decision.frames_since); }},
+    Column{"shared", [](const Report& r) { return fine(r.decision.shared); }},
+    Column{"overlap", [](const Report& r) { return fine(r.decision.overlap); }},
+    Column{"parallax", [](const Report& r) { return fine(r.decision.parallax); }},
+    Column{"rotation_rad", [](const Report& r) { return fine(r.decision.rotation_rad); }},
+    Column{"mapper_idle", [](const Report& r) { return flag(r.decision.mapper_idle); }},
+
+    // Section 4.1: the viewing cones.
+    Column{"cone_candidate", [](const Report& r) { return flag(r.decision.cone.candidate); }},
+    Column{"cone_shared", [](const Report& r) { return fine(r.decision.cone.shared); }},
+    Column{"cone_matched", [](const Report& r) { return fmt::format("{}", r.decision.cone.now.matched); }},
+    Column{"cone_all", [](const Report& r) { return fmt::format("{}", r.decision.cone.now.all); }},
+    Column{"cone_changed", [](const Report& r) { return fmt::format("{}", r.decision.cone.now.changed); }},
+    Column{"cone_theta", [](const Report& r) { return fine(r.decision.cone.threshold.theta); }},
+    Column{"cone_beta", [](const Report& r) { return fine(r.decision.cone.threshold.beta); }},
+    Column{"cone_alpha", [](const Report& r) { return fine(r.decision.cone.threshold.alpha); }},
+    Column{"cone_initial", [](const Report& r) { return degrees(r.decision.cone.threshold.initial); }},
+    Column{"cone_adaptive", [](const Report& r) { return degrees(r.decision.cone.threshold.adaptive); }},
+    Column{"cone_ecog", [](const Report& r) { return fine(r.decision.cone.balance.ecog); }},
+    Column{"cone_offset", [](const Report& r) { return fine(r.decision.cone.balance.offset); }},
+    Column{"wanted", [](const Report& r) { return flag(r.decision.wanted); }},
+    Column{"urgent", [](const Report& r) { return flag(r.decision.urgent); }},
+
+    // The bundle that was put back before this frame; empty: none was.
+    Column{"bundle", [](const Report& r) { return number(r.bundle.keyframe.index); }},
+    Column{"bundle_cost",
+           [](const Report& r) { return r.bundle.keyframe.valid() ? fine(cost_ratio(r.bundle)) : ""; }},
+    Column{"bundle_outliers",
+           [](const Report& r) {
+             const auto& summary = r.bundle.summary;
+             return r.bundle.keyframe.valid() ? number(summary.point_outliers + summary.line_outliers) : "";
+           }},
+    Column{"bundle_refused",
+           [](const Report& r) { return flag(r.bundle.keyframe.valid() && r.bundle.refused); }},
+};
+
+}  // namespace
+
+std::string row_columns(const mapping::FrameReport& report) {
+  std::string row;
+  for (const Column& column : kColumns) row += (row.empty() ? "" : ",") + column.text(report);
+  return row;
+}
+
+std::string row_column_names() {
+  std::string names;
+  for (const Column& column : kColumns) names += (names.empty() ? "" : ",") + std::string(column.name);
+  return names;
+}
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "robots/robot_cameras.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+namespace plumbline::pipeline {
+namespace {
+
+// What a map has seen when it is asked for its camera: keyframes or seconds.
+constexpr std::size_t kKeyframes = 40;
+constexpr double kSeconds = 10.0;
+// The answer is waited for so many frames after the question, and used so many after that: by then no frame
+// that it is for has been read, whatever the number of threads. Nobody asks when only a few frames would be
+// left.
+constexpr std::size_t kAnswerFrames = 32;
+constexpr std::size_t kUseFrames = kMostUnderWay;
+constexpr std::size_t kLeastFramesLeft = 60;
+// Of a finished map: what a wrong camera has bent shows when it is made anew.
+constexpr int kMostQuestions = 2;
+
+}  // namespace
+
+RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor,
+                           core::Log& log)
+    : recordings_(&recordings), executor_(&executor), log_(&log), robots_(recordings.robots()) {
+  // What is filmed while it is mapped has no lens, and no error.
+  asked_ = recordings.format() == "synth";
+  refine_ = refine && !asked_;
+  for (const RobotInfo& robot : robots_) cameras_.emplace_back(robot);
+}
+
+std::vector<sensor::Camera> RobotCameras::now() const {
+  std::vector<sensor::Camera> cameras;
+  for (const CameraRefinement& camera : cameras_) cameras.push_back(camera.camera());
+  return cameras;
+}
+
+bool RobotCameras::knows_enough(std::size_t frame, const Slams& slams) const {
+  return recordings_->time_of(frame) - recordings_->time_of(0) >= kSeconds ||
+         std::all_of(slams.begin(), slams.end(),
+                     [](const auto& slam) { return slam->map().keyframe_count() >= kKeyframes; });
+}
+
+void RobotCameras::after(std::size_t frame, const Slams& slams) {
+  if (!refine_ || asked_ || !knows_enough(frame, slams)) return;
+  asked_ = true;
+  if (frame + kAnswerFrames + kUseFrames + kLeastFramesLeft > recordings_->size()) return;
+
+  question_ = std::make_unique<Question>();
+  question_->cameras = cameras_;
+  question_->better.resize(cameras_.size());
+  question_->due = frame + kAnswerFrames;
+  std::vector<std::pair<maps::Map, std::vector<maps::FramePose>>> maps;
+  for (const auto& slam : slams) maps.emplace_back(slam->map(), slam->frame_poses());
+  question_->job = executor_->submit([question = question_.get(), maps = std::move(maps), log = log_] {
+    const core::Executor here(1);
+    for (std::size_t r = 0; r < maps.size(); ++r)
+      question->better[r] = question->cameras[r].ask(maps[r].first, maps[r].second, here, *log);
+  });
+}
+
+void RobotCameras::take_answer(std::size_t frame) {
+  question_->job.wait();
+  use_from_ = frame + kUseFrames;
+  cameras_ = question_->cameras;
+  waiting_ = question_->better;
+  question_.reset();
+  if (std::count(waiting_.begin(), waiting_.end(), true) > 0) recordings_->correct(use_from_, now());
+  for (std::size_t r = 0; r < cameras_.size(); ++r) {
+    if (waiting_[r]) cameras_[r].used_from(use_from_);
+  }
+}
+
+bool RobotCameras::before(std::size_t frame, std::size_t robot, const Slams& slams) {
+  if (question_ != nullptr && frame >= question_->due) take_answer(frame);
+  if (waiting_.empty() || !waiting_[robot] || frame < use_from_) return false;
+  waiting_[robot] = false;
+  use(robot, *slams[robot]);
+  return true;
+}
+
+void RobotCameras::use(std::size_t robot, mapping::Slam& slam) {
+  const auto number = static_cast<std::int32_t>(robot);
+  robots_[robot].versions.push_back({cameras_[robot].camera(), slam.map().next_keyframe_id(number).index,
+                                     static_cast<std::int32_t>(slam.frame_poses().size())});
+  const auto pictures = recordings_->taken_by(number, cameras_[robot].camera());
+  slam.recalibrate(cameras_[robot].camera(), [&](std::int64_t index) -> std::optional<sensor::RgbdFrame> {
+    if (pictures == nullptr) return std::nullopt;
+    auto frame = pictures->read(static_cast<std::size_t>(index));
+    if (!frame) return std::nullopt;
+    return std::move(*frame);
+  });
+}
+
+void RobotCameras::ask_finished(const Slams& slams) {
+  if (!refine_) return;
+  for (std::size_t r = 0; r < slams.size(); ++r) {
+    mapping::Slam& slam = *slams[r];
+    if (!waiting_.empty() && waiting_[r]) use(r, slam);  // its last frame came before the answer was used
+    for (int i = 0; i < kMostQuestions; ++i) {
+      if (!cameras_[r].ask(slam.map(), slam.frame_poses(), *executor_, *log_)) break;
+      use(r, slam);
+    }
+  }
+}
+
+void RobotCameras::restore(const RobotInfo& stored, mapping::Slam& slam) {
+  if (stored.versions.empty()) return;
+  const auto number = static_cast<std::size_t>(stored.number);
+  asked_ = true;
+  robots_.at(number).versions = stored.versions;
+  const maps::CameraVersion& newest = stored.versions.back();
+  cameras_[number].restore(newest.camera, static_cast<std::size_t>(newest.first_frame));
+  slam.set_camera(cameras_[number].camera());
+}
+
+void RobotCameras::resume() {
+  if (asked_ && refine_) recordings_->correct(0, now());
+}
+
+Json RobotCameras::section() const {
+  Json list = Json::array();
+  for (std::size_t r = 0; r < cameras_.size(); ++r) {
+    if (!refine_ && !robots_[r].camera.guess) continue;
+    CameraReport report = cameras_[r].report();
+    if (!refine_) report.doubt = "no camera file was given: the camera is a guess";
+    list.push_back(section_of(report));
+  }
+  return list;
+}
+
+void RobotCameras::doubt(std::vector<Doubt>& doubts) const {
+  for (const Json& camera : section()) {
+    const auto text = camera.at("doubt").get<std::string>();
+    if (!text.empty()) doubts.push_back({Doubt::About::kCamera, text});
+  }
+}
+
+}  // namespace plumbline::pipeline

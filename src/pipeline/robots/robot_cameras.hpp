@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// The cameras of all robots of a run. The maps are asked what these are: once while they grow, beside the
+// tracker, and again when they are finished (CameraRefinement).
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/mapping/slam.hpp"
+#include "plumbline/pipeline/robot_recordings.hpp"
+#include "robots/camera_refinement.hpp"
+#include "summary/sections.hpp"
+
+namespace plumbline::pipeline {
+
+using Slams = std::vector<std::unique_ptr<mapping::Slam>>;  ///< by robot
+
+class RobotCameras {
+ public:
+  /// `refine`: the maps are asked. All must outlive this.
+  RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor, core::Log& log);
+
+  /// The robots, with each version that their cameras turned out to be.
+  [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
+  /// What each camera is as far as it is known now.
+  [[nodiscard]] std::vector<sensor::Camera> now() const;
+
+  /// Before a frame is tracked: waits for the answer when it is due, and goes on with it from the first frame
+  /// on that is read with it. True: the robot's map was made anew for its camera.
+  bool before(std::size_t frame, std::size_t robot, const Slams& slams);
+  /// After a frame was tracked: asks the maps as they are now, beside the tracker, once.
+  void after(std::size_t frame, const Slams& slams);
+  /// Asks the finished maps, until they have nothing new to say.
+  void ask_finished(const Slams& slams);
+
+  /// What an interrupted run knew of a robot's camera; then resume().
+  void restore(const RobotInfo& stored, mapping::Slam& slam);
+  void resume();
+
+  [[nodiscard]] Json section() const;
+  void doubt(std::vector<Doubt>& doubts) const;
+
+ private:
+  /// The maps while they are being asked.
+  struct Question {
+    std::vector<CameraRefinement> cameras;  ///< by robot
+    std::vector<bool> better;               ///< by robot: the answer
+    std::size_t due = 0;                    ///< the frame at which it is waited for
+    core::Executor::Job job;                ///< last: its destructor waits for it
+  };
+  [[nodiscard]] bool knows_enough(std::size_t frame, const Slams& slams) const;
+  void take_answer(std::size_t frame);
+  /// What was mapped before is made anew for the robot's camera as it is known now.
+  void use(std::size_t robot, mapping::Slam& slam);
+
+  RobotRecordings* recordings_;
+  const core::Executor* executor_;
+  core::Log* log_;
+  bool refine_;
+  bool asked_;  ///< while mapping
+  std::vector<RobotInfo> robots_;
+  std::vector<CameraRefinement> cameras_;  ///< by robot
+  std::unique_ptr<Question> question_;     ///< under way; null: none is
+  std::size_t use_from_ = 0;               ///< frame from which the answer is used
+  std::vector<bool> waiting_;  ///< by robot: its first frame from there on has not come; empty: no answer yet
+};
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What robots' SLAM says in summary.json: loops, components, maps of other robots.
+#include <map>
+#include <string>
+
+#include "plumbline/mapping/slam.hpp"
+#include "robots/robot_cameras.hpp"
+#include "summary/sections.hpp"
+
+namespace plumbline::pipeline {
+
+/// Adds one robot's to the section `loops`.
+void report_loops(const mapping::Slam& slam, Json& loops);
+/// Adds the components that were joined while the robot mapped. `frames`: by root, as they were tracked.
+void report_joins(const std::string& robot, const mapping::Slam& slam,
+                  const std::map<core::KeyframeId, std::size_t>& frames, Json& list);
+/// What maps of other robots were used for.
+Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others);
+
+/// Loops that agree with one another against the path.
+void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& doubts);
+
+}  // namespace plumbline::pipeline

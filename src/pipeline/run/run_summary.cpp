@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "run/run_summary.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/core/version.hpp"
+#include "summary/sections.hpp"
+
+namespace plumbline::pipeline {
+namespace {
+
+std::vector<StageTiming> parts_of(const Graph& graph) {
+  std::vector<StageTiming> parts;
+  for (const Node& node : graph.nodes) {
+    for (StageTiming& part : node.stage->parts()) parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+/// Frames read by this run a second, all that is not export included.
+double frames_a_second(const Json& frames, const RunReport& report, const RunFacts& facts) {
+  const double seconds = facts.wall_s - report.export_s;
+  const auto read = frames.at("read").get<std::size_t>() - frames.at("resumed").get<std::size_t>();
+  return seconds > 0.0 ? static_cast<double>(read) / seconds : 0.0;
+}
+
+Json timing_of(const Graph& graph, const RunReport& report, const RunFacts& facts, double fps) {
+  Json stages = Json::object();
+  for (const StageTiming& stage : report.stages) {
+    stages[stage.name] = {{"median", rounded(stage.quantile_ms(0.5))},
+                          {"p95", rounded(stage.quantile_ms(0.95))},
+                          {"finish", rounded(stage.finish_ms)}};
+  }
+
+  Json parts = Json::object();
+  for (const StageTiming& part : parts_of(graph)) {
+    const auto times =
+        std::count_if(part.frame_ms.begin(), part.frame_ms.end(), [](float ms) { return !std::isnan(ms); });
+    parts[part.name] = {{"times", times},
+                        {"median", rounded(part.quantile_ms(0.5))},
+                        {"p95", rounded(part.quantile_ms(0.95))}};
+  }
+
+  return {{"wall_s", rounded(facts.wall_s)},
+          {"pace_hz", rounded(facts.pace_hz)},
+          {"behind_s", rounded(report.behind_s)},
+          {"map_s", rounded(report.map_s)},
+          {"fps", rounded(fps)},
+          {"export_s", rounded(report.export_s)},
+          {"stages_ms", stages},
+          {"parts_ms", parts},
+          {"threads", facts.threads}};
+}
+
+double tracked_percent(const Json& frames) {
+  const double all = frames.at("read").get<double>() + frames.at("unreadable").get<double>();
+  return all > 0.0 ? 100.0 * frames.at("tracked").get<double>() / all : 0.0;
+}
+
+/// The gravest doubt; of lost frames together with what is mapped apart from the rest.
+std::string reason_of(const Graph& graph, const Json& summary) {
+  std::vector<Doubt> doubts;
+  for (const Node& node : graph.nodes) node.stage->doubt(summary, doubts);
+  if (doubts.empty()) return {};
+  std::stable_sort(doubts.begin(), doubts.end(),
+                   [](const Doubt& x, const Doubt& y) { return x.about < y.about; });
+
+  std::string reason = doubts.front().text;
+  const auto apart = std::find_if(doubts.begin(), doubts.end(), [](const Doubt& doubt) {
+    return doubt.about == Doubt::About::kComponents;
+  });
+  if (doubts.front().about == Doubt::About::kLostFrames && apart != doubts.end())
+    reason += "; " + apart->text;
+  return reason;
+}
+
+std::string text_of(const Json& summary) {
+  const Json& frames = summary.at("frames");
+  const auto count = [](const Json& number) { return number.get<std::size_t>(); };
+  std::string text;
+  if (summary.at("stopped").get<bool>()) {
+    text +=
+        fmt::format("stopped after {} of {} frames; what was mapped so far is written\n",
+                    count(frames.at("read")) + count(frames.at("unreadable")), count(frames.at("available")));
+  }
+
+  text += fmt::format("frames     {} read, {} tracked ({:.1f} %), {} unreadable\n", count(frames.at("read")),
+                      count(frames.at("tracked")), tracked_percent(frames), count(frames.at("unreadable")));
+  if (count(frames.at("odometry")) > 0) {
+    text += fmt::format("poses      of the recorder's own odometry started the search in {} frames\n",
+                        count(frames.at("odometry")));
+  }
+
+  const Json& landmarks = summary.at("landmarks");
+  text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n",
+                      count(summary.at("keyframes")), count(landmarks.at("points")),
+                      count(landmarks.at("lines")), count(summary.at("loops").at("accepted")));
+  const Json& cloud = summary.at("cloud");
+  text += fmt::format("cloud      {} points, {:g} mm voxels\n", count(cloud.at("points")),
+                      cloud.at("voxel_m").get<double>() * 1000.0);
+  for (const std::string& without : {left_out_text(cloud), left_out_of_map_text(cloud)}) {
+    if (!without.empty()) text += fmt::format("left out   {}\n", without);
+  }
+
+  const Json& timing = summary.at("timing");
+  const auto seconds = [&](const char* name) { return timing.at(name).get<double>(); };
+  text +=
+      fmt::format("time       {:.1f} s in all, {:.1f} s of it export: {:.1f} frames a second without that\n",
+                  seconds("wall_s"), seconds("export_s"), seconds("fps"));
+  if (seconds("pace_hz") > 0.0) {
+    text += fmt::format("pace       {:g} frames a second; {:.2f} s behind at most\n", seconds("pace_hz"),
+                        seconds("behind_s"));
+  }
+  text += fmt::format("memory     {:.0f} MB at most\n", summary.at("memory").at("peak_rss_mb").get<double>());
+  return text;
+}
+
+}  // namespace
+
+RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFacts& facts) {
+  Json summary = empty_sections();
+  summary["input"] = facts.input;
+  summary["pipeline"] = facts.pipeline;
+  summary["stopped"] = report.stopped;
+  summary["frames"]["available"] = report.frames_available;
+  for (const Node& node : graph.nodes) node.stage->report(summary);
+
+  const Json& frames = summary.at("frames");
+  summary["frames"]["tracked_percent"] = rounded(tracked_percent(frames));
+  summary["timing"] = timing_of(graph, report, facts, frames_a_second(frames, report, facts));
+  summary["memory"] = {{"peak_rss_mb", rounded(peak_rss_mb())}};
+  summary["version"] = core::version();
+  summary["seed"] = 0;
+
+  RunSummary result;
+  result.reason = reason_of(graph, summary);
+  summary["trustworthy"] = result.reason.empty();
+  summary["reason"] = result.reason;
+  // Names of files need not be UTF-8: replace what JSON cannot hold.
+  result.json = summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  result.text = text_of(summary);
+  return result;
+}
+
+core::Result<void> write_timing(const std::filesystem::path& file, const Graph& graph,
+                                const RunReport& report, const dataset::FrameSource& source) {
+  const std::vector<StageTiming> parts = parts_of(graph);
+  std::vector<const StageTiming*> columns;
+  for (const StageTiming& stage : report.stages) columns.push_back(&stage);
+  for (const StageTiming& part : parts) columns.push_back(&part);
+  std::string text = "frame,stamp";
+  for (const StageTiming* column : columns) text += "," + column->name + "_ms";
+  text += ",rss_mb\n";
+
+  for (std::size_t f = 0; f < report.frames; ++f) {
+    text += fmt::format("{},{:.6f}", f, source.info(f).stamp);
+    for (const StageTiming* column : columns) {
+      const bool worked = f < column->frame_ms.size() && !std::isnan(column->frame_ms[f]);
+      text += worked ? fmt::format(",{:.3f}", column->frame_ms[f]) : ",";
+    }
+    const bool known = f < report.rss_mb.size() && !std::isnan(report.rss_mb[f]);
+    text += known ? fmt::format(",{:.1f}", report.rss_mb[f]) : ",";
+    text += '\n';
+  }
+  return core::write_file(file, text);
+}
+
+double peak_rss_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts in kB
+}
+
+double rss_mb() {
+  std::FILE* file = std::fopen("/proc/self/statm", "r");
+  if (file == nullptr) return std::numeric_limits<double>::quiet_NaN();
+  long all = 0;
+  long resident = 0;
+  const int fields = std::fscanf(file, "%ld %ld", &all, &resident);  // pages
+  std::fclose(file);
+  if (fields != 2) return std::numeric_limits<double>::quiet_NaN();
+  return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1024.0 * 1024.0);
+}
+
+}  // namespace plumbline::pipeline

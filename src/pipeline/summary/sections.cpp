@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "summary/sections.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace plumbline::pipeline {
+namespace {
+
+constexpr double kMostLostPercent = 10.0;
+constexpr double kWorthReporting_percent = 1.0;
+
+const Json kNoSigma = {{"median", 0.0}, {"p90", 0.0}};
+
+}  // namespace
+
+Json empty_sections() {
+  const Json none = Json::array();
+  return {{"input", ""},
+          {"pipeline", ""},
+          {"trustworthy", true},
+          {"reason", ""},
+          {"stopped", false},
+          {"frames",
+           {{"available", 0},
+            {"read", 0},
+            {"resumed", 0},
+            {"unreadable", 0},
+            {"odometry", 0},
+            {"tracked", 0},
+            {"lost", 0},
+            {"longest_loss", 0},
+            {"tracked_percent", 0.0}}},
+          {"keyframes", 0},
+          {"keyframe_causes", {{"cone", 0}, {"urgent", 0}, {"plain", 0}}},
+          {"landmarks", {{"points", 0}, {"lines", 0}}},
+          {"loops",
+           {{"candidates", 0},
+            {"verified", 0},
+            {"accepted", 0},
+            {"rejected", 0},
+            {"relocalisations_taken_back", 0},
+            {"disputes", none},
+            {"list", none}}},
+          {"refine",
+           {{"local_maps", 0},
+            {"tried", 0},
+            {"accepted", 0},
+            {"rejected", 0},
+            {"mean_rms", 0.0},
+            {"mean_shift_m", 0.0},
+            {"max_shift_m", 0.0},
+            {"sigma_position_m", kNoSigma},
+            {"sigma_rotation_rad", kNoSigma},
+            {"before", Json::object()},
+            {"after", Json::object()}}},
+          {"path",
+           {{"largest_step_m", 0.0}, {"largest_step_rad", 0.0}, {"refused_adjustments", 0}, {"tears", none}}},
+          {"merges", none},
+          {"meetings", none},
+          {"robots", none},
+          {"components", {{"list", none}, {"dropped", 0}, {"dropped_frames", 0}}},
+          {"cloud", {{"points", 0}, {"voxel_m", 0.0}}},
+          {"frame", {{"up", "none"}, {"yaw", "none"}, {"output_from_map", rows({})}}},
+          {"camera", none}};
+}
+
+double rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+Json rows(const geometry::Rigid3& transform) {
+  Json matrix = Json::array();
+  const Eigen::Matrix4d values = transform.isometry().matrix();
+  for (int row = 0; row < 4; ++row) {
+    matrix.push_back({values(row, 0), values(row, 1), values(row, 2), values(row, 3)});
+  }
+  return matrix;
+}
+
+Json section_of(const Sigma& sigma) {
+  const auto rounded_finely = [](double value) { return std::round(value * 1e6) / 1e6; };
+  return {{"median", rounded_finely(sigma.median)}, {"p90", rounded_finely(sigma.p90)}};
+}
+
+void add(Json& number, std::size_t more) { number = number.get<std::size_t>() + more; }
+
+void report_frames(const std::vector<FrameRow>& rows, Json& frames) {
+  std::size_t tracked = 0, lost = 0, loss = 0, longest_loss = 0;
+  for (const FrameRow& row : rows) {
+    const bool is_tracked = row.state == "tracked";
+    ++(is_tracked ? tracked : lost);
+    loss = is_tracked ? 0 : loss + 1;
+    longest_loss = std::max(longest_loss, loss);
+  }
+  frames["tracked"] = tracked;
+  frames["lost"] = lost;
+  frames["longest_loss"] = longest_loss;
+}
+
+Json left_out_section(const std::vector<std::pair<std::string, std::size_t>>& left_out) {
+  Json list = Json::array();
+  for (const auto& [by, points] : left_out) list.push_back({{"by", by}, {"points", points}});
+  return list;
+}
+
+std::string left_out_text(const Json& cloud) {
+  if (!cloud.contains("left_out")) return {};
+  const double measured = std::max(1.0, cloud.at("measured").get<double>());
+  std::string text;
+  for (const Json& part : cloud.at("left_out")) {
+    const double percent = 100.0 * part.at("points").get<double>() / measured;
+    if (percent < kWorthReporting_percent) continue;
+    text +=
+        fmt::format("{}{:.0f} % by {}", text.empty() ? "" : ", ", percent, part.at("by").get<std::string>());
+  }
+  return text.empty() ? text : text + ", of what keyframes measured (stage cloud)";
+}
+
+std::string left_out_of_map_text(const Json& cloud) {
+  if (!cloud.contains("left_out_of_map")) return {};
+  std::string text;
+  for (const Json& part : cloud.at("left_out_of_map")) {
+    const auto points = part.at("points").get<std::size_t>();
+    if (points == 0) continue;
+    text +=
+        fmt::format("{}{} points by {}", text.empty() ? "" : ", ", points, part.at("by").get<std::string>());
+  }
+  return text.empty() ? text : text + ", of the merged cloud";
+}
+
+void doubt_lost_frames(const Json& summary, std::vector<Doubt>& doubts) {
+  const Json& frames = summary.at("frames");
+  const auto count = [&](const char* name) { return frames.at(name).get<std::size_t>(); };
+  const std::size_t all = count("read") + count("unreadable");
+  const std::size_t without = all - std::min(all, count("tracked"));
+  const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
+  if (percent <= kMostLostPercent) return;
+  doubts.push_back(
+      {Doubt::About::kLostFrames, fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
+                                              "be trusted): {} lost, {} unreadable; "
+                                              "the longest loss is {} frames",
+                                              without, all, percent, kMostLostPercent, count("lost"),
+                                              count("unreadable"), count("longest_loss"))});
+}
+
+void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& doubts) {
+  const Json& cloud = summary.at("cloud");
+  if (summary.at("frames").at("read").get<std::size_t>() == 0) return;
+  if (!(cloud.at("voxel_m").get<double>() > 0.0) || cloud.at("points").get<std::size_t>() > 0) return;
+  const std::string of_map = left_out_of_map_text(cloud);
+  const std::string without = of_map.empty() ? left_out_text(cloud) : of_map;
+  doubts.push_back({Doubt::About::kEmptyCloud,
+                    "the cloud is empty: " +
+                        (without.empty() ? "no keyframe had usable depth" : "left out were " + without)});
+}
+
+}  // namespace plumbline::pipeline

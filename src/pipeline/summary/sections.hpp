@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Sections of summary.json. Each stage fills in those that it knows (Stage::report); what several stages have
+// in common is here.
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/numbers.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/pipeline/data.hpp"
+
+namespace plumbline::pipeline {
+
+using Json = nlohmann::ordered_json;
+
+/// All sections, in their order, as of a run in which nothing happened.
+Json empty_sections();
+
+/// Numbers are for people: 4 decimals are more than any of them is good for.
+double rounded(double value);
+
+/// The 4 x 4 matrix, row by row.
+Json rows(const geometry::Rigid3& transform);
+
+/// Of many standard deviations the middle one and the one that nine of ten do not pass; 0: not known.
+struct Sigma {
+  double median = 0.0;
+  double p90 = 0.0;
+};
+template <typename T>
+Sigma sigma_of(const std::vector<T>& values) {
+  return {static_cast<double>(core::quantile(values, 0.5, T(0))),
+          static_cast<double>(core::quantile(values, 0.9, T(0)))};
+}
+Json section_of(const Sigma& sigma);
+
+/// Adds to a number of a section.
+void add(Json& number, std::size_t more);
+
+/// Tracked and lost frames and the longest run of lost ones, for the section `frames`.
+void report_frames(const std::vector<FrameRow>& rows, Json& frames);
+
+/// Points that filters left out, by the filter's type.
+Json left_out_section(const std::vector<std::pair<std::string, std::size_t>>& left_out);
+
+/// What keyframes measured and the cloud does not hold, in words; empty: hardly anything.
+std::string left_out_text(const Json& cloud);
+/// What the merged cloud's filters took from it, in words; empty: nothing.
+std::string left_out_of_map_text(const Json& cloud);
+
+/// More frames have no pose than would be trusted.
+void doubt_lost_frames(const Json& summary, std::vector<Doubt>& doubts);
+/// The cloud that was to be made is empty.
+void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& doubts);
+
+}  // namespace plumbline::pipeline
