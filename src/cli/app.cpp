@@ -150,7 +150,8 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
   command
       .add_option_function<std::vector<std::string>>(
           "--topic", take,
-          "Of a bag: the topic of color, depth, info (colour's CameraInfo) or depth_info, where it is not "
+          "Of a bag or a live camera: the topic of color, depth, info (colour's CameraInfo) or depth_info, "
+          "where it is not "
           "found by itself; may be repeated")
       ->type_name("WHAT=/TOPIC")
       ->allow_extra_args(false);
@@ -172,7 +173,7 @@ int run(int argc, char** argv) {
   Session session;
   for (const auto add :
        {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_convert, add_info, add_render,
-        add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines}) {
+        add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines, add_play}) {
     add(app, session);
   }
 

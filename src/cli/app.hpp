@@ -14,6 +14,7 @@
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/executor.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
 
 namespace plumbline::cli {
@@ -64,6 +65,16 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
 std::string shift_text(const Eigen::Vector3d& shift);
 
 void add_time_range(CLI::App& command, dataset::OpenOptions& open);
+/// Lets a command take live cameras: --for, --record.
+void add_live_options(CLI::App& command, pipeline::MapRequest& request);
+/// --publish, for commands that make a map.
+void add_publish_option(CLI::App& command, std::string& address);
+/// Makes the one who looks on of the option's value; `names`, `name`: as
+/// open_ros2_publisher's.
+core::Result<void> prepare_publisher(Session& session, const std::string& address, net::PublishedNames names,
+                                     const std::string& name, pipeline::RunRequest& request);
+/// Once they are parsed: who opens addresses, and what ends them.
+void prepare_live(pipeline::MapRequest& request);
 /// --topic, for commands that read recordings, which may be bags.
 void add_topic_option(CLI::App& command, dataset::OpenOptions& open);
 /// A word that only groups commands, like `evaluate`.
@@ -85,6 +96,7 @@ void add_evaluate_cloud(CLI::App& group, Session& session);  ///< the one below 
 void add_synth(CLI::App& app, Session& session);
 void add_filter(CLI::App& app, Session& session);
 void add_pipelines(CLI::App& app, Session& session);
+void add_play(CLI::App& app, Session& session);
 
 /// Parses, runs the command and returns the exit code (see core::ErrorKind).
 int run(int argc, char** argv);

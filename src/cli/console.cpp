@@ -21,6 +21,12 @@ const char* label(core::LogLevel level) {
   return level == core::LogLevel::kWarning ? "warning: " : level == core::LogLevel::kError ? "error: " : "";
 }
 
+/// How much is done of what nobody knows the end of.
+std::string counted(std::size_t done, const char* what, double elapsed_s) {
+  const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+  return fmt::format("{} {}, {:.1f} a second", done, what, rate);
+}
+
 }  // namespace
 
 std::string clock_text(double seconds) {
@@ -56,7 +62,7 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
   }
 
   const double since_last_s = std::chrono::duration<double>(now - last_).count();
-  if (done < total && since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
+  if ((done < total || total == 0) && since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
   last_ = now;
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
 
@@ -64,6 +70,8 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
     clear_bar();
     draw_bar(done, total, what, elapsed_s);
     bar_shown_ = true;
+  } else if (total == 0) {
+    put(fmt::format("plumbline: {}{}\n", counted(done, what, elapsed_s), note_));
   } else {
     const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
     const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
@@ -89,6 +97,11 @@ void Console::status(const std::string& line) {
 }
 
 void Console::draw_bar(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
+  if (total == 0) {
+    put(fmt::format("{}  {}{}", counted(done, what, elapsed_s), clock_text(elapsed_s), note_));
+    std::fflush(stderr);
+    return;
+  }
   const double share = total > 0 ? static_cast<double>(done) / static_cast<double>(total) : 1.0;
   const auto filled = static_cast<std::size_t>(std::lround(share * static_cast<double>(kBarWidth)));
   const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;

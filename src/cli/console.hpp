@@ -20,6 +20,7 @@ class Console : public core::Log {
   void write(core::LogLevel level, const std::string& message) override;
 
   /// A bar with rate and time left on a terminal, a line every few seconds elsewhere; nothing when quiet.
+  /// `total` 0: nobody knows.
   void progress(std::size_t done, std::size_t total, const char* what);
   /// progress() for those who only tell how much is done.
   [[nodiscard]] std::function<void(std::size_t, std::size_t)> counting(const char* what) {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
 
@@ -55,13 +54,7 @@ class FolderSource final : public FrameSource {
     std::optional<sensor::Rectifier> own;
     if (pair.camera >= 0) own.emplace(camera_of(pair), rectified_);
     const sensor::Rectifier& rectifier = own ? *own : rectifier_;
-    sensor::RgbdFrame frame;
-    frame.index = static_cast<std::int64_t>(index);
-    frame.stamp = pair.stamp;
-    frame.depth_stamp = pair.depth_stamp;
-    frame.color = rectifier.color(*color);
-    cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
-    frame.depth = rectifier.depth(*depth);
+    sensor::RgbdFrame frame = rectified_frame(index, pair, *color, *depth, rectifier);
     if (layout_.gives_odometry && layout_.truth)
       frame.odometry = geometry::pose_at(*layout_.truth, pair.stamp, kNearestPose_s);
     return frame;

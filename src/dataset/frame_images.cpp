@@ -139,6 +139,18 @@ core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, 
   return image->type() == CV_32FC1 ? depth_units(*image, depth_scale) : *image;
 }
 
+sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const cv::Mat& color,
+                                  const cv::Mat& depth, const sensor::Rectifier& rectifier) {
+  sensor::RgbdFrame frame;
+  frame.index = static_cast<std::int64_t>(index);
+  frame.stamp = pair.stamp;
+  frame.depth_stamp = pair.depth_stamp;
+  frame.color = rectifier.color(color);
+  cv::cvtColor(frame.color, frame.gray, cv::COLOR_BGR2GRAY);
+  frame.depth = rectifier.depth(depth);
+  return frame;
+}
+
 core::Result<void> check_image_kinds(const Layout& layout, sensor::Camera& camera, core::Log& log) {
   const cv::Mat color = first_image(layout, [](const PairInfo& pair) { return pair.color_file; });
   if (!color.empty() && color.depth() == CV_16U && color.channels() >= 3)

@@ -10,6 +10,7 @@
 #include "plumbline/core/log.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/sensor/camera.hpp"
+#include "plumbline/sensor/rectify.hpp"
 
 namespace plumbline::dataset {
 
@@ -44,6 +45,10 @@ cv::Mat depth_units(const cv::Mat& metres, double depth_scale);
 
 /// Takes out of a depth image what a mask of any size, in a file, has 0 for. Error (kInput): no mask.
 core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth);
+
+/// A pair's images, as read_color and read_depth give them, as a frame without odometry.
+sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const cv::Mat& color,
+                                  const cv::Mat& depth, const sensor::Rectifier& rectifier);
 
 /// Looks at the first images that can be read and says what is unusual about their kind. Where depth is
 /// stored as floats, the camera's depth_scale becomes kFloatDepthScale. Error (kInput): floats that cannot be

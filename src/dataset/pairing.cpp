@@ -21,12 +21,14 @@ std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
                                     const std::vector<StampedFile>& depth, double max_gap_s,
                                     double depth_delay_s) {
   const double reach = max_gap_s + kStampResolution;
-  std::vector<std::tuple<double, std::size_t, std::size_t>> candidates;  // gap, colour, depth
+  // Gap in microseconds, which is what stamps are good to; colour, depth.
+  std::vector<std::tuple<long long, std::size_t, std::size_t>> candidates;
   for (std::size_t i = 0; i < color.size(); ++i) {
     const double stamp = color[i].stamp - depth_delay_s;  // of depth taken at the same moment
     for (auto d = std::lower_bound(depth.begin(), depth.end(), stamp - reach, earlier);
          d != depth.end() && d->stamp <= stamp + reach; ++d) {
-      candidates.emplace_back(std::abs(d->stamp - stamp), i, static_cast<std::size_t>(d - depth.begin()));
+      candidates.emplace_back(std::llround(std::abs(d->stamp - stamp) / kStampResolution), i,
+                              static_cast<std::size_t>(d - depth.begin()));
     }
   }
   std::sort(candidates.begin(), candidates.end());

@@ -2,9 +2,11 @@
 #pragma once
 
 // A recording, whatever its layout: an indexed list of RGB-D pairs.
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -13,11 +15,14 @@
 
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
+#include "plumbline/core/stop.hpp"
 #include "plumbline/geometry/trajectory.hpp"
 #include "plumbline/sensor/camera.hpp"
 #include "plumbline/sensor/frame.hpp"
 
 namespace plumbline::dataset {
+
+class MessageStream;
 
 struct PairInfo {
   double stamp = 0.0;        ///< of colour, seconds
@@ -37,6 +42,15 @@ struct StoredImage {
 struct StoredPair {
   StoredImage color;
   StoredImage depth;
+};
+
+/// What became of the images of a live source.
+struct LiveReport {
+  std::size_t taken = 0;      ///< frames
+  std::size_t dropped = 0;    ///< frames that came while too many waited
+  std::size_t backwards = 0;  ///< frames whose stamp was not later than the last one's
+  std::size_t unpaired = 0;   ///< images of either kind without one of the other near them
+  std::size_t lost = 0;       ///< messages that the network lost and said so
 };
 
 /// Read access to one recording. All const methods are thread-safe: frames may be decoded side by side.
@@ -61,6 +75,21 @@ class FrameSource {
   [[nodiscard]] virtual std::unique_ptr<FrameSource> taken_by(const sensor::Camera& /*better*/) const {
     return nullptr;
   }
+  /// Whether frames come while others are read: size() grows, and how many there will be is not known.
+  [[nodiscard]] virtual bool live() const { return false; }
+  /// Of a live source: waits, at most so long, until frame `index` can be read and it is known whether
+  /// another one follows.
+  virtual void wait_for(std::size_t /*index*/, std::chrono::milliseconds /*most*/) const {}
+  /// Of a live source: frame `index` can be read and it is known whether another one follows (then size() is
+  /// larger); or that no such frame will come.
+  [[nodiscard]] virtual bool decided(std::size_t /*index*/) const { return true; }
+  /// Of a live source: frame `index`, one of the latest 256 or so, is wanted again later; others are
+  /// forgotten.
+  virtual void keep(std::size_t /*index*/) const {}
+  /// Of a live source: ends it and what it writes itself. Error (kOutput): the record.
+  [[nodiscard]] virtual core::Result<void> finish() const { return {}; }
+  /// Of a live source that has ended.
+  [[nodiscard]] virtual LiveReport report() const { return {}; }
   /// What makes a map of it doubtful whatever comes out, such as depth in an unlikely unit; "" if nothing.
   [[nodiscard]] virtual std::string doubt() const { return ""; }
   /// Truth that comes with the recording, if any.
@@ -87,6 +116,20 @@ struct TopicNames {
   }
 };
 
+/// Of what is live.
+struct LiveOptions {
+  /// Opens the stream behind an address, and takes the topics that the address names; empty: nothing live is
+  /// taken.
+  std::function<core::Result<std::unique_ptr<MessageStream>>(const std::string& address, TopicNames& topics)>
+      open;
+  core::StopToken stop;                      ///< ends the source; what it has given a number is still read
+  double for_s = 1e300;                      ///< seconds after which it ends
+  std::filesystem::path record;              ///< an MCAP file of the frames that were taken; "": none
+  bool replace = false;                      ///< an earlier such file
+  std::chrono::milliseconds patience{5000};  ///< until the first image must have come
+  std::size_t most_waiting_bytes = std::size_t{1024} << 20U;  ///< of messages whose turn has not come
+};
+
 struct OpenOptions {
   std::string format = "auto";  ///< one of layout_names()
   std::string camera;           ///< shipped name or file; "" = camera.yaml in the folder
@@ -97,6 +140,7 @@ struct OpenOptions {
   int every = 1;                 ///< every n-th pair
   PoseUse poses = PoseUse::kPrior;
   TopicNames topics;  ///< of bags
+  LiveOptions live;
 };
 
 /// "auto", and the layouts that open_recording knows.

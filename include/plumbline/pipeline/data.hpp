@@ -44,6 +44,7 @@ struct TrackedFrame {
   FrameRow row;
   geometry::Rigid3 depth_from_camera;               ///< motion between the stamps of colour and depth
   std::optional<maps::FramePose> pose;              ///< none before the map began, or where there is no map
+  std::optional<geometry::Rigid3> map_from_camera;  ///< when somebody looks on: as the map is now; none: lost
   std::shared_ptr<const maps::MapChanges> changes;  ///< of the map since the last keyframe, with each
                                                     ///< keyframe, when somebody keeps the map
   std::shared_ptr<const maps::Map> map;             ///< of several robots: as it is with this keyframe

@@ -13,7 +13,8 @@
 
 namespace plumbline::pipeline {
 
-/// A recording's folder, or "synth:SCENE?..." filmed on demand. `scenes_folder` holds the shipped scenes.
+/// A recording, "synth:SCENE?..." filmed on demand, or the address of a live camera ("ros2://0") where
+/// options.live.open can open one. `scenes_folder` holds the shipped scenes.
 core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string& input,
                                                                const dataset::OpenOptions& options,
                                                                const std::filesystem::path& scenes_folder,

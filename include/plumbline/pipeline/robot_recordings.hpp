@@ -18,21 +18,21 @@ namespace plumbline::pipeline {
 class RobotRecordings : public dataset::FrameSource {
  public:
   /// One recording a robot, numbered in this order; of several with one name, later ones get a number behind
-  /// it. Throws std::invalid_argument without recordings.
+  /// it. Throws std::invalid_argument without recordings, or when one of several is live.
   explicit RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings);
 
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
   [[nodiscard]] const RobotInfo& robot(std::int32_t number) const {
     return robots_.at(static_cast<std::size_t>(number));
   }
-  [[nodiscard]] std::int32_t robot_of(std::size_t index) const { return order_.at(index).robot; }
+  [[nodiscard]] std::int32_t robot_of(std::size_t index) const { return place(index).robot; }
   /// Its number within its recording, and how many that has.
-  [[nodiscard]] std::size_t frame_of(std::size_t index) const { return order_.at(index).index; }
+  [[nodiscard]] std::size_t frame_of(std::size_t index) const { return place(index).index; }
   [[nodiscard]] std::size_t frames_of(std::int32_t robot) const {
     return recordings_[static_cast<std::size_t>(robot)]->size();
   }
   /// Seconds since the run began, of a frame.
-  [[nodiscard]] double time_of(std::size_t index) const { return order_.at(index).time; }
+  [[nodiscard]] double time_of(std::size_t index) const { return place(index).time; }
 
   /// Frames from `from` on are read as taken by these cameras, one a robot, and rectified into images of
   /// robot(...).camera all the same. Of sources that cannot, nothing changes. Beside read().
@@ -47,9 +47,20 @@ class RobotRecordings : public dataset::FrameSource {
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& format() const override { return recordings_.front()->format(); }
   [[nodiscard]] const sensor::Camera& camera() const override { return recordings_.front()->camera(); }
-  [[nodiscard]] std::size_t size() const override { return order_.size(); }
+  [[nodiscard]] std::size_t size() const override {
+    return live() ? recordings_.front()->size() : order_.size();
+  }
   [[nodiscard]] dataset::PairInfo info(std::size_t index) const override;
   [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override;
+  /// One recording alone may be live.
+  [[nodiscard]] bool live() const override { return recordings_.front()->live(); }
+  void wait_for(std::size_t index, std::chrono::milliseconds most) const override {
+    recordings_.front()->wait_for(index, most);
+  }
+  [[nodiscard]] bool decided(std::size_t index) const override { return recordings_.front()->decided(index); }
+  void keep(std::size_t index) const override { recordings_.front()->keep(index); }
+  [[nodiscard]] core::Result<void> finish() const override { return recordings_.front()->finish(); }
+  [[nodiscard]] dataset::LiveReport report() const override { return recordings_.front()->report(); }
   /// The first that one of the recordings has.
   [[nodiscard]] std::string doubt() const override;
   [[nodiscard]] std::optional<geometry::Trajectory> truth_of(std::int32_t robot) const {
@@ -66,6 +77,7 @@ class RobotRecordings : public dataset::FrameSource {
     std::int32_t robot = 0;
     std::size_t index = 0;  ///< in its recording
   };
+  [[nodiscard]] Place place(std::size_t index) const;
   [[nodiscard]] const dataset::FrameSource& of(const Place& place) const {
     return *recordings_[static_cast<std::size_t>(place.robot)];
   }
@@ -73,7 +85,7 @@ class RobotRecordings : public dataset::FrameSource {
   std::string name_;
   std::vector<std::unique_ptr<dataset::FrameSource>> recordings_;
   std::vector<RobotInfo> robots_;
-  std::vector<Place> order_;
+  std::vector<Place> order_;  ///< none of what is live
   mutable std::mutex mutex_;  ///< of what follows
   std::size_t corrected_from_ = 0;
   std::vector<std::shared_ptr<const dataset::FrameSource>> corrected_;  ///< by robot; empty: none

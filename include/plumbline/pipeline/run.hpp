@@ -4,6 +4,7 @@
 // Runs a checked graph on oneTBB.
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,8 @@
 #include "plumbline/pipeline/graph.hpp"
 
 namespace plumbline::pipeline {
+
+class RunObserver;
 
 /// What `map` and `fuse` are both asked for.
 struct RunRequest {
@@ -20,6 +23,7 @@ struct RunRequest {
   std::filesystem::path pipelines_folder;  ///< shipped pipelines, with cameras/, filters/ and scenes/
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   bool replace = false;                                      ///< replace an earlier result
+  std::shared_ptr<RunObserver> observer;                     ///< who looks on; null: nobody
 };
 
 struct RunReport {
@@ -34,7 +38,7 @@ struct RunReport {
   std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };
 
-/// Called in frame order, from one thread at a time.
+/// Called in frame order, from one thread at a time; `total` 0: not known (what is live).
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// With a pace (`pace_hz` > 0) frame n of a recording is handed out no earlier than n / pace_hz seconds

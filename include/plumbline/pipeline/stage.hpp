@@ -48,6 +48,7 @@ class StoredMaps;
 
 namespace plumbline::pipeline {
 
+class RunObserver;
 struct ResumedRun;
 class RobotRecordings;
 
@@ -139,12 +140,13 @@ struct RunStore {
   bool keeps_clouds = false;  ///< and it gets the clouds that are to be laid down
 };
 
-/// What reaches into the tracking of a run.
-struct TrackingHooks {
+/// What reaches into a run, or looks on.
+struct RunHooks {
   std::filesystem::path debug_folder;                       ///< where its pictures go; empty: nowhere
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
   std::function<void(maps::Map&)>
-      alter_map;  ///< for tests: changes the map when tracking has ended; may be empty
+      alter_map;                    ///< for tests: changes the map when tracking has ended; may be empty
+  RunObserver* observer = nullptr;  ///< who looks on; null: nobody
 };
 
 /// What a run lends to its stages; outlives them.
@@ -156,7 +158,7 @@ struct RunContext {
   RunInput input;
   const ResumedRun* resumed = nullptr;  ///< what an earlier run did already; null: nothing
   RunStore store;
-  TrackingHooks hooks;
+  RunHooks hooks;
 };
 
 /// Why a result must not be trusted.
@@ -233,7 +235,7 @@ class Stage {
   virtual void doubt(const nlohmann::ordered_json& /*summary*/, std::vector<Doubt>& /*doubts*/) const {}
   /// Times of parts of this stage's work, named "stage.part".
   [[nodiscard]] virtual std::vector<StageTiming> parts() const { return {}; }
-  /// Asked before the run: it draws what it sees of each frame (TrackingHooks::debug_folder).
+  /// Asked before the run: it draws what it sees of each frame (RunHooks::debug_folder).
   [[nodiscard]] virtual bool draws_frames() const { return false; }
   /// Asked before the run: it can go on from an earlier one (RunContext::resumed).
   [[nodiscard]] virtual bool resumes() const { return false; }

@@ -35,9 +35,11 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
   options.replace = request.replace;
   options.stop = [&stop] { return stop.stop_requested(); };
   options.progress = [&](std::size_t frames) { told(frames, (*source)->size()); };
+
   const auto summary = dataset::convert_recording(**source, request.output, options, console);
   console.end_progress();
   if (!summary) return tl::unexpected<core::Error>(summary.error());
+
   if (summary->stopped) console.warning("stopped: the copy ends here");
   if (summary->unreadable > 0)
     console.warning(fmt::format("{} frames cannot be read and are left out", summary->unreadable));

@@ -69,16 +69,19 @@ core::Result<void> run_export(ExportCommand& command, Session& session) {
     fmt::print("{}", exports::exports_page());
     return {};
   }
+
   exports::ExportRequest& request = command.request;
   if (request.input.empty())
     return core::usage_error("MAP is required: a result folder, map.db, or a cloud file");
   if (auto applied = command.flags.apply(); !applied) return applied;
   if (request.output.empty() && command.keyframes.empty())
     return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
+
   if (!command.keyframes.empty()) {
     auto done = export_keyframes(command);
     if (!done || request.output.empty()) return done;
   }
+
   request.content = content_of(command);
   request.given = command.flags.given();
   request.open = recording_opener(session);
@@ -86,6 +89,7 @@ core::Result<void> run_export(ExportCommand& command, Session& session) {
     const SilencedStdio silenced;
     work();
   };
+
   Console& console = session.console();
   auto summary = exports::write_export(request, session.executor(), console, console.counting("views"));
   console.end_progress();
@@ -117,6 +121,7 @@ void add_export(CLI::App& app, Session& session) {
   const auto state = std::make_shared<ExportCommand>();
   CLI::App* command = add_command(app, session, "export", "Write a map in the forms that other programs read",
                                   [&session, state] { return run_export(*state, session); });
+
   exports::ExportRequest& request = state->request;
   command->add_option("MAP", request.input,
                       "A result folder, also of a run that was interrupted, map.db, or a cloud file");
@@ -125,6 +130,7 @@ void add_export(CLI::App& app, Session& session) {
   command
       ->add_option("--format", request.format, "One of the formats below (default: by the output's ending)")
       ->type_name("NAME");
+
   command
       ->add_option("--keyframes", state->keyframes,
                    "Write the cloud of every keyframe as DIR/<number>.ply, from map.db")
@@ -133,19 +139,23 @@ void add_export(CLI::App& app, Session& session) {
       ->add_option("--robot", request.robot,
                    "Robot whose map to use, for an interrupted run of several robots")
       ->type_name("NAME");
+
   command
       ->add_option("--recording", request.recordings,
                    "Where pictures come from, one for each robot (default: what the map was made from)")
       ->type_name("INPUT")
       ->allow_extra_args(false);
+
   CLI::Option* what = command->add_option("--what", state->what, "What to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));
   CLI::Option* trajectory =
       command->add_flag("--trajectory", state->trajectory, "The same as --what trajectory")->excludes(what);
+
   command->add_flag("--lines", state->lines, "The same as --what lines")
       ->excludes(what)
       ->excludes(trajectory);
   command->add_flag("--mesh", state->mesh, "Write the cloud as a mesh, .ply, .obj or .glb")->excludes(what);
+
   command->add_flag("--force", request.replace, "Replace the folder of an earlier export");
   command->add_flag("--describe", state->page, "Print the page of all formats, docs/guide/exports.md");
   state->flags.add(*command, request.options);

@@ -17,7 +17,7 @@ const char* const kTwoTerminals =
     "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 --interface lo\n"
     "Hub and robots may start in any order. More: docs/guide/network.md";
 
-int hub(Session& session, net::HubRequest request, double quota_gb) {
+int hub(Session& session, net::HubRequest request, double quota_gb, const std::string& publish) {
   if (auto equipped = session.equip(request.fuse); !equipped) return session.fail(equipped.error());
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
@@ -25,6 +25,9 @@ int hub(Session& session, net::HubRequest request, double quota_gb) {
     session.console().info(request.fuse.output.string() + ": is finished; there is nothing to continue");
     return 0;
   }
+  if (auto prepared = prepare_publisher(session, publish, net::PublishedNames::kOfEach, "", request.fuse);
+      !prepared)
+    return session.fail(prepared.error());
   Console& console = session.console();
   const auto summary = net::run_hub(
       request, session.executor(), console, stop_on_signals(),
@@ -37,9 +40,10 @@ int hub(Session& session, net::HubRequest request, double quota_gb) {
 void add_hub(CLI::App& app, Session& session) {
   const auto request = std::make_shared<net::HubRequest>();
   const auto quota_gb = std::make_shared<double>(20.0);
-  CLI::App* command =
-      add_command(app, session, "hub", "Collect the maps of robots over a network and fuse them",
-                  [&session, request, quota_gb] { return hub(session, *request, *quota_gb); });
+  const auto publish = std::make_shared<std::string>();
+  CLI::App* command = add_command(
+      app, session, "hub", "Collect the maps of robots over a network and fuse them",
+      [&session, request, quota_gb, publish] { return hub(session, *request, *quota_gb, *publish); });
   command->footer(kTwoTerminals);
 
   command->add_option("-o,--output", request->fuse.output, "Folder for the result")
@@ -49,6 +53,7 @@ void add_hub(CLI::App& app, Session& session) {
       ->type_name("N")
       ->check(CLI::Range(1, 64));
   add_network_options(*command, request->network);
+  add_publish_option(*command, *publish);
 
   command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")

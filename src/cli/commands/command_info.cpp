@@ -16,12 +16,15 @@
 #include "app.hpp"
 #include "plumbline/cloud/cloud_io.hpp"
 #include "plumbline/dataset/bag.hpp"
+#include "plumbline/dataset/live.hpp"
 #include "plumbline/dataset/recording_poses.hpp"
 #include "plumbline/dataset/summary.hpp"
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/stored_result.hpp"
+#include "plumbline/net/ros2.hpp"
 #include "plumbline/pipeline/input.hpp"
 #include "plumbline/synth/source.hpp"
+#include "signals.hpp"
 
 namespace plumbline::cli {
 namespace {
@@ -155,8 +158,20 @@ core::Result<void> describe_bag(Session& session, InfoRequest& request) {
   return describe_recording(session, request);
 }
 
+core::Result<void> describe_live(InfoRequest& request) {
+  const auto stream = net::open_live_stream(request.input, request.open.topics);
+  if (!stream) return tl::unexpected<core::Error>(stream.error());
+  request.open.live.stop = stop_on_signals();
+  const auto text = dataset::live_to_text(request.input, **stream, request.open);
+  if (!text) return tl::unexpected<core::Error>(text.error());
+  fmt::print("{}", *text);
+  return {};
+}
+
 core::Result<void> info(Session& session, InfoRequest& request) {
+  if (dataset::is_live_address(request.input)) return describe_live(request);
   if (synth::is_synth_url(request.input)) return describe_recording(session, request);
+
   std::error_code ec;
   const std::filesystem::path path = request.input;
   const auto map = maps::find_map(path);  // also of a run that was interrupted and has left no `path`
@@ -164,6 +179,7 @@ core::Result<void> info(Session& session, InfoRequest& request) {
   if (!std::filesystem::exists(path, ec)) {
     return core::input_error(fmt::format("{}: no such map, cloud or recording", request.input));
   }
+
   if (dataset::is_bag(path)) return describe_bag(session, request);
   if (!std::filesystem::is_directory(path, ec) && !dataset::is_recording_file(path)) {
     if (!is_trajectory(path)) return describe_cloud(path);
@@ -182,8 +198,9 @@ void add_info(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "info", "Describe a recording, a map or a cloud",
                                   [&session, request] { return info(session, *request); });
   command
-      ->add_option("INPUT", request->input,
-                   "A recording, a ROS bag, a result folder, map.db, a cloud file or synth:SCENE")
+      ->add_option(
+          "INPUT", request->input,
+          "A recording, a ROS bag, ros2://DOMAIN, a result folder, map.db, a cloud file or synth:SCENE")
       ->required();
   command->add_option("--camera", request->open.camera, "Shipped calibration or file")
       ->type_name("NAME|FILE");

@@ -14,17 +14,25 @@
 namespace plumbline::cli {
 namespace {
 
-int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs) {
+int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs,
+        const std::string& publish) {
   const bool as_given = request.open.poses == dataset::PoseUse::kGiven;
   if (as_given && request.pipeline == pipeline::MapRequest().pipeline) request.pipeline = "known_poses";
   request.input = inputs.front();
   request.others.assign(inputs.begin() + 1, inputs.end());
+
   if (auto equipped = session.equip(request); !equipped) return session.fail(equipped.error());
   if (request.resume && pipeline::is_finished(request.output)) {
     if (!session.quiet)
       fmt::print("{}: is finished; there is nothing to continue\n", request.output.string());
     return 0;
   }
+
+  prepare_live(request);
+  if (auto prepared = prepare_publisher(session, publish, net::PublishedNames::kOfOne, "", request);
+      !prepared)
+    return session.fail(prepared.error());
+
   Console& console = session.console();
   const auto summary = pipeline::map_recording(request, session.executor(), console, stop_on_signals(),
                                                console.counting("frames"));
@@ -59,6 +67,7 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
       ->type_name("HZ")
       ->check(CLI::Range(0.0, 1000.0));
 
+  add_live_options(command, request);
   command.add_flag("--resume", request.resume,
                    "Continue an interrupted run from OUT.partial, with the same input and settings");
   add_pipeline_options(command, session, request);
@@ -67,15 +76,25 @@ void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& 
 void add_map(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto inputs = std::make_shared<std::vector<std::string>>();
-  CLI::App* command = add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
-                                  [&session, request, inputs] { return map(session, *request, *inputs); });
+  const auto publish = std::make_shared<std::string>();
+
+  CLI::App* command =
+      add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
+                  [&session, request, inputs, publish] { return map(session, *request, *inputs, *publish); });
+
   command
-      ->add_option("INPUT", *inputs,
-                   "A recording (docs/guide/inputs.md), or synth:SCENE?frames=900&texture=none&seed=3; give "
-                   "several, one per robot, to fuse them into one map")
+      ->add_option(
+          "INPUT", *inputs,
+          "A recording (docs/guide/inputs.md), ros2://DOMAIN for a live camera, or "
+          "synth:SCENE?frames=900&texture=none&seed=3; give several recordings, one per robot, to fuse "
+          "them into one map")
       ->required();
+
   command->add_option("-o,--output", request->output, "Folder for the result")->required()->type_name("OUT");
+
+  add_publish_option(*command, *publish);
   add_map_options(*command, session, *request);
+
   command
       ->add_option("--debug-video", request->debug_video,
                    "Also write a picture of every frame with what the tracker sees")

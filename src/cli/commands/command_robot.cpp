@@ -25,8 +25,13 @@ int finish(Session& session, const core::Result<net::RobotOutcome>& outcome,
   return code;
 }
 
-int robot(Session& session, net::RobotRequest request) {
+int robot(Session& session, net::RobotRequest request, const std::string& publish) {
   if (auto equipped = session.equip(request.map); !equipped) return session.fail(equipped.error());
+  prepare_live(request.map);
+  if (auto prepared =
+          prepare_publisher(session, publish, net::PublishedNames::kOfEach, request.name, request.map);
+      !prepared)
+    return session.fail(prepared.error());
   request.fresh_id = fresh_id();
   request.hand_in = fmt::format("--name {}{}", request.name, network_arguments(request.network));
   if (request.map.output.empty()) request.map.output = request.name;
@@ -56,10 +61,11 @@ int robot(Session& session, net::RobotRequest request) {
 void add_robot(CLI::App& app, Session& session) {
   const auto request = std::make_shared<net::RobotRequest>();
   request->map.pipeline = "robot";
+  const auto publish = std::make_shared<std::string>();
 
   CLI::App* command =
       add_command(app, session, "robot", "Map a recording and send the map to a hub meanwhile",
-                  [&session, request] { return robot(session, *request); });
+                  [&session, request, publish] { return robot(session, *request, *publish); });
   command->footer(
       "Start a hub:        plumbline hub -o building --robots 1 --interface lo\n"
       "and a robot:        plumbline robot 'synth:room?frames=300&seed=1' --name r0 --interface lo\n"
@@ -77,6 +83,7 @@ void add_robot(CLI::App& app, Session& session) {
       ->type_name("OUT");
 
   add_network_options(*command, request->network);
+  add_publish_option(*command, *publish);
   command
       ->add_option_function<std::string>(
           "--feedback", [request](const std::string& choice) { request->feedback = choice == "on"; },

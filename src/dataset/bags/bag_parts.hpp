@@ -13,13 +13,14 @@ struct BagReaders {
   static constexpr const char* kPart = "bags";
   static constexpr std::uint64_t layout() {
     return core::layout_of<BagReaders, MessageDecoder, BagEntry, BagTopic, ImageMessage, CameraInfoMessage,
-                           TransformMessage>();
+                           TransformMessage, PathMessage, CloudMessage>();
   }
 
   /// A file of any kind; recognised by content.
   OpenedBag (*open)(const std::filesystem::path& file);
   const MessageDecoder& (*cdr)();
   const MessageDecoder& (*ros1)();
+  const MessageEncoder& (*encoder)();
   std::unique_ptr<BagWriter> (*create_mcap)(const std::filesystem::path& file);
 };
 

@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "bags/bag_camera.hpp"
-#include "bags/images.hpp"
+#include "bags/message_images.hpp"
 #include "bags/topics.hpp"
-#include "image_decoders.hpp"
 #include "plumbline/core/numbers.hpp"
 
 namespace plumbline::dataset {
@@ -25,53 +24,13 @@ struct ImageList {
   std::string prefix;  ///< of names: "office.mcap:/camera/color/image_raw#"
 };
 
-class BagImages final : public ImageStore {
+class BagImages final : public MessageImages {
  public:
   BagImages(std::vector<std::shared_ptr<const BagFile>> files, ImageList color, ImageList depth)
       : files_(std::move(files)), color_(std::move(color)), depth_(std::move(depth)) {}
 
-  [[nodiscard]] core::Result<cv::Mat> image(const std::string& name) const override {
-    const auto place = place_of(name);
-    if (!place) return tl::unexpected(place.error());
-    const MessageDecoder& decoder = *place->list->decoder;
-    MessageImage image = tl::unexpected<std::string>("");
-    if (place->list->topic.type == "sensor_msgs/Image") {
-      const auto message = decoder.image(place->bytes);
-      image = message ? image_of(*message) : tl::unexpected(message.error());
-    } else {
-      const auto message = decoder.compressed_image(place->bytes);
-      image = message ? image_of(*message) : tl::unexpected(message.error());
-    }
-    if (image) return std::move(*image);
-    return core::input_error(name + ": " + image.error());
-  }
-
-  [[nodiscard]] core::Result<StoredImage> stored(const std::string& name) const override {
-    const auto place = place_of(name);
-    if (!place) return tl::unexpected(place.error());
-    StoredImage stored;
-    if (place->list->topic.type == "sensor_msgs/CompressedImage") {
-      const auto message = place->list->decoder->compressed_image(place->bytes);
-      const bool file = message && !is_compressed_depth(message->format);
-      if (file && (is_png(message->data) || is_jpeg(message->data))) {
-        stored.ending = is_png(message->data) ? ".png" : ".jpg";
-        stored.bytes = message->data;
-        return stored;
-      }
-    }
-    auto pixels = image(name);
-    if (!pixels) return tl::unexpected(pixels.error());
-    stored.pixels = std::move(*pixels);
-    return stored;
-  }
-
  private:
-  struct Place {
-    const ImageList* list = nullptr;
-    Bytes bytes;
-  };
-
-  [[nodiscard]] core::Result<Place> place_of(const std::string& name) const {
+  [[nodiscard]] core::Result<Place> place_of(const std::string& name) const override {
     for (const ImageList* list : {&color_, &depth_}) {
       if (name.compare(0, list->prefix.size(), list->prefix) != 0) continue;
       std::size_t number = 0;
@@ -79,7 +38,7 @@ class BagImages final : public ImageStore {
       const MessagePlace& place = list->images.at(number).place;
       auto bytes = files_.at(place.file)->read(place);
       if (!bytes) return tl::unexpected(bytes.error());
-      return Place{list, std::move(*bytes)};
+      return Place{list->topic.type == "sensor_msgs/Image", list->decoder, std::move(*bytes)};
     }
     return core::input_error(name + ": is no image of this bag");
   }
@@ -142,17 +101,6 @@ std::vector<StampedFile> stamped(const ImageList& list) {
   return files;
 }
 
-/// The rate of colour, for a camera file made of the bag.
-double usual_fps(const std::vector<PairInfo>& pairs) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < pairs.size(); ++i) {
-    const double step = pairs[i].stamp - pairs[i - 1].stamp;
-    if (step > 0.0) steps.push_back(step);
-  }
-  if (steps.empty()) return 30.0;
-  return std::clamp(std::round(100.0 / core::median(std::move(steps))) / 100.0, 0.01, 1000.0);
-}
-
 core::Result<std::optional<sensor::CameraReading>> camera_of_bag(const BagSurvey& survey,
                                                                  const ChosenTopics& topics, core::Log& log) {
   if (survey.camera_yaml.empty()) return bag_camera(survey, topics, log);
@@ -164,6 +112,16 @@ core::Result<std::optional<sensor::CameraReading>> camera_of_bag(const BagSurvey
 }
 
 }  // namespace
+
+double usual_fps(const std::vector<PairInfo>& pairs) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    const double step = pairs[i].stamp - pairs[i - 1].stamp;
+    if (step > 0.0) steps.push_back(step);
+  }
+  if (steps.empty()) return 30.0;
+  return std::clamp(std::round(100.0 / core::median(std::move(steps))) / 100.0, 0.01, 1000.0);
+}
 
 core::Result<Layout> read_bag(const std::filesystem::path& path, const TopicNames& names,
                               const LayoutOptions& options, core::Log& log) {

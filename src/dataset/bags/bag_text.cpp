@@ -27,6 +27,11 @@ std::string choice_line(const char* what, const ChosenTopic& chosen) {
 
 }  // namespace
 
+std::string choice_text(const ChosenTopics& chosen) {
+  return choice_line("colour", chosen.color) + choice_line("depth", chosen.depth) +
+         choice_line("camera of colour", chosen.info) + choice_line("camera of depth", chosen.depth_info);
+}
+
 core::Result<std::string> bag_to_text(const std::filesystem::path& path, const TopicNames& named) {
   const auto survey = survey_bag(path);
   if (!survey) return tl::unexpected(survey.error());
@@ -37,9 +42,7 @@ core::Result<std::string> bag_to_text(const std::filesystem::path& path, const T
   for (const std::string& note : survey->notes) text += "damaged: " + note + "\n";
   const auto chosen = choose_topics(*survey, named);
   if (!chosen) return text;  // why not is told by who opens it
-  text += choice_line("colour", chosen->color) + choice_line("depth", chosen->depth);
-  text += choice_line("camera of colour", chosen->info) + choice_line("camera of depth", chosen->depth_info);
-  return text;
+  return text + choice_text(*chosen);
 }
 
 }  // namespace plumbline::dataset

@@ -20,6 +20,9 @@ class BagWriter {
   virtual void write(const std::string& topic, const CameraInfoMessage& message) = 0;
   virtual void write(const std::string& topic, const std::vector<TransformMessage>& transforms,
                      std::int64_t stamp_ns) = 0;
+  /// A message of one of these types as it came; `type`: "sensor_msgs/msg/Image".
+  virtual void write_bytes(const std::string& topic, const std::string& type, std::int64_t log_ns,
+                           const Bytes& cdr) = 0;
   /// Kept beside the messages: what they cannot say of the camera.
   virtual void write_camera_yaml(const std::string& text) = 0;
   virtual core::Result<void> finish() = 0;

@@ -10,6 +10,7 @@
 
 #include "bags/bag_file.hpp"
 #include "plumbline/geometry/rigid3.hpp"
+#include "plumbline/geometry/trajectory.hpp"
 
 namespace plumbline::dataset {
 
@@ -54,6 +55,19 @@ struct TransformMessage {
   geometry::Rigid3 parent_from_child;
 };
 
+/// nav_msgs/Path: all poses in the header's frame
+struct PathMessage {
+  MessageHeader header;
+  std::vector<geometry::StampedPose> poses;
+};
+
+/// sensor_msgs/PointCloud2 with the fields x y z (float) and rgb (float whose bytes are 0 r g b)
+struct CloudMessage {
+  MessageHeader header;
+  std::uint32_t points = 0;
+  Bytes data;  ///< 16 bytes a point
+};
+
 /// A message, or what is wrong with its bytes.
 template <typename Message>
 using DecodedMessage = tl::expected<Message, std::string>;
@@ -68,6 +82,17 @@ struct MessageDecoder {
   DecodedMessage<std::vector<TransformMessage>> (*transforms)(const Bytes& bytes);
   DecodedMessage<geometry::Rigid3> (*transform)(const Bytes& bytes);  ///< geometry_msgs/Transform
   DecodedMessage<float> (*number)(const Bytes& bytes);                ///< std_msgs/Float32
+};
+
+/// Messages as CDR, little endian, with the four bytes in front that say so.
+struct MessageEncoder {
+  Bytes (*image)(const ImageMessage& message);
+  Bytes (*compressed_image)(const CompressedImageMessage& message);
+  Bytes (*camera_info)(const CameraInfoMessage& message);
+  /// tf2_msgs/TFMessage; all at `stamp_ns`.
+  Bytes (*transforms)(const std::vector<TransformMessage>& transforms, std::int64_t stamp_ns);
+  Bytes (*path)(const PathMessage& message);
+  Bytes (*cloud)(const CloudMessage& message);
 };
 
 }  // namespace plumbline::dataset

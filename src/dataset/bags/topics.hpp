@@ -28,4 +28,7 @@ struct ChosenTopics {
 /// all.
 core::Result<ChosenTopics> choose_topics(const BagSurvey& survey, const TopicNames& named);
 
+/// A line for each of the chosen, with the reason.
+std::string choice_text(const ChosenTopics& chosen);
+
 }  // namespace plumbline::dataset

@@ -16,13 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whole microseconds where these are the same stamp: of seconds since 1970 a double keeps no more.
-std::int64_t nanoseconds(double seconds) {
-  const std::int64_t rounded = 1000 * std::llroundl(static_cast<long double>(seconds) * 1e6L);
-  if (seconds_of(rounded) == seconds) return rounded;
-  return std::llroundl(static_cast<long double>(seconds) * 1e9L);
-}
-
 /// What stands at `out` must be a copy of before, and may be replaced.
 core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
   std::error_code ignored;
@@ -75,6 +68,12 @@ core::Result<ConvertSummary> copy_frames(const FrameSource& source, CopyTarget& 
 }
 
 }  // namespace
+
+std::int64_t nanoseconds(double seconds) {
+  const std::int64_t rounded = 1000 * std::llroundl(static_cast<long double>(seconds) * 1e6L);
+  if (seconds_of(rounded) == seconds) return rounded;
+  return std::llroundl(static_cast<long double>(seconds) * 1e9L);
+}
 
 core::Result<cv::Mat> pixels_of(const StoredImage& image) {
   if (image.ending.empty()) return image.pixels;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "bags/bag_writer.hpp"
 #include "plumbline/core/error.hpp"
 #include "plumbline/core/log.hpp"
 #include "plumbline/dataset/frame_source.hpp"
@@ -25,6 +26,14 @@ core::Result<std::unique_ptr<CopyTarget>> make_tum_target(const std::filesystem:
                                                           const sensor::Camera& camera);
 core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem::path& file,
                                                            const sensor::Camera& camera, core::Log& log);
+
+/// Messages into any bag. `standard_depth`: depth in other units than millimetres is given in metres, for
+/// those who do not have the camera file, and nothing is said.
+std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,
+                                                bool standard_depth, core::Log& log);
+
+/// Of a stamp: whole microseconds where these are the same: of seconds since 1970 a double keeps no more.
+std::int64_t nanoseconds(double seconds);
 
 /// The image's pixels, decoded where they are a file's bytes. Error (kInput): damaged.
 core::Result<cv::Mat> pixels_of(const StoredImage& image);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "bags/bag_parts.hpp"
 #include "convert/copy_target.hpp"
@@ -66,8 +67,8 @@ CameraInfoMessage info_of(const sensor::Pinhole& camera, const sensor::Lens& len
 
 class McapTarget final : public CopyTarget {
  public:
-  McapTarget(std::unique_ptr<BagWriter> bag, sensor::Camera camera, core::Log& log)
-      : bag_(std::move(bag)), camera_(std::move(camera)), log_(log) {
+  McapTarget(std::unique_ptr<BagWriter> bag, sensor::Camera camera, bool standard_depth, core::Log& log)
+      : bag_(std::move(bag)), camera_(std::move(camera)), standard_depth_(standard_depth), log_(log) {
     own_depth_camera_ = camera_.color_from_depth && camera_.depth;
     depth_topic_ = own_depth_camera_ ? "/camera/depth" : "/camera/aligned_depth_to_color";
   }
@@ -125,14 +126,15 @@ class McapTarget final : public CopyTarget {
     cv::Mat depth = stored;
     if (depth.type() == CV_16UC3) cv::extractChannel(depth, depth, 0);
     if (depth.type() == CV_64FC1) depth.convertTo(depth, CV_32F);
-    if (depth.type() == CV_16UC1 && camera_.depth_scale == kFloatDepthScale) {
+    const bool others = standard_depth_ && camera_.depth_scale != kMillimetresOfMetre;
+    if (depth.type() == CV_16UC1 && (camera_.depth_scale == kFloatDepthScale || others)) {
       cv::Mat metres(depth.size(), CV_32FC1);
       for (int v = 0; v < depth.rows; ++v) {
         const auto* from = depth.ptr<std::uint16_t>(v);
         auto* to = metres.ptr<float>(v);
         for (int u = 0; u < depth.cols; ++u)
           to[u] =
-              from[u] == 65535 ? 0.0F : static_cast<float>(from[u]) / static_cast<float>(kFloatDepthScale);
+              from[u] == 65535 ? 0.0F : static_cast<float>(from[u]) / static_cast<float>(camera_.depth_scale);
       }
       depth = metres;
     }
@@ -149,6 +151,7 @@ class McapTarget final : public CopyTarget {
 
   std::unique_ptr<BagWriter> bag_;
   sensor::Camera camera_;
+  bool standard_depth_;
   core::Log& log_;
   std::string depth_topic_;
   bool own_depth_camera_ = false;
@@ -162,7 +165,12 @@ core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem
                                                            const sensor::Camera& camera, core::Log& log) {
   const auto& part = core::part<BagReaders>();
   if (!part) return tl::unexpected(part.error());
-  return std::make_unique<McapTarget>((*part)->create_mcap(file), camera, log);
+  return make_message_target((*part)->create_mcap(file), camera, false, log);
+}
+
+std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,
+                                                bool standard_depth, core::Log& log) {
+  return std::make_unique<McapTarget>(std::move(bag), camera, standard_depth, log);
 }
 
 }  // namespace plumbline::dataset

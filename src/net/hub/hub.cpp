@@ -13,9 +13,9 @@
 
 #include "hub/hub_server.hpp"
 #include "plumbline/core/output_file.hpp"
+#include "plumbline/core/side_thread.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/maps/stored_maps.hpp"
-#include "side_thread.hpp"
 
 namespace plumbline::net {
 namespace {
@@ -186,7 +186,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   (*server)->serve(stop, status);
   const HubServer::Collected collected = (*server)->close();
 
-  const SideThread farewell([&](const core::StopToken& enough) {
+  const core::SideThread farewell([&](const core::StopToken& enough) {
     (*server)->publisher().publish_final(collected.final_statuses, enough);
   });
   auto summary =

@@ -296,6 +296,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
     }
     publish_all();
     feedback_.step(robots_, meetings_, *bus_);
+    show_.step(robots_, meetings_);
 
     const double since_s = std::chrono::duration<double>(Clock::now() - line_at).count();
     if (status && since_s >= 1.0) {
@@ -310,6 +311,7 @@ void HubServer::serve(const core::StopToken& stop, const Status& status) {
 }
 
 HubServer::Collected HubServer::close() {
+  show_.finish();
   Collected collected;
   for (const auto& [name, session] : robots_) {
     collected.traffic.push_back(session.traffic());

@@ -12,6 +12,7 @@
 #include "bus.hpp"
 #include "hub/hub_feedback.hpp"
 #include "hub/hub_meetings.hpp"
+#include "hub/hub_show.hpp"
 #include "hub/robot_session.hpp"
 #include "hub/status_publisher.hpp"
 #include "plumbline/core/log.hpp"
@@ -49,7 +50,8 @@ class HubServer {
         bus_(std::move(bus)),
         log_(log),
         publisher_(*bus_),
-        meetings_(folder_, executor, log) {}
+        meetings_(folder_, executor, log),
+        show_(request.fuse.observer, executor, log) {}
   [[nodiscard]] maps::Ledger ledger() const { return maps::Ledger(folder_ / "network.db"); }
   core::Result<void> load_ledger();
   core::Result<void> save(const RobotSession& session) const;
@@ -78,6 +80,7 @@ class HubServer {
   std::set<std::string> reported_;
   HubMeetings meetings_;
   HubFeedback feedback_;
+  HubShow show_;
 };
 
 }  // namespace plumbline::net

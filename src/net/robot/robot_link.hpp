@@ -12,11 +12,11 @@
 
 #include "bus.hpp"
 #include "plumbline/core/log.hpp"
+#include "plumbline/core/side_thread.hpp"
 #include "robot/chunk_sender.hpp"
 #include "robot/hub_session.hpp"
 #include "robot/other_robots.hpp"
 #include "robot/store_watch.hpp"
-#include "side_thread.hpp"
 
 namespace plumbline::net {
 
@@ -52,7 +52,7 @@ class RobotLink {
   HubSession hub_;
   Clock::time_point published_at_;
   std::optional<OtherRobots> others_;  ///< used by the thread only
-  SideThread thread_;
+  core::SideThread thread_;
 };
 
 }  // namespace plumbline::net

@@ -12,11 +12,11 @@ namespace {
 constexpr std::size_t kKeyframes = 40;
 constexpr double kSeconds = 10.0;
 // The answer is waited for so many frames after the question, and used so many after that: by then no frame
-// that it is for has been read, whatever the number of threads. Nobody asks when only a few frames would be
-// left.
+// that it is for has been read, whatever the number of threads. Nobody asks when no frame would be left. Of
+// what is live nobody knows how many frames are to come: the answer is used when there were so many more.
 constexpr std::size_t kAnswerFrames = 32;
-constexpr std::size_t kUseFrames = kMostUnderWay;
 constexpr std::size_t kLeastFramesLeft = 60;
+constexpr std::size_t kUseFrames = kMostUnderWay + kLeastFramesLeft;
 // Of a finished map: what a wrong camera has bent shows when it is made anew.
 constexpr int kMostQuestions = 2;
 
@@ -46,7 +46,8 @@ bool RobotCameras::knows_enough(std::size_t frame, const Slams& slams) const {
 void RobotCameras::after(std::size_t frame, const Slams& slams) {
   if (!refine_ || asked_ || !knows_enough(frame, slams)) return;
   asked_ = true;
-  if (frame + kAnswerFrames + kUseFrames + kLeastFramesLeft > recordings_->size()) return;
+  const bool ends_before = frame + kAnswerFrames + kUseFrames >= recordings_->size();
+  if (ends_before && !recordings_->live()) return;
 
   question_ = std::make_unique<Question>();
   question_->cameras = cameras_;
@@ -64,7 +65,7 @@ void RobotCameras::after(std::size_t frame, const Slams& slams) {
 void RobotCameras::take_answer(std::size_t frame) {
   question_->job.wait();
   use_from_ = frame + kUseFrames;
-  cameras_ = question_->cameras;
+  given_ = std::exchange(cameras_, question_->cameras);
   waiting_ = question_->better;
   question_.reset();
   if (std::count(waiting_.begin(), waiting_.end(), true) > 0) recordings_->correct(use_from_, now());
@@ -96,6 +97,12 @@ void RobotCameras::use(std::size_t robot, mapping::Slam& slam) {
 
 void RobotCameras::ask_finished(const Slams& slams) {
   if (!refine_) return;
+  // What is live ended before the answer was used: as if nobody had asked, for nobody asks of a recording.
+  if (recordings_->live() && !waiting_.empty() && recordings_->size() <= use_from_) {
+    cameras_ = given_;
+    waiting_.assign(waiting_.size(), false);
+  }
+
   for (std::size_t r = 0; r < slams.size(); ++r) {
     mapping::Slam& slam = *slams[r];
     if (!waiting_.empty() && waiting_[r]) use(r, slam);  // its last frame came before the answer was used

@@ -63,6 +63,7 @@ class RobotCameras {
   bool asked_;  ///< while mapping
   std::vector<RobotInfo> robots_;
   std::vector<CameraRefinement> cameras_;  ///< by robot
+  std::vector<CameraRefinement> given_;    ///< before the answer came
   std::unique_ptr<Question> question_;     ///< under way; null: none is
   std::size_t use_from_ = 0;               ///< frame from which the answer is used
   std::vector<bool> waiting_;  ///< by robot: its first frame from there on has not come; empty: no answer yet

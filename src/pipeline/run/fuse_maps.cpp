@@ -58,6 +58,7 @@ RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, 
   context.input.text = names_of(maps);
   context.store.configuration = config_text(request, maps, graph);
   context.store.keeps_clouds = keeps_clouds(graph);
+  context.hooks.observer = request.observer.get();
   return context;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/dataset/live.hpp"
 #include "plumbline/synth/source.hpp"
 
 namespace plumbline::pipeline {
@@ -51,6 +52,22 @@ core::Result<std::unique_ptr<dataset::FrameSource>> select_frames(
   return std::make_unique<SelectedFrames>(std::move(source), std::move(indices));
 }
 
+constexpr double kNoEnd_s = 1e299;
+
+core::Result<std::unique_ptr<dataset::FrameSource>> open_live_input(const std::string& address,
+                                                                    dataset::OpenOptions options,
+                                                                    core::Log& log) {
+  if (!options.live.open) {
+    return core::usage_error(
+        fmt::format("{}: is live, and a recording is needed here; map it and keep what came: plumbline map "
+                    "'{}' -o OUT --record take.mcap",
+                    address, address));
+  }
+  auto stream = options.live.open(address, options.topics);
+  if (!stream) return tl::unexpected(stream.error());
+  return dataset::open_live(address, std::move(*stream), options, log);
+}
+
 }  // namespace
 
 core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string& input,
@@ -58,6 +75,11 @@ core::Result<std::unique_ptr<dataset::FrameSource>> open_input(const std::string
                                                                const std::filesystem::path& scenes_folder,
                                                                const core::Executor& executor,
                                                                core::Log& log) {
+  if (dataset::is_live_address(input)) return open_live_input(input, options, log);
+  if (!options.live.record.empty() || options.live.for_s < kNoEnd_s) {
+    return core::usage_error(
+        fmt::format("{}: is a recording; --record and --for are about live cameras (ros2://DOMAIN)", input));
+  }
   if (!synth::is_synth_url(input)) return dataset::open_recording(input, options, log);
   if (!options.camera.empty()) {
     return core::usage_error(

@@ -13,6 +13,7 @@
 #include "plumbline/core/hash.hpp"
 #include "plumbline/core/output_file.hpp"
 #include "plumbline/core/version.hpp"
+#include "plumbline/dataset/live.hpp"
 #include "plumbline/maps/output_folder.hpp"
 #include "plumbline/pipeline/graph.hpp"
 #include "plumbline/pipeline/input.hpp"
@@ -41,8 +42,8 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
   text +=
       fmt::format("  camera: {}\n  format: {}\n", quoted(request.open.camera), quoted(request.open.format));
   text += fmt::format("  from: {} s\n", request.open.from_s);
-  constexpr double kNoEnd_s = 1e299;
-  if (request.open.to_s < kNoEnd_s) text += fmt::format("  to: {} s\n", request.open.to_s);
+  constexpr double kWhole_s = 1e299;
+  if (request.open.to_s < kWhole_s) text += fmt::format("  to: {} s\n", request.open.to_s);
   text += fmt::format("  every: {}\n", request.open.every);
   const dataset::TopicNames& topics = request.open.topics;
   const std::pair<const char*, const std::string&> named[] = {{"color", topics.color},
@@ -60,6 +61,7 @@ std::string config_text(const MapRequest& request, const Graph& graph, int threa
 
 /// Tells recordings apart without reading their images.
 std::string input_text(const RobotRecordings& source) {
+  if (source.live()) return "live: " + quoted(source.name()) + "\n";
   core::Hash hash;
   for (std::size_t i = 0; i < source.size(); ++i) hash.number(source.info(i).stamp);
   std::string text = fmt::format("frames: {}\n", source.size());
@@ -104,6 +106,13 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
   const std::filesystem::path scenes = request.pipelines_folder / "scenes";
   std::vector<std::string> inputs{request.input};
   inputs.insert(inputs.end(), request.others.begin(), request.others.end());
+  for (const std::string& input : inputs) {
+    if (inputs.size() > 1 && dataset::is_live_address(input)) {
+      return core::usage_error(fmt::format(
+          "{}: is live, and is mapped alone; give each robot a process of its own: plumbline robot, hub",
+          input));
+    }
+  }
   std::vector<std::unique_ptr<dataset::FrameSource>> all;
   for (const std::string& input : inputs) {
     dataset::OpenOptions open = request.open;
@@ -138,6 +147,13 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
         fmt::format("{}: begins with finished maps; it is run by plumbline fuse", graph.file.string()));
   }
   return {};
+}
+
+core::Result<void> fits_live(const MapRequest& request) {
+  if (!dataset::is_live_address(request.input)) return {};
+  const char* wrong = request.resume ? "--resume" : request.pace_hz > 0.0 ? "--pace" : nullptr;
+  if (wrong == nullptr) return {};
+  return core::usage_error(fmt::format("{}: is live; {} is about recordings", request.input, wrong));
 }
 
 core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
@@ -184,6 +200,7 @@ class MapRun {
     if (!graph) return tl::unexpected(graph.error());
     graph_ = std::move(*graph);
     if (auto can = fits(graph_, request_); !can) return can;
+    if (auto can = fits_live(request_); !can) return can;
     auto source = open_inputs(request_, executor_, log_);
     if (!source) return tl::unexpected(source.error());
     source_ = std::move(*source);
@@ -201,6 +218,7 @@ class MapRun {
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress, request_.pace_hz);
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
+    const auto recorded = source_->finish();
 
     std::string input = request_.input;
     for (const std::string& other : request_.others) input += " " + other;
@@ -212,6 +230,7 @@ class MapRun {
     if (debug_) {
       if (auto committed = debug_->commit(); !committed) return tl::unexpected(committed.error());
     }
+    if (!recorded) return tl::unexpected(recorded.error());
     return summary;
   }
 
@@ -242,7 +261,8 @@ class MapRun {
     RunContext context;
     context.executor = &executor_;
     context.log = &log_;
-    context.stop = stop;
+    // What is live ends by itself when it is asked to, and all that came is mapped.
+    context.stop = source_->live() ? core::StopToken() : stop;
     context.output_folder = output_->path();
     context.input.source = source_.get();
     context.input.recordings = source_.get();
@@ -255,6 +275,7 @@ class MapRun {
     if (debug_) context.hooks.debug_folder = debug_->path();
     context.hooks.feedback = request_.feedback;
     context.hooks.alter_map = request_.alter_map;
+    context.hooks.observer = request_.observer.get();
     return context;
   }
 

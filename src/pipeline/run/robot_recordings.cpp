@@ -15,6 +15,9 @@ namespace plumbline::pipeline {
 RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSource>> recordings)
     : recordings_(std::move(recordings)) {
   if (recordings_.empty()) throw std::invalid_argument("RobotRecordings: no recordings");
+  const auto is_live = [](const auto& recording) { return recording->live(); };
+  if (recordings_.size() > 1 && std::any_of(recordings_.begin(), recordings_.end(), is_live))
+    throw std::invalid_argument("RobotRecordings: one of several is live");
   std::set<std::string> taken;
   double latest_start = std::numeric_limits<double>::lowest();
   double earliest_start = std::numeric_limits<double>::max();
@@ -34,6 +37,7 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
     earliest_start = std::min(earliest_start, start);
     earliest_end = std::min(earliest_end, recording->info(recording->size() - 1).stamp);
   }
+  if (live()) return;
   const bool together = latest_start <= earliest_end;
   for (const RobotInfo& robot : robots_) {
     const dataset::FrameSource& recording = *recordings_[static_cast<std::size_t>(robot.number)];
@@ -47,9 +51,15 @@ RobotRecordings::RobotRecordings(std::vector<std::unique_ptr<dataset::FrameSourc
   });
 }
 
+RobotRecordings::Place RobotRecordings::place(std::size_t index) const {
+  if (!live()) return order_.at(index);
+  const dataset::FrameSource& source = *recordings_.front();
+  return {source.info(index).stamp - source.info(0).stamp, 0, index};
+}
+
 dataset::PairInfo RobotRecordings::info(std::size_t index) const {
-  const Place& place = order_.at(index);
-  return of(place).info(place.index);
+  const Place at = place(index);
+  return of(at).info(at.index);
 }
 
 std::string RobotRecordings::doubt() const {
@@ -70,13 +80,13 @@ void RobotRecordings::correct(std::size_t from, const std::vector<sensor::Camera
 std::shared_ptr<const dataset::FrameSource> RobotRecordings::corrected(std::size_t index) const {
   const std::lock_guard lock(mutex_);
   if (corrected_.empty() || index < corrected_from_) return nullptr;
-  return corrected_[static_cast<std::size_t>(order_.at(index).robot)];
+  return corrected_[static_cast<std::size_t>(robot_of(index))];
 }
 
 core::Result<sensor::RgbdFrame> RobotRecordings::read(std::size_t index) const {
-  const Place& place = order_.at(index);
+  const Place at = place(index);
   const auto better = corrected(index);
-  return (better ? *better : of(place)).read(place.index);
+  return (better ? *better : of(at)).read(at.index);
 }
 
 }  // namespace plumbline::pipeline

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "plumbline/core/numbers.hpp"
+#include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
 #include "results/resumed_run.hpp"
@@ -72,6 +73,8 @@ void give_back_memory() {
 #endif
 }
 
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
 class Runner {
  public:
   Runner(Graph& graph, const RunContext& context, const Progress& progress, double pace_hz)
@@ -89,15 +92,14 @@ class Runner {
   }
 
   core::Result<RunReport> run() {
+    tell_observer();
     for (Node& node : graph_.nodes) {
       auto started = guarded(node.name, [&] { return node.stage->start(context_); });
       if (!started) return tl::unexpected(started.error());
     }
-    total_ = graph_.source().stage->frames();
-    report_.frames_available = total_;
-    const std::vector<float> unknown(total_, std::numeric_limits<float>::quiet_NaN());
-    for (const Node& node : graph_.nodes) report_.stages.push_back({node.name, unknown, 0.0});
-    report_.rss_mb = unknown;
+    live_ = context_.input.recordings != nullptr && context_.input.recordings->live();
+    total_ = live_ ? std::numeric_limits<std::size_t>::max() : graph_.source().stage->frames();
+    for (const Node& node : graph_.nodes) report_.stages.push_back({node.name, {}, 0.0});
     skip_done();
     const auto start = Clock::now();
     pace_.emplace(pace_hz_, started_, context_.input.recordings);
@@ -105,19 +107,28 @@ class Runner {
     // a frame keeps no thread from what else there is to do.
     while (!ended()) {
       pace_->wait_for(started_, context_.stop);
+      wait_for_live();
       context_.executor->run([this] { stream(); });
     }
     report_.behind_s = pace_->behind_s();
     if (failure_.any()) return tl::unexpected(failure_.error());
     report_.frames = started_;
+    report_.frames_available = total_;
     report_.stopped = report_.frames < total_;
-    for (StageTiming& stage : report_.stages) stage.frame_ms.resize(report_.frames);
-    report_.rss_mb.resize(report_.frames);
+    for (StageTiming& stage : report_.stages) stage.frame_ms.resize(report_.frames, kUnknown);
+    report_.rss_mb.resize(report_.frames, kUnknown);
     if (auto finished = finish(start); !finished) return tl::unexpected(finished.error());
     return std::move(report_);
   }
 
  private:
+  void tell_observer() {
+    if (context_.hooks.observer == nullptr || context_.input.robots == nullptr) return;
+    std::vector<std::string> names;
+    for (const maps::RobotInfo& robot : *context_.input.robots) names.push_back(robot.name);
+    context_.hooks.observer->begins(names);
+  }
+
   /// All stages as one oneTBB pipeline in graph order.
   void stream() {
     using Filter = tbb::filter<TickPtr, TickPtr>;
@@ -143,13 +154,27 @@ class Runner {
     return started_ >= total_ || context_.stop.stop_requested() || failure_.any();
   }
 
+  /// Of a live source, when it has ended: how many frames there are after all.
+  void look_at_live() {
+    if (!live_ || ended() || !context_.input.recordings->decided(started_)) return;
+    if (const std::size_t frames = context_.input.recordings->size(); frames <= started_) total_ = frames;
+  }
+  void wait_for_live() {
+    constexpr std::chrono::milliseconds kLookUp(20);
+    while (live_ && !ended() && !context_.input.recordings->decided(started_)) {
+      context_.input.recordings->wait_for(started_, kLookUp);
+    }
+    look_at_live();
+  }
+
   /// Over frames that the run did which this one goes on from.
   void skip_done() {
     while (started_ < total_ && context_.resumed != nullptr && context_.resumed->done[started_]) ++started_;
   }
 
   TickPtr next(tbb::flow_control& control) {
-    if (ended() || !pace_->is_due(started_)) {
+    look_at_live();
+    if (ended() || (live_ && !context_.input.recordings->decided(started_)) || !pace_->is_due(started_)) {
       control.stop();
       return nullptr;
     }
@@ -192,10 +217,14 @@ class Runner {
 
   void done(const Tick& tick) {
     if (failure_.before(tick.frame)) return;
-    for (std::size_t n = 0; n < tick.ms.size(); ++n) report_.stages[n].frame_ms[tick.frame] = tick.ms[n];
-    report_.rss_mb[tick.frame] = static_cast<float>(rss_mb());
+    for (std::size_t n = 0; n < tick.ms.size(); ++n) {
+      report_.stages[n].frame_ms.resize(tick.frame + 1, kUnknown);
+      report_.stages[n].frame_ms.back() = tick.ms[n];
+    }
+    report_.rss_mb.resize(tick.frame + 1, kUnknown);
+    report_.rss_mb.back() = static_cast<float>(rss_mb());
     pace_->done(tick.frame);
-    if (progress_) progress_(tick.frame + 1, total_);
+    if (progress_) progress_(tick.frame + 1, live_ ? 0 : total_);
   }
 
   core::Result<void> finish(Clock::time_point start) {
@@ -267,7 +296,8 @@ class Runner {
   double pace_hz_;
   std::vector<std::size_t> last_use_;  ///< [node]: the last node that reads from it
   FirstFailure failure_;
-  std::size_t total_ = 0;
+  bool live_ = false;
+  std::size_t total_ = 0;    ///< frames; of a live source more than any until it has ended
   std::size_t started_ = 0;  ///< frames, or done by an earlier run
   std::optional<Pace> pace_;
   RunReport report_;

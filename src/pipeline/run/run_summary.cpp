@@ -82,6 +82,20 @@ std::string reason_of(const Graph& graph, const Json& summary) {
   return reason;
 }
 
+/// Frames that came and were mapped, and what became of the others.
+std::string live_text(const Json& live) {
+  const auto count = [&](const char* name) { return live.at(name).get<std::size_t>(); };
+  const std::size_t came = count("taken") + count("dropped") + count("stamps_backwards");
+  std::string text = fmt::format("{} of {} frames that came were taken", count("taken"), came);
+  for (const auto& [name, what] : {std::pair{"dropped", "dropped, as too many waited"},
+                                   {"stamps_backwards", "left out, as their stamps went back"},
+                                   {"unpaired_images", "images without one of the other kind near them"},
+                                   {"lost_messages", "messages lost on the way"}}) {
+    if (count(name) > 0) text += fmt::format(", {} {}", count(name), what);
+  }
+  return text;
+}
+
 std::string text_of(const Json& summary) {
   const Json& frames = summary.at("frames");
   const auto count = [](const Json& number) { return number.get<std::size_t>(); };
@@ -98,6 +112,8 @@ std::string text_of(const Json& summary) {
     text += fmt::format("poses      of the recorder's own odometry started the search in {} frames\n",
                         count(frames.at("odometry")));
   }
+
+  if (summary.contains("live")) text += fmt::format("live       {}\n", live_text(summary.at("live")));
 
   const Json& landmarks = summary.at("landmarks");
   text += fmt::format("map        {} keyframes, {} points, {} lines, {} loops\n",

@@ -15,6 +15,7 @@
 #include "plumbline/cloud/sensor_pose.hpp"
 #include "plumbline/dataset/frame_source.hpp"
 #include "plumbline/mapping/local_map_alignment.hpp"
+#include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
@@ -79,6 +80,7 @@ class CloudStage : public Stage {
   [[nodiscard]] std::vector<std::string> files() const override { return filters_.files(); }
   core::Result<void> start(const RunContext& context) override {
     recordings_ = context.input.recordings;
+    observer_ = context.hooks.observer;
     left_out_.start(filters_.chain().size());
     return {};
   }
@@ -103,6 +105,10 @@ class CloudStage : public Stage {
                     : cloud::depth_view(*frame, camera, options_.min_depth_m, options_.max_depth_m);
     if (!made) return tl::unexpected(made.error());
     cloud::set_sensor_pose(**made, track->depth_from_camera.inverse());
+    if (observer_ != nullptr && track->keyframe.valid() && track->map_from_camera) {
+      observer_->added(robot, track->stamp, *track->map_from_camera * track->depth_from_camera.inverse(),
+                       **made);
+    }
     auto result = std::make_shared<KeyframeCloud>();
     result->id = track->keyframe;
     result->frame = track->frame;
@@ -137,6 +143,7 @@ class CloudStage : public Stage {
   ChainOption filters_{"filters/keyframe.yaml"};
   LeftOut left_out_;
   const RobotRecordings* recordings_ = nullptr;
+  RunObserver* observer_ = nullptr;
 };
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "plumbline/dataset/trajectory_io.hpp"
 #include "plumbline/maps/frame_pose.hpp"
 #include "plumbline/maps/line_export.hpp"
+#include "plumbline/pipeline/observer.hpp"
 #include "plumbline/viz/snapshot.hpp"
 #include "stages/stages.hpp"
 #include "summary/sections.hpp"
@@ -83,6 +84,7 @@ class OutputStage : public Stage {
     const auto dense = io.input<DenseCloud>("cloud");
     const auto given = io.input<MapResult>("map");
     if (given->map != nullptr) path_ = maps::check_path(given->frame_poses, *given->map);
+    if (context_->hooks.observer != nullptr) tell_observer(*given, *dense);
     const MapResult map = moved(*given, dense->output_from_map);
     const std::filesystem::path& folder = context_->output_folder;
     const cloud::CloudColumns& columns = dense->columns;
@@ -137,6 +139,14 @@ class OutputStage : public Stage {
   }
 
  private:
+  void tell_observer(const MapResult& map, const DenseCloud& dense) const {
+    std::vector<geometry::Trajectory> paths;
+    const std::size_t robots = std::max<std::size_t>(map.robots.size(), 1);
+    for (std::size_t r = 0; r < robots; ++r)
+      paths.push_back(trajectory_of(map, map.robots.empty() ? 0 : map.robots[r].number));
+    context_->hooks.observer->finished(paths, dense.output_from_map.inverse(), *dense.cloud);
+  }
+
   /// Poses and lines in the output's frame.
   static MapResult moved(MapResult map, const geometry::Rigid3& output_from_map) {
     maps::move(map, output_from_map);

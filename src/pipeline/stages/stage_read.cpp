@@ -15,6 +15,14 @@ namespace {
 
 constexpr std::size_t kReportedOneByOne = 5;
 
+Json live_section(const dataset::LiveReport& live) {
+  return {{"taken", live.taken},
+          {"dropped", live.dropped},
+          {"stamps_backwards", live.backwards},
+          {"unpaired_images", live.unpaired},
+          {"lost_messages", live.lost}};
+}
+
 class ReadStage : public Stage {
  public:
   core::Result<void> start(const RunContext& context) override {
@@ -69,6 +77,7 @@ class ReadStage : public Stage {
     frames["resumed"] = resumed_;
     frames["unreadable"] = unreadable_.load();
     frames["odometry"] = odometry_.load();
+    if (source_->live()) summary["live"] = live_section(source_->report());
   }
   void doubt(const Json& /*summary*/, std::vector<Doubt>& doubts) const override {
     if (const std::string doubt = source_->doubt(); !doubt.empty())

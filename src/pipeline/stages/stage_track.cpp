@@ -10,10 +10,12 @@
 #include <utility>
 
 #include "plumbline/mapping/slam.hpp"
+#include "plumbline/pipeline/observer.hpp"
 #include "plumbline/pipeline/robot_recordings.hpp"
 #include "results/debug_video.hpp"
 #include "results/frame_rows.hpp"
 #include "results/resumed_run.hpp"
+#include "robots/observed_way.hpp"
 #include "robots/robot_cameras.hpp"
 #include "robots/robot_components.hpp"
 #include "robots/tracking_sections.hpp"
@@ -50,6 +52,7 @@ class TrackStage : public Stage {
     }
     cameras_.emplace(*context.input.recordings, refine_, *context.executor, *context.log);
     unstored_.resize(slams_.size());
+    observed_.resize(slams_.size());
     if (context.resumed != nullptr) restore(*context.resumed);
     stored_robots_ = cameras_->robots();
     return {};
@@ -69,6 +72,7 @@ class TrackStage : public Stage {
     const mapping::FrameReport report = slam.process(*frame, features);
     if (slam.taken_back() > taken_back) unstored_[number].since = {};  // edges that are stored have changed
     note(io.frame(), robot, report);
+    if (report.keyframe.valid() && refine_) recordings().keep(io.frame());
 
     auto tracked = std::make_shared<TrackedFrame>();
     tracked->robot = robot.number;
@@ -81,6 +85,8 @@ class TrackStage : public Stage {
       tracked->frame = {robot.number, static_cast<std::int32_t>(poses)};
     }
     if (report.keyframe.valid()) add_map(slam, number, *tracked);
+    if (context_->hooks.observer != nullptr)
+      observed_[number].report(slam, report, *tracked, *context_->hooks.observer);
     io.output<TrackedFrame>("track", tracked);
 
     cameras_->after(io.frame(), slams_);
@@ -221,11 +227,19 @@ class TrackStage : public Stage {
     cameras_->resume();
   }
 
+  /// Of a robot, for who looks on.
+  struct Way {
+    core::KeyframeId component;       ///< the one that is told of
+    std::optional<std::size_t> last;  ///< of the frame poses
+    geometry::Rigid3 odometry_from_camera;
+  };
+
   const RunContext* context_ = nullptr;
   mapping::SlamOptions options_;
   bool refine_ = true;
   Slams slams_;
   std::optional<RobotCameras> cameras_;
+  std::vector<ObservedWay> observed_;     ///< by robot
   std::vector<Unstored> unstored_;        ///< by robot
   std::vector<RobotInfo> stored_robots_;  ///< it learns of a robot's camera with its next keyframe
   std::vector<FrameRow> rows_;

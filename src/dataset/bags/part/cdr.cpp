@@ -5,6 +5,8 @@
 #include <dds/ddsi/ddsi_xqos.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <iterator>
 #include <limits>
@@ -273,6 +275,52 @@ Bytes encode_cdr(const std::vector<TransformMessage>& transforms, std::int64_t s
   message.transforms._length = message.transforms._maximum = static_cast<std::uint32_t>(samples.size());
   message.transforms._buffer = samples.data();
   return write_sample(&message, tf2_msgs_msg_dds__TFMessage__desc);
+}
+
+Bytes encode_cdr(const PathMessage& message) {
+  std::vector<geometry_msgs_msg_dds__PoseStamped_> samples;
+  samples.reserve(message.poses.size());
+  for (const geometry::StampedPose& pose : message.poses) {
+    geometry_msgs_msg_dds__PoseStamped_ sample{};
+    sample.header = header_from(std::llround(pose.stamp * 1e9), message.header.frame_id);
+    const Eigen::Quaterniond q = pose.world_from_camera.quaternion();
+    const Eigen::Vector3d& t = pose.world_from_camera.translation;
+    sample.pose.position = {t.x(), t.y(), t.z()};
+    sample.pose.orientation = {q.x(), q.y(), q.z(), q.w()};
+    samples.push_back(sample);
+  }
+  nav_msgs_msg_dds__Path_ path{};
+  path.header = header_from(message.header.stamp_ns, message.header.frame_id);
+  path.poses._length = path.poses._maximum = static_cast<std::uint32_t>(samples.size());
+  path.poses._buffer = samples.data();
+  return write_sample(&path, nav_msgs_msg_dds__Path__desc);
+}
+
+Bytes encode_cdr(const CloudMessage& message) {
+  constexpr std::uint8_t kFloat32 = 7;
+  constexpr std::uint32_t kPointBytes = 16;
+  constexpr const char* kNames[] = {"x", "y", "z", "rgb"};
+  std::array<sensor_msgs_msg_dds__PointField_, 4> fields{};
+  for (std::uint32_t i = 0; i < fields.size(); ++i)
+    fields[i] = {const_cast<char*>(kNames[i]), i * 4U, kFloat32, 1};
+
+  sensor_msgs_msg_dds__PointCloud2_ cloud{};
+  cloud.header = header_from(message.header.stamp_ns, message.header.frame_id);
+  cloud.height = 1;
+  cloud.width = message.points;
+  cloud.fields._length = cloud.fields._maximum = static_cast<std::uint32_t>(fields.size());
+  cloud.fields._buffer = fields.data();
+  cloud.point_step = kPointBytes;
+  cloud.row_step = kPointBytes * message.points;
+  cloud.data = borrowed(message.data);
+  cloud.is_dense = true;
+  return write_sample(&cloud, sensor_msgs_msg_dds__PointCloud2__desc);
+}
+
+const MessageEncoder& cdr_encoder() {
+  static const MessageEncoder encoder{&encode_cdr, &encode_cdr, &encode_cdr,
+                                      &encode_cdr, &encode_cdr, &encode_cdr};
+  return encoder;
 }
 
 }  // namespace plumbline::dataset

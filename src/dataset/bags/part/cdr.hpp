@@ -16,5 +16,8 @@ Bytes encode_cdr(const CompressedImageMessage& message);
 Bytes encode_cdr(const CameraInfoMessage& message);
 /// tf2_msgs/TFMessage; all at `stamp_ns`.
 Bytes encode_cdr(const std::vector<TransformMessage>& transforms, std::int64_t stamp_ns);
+Bytes encode_cdr(const PathMessage& message);
+Bytes encode_cdr(const CloudMessage& message);
+const MessageEncoder& cdr_encoder();
 
 }  // namespace plumbline::dataset

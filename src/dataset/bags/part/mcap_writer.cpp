@@ -95,6 +95,10 @@ class McapWriter final : public BagWriter {
              std::int64_t stamp_ns) override {
     add(topic, "tf2_msgs/msg/TFMessage", stamp_ns, encode_cdr(transforms, stamp_ns));
   }
+  void write_bytes(const std::string& topic, const std::string& type, std::int64_t log_ns,
+                   const Bytes& cdr) override {
+    add(topic, type, log_ns, cdr);
+  }
   void write_camera_yaml(const std::string& text) override {
     flush();
     metadata_at_ = at_;

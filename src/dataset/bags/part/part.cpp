@@ -7,4 +7,4 @@
 
 PLUMBLINE_PART(plumbline::dataset::BagReaders, &plumbline::dataset::open_bag_file,
                &plumbline::dataset::cdr_decoder, &plumbline::dataset::ros1_decoder,
-               &plumbline::dataset::create_mcap)
+               &plumbline::dataset::cdr_encoder, &plumbline::dataset::create_mcap)

@@ -6,12 +6,12 @@
 
 #include "plumbline/core/stop.hpp"
 
-namespace plumbline::net {
+namespace plumbline::core {
 
 /// A thread that works until this object is destroyed. Declare it as the last member, after what it uses.
 class SideThread {
  public:
-  explicit SideThread(const std::function<void(const core::StopToken&)>& work)
+  explicit SideThread(const std::function<void(const StopToken&)>& work)
       : thread_([this, work] { work(stop_); }) {}
   SideThread(const SideThread&) = delete;
   SideThread& operator=(const SideThread&) = delete;
@@ -21,8 +21,8 @@ class SideThread {
   }
 
  private:
-  core::StopToken stop_;
+  StopToken stop_;
   std::thread thread_;
 };
 
-}  // namespace plumbline::net
+}  // namespace plumbline::core

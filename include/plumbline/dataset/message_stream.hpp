@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Messages of ROS as they come and go over a network, whatever carries them: plumbline::net has ROS 2's.
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::dataset {
+
+struct StreamTopic {
+  std::string name;       ///< "/camera/color/image_raw"
+  std::string type;       ///< "sensor_msgs/Image", without "/msg"
+  bool supported = true;  ///< messages of the type can be received
+};
+
+struct StreamMessage {
+  std::string topic;
+  std::int64_t received_ns = 0;     ///< since 1970
+  std::vector<std::uint8_t> bytes;  ///< CDR with the four bytes in front that name its kind
+};
+
+/// Messages that somebody publishes. Used by one thread at a time.
+class MessageStream {
+ public:
+  virtual ~MessageStream() = default;
+  /// All that is published and seen so far, by name.
+  virtual std::vector<StreamTopic> topics() = 0;
+  /// From now on next() gives messages of it. Error (kInput): nobody publishes it in a known type.
+  virtual core::Result<void> subscribe(const std::string& topic) = 0;
+  virtual void unsubscribe(const std::string& topic) = 0;
+  /// The next message, of whichever topic; none when none comes in time.
+  virtual std::optional<StreamMessage> next(std::chrono::milliseconds most) = 0;
+  /// Messages that came too fast for next(), or that the network lost and said so.
+  [[nodiscard]] virtual std::size_t lost() const = 0;
+};
+
+enum class Retention {
+  kPassing,  ///< for who listens now
+  kLatest,   ///< who comes later gets the latest one, too
+};
+
+/// Somebody who takes messages. Used by one thread at a time.
+class MessageSink {
+ public:
+  virtual ~MessageSink() = default;
+  /// Says that messages of the topic will come, so that listeners find it. `type`: "sensor_msgs/Image".
+  /// Error (kUsage): the network refuses it.
+  virtual core::Result<void> announce(const std::string& topic, const std::string& type,
+                                      Retention retention) = 0;
+  /// Of an announced topic. Waits a moment for slow listeners, no more than a second.
+  virtual core::Result<void> send(const std::string& topic, const std::vector<std::uint8_t>& bytes) = 0;
+  /// How many listen to the topic now.
+  virtual std::size_t listeners(const std::string& topic) = 0;
+  /// Waits until listeners have what was sent, at most so long.
+  virtual void flush(std::chrono::milliseconds most) = 0;
+};
+
+}  // namespace plumbline::dataset

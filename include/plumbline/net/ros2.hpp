@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Topics of ROS 2, received and sent without ROS: CycloneDDS under the names and types that ROS 2's
+// middleware gives them (docs/method/network.md). CycloneDDS is in the part plumbline_ros2.so.
+#include <memory>
+#include <string>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/message_stream.hpp"
+#include "plumbline/net/options.hpp"
+#include "plumbline/pipeline/observer.hpp"
+
+namespace plumbline::net {
+
+/// "ros2://DOMAIN[?interface=IF&peers=HOST,HOST&color=/TOPIC&depth=/TOPIC&info=/TOPIC&depth_info=/TOPIC]"
+struct Ros2Address {
+  NetworkOptions network;
+  dataset::TopicNames topics;
+};
+
+/// Error (kUsage): names the part of the address that is wrong, and what is allowed.
+core::Result<Ros2Address> parse_ros2_address(const std::string& address);
+
+/// Error (kUsage): the network cannot be used.
+core::Result<std::unique_ptr<dataset::MessageStream>> open_ros2_stream(const Ros2Address& address);
+core::Result<std::unique_ptr<dataset::MessageSink>> open_ros2_sink(const Ros2Address& address);
+
+enum class PublishedNames {
+  kOfOne,   ///< of a robot alone nothing stands in front of topics and frames, of several their names
+  kOfEach,  ///< every robot's name stands there: others may join it
+};
+
+/// Publishes what comes of a run, as long as the result lives, in a thread of its own; a listener that is too
+/// slow misses messages and holds up nothing. `name`: what stands there in any case, or "". Topics are
+/// /plumbline/path (the poses of the keyframes, at the end of all frames), /plumbline/points (the cloud of
+/// each keyframe) and /plumbline/map (the merged cloud, at the end), of a robot or of each of several
+/// /NAME/..., and /tf: map -> odom -> camera, with NAME/ in front. In the frame map x points forward, y left,
+/// z up as the camera stood in its first frame. The destructor waits a moment for listeners to get the last
+/// messages. Error (kUsage): the network cannot be used, or the address names topics.
+core::Result<std::shared_ptr<pipeline::RunObserver>> open_ros2_publisher(const std::string& address,
+                                                                         PublishedNames names,
+                                                                         const std::string& name,
+                                                                         core::Log& log);
+
+/// For LiveOptions::open: opens the stream of an address; the topics that it names replace those given.
+core::Result<std::unique_ptr<dataset::MessageStream>> open_live_stream(const std::string& address,
+                                                                       dataset::TopicNames& topics);
+
+}  // namespace plumbline::net

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/dataset/ros_messages.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "bags/bag_parts.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+constexpr std::size_t kBytesOfPoint = 16;
+
+std::int64_t stamp_ns_of(double seconds) { return std::llround(seconds * 1e9); }
+
+template <typename Encode>
+MessageBytes encoded(const Encode& encode) {
+  const auto& part = core::part<BagReaders>();
+  if (!part) return tl::unexpected(part.error());
+  return encode((*part)->encoder());
+}
+
+}  // namespace
+
+MessageBytes transforms_message(const std::vector<NamedTransform>& transforms, double stamp) {
+  std::vector<TransformMessage> messages;
+  for (const NamedTransform& transform : transforms)
+    messages.push_back({transform.parent, transform.child, transform.parent_from_child});
+  return encoded(
+      [&](const MessageEncoder& encoder) { return encoder.transforms(messages, stamp_ns_of(stamp)); });
+}
+
+MessageBytes path_message(const std::string& frame, const geometry::Trajectory& path) {
+  const double stamp = path.empty() ? 0.0 : path.back().stamp;
+  return encoded([&](const MessageEncoder& encoder) {
+    return encoder.path({{stamp_ns_of(stamp), frame}, path});
+  });
+}
+
+MessageBytes points_message(const std::string& frame, double stamp, std::vector<std::uint8_t> points) {
+  CloudMessage message{{stamp_ns_of(stamp), frame}, 0, std::move(points)};
+  message.points = static_cast<std::uint32_t>(message.data.size() / kBytesOfPoint);
+  return encoded([&](const MessageEncoder& encoder) { return encoder.cloud(message); });
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "plumbline/core/error.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+
+namespace plumbline::dataset {
+
+/// Looks at the depth of a few frames. The warning where it is in an unlikely unit, "" where it looks like
+/// metres. Error (kInput): it cannot be metres, or no frame can be read. `folder`: what messages call the
+/// source.
+core::Result<std::string> check_depth_scale(const FrameSource& source, const std::string& folder);
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
+
+#include <cctype>
+#include <utility>
+
+#include "bags/bag_camera.hpp"
+#include "bags/bag_recording.hpp"
+#include "depth_check.hpp"
+#include "frame_images.hpp"
+#include "live/live_stream.hpp"
+#include "plumbline/dataset/live.hpp"
+#include "recording_camera.hpp"
+
+namespace plumbline::dataset {
+namespace {
+
+constexpr const char* kScheme = "ros2://";
+
+/// What all views of one live camera share.
+struct LiveCamera {
+  std::string name;
+  std::string address;
+  std::string doubt;
+  Layout layout;  ///< of the first frames; its images are the stream
+  std::shared_ptr<LiveStream> stream;
+};
+
+class LiveSource final : public FrameSource {
+ public:
+  LiveSource(std::shared_ptr<LiveCamera> live, sensor::Camera camera, const sensor::Pinhole& rectified,
+             std::vector<double> delays)
+      : live_(std::move(live)),
+        camera_(std::move(camera)),
+        rectified_(rectified),
+        rectifier_(camera_, rectified),
+        delays_(std::move(delays)) {}
+
+  [[nodiscard]] const std::string& name() const override { return live_->name; }
+  [[nodiscard]] const std::string& format() const override { return live_->layout.format; }
+  [[nodiscard]] const sensor::Camera& camera() const override { return camera_; }
+  [[nodiscard]] std::string doubt() const override { return live_->doubt; }
+  [[nodiscard]] std::optional<geometry::Trajectory> truth() const override { return std::nullopt; }
+  [[nodiscard]] std::size_t size() const override { return live_->stream->size(); }
+
+  [[nodiscard]] PairInfo info(std::size_t index) const override {
+    PairInfo pair = live_->stream->info(index);
+    // One after another, as a recording's are: to the last digit.
+    for (const double delay : delays_) pair.depth_stamp += delay;
+    return pair;
+  }
+
+  [[nodiscard]] core::Result<sensor::RgbdFrame> read(std::size_t index) const override {
+    const PairInfo pair = info(index);
+    auto color = read_color(live_->layout, pair.color_file, camera_.color);
+    if (!color) return tl::unexpected(color.error());
+    auto depth = read_depth(live_->layout, pair.depth_file, camera_.depth ? *camera_.depth : camera_.color,
+                            camera_.depth_scale);
+    if (!depth) return tl::unexpected(depth.error());
+    return rectified_frame(index, pair, *color, *depth, rectifier_);
+  }
+
+  [[nodiscard]] std::unique_ptr<FrameSource> taken_by(const sensor::Camera& better) const override {
+    std::vector<double> delays = delays_;
+    delays.push_back(better.depth_delay_s - camera_.depth_delay_s);
+    return std::make_unique<LiveSource>(live_, better, rectified_, std::move(delays));
+  }
+
+  [[nodiscard]] bool live() const override { return true; }
+  void wait_for(std::size_t index, std::chrono::milliseconds most) const override {
+    live_->stream->wait_for(index, most);
+  }
+  [[nodiscard]] bool decided(std::size_t index) const override { return live_->stream->decided(index); }
+  void keep(std::size_t index) const override { live_->stream->keep(index); }
+  [[nodiscard]] core::Result<void> finish() const override { return live_->stream->finish(); }
+
+  [[nodiscard]] LiveReport report() const override {
+    const LiveCounts counts = live_->stream->counts();
+    return {counts.taken, counts.dropped, counts.backwards, counts.unpaired, counts.lost};
+  }
+
+ private:
+  std::shared_ptr<LiveCamera> live_;
+  sensor::Camera camera_;
+  sensor::Pinhole rectified_;  ///< of the images that are given
+  sensor::Rectifier rectifier_;
+  std::vector<double> delays_;  ///< added to the stamps of depth
+};
+
+core::Result<void> fits_live(const std::string& address, const OpenOptions& options) {
+  const char* wrong = options.from_s > 0.0 || options.to_s < 1e299          ? "--from and --to"
+                      : options.every != 1                                  ? "--every"
+                      : options.format != "auto" && !options.format.empty() ? "--format"
+                      : options.poses == PoseUse::kGiven                    ? "--poses given"
+                                                                            : nullptr;
+  if (wrong == nullptr) return {};
+  return core::usage_error(
+      fmt::format("{}: is live; {} is about recordings (--for S ends the run)", address, wrong));
+}
+
+/// The messages that say what the cameras are.
+LiveRecord::Infos infos_of(const BagSurvey& survey, const ChosenTopics& topics) {
+  LiveRecord::Infos infos;
+  const auto first = [&](const ChosenTopic& chosen) -> std::optional<CameraInfoMessage> {
+    if (chosen.topic == nullptr) return std::nullopt;
+    auto message = survey.first(*chosen.topic, &MessageDecoder::camera_info);
+    return message ? std::optional<CameraInfoMessage>(std::move(*message)) : std::nullopt;
+  };
+  infos.color = first(topics.info);
+  if (topics.depth_info.topic != topics.info.topic) infos.depth = first(topics.depth_info);
+  return infos;
+}
+
+LiveRecord::Topics topics_of(const ChosenTopics& topics) {
+  const auto name = [](const ChosenTopic& chosen) {
+    return chosen.topic == nullptr ? "" : chosen.topic->topic.name;
+  };
+  return {topics.color.topic->topic, topics.depth.topic->topic, name(topics.info), name(topics.depth_info)};
+}
+
+/// The camera of the first frames, as open_recording finds that of a recording.
+core::Result<sensor::Camera> complete_live_camera(const std::string& address, const OpenOptions& options,
+                                                  const std::optional<ChosenCamera>& chosen,
+                                                  const LiveSurvey& found, const ChosenTopics& topics,
+                                                  Layout& layout, core::Log& log) {
+  auto camera = bag_camera(found.survey, topics, log);
+  if (!camera && options.camera.empty()) return tl::unexpected(camera.error());
+  if (camera) layout.camera = std::move(*camera);
+  if (layout.camera) layout.camera->camera.fps = usual_fps(layout.pairs);
+  auto complete = complete_camera(address, chosen, layout, log);
+  if (!complete) return tl::unexpected(complete.error());
+  layout.color_reduction = stored_reduction(layout, *complete);
+  if (auto kinds = check_image_kinds(layout, *complete, log); !kinds) return tl::unexpected(kinds.error());
+  return complete;
+}
+
+/// "ros2://0?color=..." is called "ros2_0".
+std::string name_of_address(const std::string& address) {
+  std::string name;
+  for (const char c : address.substr(0, address.find('?'))) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;
+    if (c == '/' && !name.empty() && name.back() != '_') name += '_';
+  }
+  return name;
+}
+
+}  // namespace
+
+bool is_live_address(const std::string& input) { return input.rfind(kScheme, 0) == 0; }
+
+core::Result<std::unique_ptr<FrameSource>> open_live(const std::string& address,
+                                                     std::unique_ptr<MessageStream> stream,
+                                                     const OpenOptions& options, core::Log& log) {
+  const LiveOptions& live_options = options.live;
+  if (auto fits = fits_live(address, options); !fits) return tl::unexpected(fits.error());
+  if (!live_options.record.empty()) {
+    if (auto can = LiveRecord::check(live_options.record, live_options.replace); !can)
+      return tl::unexpected(can.error());
+  }
+  const auto chosen = choose_camera(address, options, log);
+  if (!chosen) return tl::unexpected(chosen.error());
+
+  // Listen until it is clear what the camera is.
+  const auto found =
+      survey_stream(address, *stream, options.topics, live_options.patience, live_options.stop);
+  if (!found) return tl::unexpected(found.error());
+  const auto topics = choose_topics(found->survey, options.topics);
+  if (!topics) return tl::unexpected(topics.error());
+  log.info(fmt::format("{}: colour from {}, depth from {}", address, topics->color.topic->topic.name,
+                       topics->depth.topic->topic.name));
+
+  LiveStream::Options how;
+  how.address = address;
+  how.max_pair_gap_s = options.max_pair_gap_s;
+  if (*chosen) how.depth_delay_s = (*chosen)->reading.camera.depth_delay_s;
+  how.for_s = live_options.for_s;
+  how.stop = live_options.stop;
+  how.most_waiting_bytes = live_options.most_waiting_bytes;
+  auto live = std::make_shared<LiveCamera>();
+  live->name = name_of_address(address);
+  live->address = address;
+  live->stream = std::make_shared<LiveStream>(
+      std::move(stream), LiveTopic{topics->color.topic->topic, topics->color.topic->decoder},
+      LiveTopic{topics->depth.topic->topic, topics->depth.topic->decoder}, how, log);
+
+  // What came meanwhile are the first frames.
+  for (const LiveMessage& message : found->images) live->stream->add(message);
+  if (!live->stream->wait_for_first(live_options.patience)) {
+    return core::input_error(fmt::format(
+        "{}: images of {} and {} come, but none of the two within {:g} s of each other; name "
+        "topics of one camera with ?color=/TOPIC&depth=/TOPIC",
+        address, topics->color.topic->topic.name, topics->depth.topic->topic.name, options.max_pair_gap_s));
+  }
+  live->layout.format = "ros2";
+  live->layout.pairs = live->stream->infos();
+  live->layout.images = live->stream;
+  const auto camera = complete_live_camera(address, options, *chosen, *found, *topics, live->layout, log);
+  if (!camera) return tl::unexpected(camera.error());
+  auto source =
+      std::make_unique<LiveSource>(live, *camera, camera->color, std::vector<double>{camera->depth_delay_s});
+  const auto doubt = check_depth_scale(*source, address);
+  if (!doubt) return tl::unexpected(doubt.error());
+  if (!doubt->empty()) log.warning(*doubt);
+  live->doubt = *doubt;
+
+  std::unique_ptr<LiveRecord> record;
+  if (!live_options.record.empty()) {
+    auto created = LiveRecord::create(live_options.record, topics_of(*topics),
+                                      infos_of(found->survey, *topics), *camera);
+    if (!created) return tl::unexpected(created.error());
+    record = std::move(*created);
+  }
+  live->stream->start(std::move(record));
+  return source;
+}
+
+core::Result<std::string> live_to_text(const std::string& address, MessageStream& stream,
+                                       const OpenOptions& options) {
+  const auto found = survey_stream(address, stream, options.topics, options.live.patience, options.live.stop);
+  std::string text = fmt::format("live: {}\n{}", address, published_text(stream.topics()));
+  if (!found) {
+    if (stream.topics().empty()) return tl::unexpected(found.error());
+    return text + "note: " + found.error().message + "\n";
+  }
+  const auto topics = choose_topics(found->survey, options.topics);
+  if (topics) text += choice_text(*topics);
+  return text;
+}
+
+}  // namespace plumbline::dataset

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What a stream of messages has to offer: listened to for a moment and looked at as if it were a bag.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bags/topics.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/dataset/message_stream.hpp"
+
+namespace plumbline::dataset {
+
+using SharedBytes = std::shared_ptr<const Bytes>;
+
+struct LiveMessage {
+  std::string topic;
+  std::int64_t received_ns = 0;
+  SharedBytes bytes;
+};
+
+struct LiveSurvey {
+  BagSurvey survey;
+  std::vector<LiveMessage> images;  ///< all that came, in order: none is lost while the camera is looked for
+};
+
+/// Subscribes to what could be a camera and listens until colour, depth and what is known of their cameras
+/// are there, at most `patience`; then unsubscribes from all but the chosen images. `named` as in
+/// choose_topics. Errors: those of choose_topics; kInput: no image came, with topics and types that were
+/// seen.
+core::Result<LiveSurvey> survey_stream(const std::string& address, MessageStream& stream,
+                                       const TopicNames& named, std::chrono::milliseconds patience,
+                                       const core::StopToken& stop);
+
+/// What is published, a line each.
+std::string published_text(const std::vector<StreamTopic>& topics);
+
+}  // namespace plumbline::dataset

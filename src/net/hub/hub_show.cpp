@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "hub/hub_show.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/store.hpp"
+
+namespace plumbline::net {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kShowEvery = 2s;
+
+geometry::Rigid3 pose_of_numbers(const std::array<double, 7>& p) {
+  return {Eigen::Quaterniond(p[6], p[3], p[4], p[5]), Eigen::Vector3d(p[0], p[1], p[2])};
+}
+
+}  // namespace
+
+void HubShow::step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings) {
+  if (observer_ == nullptr || Clock::now() < next_) return;
+
+  if (job_.valid()) {
+    if (!job_.ready()) return;
+    job_.wait();
+  }
+
+  next_ = Clock::now() + kShowEvery;
+
+  std::vector<std::string> names;
+  std::vector<Task> tasks;
+
+  for (const auto& [name, session] : robots) {
+    const auto number = static_cast<std::int32_t>(names.size());
+    names.push_back(name);
+    const std::int64_t head = session.copy().heads().last();
+    if (session.copy().keyframes() == 0 || std::exchange(shown_heads_[name], head) == head) continue;
+    tasks.push_back({number, name, session.file(), meetings.frame(name)});
+  }
+
+  if (tasks.empty()) return;
+  job_ = executor_.submit([this, names = std::move(names), tasks = std::move(tasks)] { show(names, tasks); });
+}
+
+void HubShow::show(const std::vector<std::string>& names, const std::vector<Task>& tasks) {
+  observer_->begins(names);
+  for (const Task& task : tasks) {
+    // Rows that belong together may not all be there yet; the next look finds them.
+    if (const auto shown = show_robot(task); !shown) log_.debug(task.name + ": " + shown.error().message);
+  }
+}
+
+core::Result<void> HubShow::show_robot(const Task& task) {
+  const auto store = maps::StoreReader::open(task.file);
+  if (!store) return tl::unexpected(store.error());
+
+  const auto stored = store->load();
+  if (!stored) return tl::unexpected(stored.error());
+  const geometry::Trajectory path = maps::keyframe_trajectory(stored->map);
+  if (path.empty()) return {};
+
+  if (!task.frame.frame_of.empty())
+    observer_->placed(task.number, path.back().stamp, pose_of_numbers(task.frame.frame_from_robot));
+  observer_->tracked(task.number, path.back().stamp, path.back().world_from_camera,
+                     path.back().world_from_camera);
+  observer_->keyframes(task.number, path);
+
+  const auto clouds = store->cloud_ids();
+  if (!clouds) return tl::unexpected(clouds.error());
+  for (const maps::KeyframePose& keyframe : maps::keyframe_poses(stored->map)) {
+    const bool there = std::find(clouds->begin(), clouds->end(), keyframe.id) != clouds->end();
+    if (!there || !shown_clouds_[task.name].insert(keyframe.id).second) continue;
+    const auto cloud = store->cloud(keyframe.id);
+    if (!cloud) return tl::unexpected(cloud.error());
+    observer_->added(task.number, keyframe.stamp, keyframe.world_from_camera * cloud::sensor_pose(**cloud),
+                     **cloud);
+  }
+  return {};
+}
+
+}  // namespace plumbline::net

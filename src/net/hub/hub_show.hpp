@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Shows who looks on what comes to a hub: paths, places and clouds of the robots, from the copies of their
+// stores. A job beside the hub's thread.
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bus.hpp"
+#include "hub/hub_meetings.hpp"
+#include "hub/robot_session.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
+#include "plumbline/maps/store_replica.hpp"
+#include "plumbline/pipeline/observer.hpp"
+
+namespace plumbline::net {
+
+class HubShow {
+ public:
+  /// `observer` null: nobody looks on.
+  HubShow(std::shared_ptr<pipeline::RunObserver> observer, const core::Executor& executor, core::Log& log)
+      : observer_(std::move(observer)), executor_(executor), log_(log) {}
+
+  /// To be called often.
+  void step(const std::map<std::string, RobotSession>& robots, const HubMeetings& meetings);
+  /// Waits for what is under way.
+  void finish() {
+    if (job_.valid()) job_.wait();
+  }
+
+ private:
+  /// A robot of whose map there is more than was shown.
+  struct Task {
+    std::int32_t number = 0;
+    std::string name;
+    std::filesystem::path file;
+    SharedFrame frame;
+  };
+  void show(const std::vector<std::string>& names, const std::vector<Task>& tasks);
+  core::Result<void> show_robot(const Task& task);
+
+  std::shared_ptr<pipeline::RunObserver> observer_;
+  const core::Executor& executor_;
+  core::Log& log_;
+  Clock::time_point next_;
+  std::map<std::string, std::int64_t> shown_heads_;                 ///< last transaction, by robot
+  std::map<std::string, std::set<core::KeyframeId>> shown_clouds_;  ///< of the job
+  core::Executor::Job job_;  ///< last member: it ends before the others are destroyed
+};
+
+}  // namespace plumbline::net

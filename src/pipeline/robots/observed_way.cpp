@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "robots/observed_way.hpp"
+
+namespace plumbline::pipeline {
+
+void ObservedWay::report(const mapping::Slam& slam, const mapping::FrameReport& report, TrackedFrame& tracked,
+                         RunObserver& observer) {
+  if (!tracked.pose || !tracked.pose->tracked) return;
+  if (!component_.valid()) component_ = report.component;
+  if (report.component != component_) return;
+
+  // Both ends of a step in the map as it is now: what moved the map in between moves none.
+  const auto pose_of = [&](const maps::FramePose& frame) {
+    return (frame.camera_from_reference * slam.map().camera_from_world(frame.reference)).inverse();
+  };
+  const geometry::Rigid3 map_from_camera = pose_of(*tracked.pose);
+  odometry_from_camera_ =
+      last_ ? odometry_from_camera_ * (pose_of(slam.frame_poses()[*last_]).inverse() * map_from_camera)
+            : map_from_camera;
+  last_ = slam.frame_poses().size() - 1;
+
+  tracked.map_from_camera = map_from_camera;
+  observer.tracked(tracked.robot, tracked.stamp, map_from_camera, odometry_from_camera_);
+  if (tracked.keyframe.valid()) observer.keyframes(tracked.robot, maps::keyframe_trajectory(slam.map()));
+}
+
+}  // namespace plumbline::pipeline

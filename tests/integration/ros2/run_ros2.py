@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Cameras on ROS 2's network, played and mapped by the program on one machine: run_ros2.py PROGRAM WORK CASE
+
+    live      600 frames at 30 Hz: nearly all are taken, and what was recorded of them maps to the same bytes
+    messages  what is told when there is no camera, or no certain one, and when addresses make no sense
+    judge     what a run publishes is received by @foxglove/ros2 on Node (scripts/install-deps --judges; without it the
+              exit code is 77)
+"""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+SKIPPED = 77
+FILES = ["trajectory.txt", "keyframes.txt", "keyframes.csv", "frames.csv", "lines.ply", "map.ply", "map.pcd", "camera.yaml"]
+RATE_HZ = 30
+
+
+def judges():
+    given = os.environ.get("PLUMBLINE_JUDGES")
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "plumbline/judges"
+    return (Path(given) if given else cache) / "node_modules"
+
+
+def check(condition, message):
+    if not condition:
+        raise AssertionError(message)
+
+
+class Case:
+    def __init__(self, program, work):
+        self.program, self.work = program, work
+        # Domains apart from those of tests side by side, and of the user.
+        self.domain = 40 + os.getpid() % 90
+
+    def address(self, more=""):
+        return f"ros2://{self.domain}?interface=lo{more}"
+
+    def start(self, *arguments, log):
+        out = open(self.work / log, "w", encoding="utf-8")
+        return subprocess.Popen([self.program, *map(str, arguments)], stdout=out, stderr=subprocess.STDOUT)
+
+    def run(self, *arguments, code=0, timeout=600):
+        done = subprocess.run([self.program, *map(str, arguments)], capture_output=True, text=True, timeout=timeout,
+                              check=False)
+        text = done.stdout + done.stderr
+        check(done.returncode == code, f"{arguments}: exit code {done.returncode}, not {code}\n{text}")
+        return text
+
+    def log(self, name):
+        return (self.work / name).read_text(encoding="utf-8")
+
+    def world(self, frames):
+        """A generated room on disk."""
+        folder = self.work / "room"
+        self.run("synth", "room", "-o", folder, "--frames", frames, "--seed", 1, "-q")
+        return folder
+
+    def to_and_fro(self, room, frames):
+        """The room's frames again and again, forwards and backwards, 30 a second."""
+        folder = self.work / "long"
+        folder.mkdir()
+        lines = [line.split() for line in (room / "associations.txt").read_text().splitlines() if not line.startswith("#")]
+        turn = list(range(len(lines))) + list(range(len(lines) - 2, 0, -1))
+        with open(folder / "associations.txt", "w", encoding="utf-8") as out:
+            for i in range(frames):
+                _, color, _, depth = lines[turn[i % len(turn)]]
+                stamp = f"{100 + i / RATE_HZ:.6f}"
+                out.write(f"{stamp} {room / color} {stamp} {room / depth}\n")
+        shutil.copy(room / "camera.yaml", folder)
+        return folder
+
+    def end(self, process, name, code=0, timeout=600):
+        got = process.wait(timeout)
+        check(got == code, f"exit code {got}, not {code}\n{self.log(name)}")
+
+
+def live(case):
+    frames = 600
+    recording = case.to_and_fro(case.world(60), frames)
+    record = case.work / "taken.mcap"
+    mapping = case.start("map", case.address(), "-o", case.work / "live", "--record", record, log="map.log")
+    playing = case.start("play", recording, case.address(), "--wait", 60, log="play.log")
+    case.end(playing, "play.log")
+    time.sleep(1.0)
+    mapping.send_signal(signal.SIGINT)
+    case.end(mapping, "map.log", timeout=1200)
+
+    summary = json.loads((case.work / "live/summary.json").read_text())
+    taken = summary["live"]["taken"]
+    print(f"{taken} of {frames} frames were taken: {summary['live']}; {case.log('play.log').strip()}")
+    check(taken >= 0.99 * frames, f"{taken} of {frames} frames were taken\n{case.log('map.log')}")
+    check(f"{taken} of" in case.log("map.log"), "the summary does not tell how many frames were taken")
+    check(not summary["stopped"], "a live run that is ended is not cut off")
+
+    case.run("map", record, "-o", case.work / "again", "-q", timeout=1200)
+    for name in FILES:
+        same = (case.work / "live" / name).read_bytes() == (case.work / "again" / name).read_bytes()
+        check(same, f"{name} is another one when the recording is mapped")
+    print("the recording gives the same bytes")
+
+
+def messages(case):
+    text = case.run("map", case.address(), "-o", case.work / "none", code=3)
+    check("nothing at all is published" in text and "ROS_DOMAIN_ID" in text, text)
+    for address, word in (("ros2://x", "is no domain"), ("ros2://7?colour=/a", "'colour' is no setting"),
+                          ("ros2://300", "--domain"), ("ros2://7?interface=none0", "no interface")):
+        check(word in case.run("map", address, "-o", case.work / "none", code=2), address)
+    check("is live" in case.run("map", case.address(), "-o", case.work / "none", "--from", 1, code=2), "--from")
+    check("plumbline map" in case.run("convert", case.address(), case.work / "copy", code=2), "convert")
+
+    room = case.world(10)
+    playing = case.start("play", room, case.address(), "--loop", "--wait", 0, log="play.log")
+    try:
+        time.sleep(1.0)
+        text = case.run("map", case.address("&color=/other/image"), "-o", case.work / "none", code=2)
+        check("/camera/color/image_raw" in text, text)
+        text = case.run("info", case.address())
+        check("colour: /camera/color/image_raw" in text and "sensor_msgs/CameraInfo" in text, text)
+        text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s", "--record", case.work / "short.txt",
+                        code=2)
+        check("ends in .mcap" in text, text)
+        text = case.run("map", case.address(), "-o", case.work / "short", "--for", "2s")
+        check("frames that came were taken" in text, text)
+    finally:
+        playing.send_signal(signal.SIGINT)
+        case.end(playing, "play.log")
+
+
+def judge(case):
+    if shutil.which("node") is None or not (judges() / "@foxglove/ros2").is_dir():
+        print(f"no @foxglove/ros2 in {judges()}")
+        return SKIPPED
+    room = case.world(60)
+    listening = subprocess.Popen(["node", HERE / "judge_ros2.mjs", str(case.domain), "plumbline", "300"],
+                                 env={**os.environ, "JUDGES": str(judges())}, stdout=subprocess.PIPE,
+                                 stderr=open(case.work / "judge.log", "w", encoding="utf-8"), text=True)
+    time.sleep(3.0)
+    case.run("map", room, "-o", case.work / "out", "--publish", case.address(), "-q")
+    heard, _ = listening.communicate(timeout=60)
+    check(listening.returncode == 0, f"nothing was heard: {heard}\n{case.log('judge.log')}")
+    told = json.loads(heard)
+    print(json.dumps(told))
+
+    summary = json.loads((case.work / "out/summary.json").read_text())
+    check(told["map"]["points"] == summary["cloud"]["points"], f"{told['map']} of {summary['cloud']}")
+    check(told["map"]["frame"] == "map" and told["map"]["fields"] == ["x@0", "y@4", "z@8", "rgb@12"], told["map"])
+    check(told["path"]["poses"] == summary["frames"]["tracked"], told["path"])
+    check({"map -> odom", "odom -> camera"} <= set(told["tf"]["chains"]), told["tf"])
+    check(told["tf"]["messages"] > 5, told["tf"])
+    check(told["points"]["messages"] >= 1, told["points"])
+    case.run("map", room, "-o", case.work / "silent", "-q")
+    for name in FILES:
+        same = (case.work / "out" / name).read_bytes() == (case.work / "silent" / name).read_bytes()
+        check(same, f"{name} is another one when it is published")
+    return 0
+
+
+def main():
+    program, work, name = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve(), sys.argv[3]
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    return {"live": live, "messages": messages, "judge": judge}[name](Case(program, work)) or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
