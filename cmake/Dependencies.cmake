@@ -16,8 +16,12 @@ find_package(tsl-robin-map REQUIRED)
 # PCL's own package file drags VTK into every target that links pcl_io; link the libraries by name instead,
 # so that only viz/ sees VTK.
 find_package(PkgConfig REQUIRED)
-find_path(PCL_INCLUDE pcl/point_types.h PATH_SUFFIXES pcl-1.13 REQUIRED)
+find_path(PCL_INCLUDE pcl/point_types.h PATH_SUFFIXES pcl-1.15 pcl-1.14 pcl-1.13 pcl-1.12 REQUIRED)
 find_package(Boost REQUIRED)
+# Libraries that `plumbline --version` tells; the modules that find others add them.
+file(STRINGS ${PCL_INCLUDE}/pcl/pcl_config.h pcl_version REGEX "define PCL_VERSION_PRETTY")
+string(REGEX MATCH "[0-9.]+[0-9]" pcl_version "${pcl_version}")
+set_property(GLOBAL PROPERTY plumbline_libraries "PCL ${pcl_version}" "Ceres ${Ceres_VERSION}" "OpenCV ${OpenCV_VERSION}")
 add_library(plumbline_pcl INTERFACE)
 target_include_directories(plumbline_pcl SYSTEM INTERFACE ${PCL_INCLUDE})
 # Those that need others come first: a linker that leaves out what is not needed would keep too many otherwise.

@@ -1,4 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
+# cmake --build DIR --target site: all pages as a site with search, in DIR/site; a link that leads nowhere is an error.
+find_program(MKDOCS mkdocs)
+find_package(Python3 3.9 QUIET COMPONENTS Interpreter)
+if(MKDOCS AND Python3_FOUND)
+  add_custom_target(site
+    COMMAND Python3::Interpreter -B ${PROJECT_SOURCE_DIR}/cmake/site_pages.py ${PROJECT_SOURCE_DIR} ${CMAKE_BINARY_DIR}/site_pages ${PROJECT_VERSION}
+    COMMAND ${CMAKE_COMMAND} -E env NO_COLOR=1 ${MKDOCS} build --strict --quiet --config-file ${CMAKE_BINARY_DIR}/site_pages/mkdocs.yml
+    COMMENT "Site of the pages" VERBATIM)
+else()
+  add_custom_target(site COMMAND ${CMAKE_COMMAND} -E echo "mkdocs is missing; scripts/install-deps --judges installs it"
+                         COMMAND ${CMAKE_COMMAND} -E false)
+endif()
+
 # cmake --build DIR --target docs: the reference of the public headers, in DIR/docs/html. A warning is an error.
 find_package(Doxygen QUIET)
 if(NOT DOXYGEN_FOUND)

@@ -29,14 +29,17 @@ function(plumbline_module name)
   endif()
   add_library(plumbline::${name} ALIAS plumbline_${name})
   set_target_properties(plumbline_${name} PROPERTIES EXPORT_NAME ${name})
-  install(TARGETS plumbline_${name} EXPORT plumbline ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS plumbline_${name} EXPORT plumbline ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 endfunction()
 
-# plumbline_part(NAME MODULE module SOURCES source... [LINK library...] [PCH header...])
+# plumbline_part(NAME MODULE module SOURCES source... [LINK library...] [PCH header...] [COMPONENT package])
 # A shared object that is loaded by the first who needs it (core/part.hpp). It has all its code in itself: what
 # sources a part shares with its module are compiled into both.
 function(plumbline_part name)
-  cmake_parse_arguments(ARG "" "MODULE" "SOURCES;LINK;PCH" ${ARGN})
+  cmake_parse_arguments(ARG "" "MODULE;COMPONENT" "SOURCES;LINK;PCH" ${ARGN})
+  if(NOT ARG_COMPONENT)
+    set(ARG_COMPONENT program)
+  endif()
   set(target plumbline_part_${name})
   add_library(${target} MODULE ${ARG_SOURCES})
   set_target_properties(${target} PROPERTIES PREFIX "" OUTPUT_NAME plumbline_${name} CXX_VISIBILITY_PRESET hidden
@@ -49,7 +52,7 @@ function(plumbline_part name)
     target_precompile_headers(${target} PRIVATE ${ARG_PCH})
   endif()
   add_dependencies(plumbline_${ARG_MODULE} ${target}) # so that whatever links the module has the part at hand
-  install(TARGETS ${target} LIBRARY DESTINATION ${PLUMBLINE_INSTALLED_PARTS})
+  install(TARGETS ${target} LIBRARY DESTINATION ${PLUMBLINE_INSTALLED_PARTS} COMPONENT ${ARG_COMPONENT})
 endfunction()
 
 # plumbline_test(NAME SOURCES... LINK library... [LABEL label]): a GoogleTest program, each of its tests seen by

@@ -6,18 +6,17 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
 #include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "paths.hpp"
 #include "plumbline/cloud/filter_plugin.hpp"
-#include "plumbline/core/version.hpp"
 #include "signals.hpp"
+#include "version_text.hpp"
 
 namespace plumbline::cli {
 namespace {
-
-std::string version_text() { return fmt::format("plumbline {}", core::version()); }
 
 const char* const kFooter =
     "Exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 input data, 4 done but not trustworthy,\n"
@@ -40,7 +39,7 @@ core::Result<cloud::FilterRegistry> Session::filters() const {
 }
 
 Console& Session::console() {
-  if (!console_) console_ = std::make_unique<Console>(quiet, verbose);
+  if (!console_) console_ = std::make_unique<Console>(quiet, verbose, progress);
   return *console_;
 }
 
@@ -56,13 +55,14 @@ int Session::fail(const core::Error& error) {
   return static_cast<int>(error.kind);
 }
 
-core::Result<void> Session::equip(pipeline::RunRequest& request) const {
+core::Result<void> Session::equip(pipeline::RunRequest& request) {
   const auto pipelines = pipelines_folder();
   if (!pipelines) return tl::unexpected<core::Error>(pipelines.error());
   const auto all_filters = filters();
   if (!all_filters) return tl::unexpected<core::Error>(all_filters.error());
   request.pipelines_folder = *pipelines;
   request.filters = *all_filters;
+  request.finishing = console().stepping();
   return {};
 }
 
@@ -103,7 +103,20 @@ void add_plugin_option(CLI::App& command, Session& session) {
       ->allow_extra_args(false);
 }
 
+void add_progress_option(CLI::App& command, Session& session) {
+  const std::map<std::string, ProgressStyle> styles = {
+      {"auto", ProgressStyle::kAuto}, {"json", ProgressStyle::kJson}, {"none", ProgressStyle::kNone}};
+  command
+      .add_option("--progress", session.progress,
+                  "How progress is shown on stderr: json writes an object a line, for programs; messages "
+                  "stay as they are "
+                  "(default: auto, one line that is rewritten on a terminal, else lines)")
+      ->type_name("auto|json|none")
+      ->transform(CLI::CheckedTransformer(styles));
+}
+
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request) {
+  add_progress_option(command, session);
   command
       .add_option("-p,--pipeline", request.pipeline,
                   "Shipped pipeline or file (default: " + request.pipeline + ")")
@@ -171,9 +184,9 @@ int run(int argc, char** argv) {
   app.footer(kFooter);
 
   Session session;
-  for (const auto add :
-       {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_convert, add_info, add_render,
-        add_export, add_report, add_evaluate, add_synth, add_filter, add_pipelines, add_play}) {
+  for (const auto add : {add_map, add_fuse, add_hub, add_robot, add_keys, add_calibrate, add_convert,
+                         add_info, add_render, add_export, add_report, add_evaluate, add_synth, add_filter,
+                         add_pipelines, add_play, add_completion}) {
     add(app, session);
   }
 

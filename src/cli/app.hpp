@@ -23,6 +23,7 @@ namespace plumbline::cli {
 struct Session {
   bool quiet = false;
   bool verbose = false;
+  ProgressStyle progress = ProgressStyle::kAuto;
   int threads = 0;  ///< 0 = one per core
   std::string pipelines_dir;
   std::vector<std::string> plugins;  ///< shared objects with filters, of the commands that take --plugin
@@ -33,7 +34,7 @@ struct Session {
   /// The built-in filters and those of the plugins.
   [[nodiscard]] core::Result<cloud::FilterRegistry> filters() const;
   /// Fills in the folders of pipelines and filters.
-  core::Result<void> equip(pipeline::RunRequest& request) const;
+  core::Result<void> equip(pipeline::RunRequest& request);
   /// Made on first use: messages and progress on stderr.
   Console& console();
   /// Made on first use.
@@ -56,7 +57,9 @@ CLI::App* add_command(CLI::App& parent, Session& session, const std::string& nam
                       std::function<core::Result<void>()> run);
 /// --plugin FILE.so, for commands that use filters.
 void add_plugin_option(CLI::App& command, Session& session);
-/// -p, --set, --plugin and --force.
+/// --progress, for commands that take long.
+void add_progress_option(CLI::App& command, Session& session);
+/// -p, --set, --plugin, --force and --progress.
 void add_pipeline_options(CLI::App& command, Session& session, pipeline::RunRequest& request);
 /// Adds the options common to all commands that map a recording.
 void add_map_options(CLI::App& command, Session& session, pipeline::MapRequest& request);
@@ -97,6 +100,7 @@ void add_synth(CLI::App& app, Session& session);
 void add_filter(CLI::App& app, Session& session);
 void add_pipelines(CLI::App& app, Session& session);
 void add_play(CLI::App& app, Session& session);
+void add_completion(CLI::App& app, Session& session);  ///< `completion`, `man`; made from all others
 
 /// Parses, runs the command and returns the exit code (see core::ErrorKind).
 int run(int argc, char** argv);

@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 namespace plumbline::cli {
 namespace {
 
 constexpr double kBarEvery_s = 0.1;
 constexpr double kLineEvery_s = 5.0;
+constexpr double kObjectEvery_s = 1.0;
 constexpr std::size_t kBarWidth = 30;
 
 void put(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
@@ -36,12 +38,13 @@ std::string clock_text(double seconds) {
   return fmt::format("{}:{:02}", total / 60, total % 60);
 }
 
-Console::Console(bool quiet, bool verbose)
-    : quiet_(quiet),
+Console::Console(bool quiet, bool verbose, ProgressStyle style)
+    : quiet_(quiet || style == ProgressStyle::kNone),
       threshold_(quiet     ? core::LogLevel::kWarning
                  : verbose ? core::LogLevel::kDebug
                            : core::LogLevel::kInfo),
-      terminal_(isatty(STDERR_FILENO) != 0) {}
+      style_(style),
+      terminal_(style == ProgressStyle::kAuto && isatty(STDERR_FILENO) != 0) {}
 
 Console::~Console() { end_progress(); }
 
@@ -62,7 +65,10 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
   }
 
   const double since_last_s = std::chrono::duration<double>(now - last_).count();
-  if ((done < total || total == 0) && since_last_s < (terminal_ ? kBarEvery_s : kLineEvery_s)) return;
+  const double every_s = terminal_                        ? kBarEvery_s
+                         : style_ == ProgressStyle::kJson ? kObjectEvery_s
+                                                          : kLineEvery_s;
+  if ((done < total || total == 0) && since_last_s < every_s) return;
   last_ = now;
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
 
@@ -70,19 +76,48 @@ void Console::progress(std::size_t done, std::size_t total, const char* what) {
     clear_bar();
     draw_bar(done, total, what, elapsed_s);
     bar_shown_ = true;
-  } else if (total == 0) {
+  } else if (total == 0 && style_ != ProgressStyle::kJson) {
     put(fmt::format("plumbline: {}{}\n", counted(done, what, elapsed_s), note_));
   } else {
-    const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
-    const double left_s = rate > 0.0 ? static_cast<double>(total - done) / rate : 0.0;
-    put(fmt::format("plumbline: {} of {} {}, {:.1f} a second, {} left{}\n", done, total, what, rate,
-                    clock_text(left_s), note_));
+    put_line(done, total, what, elapsed_s);
+  }
+}
+
+void Console::put_line(std::size_t done, std::size_t total, const char* what, double elapsed_s) const {
+  const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
+  const double left_s = rate > 0.0 && total > 0 ? static_cast<double>(total - done) / rate : 0.0;
+  if (style_ == ProgressStyle::kJson) {
+    nlohmann::ordered_json object = {{"event", "progress"}, {"what", what},       {"done", done},
+                                     {"total", total},      {"per_second", rate}, {"seconds_left", left_s},
+                                     {"seconds", elapsed_s}};
+    if (total == 0) object["total"] = object["seconds_left"] = nullptr;  // of what is live nobody knows
+    put(object.dump() + "\n");
+    return;
+  }
+  put(fmt::format("plumbline: {} of {} {}, {:.1f} a second, {} left{}\n", done, total, what, rate,
+                  clock_text(left_s), note_));
+}
+
+void Console::step(const std::string& name) {
+  if (quiet_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (style_ == ProgressStyle::kJson) {
+    const nlohmann::ordered_json object = {{"event", "step"}, {"what", name}};
+    put(object.dump() + "\n");
+  } else if (terminal_) {
+    clear_bar();
+    put(fmt::format("finishing: {}", name));
+    std::fflush(stderr);
+    bar_shown_ = true;
+  } else {
+    put(fmt::format("plumbline: finishing: {}\n", name));
   }
 }
 
 void Console::status(const std::string& line) {
   if (quiet_) return;
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (style_ == ProgressStyle::kJson) return;
   if (started_) {
     note_ = "  " + line;
     return;

@@ -12,15 +12,22 @@
 
 namespace plumbline::cli {
 
+/// How progress is shown.
+enum class ProgressStyle {
+  kAuto,  ///< one line that is rewritten on a terminal, lines now and then elsewhere
+  kJson,  ///< one JSON object a line, for programs
+  kNone
+};
+
 class Console : public core::Log {
  public:
-  Console(bool quiet, bool verbose);
+  Console(bool quiet, bool verbose, ProgressStyle style = ProgressStyle::kAuto);
   ~Console() override;
 
   void write(core::LogLevel level, const std::string& message) override;
 
-  /// A bar with rate and time left on a terminal, a line every few seconds elsewhere; nothing when quiet.
-  /// `total` 0: nobody knows.
+  /// A bar with rate and time left on a terminal, a line every few seconds elsewhere, an object a second as
+  /// JSON; nothing when quiet. `total` 0: nobody knows.
   void progress(std::size_t done, std::size_t total, const char* what);
   /// progress() for those who only tell how much is done.
   [[nodiscard]] std::function<void(std::size_t, std::size_t)> counting(const char* what) {
@@ -29,6 +36,12 @@ class Console : public core::Log {
   /// One line that is kept up on a terminal, a line every few seconds elsewhere; nothing when quiet. While
   /// there is a bar, it stands behind that.
   void status(const std::string& line);
+  /// The work that is left once all is counted: "refine". Shown as status() is; told as JSON and to logs at
+  /// once.
+  void step(const std::string& name);
+  [[nodiscard]] std::function<void(const std::string&)> stepping() {
+    return [this](const std::string& name) { step(name); };
+  }
   /// Ends the bar's line.
   void end_progress();
 
@@ -36,11 +49,13 @@ class Console : public core::Log {
   using Clock = std::chrono::steady_clock;
   void clear_bar();
   void draw_bar(std::size_t done, std::size_t total, const char* what, double elapsed_s) const;
+  void put_line(std::size_t done, std::size_t total, const char* what, double elapsed_s) const;
 
   std::mutex mutex_;
   bool quiet_;
   core::LogLevel threshold_;
-  bool terminal_;
+  ProgressStyle style_;
+  bool terminal_;  ///< that lines may be rewritten on
   bool bar_shown_ = false;
   bool started_ = false;
   std::string note_;  ///< behind the bar

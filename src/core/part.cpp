@@ -17,11 +17,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Folders in which the dynamic linker looks for the libraries of the program: its RUNPATH, then the system's
+/// The object that holds this code: the program, or a module that another program has loaded, as Python does.
+void* own_object() {
+  Dl_info info{};
+  void* object = nullptr;
+  if (dladdr(reinterpret_cast<const void*>(&own_object), &info) != 0)
+    object = dlopen(info.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
+  return object != nullptr ? object : dlopen(nullptr, RTLD_LAZY);
+}
+
+/// Folders in which the dynamic linker looks for the libraries of that object: its RUNPATH, then the system's
 /// folders. dlopen would look there itself, but not when a sanitizer stands between. Never the current
 /// folder.
 std::vector<fs::path> library_folders() {
-  void* program = dlopen(nullptr, RTLD_LAZY);
+  void* program = own_object();
   Dl_serinfo head{};
   if (program == nullptr || dlinfo(program, RTLD_DI_SERINFOSIZE, &head) != 0) return {};
   std::vector<std::max_align_t> room(head.dls_size / sizeof(std::max_align_t) + 1);
@@ -36,6 +45,13 @@ std::vector<fs::path> library_folders() {
   return folders;
 }
 
+/// Parts of Debian packages of their own.
+std::string remedy(const std::string& name) {
+  if (name == "dds") return "install the package plumbline-net";
+  if (name == "bags") return "install the package plumbline-ros1";
+  return "install it anew";
+}
+
 }  // namespace
 
 Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
@@ -48,7 +64,7 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
   if (folder == folders.end()) {
     return failure(
         ErrorKind::kInternal,
-        fmt::format("{}: this part of Plumbline is missing; install it anew, it belongs into {}", file,
+        fmt::format("{}: this part of Plumbline is missing; {}, it belongs into {}", file, remedy(name),
                     folders.empty() ? "lib/plumbline" : folders.front().lexically_normal().string()));
   }
 

@@ -102,41 +102,48 @@ core::Result<void> mask_depth(const std::string& mask_file, cv::Mat& depth) {
   return {};
 }
 
-core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
-                                 VideoFrames* video) {
-  const int reduction = layout.color_reduction;
-  auto image = read_stored(layout, file, video);
-  if (!image) return image;
-  const bool deep = image->depth() == CV_16U && image->channels() >= 3;
-  if (image->depth() != CV_8U && !deep) {
+core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
+                                   int reduction) {
+  const bool deep = image.depth() == CV_16U && image.channels() >= 3;
+  if (image.depth() != CV_8U && !deep) {
     return core::input_error(
-        fmt::format("{}: the colour image has {}; 8 bits are needed", file, type_name(*image)));
+        fmt::format("{}: the colour image has {}; 8 bits are needed", name, type_name(image)));
   }
   sensor::Pinhole stored = camera;
   stored.width *= reduction;
   stored.height *= reduction;
-  if (auto size = check_size(file, *image, stored, "colour"); !size) return tl::unexpected(size.error());
-  if (reduction > 1) cv::resize(*image, *image, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
-  if (deep) image->convertTo(*image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
-  if (image->channels() == 1) cv::cvtColor(*image, *image, cv::COLOR_GRAY2BGR);
-  if (image->channels() == 4) cv::cvtColor(*image, *image, cv::COLOR_BGRA2BGR);
+  if (auto size = check_size(name, image, stored, "colour"); !size) return tl::unexpected(size.error());
+  if (reduction > 1) cv::resize(image, image, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
+  if (deep) image.convertTo(image, CV_8U, 1.0 / 257.0);  // 65535 becomes 255
+  if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
   return image;
+}
+
+core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
+                                   double depth_scale) {
+  if (image.type() == CV_64FC1) image.convertTo(image, CV_32F);
+  if (image.type() == CV_16UC3 && channels_are_equal(image)) cv::extractChannel(image, image, 0);
+  if (image.type() != CV_16UC1 && image.type() != CV_32FC1) {
+    return core::input_error(
+        fmt::format("{}: the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
+                    "of 32 bits in metres (TIFF or EXR)",
+                    name, type_name(image)));
+  }
+  if (auto size = check_size(name, image, camera, "depth"); !size) return tl::unexpected(size.error());
+  return image.type() == CV_32FC1 ? depth_units(image, depth_scale) : image;
+}
+
+core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
+                                 VideoFrames* video) {
+  auto image = read_stored(layout, file, video);
+  return image ? color_pixels(file, std::move(*image), camera, layout.color_reduction) : image;
 }
 
 core::Result<cv::Mat> read_depth(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,
                                  double depth_scale) {
   auto image = read_stored(layout, file);
-  if (!image) return image;
-  if (image->type() == CV_64FC1) image->convertTo(*image, CV_32F);
-  if (image->type() == CV_16UC3 && channels_are_equal(*image)) cv::extractChannel(*image, *image, 0);
-  if (image->type() != CV_16UC1 && image->type() != CV_32FC1) {
-    return core::input_error(
-        fmt::format("{}: the depth image has {}; a 16-bit PNG or PGM with one channel is needed, or floats "
-                    "of 32 bits in metres (TIFF or EXR)",
-                    file, type_name(*image)));
-  }
-  if (auto size = check_size(file, *image, camera, "depth"); !size) return tl::unexpected(size.error());
-  return image->type() == CV_32FC1 ? depth_units(*image, depth_scale) : *image;
+  return image ? depth_pixels(file, std::move(*image), camera, depth_scale) : image;
 }
 
 sensor::RgbdFrame rectified_frame(std::size_t index, const PairInfo& pair, const cv::Mat& color,

@@ -29,6 +29,12 @@ core::Result<cv::Mat> read_stored(const Layout& layout, const std::string& name,
 /// A file's bytes, undecoded. Error (kInput): cannot be read.
 core::Result<StoredImage> stored_file(const std::string& file);
 
+/// Pixels that were read already as read_color and read_depth give them; `name` is for messages.
+core::Result<cv::Mat> color_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
+                                   int reduction = 1);
+core::Result<cv::Mat> depth_pixels(const std::string& name, cv::Mat image, const sensor::Pinhole& camera,
+                                   double depth_scale);
+
 /// CV_8UC3, BGR, of the camera's size; stored Layout::color_reduction times as large. Grey, transparent and
 /// 16-bit images are converted. Error (kInput): names the file and what is wrong.
 core::Result<cv::Mat> read_color(const Layout& layout, const std::string& file, const sensor::Pinhole& camera,

@@ -22,7 +22,7 @@ LAYERS = [
     ["viz", "exports"],
     ["pipeline", "report"],
     ["net"],
-    ["cli"],
+    ["cli", "python"],
 ]
 LAYER_OF = {module: height for height, layer in enumerate(LAYERS) for module in layer}
 # Folders of a module that must not see another one: who runs a graph knows no stage.

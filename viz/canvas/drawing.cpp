@@ -2,8 +2,6 @@
 // Hands on to the part that draws, which has functions of the same names, and stands in for GLX.
 #include "canvas/drawing.hpp"
 
-#include <cstring>
-
 namespace plumbline::viz {
 namespace {
 
@@ -30,37 +28,11 @@ core::Result<void> draw_graph(const std::string& dot, const std::filesystem::pat
   return hand_on(&Drawing::draw_graph, dot, file);
 }
 
+Drawing::GlFunction offscreen_function(const char* name) {
+  const auto& drawing = core::part<Drawing>();
+  return drawing ? (*drawing)->gl_function(name) : nullptr;
+}
+
 }  // namespace plumbline::viz
 
-// GLEW's four calls to GLX (offscreen.cpp). They are here and not in the part because OpenCV loads libGLX
-// together with the program: only the program itself comes before that.
-extern "C" {
-
-using GlFunction = plumbline::viz::Drawing::GlFunction;
-
-__attribute__((visibility("default"))) void* glXGetCurrentDisplay() {
-  static char any;  // GLEW only asks whether there is one
-  return &any;
-}
-
-__attribute__((visibility("default"))) int glXQueryVersion(void* /*display*/, int* major, int* minor) {
-  if (major != nullptr) *major = 1;
-  if (minor != nullptr) *minor = 4;
-  return 1;
-}
-
-__attribute__((visibility("default"))) const char* glXGetClientString(void* /*display*/, int /*name*/) {
-  return "";
-}
-
-__attribute__((visibility("default"))) GlFunction glXGetProcAddressARB(const unsigned char* name) {
-  const char* text = reinterpret_cast<const char*>(name);
-  if (std::strcmp(text, "glXGetCurrentDisplay") == 0) {
-    return reinterpret_cast<GlFunction>(&glXGetCurrentDisplay);
-  }
-  if (std::strncmp(text, "glX", 3) == 0) return nullptr;
-  const auto& drawing = plumbline::core::part<plumbline::viz::Drawing>();
-  return drawing ? (*drawing)->gl_function(text) : nullptr;
-}
-
-}  // extern "C"
+#include "canvas/glx_stand_ins.hpp"

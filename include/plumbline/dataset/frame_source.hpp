@@ -77,15 +77,22 @@ class FrameSource {
   }
   /// Whether frames come while others are read: size() grows, and how many there will be is not known.
   [[nodiscard]] virtual bool live() const { return false; }
-  /// Of a live source: waits, at most so long, until frame `index` can be read and it is known whether
-  /// another one follows.
+  /// Of a live source: waits, at most so long, until decided(index).
   virtual void wait_for(std::size_t /*index*/, std::chrono::milliseconds /*most*/) const {}
-  /// Of a live source: frame `index` can be read and it is known whether another one follows (then size() is
-  /// larger); or that no such frame will come.
+  /// Of a live source: frame `index` can be read; or it is known that no such frame will come.
   [[nodiscard]] virtual bool decided(std::size_t /*index*/) const { return true; }
   /// Of a live source: frame `index`, one of the latest 256 or so, is wanted again later; others are
   /// forgotten.
   virtual void keep(std::size_t /*index*/) const {}
+  /// Of a live source: all is done with frame `index`, but that it may be read again if it was kept.
+  virtual void release(std::size_t /*index*/) const {}
+  /// Frame `index`, which has been read, is the last one. Of a live source it may wait until that is known,
+  /// or `stop`: then it is not.
+  [[nodiscard]] virtual bool is_last(std::size_t index, const core::StopToken& /*stop*/) const {
+    return index + 1 == size();
+  }
+  /// Of a live source: nobody wants a result any more.
+  [[nodiscard]] virtual bool given_up() const { return false; }
   /// Of a live source: ends it and what it writes itself. Error (kOutput): the record.
   [[nodiscard]] virtual core::Result<void> finish() const { return {}; }
   /// Of a live source that has ended.

@@ -13,6 +13,7 @@
 #include "plumbline/core/log.hpp"
 #include "plumbline/core/stop.hpp"
 #include "plumbline/dataset/frame_source.hpp"
+#include "plumbline/dataset/live_frames.hpp"
 #include "plumbline/mapping/other_maps.hpp"
 #include "plumbline/pipeline/run.hpp"
 #include "plumbline/pipeline/summary.hpp"
@@ -27,6 +28,9 @@ struct MapRequest : RunRequest {
   bool resume = false;              ///< go on from what an interrupted run left in OUT.partial
   double pace_hz = 0.0;  ///< play each recording at so many frames a second, at most; 0: as fast as that goes
   std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
+  /// Frames that are still coming, in the place of `input`, which is then only a name for the results.
+  /// Nothing is resumed. The run ends when they are closed.
+  std::shared_ptr<dataset::LiveFrames> live;
   /// Called before the first frame with the folder that the run writes into, where map.db will be, and again
   /// when the run begins anew with another camera: nothing of before is there then. May be empty.
   std::function<void(const std::filesystem::path&)> prepared;

@@ -8,31 +8,35 @@
 
 #include "plumbline/cloud/types.hpp"
 #include "plumbline/geometry/trajectory.hpp"
+#include "plumbline/pipeline/live_pose.hpp"
 
 namespace plumbline::pipeline {
 
-/// Called by stages, from several threads at a time; must return quickly. Poses are in the frame of the map
-/// of `robot`, as it is at that moment; metres.
+/// Called by stages, from several threads at a time; must return quickly. What is not overridden is ignored.
+/// Poses are in the frame of the map of `robot`, as it is at that moment; metres.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
   /// Before all else, and when another one comes: the robots, by number.
-  virtual void begins(const std::vector<std::string>& robots) = 0;
+  virtual void begins(const std::vector<std::string>& /*robots*/) {}
   /// Of several robots: where the map of one lies in the frame that it shares with others.
-  virtual void placed(std::int32_t robot, double stamp, const geometry::Rigid3& shared_from_map) = 0;
+  virtual void placed(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*shared_from_map*/) {
+  }
   /// A frame that was tracked, in the order of frames. `odometry_from_camera` is the same way without the
   /// corrections of loops and adjustments: it never jumps.
-  virtual void tracked(std::int32_t robot, double stamp, const geometry::Rigid3& map_from_camera,
-                       const geometry::Rigid3& odometry_from_camera) = 0;
+  virtual void tracked(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*map_from_camera*/,
+                       const geometry::Rigid3& /*odometry_from_camera*/) {}
+  /// Every frame, in the order of frames.
+  virtual void processed(const LivePose& /*pose*/) {}
   /// After each keyframe: the poses of all, by stamp.
-  virtual void keyframes(std::int32_t robot, const geometry::Trajectory& path) = 0;
+  virtual void keyframes(std::int32_t /*robot*/, const geometry::Trajectory& /*path*/) {}
   /// The cloud of a keyframe, in whatever order; points that are not finite are none.
-  virtual void added(std::int32_t robot, double stamp, const geometry::Rigid3& map_from_cloud,
-                     const cloud::Cloud& cloud) = 0;
+  virtual void added(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*map_from_cloud*/,
+                     const cloud::Cloud& /*cloud*/) {}
   /// When all is done: the tracked frames of each robot, by number, and the merged cloud, all in one frame:
   /// that of the map of a robot alone, else the one in which the robots' maps were merged.
-  virtual void finished(const std::vector<geometry::Trajectory>& paths,
-                        const geometry::Rigid3& map_from_cloud, const cloud::Cloud& cloud) = 0;
+  virtual void finished(const std::vector<geometry::Trajectory>& /*paths*/,
+                        const geometry::Rigid3& /*map_from_cloud*/, const cloud::Cloud& /*cloud*/) {}
 };
 
 }  // namespace plumbline::pipeline

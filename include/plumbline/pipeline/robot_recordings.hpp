@@ -59,6 +59,12 @@ class RobotRecordings : public dataset::FrameSource {
   }
   [[nodiscard]] bool decided(std::size_t index) const override { return recordings_.front()->decided(index); }
   void keep(std::size_t index) const override { recordings_.front()->keep(index); }
+  void release(std::size_t index) const override { recordings_.front()->release(index); }
+  [[nodiscard]] bool given_up() const override { return recordings_.front()->given_up(); }
+  /// The last one of its robot.
+  [[nodiscard]] bool is_last(std::size_t index, const core::StopToken& stop) const override {
+    return recordings_[static_cast<std::size_t>(robot_of(index))]->is_last(frame_of(index), stop);
+  }
   [[nodiscard]] core::Result<void> finish() const override { return recordings_.front()->finish(); }
   [[nodiscard]] dataset::LiveReport report() const override { return recordings_.front()->report(); }
   /// The first that one of the recordings has.

@@ -24,6 +24,9 @@ struct RunRequest {
   cloud::FilterRegistry filters = cloud::builtin_filters();  ///< with those of plugins
   bool replace = false;                                      ///< replace an earlier result
   std::shared_ptr<RunObserver> observer;                     ///< who looks on; null: nobody
+  /// Called at the end of a run with the name of each stage whose end begins ("refine", "fuse, output"). May
+  /// be empty.
+  std::function<void(const std::string&)> finishing;
 };
 
 struct RunReport {

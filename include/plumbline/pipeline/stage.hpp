@@ -147,6 +147,7 @@ struct RunHooks {
   std::function<void(maps::Map&)>
       alter_map;                    ///< for tests: changes the map when tracking has ended; may be empty
   RunObserver* observer = nullptr;  ///< who looks on; null: nobody
+  std::function<void(const std::string&)> finishing;  ///< RunRequest::finishing
 };
 
 /// What a run lends to its stages; outlives them.

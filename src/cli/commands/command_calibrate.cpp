@@ -158,6 +158,7 @@ void add_calibrate(CLI::App& app, Session& session) {
       ->type_name("NAME|FILE");
   add_topic_option(*command, request->open);
   add_time_range(*command, request->open);
+  add_progress_option(*command, session);
   command->add_option("--views", request->options.views, "Largest number of keyframes and frames to adjust")
       ->check(CLI::Range(16, 2000));
 }

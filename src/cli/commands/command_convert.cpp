@@ -37,6 +37,7 @@ core::Result<void> convert(Session& session, ConvertRequest& request) {
   options.progress = [&](std::size_t frames) { told(frames, (*source)->size()); };
 
   const auto summary = dataset::convert_recording(**source, request.output, options, console);
+
   console.end_progress();
   if (!summary) return tl::unexpected<core::Error>(summary.error());
 
@@ -66,6 +67,7 @@ void add_convert(CLI::App& app, Session& session) {
       ->type_name("N")
       ->check(CLI::Range(1, 100000));
   command->add_flag("--force", request->replace, "Replace an earlier copy");
+  add_progress_option(*command, session);
 }
 
 }  // namespace plumbline::cli

@@ -158,6 +158,7 @@ void add_export(CLI::App& app, Session& session) {
 
   command->add_flag("--force", request.replace, "Replace the folder of an earlier export");
   command->add_flag("--describe", state->page, "Print the page of all formats, docs/guide/exports.md");
+  add_progress_option(*command, session);
   state->flags.add(*command, request.options);
   command->footer(formats_help());
 }

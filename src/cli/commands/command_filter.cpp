@@ -164,6 +164,7 @@ void add_filter(CLI::App& app, Session& session) {
       ->required()
       ->type_name("IN... OUT")
       ->expected(2, -1);
+  add_progress_option(*command, session);
   add_plugin_option(*command, session);
 
   CLI::App* group = add_group(app, "filters", "List, describe and check filters");

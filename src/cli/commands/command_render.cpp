@@ -216,6 +216,7 @@ void add_render(CLI::App& app, Session& session) {
       ->check(CLI::Range(2, 3600))
       ->type_name("N");
   command->add_flag("--lines", request->lines, "Draw the map's 3D lines, too");
+  add_progress_option(*command, session);
   request->flags.add(*command, request->options);
 }
 

@@ -62,6 +62,7 @@ void add_synth(CLI::App& app, Session& session) {
   command->add_option("-o,--output", request->output, "Folder for the recordings")
       ->required()
       ->type_name("DIR");
+  add_progress_option(*command, session);
   request->flags.add(*command, request->options);
 }
 

@@ -3,17 +3,21 @@
 
 namespace plumbline::pipeline {
 
-void ObservedWay::report(const mapping::Slam& slam, const mapping::FrameReport& report, TrackedFrame& tracked,
-                         RunObserver& observer) {
-  if (!tracked.pose || !tracked.pose->tracked) return;
+void ObservedWay::report(std::size_t number, const mapping::Slam& slam, const mapping::FrameReport& report,
+                         TrackedFrame& tracked, RunObserver& observer) {
+  const auto pose_of = [&](const maps::FramePose& frame) {
+    return (frame.camera_from_reference * slam.map().camera_from_world(frame.reference)).inverse();
+  };
+  LivePose live{number, tracked.stamp, tracked.row.state, std::nullopt, tracked.keyframe};
+  const bool is_tracked = tracked.pose && tracked.pose->tracked;
+  if (is_tracked) live.world_from_camera = pose_of(*tracked.pose);
+  observer.processed(live);
+  if (!is_tracked) return;
   if (!component_.valid()) component_ = report.component;
   if (report.component != component_) return;
 
   // Both ends of a step in the map as it is now: what moved the map in between moves none.
-  const auto pose_of = [&](const maps::FramePose& frame) {
-    return (frame.camera_from_reference * slam.map().camera_from_world(frame.reference)).inverse();
-  };
-  const geometry::Rigid3 map_from_camera = pose_of(*tracked.pose);
+  const geometry::Rigid3 map_from_camera = *live.world_from_camera;
   odometry_from_camera_ =
       last_ ? odometry_from_camera_ * (pose_of(slam.frame_poses()[*last_]).inverse() * map_from_camera)
             : map_from_camera;

@@ -13,10 +13,10 @@ namespace plumbline::pipeline {
 
 class ObservedWay {
  public:
-  /// Tells the observer where the camera is, when the frame was tracked. A component has no place in the map
-  /// before it is joined.
-  void report(const mapping::Slam& slam, const mapping::FrameReport& report, TrackedFrame& tracked,
-              RunObserver& observer);
+  /// Tells the observer of a frame of the run, and where the camera is when it was tracked. A component has
+  /// no place in the map before it is joined.
+  void report(std::size_t frame, const mapping::Slam& slam, const mapping::FrameReport& report,
+              TrackedFrame& tracked, RunObserver& observer);
 
  private:
   core::KeyframeId component_;       ///< the one that is told of

@@ -59,6 +59,7 @@ RunContext context_of(const FuseRequest& request, const maps::StoredMaps& maps, 
   context.store.configuration = config_text(request, maps, graph);
   context.store.keeps_clouds = keeps_clouds(graph);
   context.hooks.observer = request.observer.get();
+  context.hooks.finishing = request.finishing;
   return context;
 }
 

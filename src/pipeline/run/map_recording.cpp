@@ -103,6 +103,11 @@ MapRequest in_order(MapRequest request) {
 
 core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& request,
                                                            const core::Executor& executor, core::Log& log) {
+  if (request.live != nullptr) {
+    std::vector<std::unique_ptr<dataset::FrameSource>> one;
+    one.push_back(request.live->recording());
+    return std::make_unique<RobotRecordings>(std::move(one));
+  }
   const std::filesystem::path scenes = request.pipelines_folder / "scenes";
   std::vector<std::string> inputs{request.input};
   inputs.insert(inputs.end(), request.others.begin(), request.others.end());
@@ -150,6 +155,9 @@ core::Result<void> fits(const Graph& graph, const MapRequest& request) {
 }
 
 core::Result<void> fits_live(const MapRequest& request) {
+  if (request.live != nullptr && request.resume) {
+    return core::usage_error("frames that come one by one: nothing of an earlier run can be resumed");
+  }
   if (!dataset::is_live_address(request.input)) return {};
   const char* wrong = request.resume ? "--resume" : request.pace_hz > 0.0 ? "--pace" : nullptr;
   if (wrong == nullptr) return {};
@@ -215,8 +223,10 @@ class MapRun {
     for (const RobotInfo& robot : source_->robots()) cameras.push_back(robot.camera);
     if (auto ok = write_cameras(output_->path(), source_->robots(), cameras); !ok)
       return tl::unexpected(ok.error());
+    if (request_.live != nullptr) request_.live->keep_in(output_->path());
     if (request_.prepared) request_.prepared(output_->path());
     const auto report = run_graph(graph_, context, progress, request_.pace_hz);
+    if (!report && source_->given_up()) return tl::unexpected(report.error());
     if (!report) return tl::unexpected(with_what_is_kept(report.error(), *output_));
     const auto recorded = source_->finish();
 
@@ -261,8 +271,8 @@ class MapRun {
     RunContext context;
     context.executor = &executor_;
     context.log = &log_;
-    // What is live ends by itself when it is asked to, and all that came is mapped.
-    context.stop = source_->live() ? core::StopToken() : stop;
+    // A live camera ends by itself when it is asked to, and all that came is mapped.
+    context.stop = source_->live() && request_.live == nullptr ? core::StopToken() : stop;
     context.output_folder = output_->path();
     context.input.source = source_.get();
     context.input.recordings = source_.get();
@@ -276,6 +286,7 @@ class MapRun {
     context.hooks.feedback = request_.feedback;
     context.hooks.alter_map = request_.alter_map;
     context.hooks.observer = request_.observer.get();
+    context.hooks.finishing = request_.finishing;
     return context;
   }
 

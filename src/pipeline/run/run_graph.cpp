@@ -112,6 +112,8 @@ class Runner {
     }
     report_.behind_s = pace_->behind_s();
     if (failure_.any()) return tl::unexpected(failure_.error());
+    if (given_up()) return core::input_error("the run was given up; nothing is written");
+    if (live_) total_ = std::max(started_, std::min(total_, context_.input.recordings->size()));
     report_.frames = started_;
     report_.frames_available = total_;
     report_.stopped = report_.frames < total_;
@@ -151,8 +153,10 @@ class Runner {
   }
 
   [[nodiscard]] bool ended() const {
-    return started_ >= total_ || context_.stop.stop_requested() || failure_.any();
+    return started_ >= total_ || context_.stop.stop_requested() || failure_.any() || given_up();
   }
+
+  [[nodiscard]] bool given_up() const { return live_ && context_.input.recordings->given_up(); }
 
   /// Of a live source, when it has ended: how many frames there are after all.
   void look_at_live() {
@@ -224,6 +228,7 @@ class Runner {
     report_.rss_mb.resize(tick.frame + 1, kUnknown);
     report_.rss_mb.back() = static_cast<float>(rss_mb());
     pace_->done(tick.frame);
+    if (live_) context_.input.recordings->release(tick.frame);
     if (progress_) progress_(tick.frame + 1, live_ ? 0 : total_);
   }
 
@@ -233,6 +238,7 @@ class Runner {
     for (std::size_t first = 0, count = 0; first < graph_.nodes.size(); first += count) {
       count = 1;
       while (first + count < graph_.nodes.size() && may_export_beside(first, first + count)) ++count;
+      report_finishing(first, count);
       const auto began = Clock::now();
       std::vector<core::Result<void>> finished(count);
       std::vector<core::Executor::Job> beside;
@@ -258,6 +264,16 @@ class Runner {
       }
     }
     return {};
+  }
+
+  /// Taps only write, and are not told.
+  void report_finishing(std::size_t first, std::size_t count) const {
+    if (!context_.hooks.finishing) return;
+    std::string names;
+    for (std::size_t n = first; n < first + count; ++n) {
+      if (!graph_.nodes[n].tap) names += (names.empty() ? "" : ", ") + graph_.nodes[n].name;
+    }
+    if (!names.empty()) context_.hooks.finishing(names);
   }
 
   /// Whether node `n` and those from `first` on only write results, none of which another one takes.

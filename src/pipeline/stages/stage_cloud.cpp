@@ -81,6 +81,7 @@ class CloudStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     recordings_ = context.input.recordings;
     observer_ = context.hooks.observer;
+    stop_ = context.stop;
     left_out_.start(filters_.chain().size());
     return {};
   }
@@ -89,12 +90,11 @@ class CloudStage : public Stage {
     const auto track = io.input<TrackedFrame>("track");
     const std::int32_t robot = recordings_->robot_of(io.frame());
     const std::size_t number = recordings_->frame_of(io.frame());
-    const std::size_t frames = recordings_->frames_of(robot);
     // The last frame shows what no other does when the camera was on its way somewhere.
-    const bool intermediate =
-        intermediate_every_ > 0 &&
-        (number % static_cast<std::size_t>(intermediate_every_) == 0 || number + 1 == frames);
-    const bool gives_cloud = track->keyframe.valid() || intermediate;
+    const bool gives_cloud =
+        track->keyframe.valid() ||
+        (intermediate_every_ > 0 && (number % static_cast<std::size_t>(intermediate_every_) == 0 ||
+                                     recordings_->is_last(io.frame(), stop_)));
     const bool gives_view =
         free_space_every_ > 0 && number % static_cast<std::size_t>(free_space_every_) == 0;
     if (!gives_cloud && !gives_view) return {};
@@ -144,6 +144,7 @@ class CloudStage : public Stage {
   LeftOut left_out_;
   const RobotRecordings* recordings_ = nullptr;
   RunObserver* observer_ = nullptr;
+  core::StopToken stop_;
 };
 
 }  // namespace

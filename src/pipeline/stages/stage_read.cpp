@@ -28,7 +28,8 @@ class ReadStage : public Stage {
   core::Result<void> start(const RunContext& context) override {
     source_ = context.input.source;
     log_ = context.log;
-    if (source_ == nullptr || source_->size() == 0) return core::input_error("the recording has no frames");
+    if (source_ == nullptr || (source_->size() == 0 && !source_->live()))
+      return core::input_error("the recording has no frames");
     if (context.resumed != nullptr) {
       resumed_ = context.resumed->rows.size();
       read_ = resumed_;

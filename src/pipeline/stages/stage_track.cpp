@@ -86,7 +86,7 @@ class TrackStage : public Stage {
     }
     if (report.keyframe.valid()) add_map(slam, number, *tracked);
     if (context_->hooks.observer != nullptr)
-      observed_[number].report(slam, report, *tracked, *context_->hooks.observer);
+      observed_[number].report(io.frame(), slam, report, *tracked, *context_->hooks.observer);
     io.output<TrackedFrame>("track", tracked);
 
     cameras_->after(io.frame(), slams_);

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# cmake --build DIR --target package: Debian packages of what was built, in DIR/packages. scripts/package makes and
+# checks them on the distribution that it runs on.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_PACKAGE_CONTACT "The Plumbline authors <maintainers@users.noreply.github.com>")
+set(CPACK_PACKAGE_HOMEPAGE_URL "https://github.com/plumbline/plumbline")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "RGB-D recordings in, one dense metric point cloud out")
+set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+set(CPACK_VERBATIM_VARIABLES ON)
+
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_ALL program net ros1 dev doc)
+if(TARGET plumbline_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(this_version "= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}")
+
+# plumbline_package(COMPONENT NAME SECTION "one line" "paragraph" DEPENDS... ): names of variables are CPack's.
+function(plumbline_package component name section summary description)
+  string(TOUPPER ${component} upper)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name} PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section} PARENT_SCOPE)
+  set(CPACK_COMPONENT_${upper}_DESCRIPTION "${summary}\n${description}" PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_DESCRIPTION "${summary}\n${description}" PARENT_SCOPE)
+  # Each package has its own copyright and changelog, as Debian wants it.
+  set(folder share/doc/${name})
+  install(FILES ${PROJECT_BINARY_DIR}/package_files/copyright ${PROJECT_BINARY_DIR}/package_files/changelog.Debian.gz
+          DESTINATION ${folder} COMPONENT ${component} EXCLUDE_FROM_ALL)
+endfunction()
+
+plumbline_package(program plumbline science "maps RGB-D recordings into one dense, metric point cloud"
+  "Tracks points, lines, depth and grey values of RGB-D recordings (folders, films, generated worlds), closes loops, refines the whole map and writes a coloured cloud, the camera's path, pictures and a report: on a CPU, without a display, with the same result every time. Further commands filter, measure, draw, export and fuse maps.")
+plumbline_package(net plumbline-net science "maps of robots over a network, for plumbline"
+  "The part of plumbline that its commands hub and robot need: robots send their maps to a hub, which fuses them (CycloneDDS). Brings a systemd unit for the hub.")
+plumbline_package(ros1 plumbline-ros1 science "ROS bags, for plumbline"
+  "The part of plumbline that reads ROS bags (ROS 1 .bag, ROS 2 .mcap and .db3) and writes MCAP files.")
+plumbline_package(dev libplumbline-dev libdevel "libraries and headers of plumbline"
+  "Static libraries, headers and the CMake package of plumbline: find_package(plumbline).")
+plumbline_package(python python3-plumbline python "plumbline as a Python module"
+  "Recordings, live mapping, results, filters, measures and pictures of plumbline, with numpy arrays.")
+plumbline_package(doc plumbline-doc doc "documentation of plumbline"
+  "The guide, the reference, the method with its formulas and the examples of plumbline.")
+
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "plumbline-net (${this_version}), plumbline-ros1 (${this_version})")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "ffmpeg, plumbline-doc")
+set(CPACK_DEBIAN_NET_PACKAGE_DEPENDS "plumbline (${this_version})")
+set(CPACK_DEBIAN_ROS1_PACKAGE_DEPENDS "plumbline (${this_version})")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "plumbline (${this_version}), python3 (>= 3.9), python3-numpy")
+set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_DOC_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
+# What cmake/plumblineConfig.cmake.in looks for.
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "plumbline (${this_version}), libpcl-dev, libopencv-dev, libopencv-contrib-dev, libeigen3-dev, libceres-dev, libtbb-dev, libyaml-cpp-dev, libspdlog-dev, libfmt-dev, nlohmann-json3-dev, libexpected-dev, libembree-dev, libnanoflann-dev, robin-map-dev, libsqlite3-dev, libzstd-dev, liblz4-dev, libdeflate-dev, libjpeg-dev")
+if(Python_VERSION_MAJOR)
+  math(EXPR next_minor "${Python_VERSION_MINOR} + 1")
+  string(APPEND CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", python3 (>= ${Python_VERSION_MAJOR}.${Python_VERSION_MINOR}), python3 (<< ${Python_VERSION_MAJOR}.${next_minor})")
+endif()
+
+# The hub as a service.
+install(FILES ${PROJECT_SOURCE_DIR}/scripts/plumbline-hub.service DESTINATION lib/systemd/system COMPONENT net EXCLUDE_FROM_ALL)
+set(CPACK_DEBIAN_NET_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/scripts/packaging/net/postinst
+    ${PROJECT_SOURCE_DIR}/scripts/packaging/net/prerm ${PROJECT_SOURCE_DIR}/scripts/packaging/net/postrm)
+
+# Pages and examples.
+install(DIRECTORY docs DESTINATION share/doc/plumbline-doc COMPONENT doc EXCLUDE_FROM_ALL)
+install(DIRECTORY examples DESTINATION share/doc/plumbline-doc COMPONENT doc EXCLUDE_FROM_ALL)
+
+# copyright and changelog.Debian.gz, once for all.
+configure_file(cmake/copyright.in ${PROJECT_BINARY_DIR}/package_files/copyright @ONLY)
+configure_file(cmake/changelog.in ${PROJECT_BINARY_DIR}/package_files/changelog.Debian @ONLY)
+execute_process(COMMAND gzip -9 -n -f ${PROJECT_BINARY_DIR}/package_files/changelog.Debian COMMAND_ERROR_IS_FATAL ANY)
+include(CPack)

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Frames that come one by one, of a camera or of another program, as a recording that grows.
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "plumbline/core/stop.hpp"
+#include "plumbline/dataset/frame_source.hpp"
+
+namespace plumbline::dataset {
+
+struct LiveFramesOptions {
+  std::string name = "live";
+};
+
+/// One pair of images as a camera gives it.
+struct LiveFrame {
+  double stamp = 0.0;                 ///< of colour, seconds
+  std::optional<double> depth_stamp;  ///< as the camera stamps it, without its depth_delay_s; none: `stamp`
+  /// CV_8UC3 (BGR) or CV_8UC1, of the camera's size.
+  cv::Mat color;
+  /// CV_16UC1 in units of 1 / depth_scale metres, or CV_32FC1 in metres, which are rounded to such units; 0
+  /// and what is not finite is no measurement. Of the depth camera's size.
+  cv::Mat depth;
+  std::optional<geometry::Rigid3> odometry;  ///< world_from_camera by the recorder's own odometry
+};
+
+/// A frame of a recording, as the camera gave it: what LiveFrames of source.camera() makes the same frame of.
+/// Errors (kInput): cannot be read, or the source has no stored images.
+core::Result<LiveFrame> stored_frame(const FrameSource& source, std::size_t index);
+
+/// Thread-safe: one thread pushes, others read a recording() of them. Of frames that were released, only
+/// those that were to be kept can be read again; they lie in a file without a name, compressed.
+class LiveFrames {
+ public:
+  explicit LiveFrames(const sensor::Camera& camera, LiveFramesOptions options = {});
+  ~LiveFrames();
+
+  /// Images as the camera took them; they are undistorted and registered when read. They are copied. Errors
+  /// (kInput): an image of another kind or size, depth that is NaN everywhere, a stamp that is not after the
+  /// last one, or after close().
+  core::Result<void> push(const LiveFrame& frame);
+  /// No more frames will come.
+  void close();
+  /// Nobody wants a result any more: the run ends with an error as soon as it can.
+  void abandon();
+
+  /// Those that have come and that nobody has begun to read.
+  [[nodiscard]] std::size_t waiting() const;
+  /// Waits until fewer than `most` frames wait, so many seconds at most; false when they did not suffice.
+  [[nodiscard]] bool wait_for_room(std::size_t most, double seconds) const;
+  /// Where kept frames are put: a folder with room. Without it they stay in memory.
+  void keep_in(const std::filesystem::path& folder);
+
+  /// The frames as a live source, which outlives this.
+  [[nodiscard]] std::unique_ptr<FrameSource> recording() const;
+
+ private:
+  class Store;
+  class View;
+  std::shared_ptr<Store> store_;
+};
+
+}  // namespace plumbline::dataset

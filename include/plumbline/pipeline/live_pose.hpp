@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "plumbline/core/ids.hpp"
+#include "plumbline/geometry/rigid3.hpp"
+
+namespace plumbline::pipeline {
+
+/// What the tracker knows of a frame as soon as it has gone through it.
+struct LivePose {
+  std::size_t frame = 0;  ///< number within the run
+  double stamp = 0.0;     ///< seconds
+  std::string state;      ///< "tracked", "lost" or "initialising"
+  /// In the frame of the first camera, metres; later optimisation moves it, and the results are set upright.
+  /// None: not tracked.
+  std::optional<geometry::Rigid3> world_from_camera;
+  core::KeyframeId keyframe;  ///< valid when the frame became a keyframe
+};
+
+}  // namespace plumbline::pipeline

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <pcl/console/print.h>
+
+#include "bindings.hpp"
+#include "plumbline/core/version.hpp"
+#include "plumbline/maps/store.hpp"
+
+namespace plumbline::python {
+
+void add_errors(py::module_& module) {
+  static const py::exception<Failure> base(module, "Error");
+  static const py::exception<Failure> internal(module, "InternalError", base);
+  static const py::exception<Failure> config(module, "ConfigError", base);
+  static const py::exception<Failure> input(module, "InputError", base);
+  static const py::exception<Failure> untrustworthy(module, "UntrustworthyError", base);
+  static const py::exception<Failure> output(module, "OutputError", base);
+
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const Failure& failure) {
+      const auto kind = failure.error.kind;
+
+      const py::handle type = kind == core::ErrorKind::kUsage           ? config
+                              : kind == core::ErrorKind::kInput         ? input
+                              : kind == core::ErrorKind::kUntrustworthy ? untrustworthy
+                              : kind == core::ErrorKind::kOutput        ? output
+                                                                        : internal;
+      PyErr_SetString(type.ptr(), failure.what());
+    }
+  });
+}
+
+}  // namespace plumbline::python
+
+PYBIND11_MODULE(_core, module) {
+  using namespace plumbline;
+  module.doc() = "What plumbline's Python classes are made of; use those.";
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what fails is told by the step that called PCL
+
+  module.attr("version") = core::version();
+  module.attr("store_format") = maps::kStoreFormat;
+  module.attr("source_pipelines") = PLUMBLINE_SOURCE_PIPELINES;
+  python::add_errors(module);
+  python::add_cameras(module);
+  python::add_recordings(module);
+  python::add_runs(module);
+  python::add_clouds(module);
+  python::add_maps(module);
+  python::add_measures(module);
+}

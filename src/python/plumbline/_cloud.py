@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Point clouds as arrays."""
+from __future__ import annotations
+
+import os
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._paths import pipelines
+from ._values import PathLike, nested
+
+
+class FilterReport(NamedTuple):
+    """What one filter of a chain did; points are those with finite coordinates."""
+
+    type: str
+    points_in: int
+    points_out: int
+
+
+class Cloud:
+    """A point cloud. Its arrays share its memory: nothing is copied, and what is written into them is in the cloud.
+
+    reports  what the filters did, of a cloud that `filter` has made
+    """
+
+    def __init__(self, core: _core.PointCloud, reports: Sequence[FilterReport] = ()) -> None:
+        self._core = core
+        self.reports: List[FilterReport] = list(reports)
+
+    @classmethod
+    def of(
+        cls,
+        points: npt.ArrayLike,
+        *,
+        colors: Optional[npt.ArrayLike] = None,
+        normals: Optional[npt.ArrayLike] = None,
+        columns: Optional[Mapping[str, npt.ArrayLike]] = None,
+    ) -> "Cloud":
+        """A cloud of arrays: points N x 3 (metres), colors N x 3 (0-255, red first), normals N x 3, and one number a
+        point in each column. Without colors white, without normals NaN. Raises InputError for other shapes."""
+        return cls(_core.PointCloud(
+            np.asarray(points, np.float32),
+            None if colors is None else np.asarray(colors, np.uint8),
+            None if normals is None else np.asarray(normals, np.float32),
+            dict(columns or {}),
+        ))
+
+    @classmethod
+    def read(cls, file: PathLike) -> "Cloud":
+        """PLY, PCD, XYZ or CSV. Raises InputError."""
+        return cls(_core.PointCloud.read(os.fspath(file)))
+
+    def write(self, file: PathLike) -> None:
+        """.ply or .pcd, binary, with all columns. Raises ConfigError (another ending), OutputError."""
+        self._core.write(os.fspath(file))
+
+    def to_ply(self, file: PathLike) -> None:
+        """The same as write, for a name that ends in .ply."""
+        self.write(file)
+
+    def to_open3d(self) -> Any:
+        """An open3d.geometry.PointCloud with colours and normals (copies). Raises ImportError without Open3D."""
+        import open3d  # type: ignore[import]
+
+        cloud = open3d.geometry.PointCloud()
+        cloud.points = open3d.utility.Vector3dVector(self.points.astype(np.float64))
+        cloud.colors = open3d.utility.Vector3dVector(self.colors.astype(np.float64) / 255.0)
+        if np.isfinite(self.normals).all():
+            cloud.normals = open3d.utility.Vector3dVector(self.normals.astype(np.float64))
+        return cloud
+
+    def __len__(self) -> int:
+        return len(self._core)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """A column by its name: "confidence", "observations" ..., or a field of `array`."""
+        columns = self.columns
+        return columns[name] if name in columns else self.array[name]
+
+    def __repr__(self) -> str:
+        return f"<plumbline.Cloud: {len(self)} points, columns {sorted(self.columns)}>"
+
+    @property
+    def points(self) -> npt.NDArray[np.float32]:
+        """N x 3, metres. Of files with large coordinates `shift` is to be added."""
+        return self._core.points
+
+    @property
+    def normals(self) -> npt.NDArray[np.float32]:
+        """N x 3, unit, towards the camera that saw the point; NaN: unknown."""
+        return self._core.normals
+
+    @property
+    def colors(self) -> npt.NDArray[np.uint8]:
+        """N x 3, 0-255, red first."""
+        return self._core.colors
+
+    @property
+    def array(self) -> npt.NDArray[Any]:
+        """Structured: fields x y z nx ny nz (float32) r g b (uint8)."""
+        return self._core.array
+
+    @property
+    def columns(self) -> Dict[str, npt.NDArray[Any]]:
+        """One number a point each, by name: confidence (0-1), observations, robot, sigma (m), and others."""
+        return self._core.columns
+
+    @property
+    def shift(self) -> npt.NDArray[np.float64]:
+        """3, metres: taken off large coordinates while reading, added again when written."""
+        return self._core.shift
+
+
+CloudLike = Union[Cloud, PathLike]
+
+
+def cloud_of(given: object) -> Cloud:
+    """A Cloud, a Result, or a file."""
+    if isinstance(given, Cloud):
+        return given
+    own = getattr(given, "cloud", None)
+    if isinstance(own, Cloud):
+        return own
+    path = os.fspath(given)  # type: ignore[call-overload]
+    return Cloud.read(os.path.join(path, "map.ply") if os.path.isdir(path) else path)
+
+
+def filter(  # noqa: A001, the program's name for it
+    cloud: CloudLike, chain: Union[str, Sequence[Mapping[str, Any]]], *, threads: int = 0
+) -> Cloud:
+    """The cloud after a chain of filters.
+
+    chain  a shipped name ("map"), a file, or the filters themselves:
+           [{"type": "voxel_grid", "leaf": "2 cm"}, {"type": "statistical_outlier"}]
+
+    Raises ConfigError with every mistake of the chain. What each filter did is in `.reports`.
+    """
+    if isinstance(chain, str) or hasattr(chain, "__fspath__"):
+        text, is_yaml = os.fspath(chain), False  # type: ignore[call-overload]
+    else:
+        text, is_yaml = nested(list(chain)), True
+    result, reports = cloud_of(cloud)._core.filter(text, is_yaml, pipelines() / "filters", threads)
+    return Cloud(result, [FilterReport(*report) for report in reports])

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings of every layout and bag that the program reads."""
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from typing import Iterator, Mapping, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Camera
+from ._paths import pipelines
+from ._trajectory import Trajectory
+from ._values import PathLike, tell
+
+
+def camera(name_or_file: PathLike) -> Camera:
+    """A shipped calibration ("tum_fr1") or a camera file of any program that plumbline knows.
+
+    Raises ConfigError: no such camera, or not one, with the place in the file.
+    """
+    return Camera._find(os.fspath(name_or_file), pipelines())
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One RGB-D pair. The arrays are not copied; keep them as long as you like.
+
+    index        number within the recording
+    stamp        of color, seconds
+    depth_stamp  of depth, seconds
+    color        height x width x 3, uint8, blue first, as OpenCV has it
+    depth        height x width: float32, metres along the optical axis, 0 = no measurement;
+                 of a recording opened with raw=True uint16 in units of 1 / camera.depth_scale m
+    odometry     4 x 4, world_from_camera by the recorder's own odometry, metres; None: there is none
+    camera       that both images belong to, pixel for pixel (raw=True: before undistortion and registration)
+    """
+
+    index: int
+    stamp: float
+    depth_stamp: float
+    color: npt.NDArray[np.uint8]
+    depth: Union[npt.NDArray[np.float32], npt.NDArray[np.uint16]]
+    odometry: Optional[npt.NDArray[np.float64]]
+    camera: Camera
+
+
+class Recording:
+    """A recording: `len`, frames by number, iteration. Made by `open`. Frames may be read from several threads."""
+
+    def __init__(self, core: _core.Recording, raw: bool) -> None:
+        self._core = core
+        self._raw = raw
+        self._camera = core.camera
+
+    def __len__(self) -> int:
+        return len(self._core)
+
+    def __getitem__(self, index: int) -> Frame:
+        """Raises InputError when this frame cannot be read, IndexError when there is none."""
+        if index < 0:
+            index += len(self)
+        if not 0 <= index < len(self):
+            raise IndexError(f"{self.name}: frame {index} of {len(self)}")
+        read = self._core.stored if self._raw else self._core.read
+        return Frame(*read(index), camera=self._camera)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """All frames in order. Those that cannot be read are left out, with a warning each, as the program does."""
+        for index in range(len(self)):
+            try:
+                frame = self[index]
+            except _core.InputError as problem:
+                if self._raw and "no stored images" in str(problem):
+                    raise
+                warnings.warn(f"frame {index} is skipped: {problem}", RuntimeWarning, stacklevel=2)
+                continue
+            yield frame
+
+    def __repr__(self) -> str:
+        return f"<plumbline.Recording {self.name}: {len(self)} frames, {self.format}>"
+
+    @property
+    def name(self) -> str:
+        """Short: the folder's or the file's."""
+        return self._core.name
+
+    @property
+    def format(self) -> str:
+        """The layout: "tum", "mcap", "synth" ..."""
+        return self._core.format
+
+    @property
+    def camera(self) -> Camera:
+        return self._camera
+
+    @property
+    def stamps(self) -> npt.NDArray[np.float64]:
+        """Of all frames, seconds."""
+        return self._core.stamps
+
+    @property
+    def truth(self) -> Optional[Trajectory]:
+        """The true path, where one comes with the recording."""
+        arrays = self._core.truth
+        return None if arrays is None else Trajectory(*arrays)
+
+
+def open(  # noqa: A001, as in gzip.open
+    input: PathLike,  # noqa: A002
+    *,
+    camera: PathLike = "",
+    format: str = "auto",  # noqa: A002
+    start: float = 0.0,
+    end: Optional[float] = None,
+    every: int = 1,
+    raw: bool = False,
+    poses: str = "prior",
+    topics: Optional[Mapping[str, str]] = None,
+    threads: int = 0,
+) -> Recording:
+    """Opens a folder, a ROS bag, a film or "synth:SCENE?frames=900".
+
+    camera   shipped calibration or file; "": what the recording brings along
+    format   layout, where it is not to be recognised
+    start    seconds after the first frame
+    end      seconds after the first frame; None: to the last one
+    every    every n-th frame
+    raw      frames as the camera took them, for Mapper.feed; else undistorted, with depth in metres and registered
+    topics   of a bag: {"color": ..., "depth": ..., "info": ..., "depth_info": ...}
+    threads  for generated worlds; 0: one per core
+
+    Raises InputError (not there, not a recording), ConfigError (camera, format). Warnings go to the logger "plumbline".
+    """
+    core = _core.open(
+        os.fspath(input), pipelines(), os.fspath(camera), format, start, end, every, poses, threads, dict(topics or {})
+    )
+    tell(core.messages())
+    return Recording(core, raw)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results: folders that map, fuse and Mapper have written."""
+from __future__ import annotations
+
+import csv
+import functools
+import json
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Dict, NamedTuple, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._cloud import Cloud
+from ._core import Camera
+from ._recording import Frame, open as open_recording
+from ._trajectory import Trajectory
+from ._values import PathLike
+
+
+class Keyframes(NamedTuple):
+    """All N keyframes by time.
+
+    stamps          N, seconds
+    poses           N x 4 x 4, world_from_camera, metres
+    numbers         N, as in keyframes.csv and Landmarks
+    frames          N, numbers of the frames that they were made of; -1: not known (no map.db)
+    sigma_position  N, metres, beside the first keyframe: root of the trace of the covariance; NaN: not known
+    sigma_rotation  N, radians
+    """
+
+    stamps: npt.NDArray[np.float64]
+    poses: npt.NDArray[np.float64]
+    numbers: npt.NDArray[np.int32]
+    frames: npt.NDArray[np.int64]
+    sigma_position: npt.NDArray[np.float64]
+    sigma_rotation: npt.NDArray[np.float64]
+
+
+class Landmarks(NamedTuple):
+    """Points of the sparse map, and M observations of them: their tracks.
+
+    points     N x 3, metres, in the frame of the result
+    point      M, which of `points`
+    keyframe   M, number of the keyframe that saw it (Keyframes.numbers)
+    frame      M, that keyframe's frame
+    pixel      M x 2, where, in the rectified image; (0, 0) is the centre of the first pixel
+    """
+
+    points: npt.NDArray[np.float64]
+    point: npt.NDArray[np.int32]
+    keyframe: npt.NDArray[np.int32]
+    frame: npt.NDArray[np.int64]
+    pixel: npt.NDArray[np.float32]
+
+
+class Result:
+    """A result folder. What is asked for is read when it is asked for first.
+
+    All positions are metres in one frame: z up, 0 on the floor, x along the walls, where these were found.
+    """
+
+    def __init__(self, folder: PathLike, _kept: Optional["TemporaryDirectory[str]"] = None) -> None:
+        self.folder = Path(folder)
+        self._kept = _kept  # a Mapper's own folder lives as long as its result
+        _core.robot_folders(self.folder)  # InputError: not a result
+
+    def __repr__(self) -> str:
+        return f"<plumbline.Result {self.folder}>"
+
+    @functools.cached_property
+    def summary(self) -> Dict[str, Any]:
+        """summary.json: counts, times, memory, evidence."""
+        with open(self.folder / "summary.json", encoding="utf-8") as file:
+            return dict(json.load(file))
+
+    @property
+    def reason(self) -> str:
+        """Why the result must not be trusted; "" if nothing speaks against it."""
+        return str(self.summary.get("reason", ""))
+
+    @property
+    def trustworthy(self) -> bool:
+        return self.reason == ""
+
+    @functools.cached_property
+    def trajectory(self) -> Trajectory:
+        """Poses of the tracked frames, of one robot; see `robots` for several."""
+        return Trajectory.read(self.folder / "trajectory.txt")
+
+    @functools.cached_property
+    def robots(self) -> Dict[str, Trajectory]:
+        """The path of each robot, by its name; of one robot under the name "". """
+        folders = _core.robot_folders(self.folder)
+        if len(folders) == 1 and folders[0] == self.folder:
+            return {"": self.trajectory}
+        return {folder.name: Trajectory.read(folder / "trajectory.txt") for folder in folders}
+
+    @functools.cached_property
+    def cloud(self) -> Cloud:
+        """The merged cloud, map.ply or map.pcd."""
+        ply = self.folder / "map.ply"
+        return Cloud.read(ply if ply.exists() else self.folder / "map.pcd")
+
+    @functools.cached_property
+    def keyframes(self) -> Keyframes:
+        path = Trajectory.read(self.folder / "keyframes.txt")
+        with open(self.folder / "keyframes.csv", encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        numbers = np.array([int(row["keyframe"]) for row in rows], np.int32)
+        known: Dict[int, int] = {}
+        if (self.folder / "map.db").exists():
+            known = _core.keyframe_frames(self.folder)
+
+        def column(name: str) -> npt.NDArray[np.float64]:
+            return np.array([float(row[name]) if row[name] else np.nan for row in rows])
+
+        frames = np.array([known.get(int(number), -1) for number in numbers], np.int64)
+        return Keyframes(path.stamps, path.poses, numbers, frames, column("sigma_position"), column("sigma_rotation"))
+
+    @functools.cached_property
+    def lines(self) -> npt.NDArray[np.float64]:
+        """N x 2 x 3: both ends of each 3D line."""
+        return _core.read_lines(self.folder / "lines.ply")
+
+    @functools.cached_property
+    def landmarks(self) -> Landmarks:
+        """Raises InputError when the result has no map.db (store.enabled=off)."""
+        return Landmarks(*_core.read_landmarks(self.folder))
+
+    @functools.cached_property
+    def camera(self) -> Camera:
+        """As it was used: given, or what the run found out about it. Of several robots that of the first."""
+        folder = _core.robot_folders(self.folder)[0]
+        file = folder / "camera.yaml"
+        return Camera.from_yaml((file if file.exists() else self.folder / "camera.yaml").read_text(encoding="utf-8"))
+
+    def image(self, frame: int) -> Frame:
+        """A frame of the recording that this was made from, where that still lies where it did. Raises InputError."""
+        recording = str(self.summary.get("input", ""))
+        return open_recording(recording)[frame]
+
+
+def load(folder: PathLike) -> Result:
+    """The result folder of an earlier run. Raises InputError: there is none."""
+    return Result(os.fspath(folder))

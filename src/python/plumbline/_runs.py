@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mapping: of recordings, of frames as they come, of maps."""
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, Callable, List, Mapping, Optional, Sequence, Type, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Camera
+from ._paths import pipelines
+from ._recording import camera as find_camera
+from ._result import Result
+from ._values import PathLike, overrides, tell
+
+Progress = Callable[[int, int], None]
+_LOOK_UP = 0.05  # seconds between two looks at signals and messages
+
+
+def _finish(run: _core.Background, progress: Optional[Progress] = None) -> None:
+    """Waits for a run. Ctrl-C has it write what it has first, and is raised then."""
+    interrupted: Optional[KeyboardInterrupt] = None
+    shown = (0, 0)
+    while True:
+        try:
+            ended = run.wait(_LOOK_UP)
+            tell(run.messages())
+            if progress is not None and run.progress != shown:
+                shown = run.progress
+                progress(*shown)
+            if ended:
+                break
+        except KeyboardInterrupt as pressed:
+            if interrupted is not None:
+                raise
+            interrupted = pressed
+            run.request_stop()
+        except BaseException:
+            run.request_stop()
+            raise
+    if interrupted is not None:
+        raise interrupted
+    reason = run.reason()
+    if reason:
+        tell([("WARNING", "the result is not trustworthy: " + reason)])
+
+
+def _files(given: Union[PathLike, Sequence[PathLike]]) -> List[str]:
+    if isinstance(given, (str, os.PathLike)):
+        return [os.fspath(given)]
+    return [os.fspath(one) for one in given]
+
+
+def map(  # noqa: A001, the program's name for it
+    recording: Union[PathLike, Sequence[PathLike]],
+    output: PathLike,
+    *,
+    pipeline: PathLike = "rgbd",
+    camera: PathLike = "",
+    format: str = "auto",  # noqa: A002
+    start: float = 0.0,
+    end: Optional[float] = None,
+    every: int = 1,
+    poses: str = "prior",
+    topics: Optional[Mapping[str, str]] = None,
+    threads: int = 0,
+    force: bool = False,
+    resume: bool = False,
+    progress: Optional[Progress] = None,
+    **options: Any,
+) -> Result:
+    """Maps a recording, or several, one per robot, into a result folder: `plumbline map` as a call.
+
+    progress  called with the number of frames that are done and of all frames, in this thread
+    threads   0: one per core; results do not depend on it
+    options   of stages: track={"loops": False} or **{"fuse.voxel": "2 cm"}
+
+    The interpreter is free meanwhile: other threads run. Ctrl-C ends the run, which writes what it has; then
+    KeyboardInterrupt is raised. Raises ConfigError, InputError, OutputError as the program's exit codes 2, 3, 5.
+    """
+    run = _core.start_map(
+        _files(recording), os.fspath(output), os.fspath(pipeline), overrides(options), pipelines(), os.fspath(camera),
+        format, start, end, every, poses, dict(topics or {}), threads, force, resume,
+    )
+    _finish(run, progress)
+    return Result(output)
+
+
+def fuse(
+    maps: Sequence[Union[PathLike, Result]],
+    output: PathLike,
+    *,
+    anchor: str = "",
+    pipeline: PathLike = "fuse",
+    threads: int = 0,
+    force: bool = False,
+    progress: Optional[Progress] = None,
+    **options: Any,
+) -> Result:
+    """Merges finished maps of several robots into one frame: `plumbline fuse` as a call.
+
+    anchor  robot whose map defines the frame; "": the one with the largest map
+    """
+    folders = [os.fspath(one.folder if isinstance(one, Result) else one) for one in maps]
+    run = _core.start_fuse(
+        folders, os.fspath(output), os.fspath(pipeline), overrides(options), pipelines(), anchor, threads, force
+    )
+    _finish(run, progress)
+    return Result(output)
+
+
+class Tracked:
+    """What became of a frame that was fed. Asking for anything but `done` and `dropped` waits for the tracker."""
+
+    def __init__(self, mapper: "Mapper", index: int, dropped: bool = False) -> None:
+        self._mapper = mapper
+        self.index = index
+        self.dropped = dropped
+        self._found: Optional[Any] = ("dropped", None, False) if dropped else None
+
+    def _wait(self) -> Any:
+        while self._found is None:
+            self._found = self._mapper._pose(self.index)
+        return self._found
+
+    @property
+    def done(self) -> bool:
+        """Whether the tracker has gone through it; does not wait."""
+        if self._found is None:
+            self._found = self._mapper._run.pose(self.index, 0.0)
+        return self._found is not None
+
+    @property
+    def state(self) -> str:
+        """ "tracked", "lost", "initialising"; "dropped": it was left out."""
+        return str(self._wait()[0])
+
+    @property
+    def pose(self) -> Optional[npt.NDArray[np.float64]]:
+        """4 x 4, world_from_camera, metres, in the frame of the first camera; None: not tracked. The results of
+        `finish` are optimised, and stand upright in a frame of their own."""
+        pose: Optional[npt.NDArray[np.float64]] = self._wait()[1]
+        return pose
+
+    @property
+    def keyframe(self) -> bool:
+        return bool(self._wait()[2])
+
+    def __repr__(self) -> str:
+        return f"<plumbline.Tracked {self.index}: {self.state if self.done else 'under way'}>"
+
+
+class Mapper:
+    """Maps frames as they come, of a camera or of any other source:
+
+        mapper = plumbline.Mapper(plumbline.camera("tum_fr3"))
+        for color, depth, stamp in frames:
+            print(mapper.feed(color, depth, stamp).pose)
+        result = mapper.finish()
+
+    camera     that the images are of; a Camera, a shipped name or a file
+    pipeline   shipped name or file; with a track stage
+    output     result folder; None: a temporary one, which lives as long as the result
+    name       of the robot, in results
+    queue      frames that may wait for the tracker; then `feed` waits, or with drop_late leaves the new one out
+    drop_late  leave frames out instead of letting them wait; `dropped` counts them
+    threads    0: one per core
+    options    of stages: track={"loops": False} or **{"fuse.voxel": "2 cm"}
+
+    One thread feeds. As a context manager it gives up what was not finished. After os.fork() use it in the process that
+    made it only; better start processes with the method "spawn".
+    """
+
+    def __init__(
+        self,
+        camera: Union[Camera, PathLike],
+        pipeline: PathLike = "rgbd",
+        *,
+        output: Optional[PathLike] = None,
+        name: str = "live",
+        queue: int = 16,
+        drop_late: bool = False,
+        threads: int = 0,
+        force: bool = False,
+        **options: Any,
+    ) -> None:
+        if queue < 1:
+            raise _core.ConfigError(f"queue: {queue} is out of range (allowed: at least 1)")
+        self._temporary = TemporaryDirectory(prefix="plumbline-") if output is None else None
+        self._output = Path(self._temporary.name) / name if self._temporary else Path(os.fspath(output or ""))
+        self._queue = queue
+        self._drop_late = drop_late
+        self._result: Optional[Result] = None
+        self._process = os.getpid()
+        self.dropped = 0
+        self.fed = 0
+        known = camera if isinstance(camera, Camera) else find_camera(camera)
+        self._run = _core.MapperRun(
+            known, self._output, os.fspath(pipeline), overrides(options), pipelines(), name, threads, force
+        )
+
+    def feed(
+        self,
+        color: npt.NDArray[np.uint8],
+        depth: Union[npt.NDArray[np.uint16], npt.NDArray[np.float32]],
+        stamp: float,
+        *,
+        depth_stamp: Optional[float] = None,
+        odometry: Optional[npt.NDArray[np.float64]] = None,
+    ) -> Tracked:
+        """Hands in a frame; the arrays are copied.
+
+        color        height x width x 3, uint8, blue first, or height x width (grey); as the camera took it
+        depth        height x width: uint16 in units of 1 / camera.depth_scale m, or float32 in metres (rounded to such
+                     units); 0 and what is not finite is no measurement
+        stamp        of color, seconds, later than the one before
+        depth_stamp  of depth, seconds; None: the same
+        odometry     4 x 4, world_from_camera by the source's own odometry, in a world of its own
+
+        Raises InputError: another dtype, shape or size than the camera's, not contiguous, NaN everywhere, a stamp that is
+        not later. The frame is then left out, and others can be fed. Errors of the run itself are raised here, too.
+        """
+        self._check()
+        while not self._run.wait_for_room(self._queue, 0.0 if self._drop_late else _LOOK_UP):
+            self._check()
+            if self._drop_late:
+                self.dropped += 1
+                return Tracked(self, -1, dropped=True)
+        index = self._run.push(stamp, depth_stamp, color, depth, odometry)
+        self.fed += 1
+        return Tracked(self, index)
+
+    def finish(self, progress: Optional[Progress] = None) -> Result:
+        """No more frames: refines the map, fuses the cloud, writes the results. Again: the same result.
+
+        Ctrl-C is raised when what there is has been written. Raises as `map`.
+        """
+        if self._result is None:
+            self._check_process()
+            self._run.close()
+            _finish(self._run.run, progress)
+            self._result = Result(self._output, self._temporary)
+        return self._result
+
+    def cancel(self) -> None:
+        """Gives the run up; nothing is written."""
+        if self._result is None:
+            self._run.abandon()
+            self._run.run.request_stop()
+
+    @property
+    def waiting(self) -> int:
+        """Frames that were fed and not tracked yet."""
+        return self._run.waiting
+
+    def __enter__(self) -> "Mapper":
+        return self
+
+    def __exit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
+        self.cancel()
+
+    def _check_process(self) -> None:
+        if os.getpid() != self._process:
+            raise _core.ConfigError("this Mapper belongs to the process that made it; make one after the fork")
+
+    def _check(self) -> None:
+        self._check_process()
+        if self._result is not None:
+            raise _core.InputError("no frame is taken any more: the mapper has finished")
+        tell(self._run.run.messages())
+        if self._run.run.done:
+            self._run.run.reason()  # raises what ended it
+            raise _core.InputError("no frame is taken any more: the run has ended")
+
+    def _pose(self, index: int) -> Optional[Any]:
+        found = self._run.pose(index, _LOOK_UP)
+        if found is None:
+            if self._result is None:
+                self._check()
+            elif self._run.pose(index, 0.0) is None:
+                raise _core.InputError(f"frame {index} was not tracked: the run ended before")
+        return found

@@ -1,0 +1,236 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The packages, made and tried: run_packages.py ROOT BUILD WORK packages|root|image|service
+
+packages  makes them of what is built, and has lintian look at them
+image     the steps of the Dockerfile's last stage, in such a root: no Docker engine is needed
+root      installs them with apt in a minimal Debian root of their own, maps, draws, reports, builds a project that finds
+          the library, runs Python, upgrades from a lower version, removes all; nothing may be left
+service   what systemd says of the hub's unit
+
+Exit code 77 where lintian, mmdebstrap, the right to make a root, or the network to fill it are not there.
+"""
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+SKIPPED = 77
+SUITE = "bookworm"
+PACKAGES = ["plumbline", "plumbline-net", "plumbline-ros1", "libplumbline-dev", "python3-plumbline", "plumbline-doc"]
+# What a run in the root leaves aside, by design of the tools themselves.
+LEFT_ALONE = re.compile(r"^(proc|sys|dev|tmp|run|packages|root/\.cache|var/(cache|log|lib/(apt|dpkg|systemd))|etc/ld\.so\.cache)")
+
+
+def run(*command, **options):
+    print("+", *command, flush=True)
+    return subprocess.run([str(word) for word in command], check=True, text=True, **options)
+
+
+def skip(why):
+    print(why)
+    sys.exit(SKIPPED)
+
+
+def packages(build):
+    return sorted((build / "packages").glob("*.deb"))
+
+
+def make(build):
+    shutil.rmtree(build / "packages", ignore_errors=True)
+    run("cmake", "--build", build, "--target", "plumbline_cli")
+    run("cpack", "--config", build / "CPackConfig.cmake", cwd=build, stdout=subprocess.DEVNULL)
+    names = {deb.name.split("_")[0] for deb in packages(build)}
+    missing = set(PACKAGES) - names
+    if "python3-plumbline" in missing and not (build / "lib" / "python").exists():
+        missing.remove("python3-plumbline")
+    assert not missing, f"packages that are not made: {missing}"
+
+
+def check_packages(_root, build, _work):
+    make(build)
+    for deb in packages(build):
+        depends = subprocess.run(["dpkg-deb", "-f", deb, "Depends"], capture_output=True, text=True, check=True).stdout
+        print(f"{deb.name}: {deb.stat().st_size / 1e6:.2f} MB; {depends.strip()}")
+        if "-doc" not in deb.name and "-dev" not in deb.name:
+            assert "libc6" in depends, f"{deb.name}: dpkg-shlibdeps has found nothing"
+    if shutil.which("lintian") is None:
+        skip("lintian is not installed (scripts/install-deps --judges)")
+    said = subprocess.run(["lintian", "--allow-root", "--fail-on", "error", *map(str, packages(build))], text=True,
+                          capture_output=True)
+    print(said.stdout, said.stderr)
+    return said.returncode
+
+
+class Root:
+    """A minimal Debian, entered with chroot."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def make(self):
+        made = subprocess.run(["mmdebstrap", "--variant=apt", "--quiet", "--aptopt=APT::Install-Recommends false", SUITE,
+                               str(self.folder)], text=True, capture_output=True)
+        if made.returncode != 0:
+            skip(f"mmdebstrap cannot make a {SUITE} root here: {made.stderr.strip().splitlines()[-1:]}")
+        # The proxy and sources of this machine hold in there, too.
+        for file in Path("/etc/apt/apt.conf.d").glob("*proxy*"):
+            shutil.copy(file, self.folder / "etc/apt/apt.conf.d")
+
+    def run(self, script, **options):
+        """A shell script in the root, with /proc and /dev for that long."""
+        enter = (f"mount -t proc proc {self.folder}/proc && mount --rbind /dev {self.folder}/dev && "
+                 f"exec chroot {self.folder} env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 "
+                 "DEBIAN_FRONTEND=noninteractive bash -euc \"$0\"")
+        print("+ (root)", script.strip().splitlines()[0], flush=True)
+        return subprocess.run(["unshare", "-m", "bash", "-euc", enter, script], check=True, text=True, **options)
+
+    def files(self):
+        found = set()
+        for folder, folders, names in os.walk(self.folder):
+            at = os.path.relpath(folder, self.folder)
+            folders[:] = [name for name in folders if not LEFT_ALONE.match(os.path.normpath(os.path.join(at, name)))]
+            found |= {os.path.normpath(os.path.join(at, name)) for name in names}
+        return {file for file in found if not LEFT_ALONE.match(file)}
+
+
+def lower_version(deb, work):
+    """The same package with a version below its own."""
+    folder = work / "lower" / deb.stem
+    run("dpkg-deb", "-R", deb, folder)
+    control = folder / "DEBIAN" / "control"
+    text = control.read_text()
+    version = re.search(r"^Version: (.*)$", text, re.M).group(1)
+    control.write_text(text.replace(version, version + "~before"))
+    run("dpkg-deb", "--root-owner-group", "-b", folder, work / "lower" / f"{deb.stem}.deb", stdout=subprocess.DEVNULL)
+
+
+MAP = """
+plumbline --version
+plumbline map "synth:room?frames=60&width=320&height=240" -o /tmp/room -q
+plumbline render /tmp/room -o /tmp/room.png
+plumbline report /tmp/room
+test -s /tmp/room/map.ply && test -s /tmp/room.png && test -s /tmp/room/report.html
+"""
+MISSING = """
+plumbline hub -o /tmp/hub --interface lo --robots 1 2>&1 | tee /tmp/said || true
+grep -q "install the package plumbline-net" /tmp/said
+plumbline convert /tmp/nothing.mcap /tmp/copy 2>&1 | tee /tmp/said || true
+"""
+PYTHON = """
+python3 /usr/share/doc/plumbline-doc/examples/python/map_folder.py "synth:room?frames=30&width=320&height=240" /tmp/python
+"""
+CONSUMER = """
+apt-get install -y -qq g++ cmake ninja-build >/dev/null
+cmake -S /packages/consumer -B /tmp/consumer -G Ninja -DCMAKE_BUILD_TYPE=Debug >/dev/null
+cmake --build /tmp/consumer >/dev/null
+mkdir -p /tmp/consumed && /tmp/consumer/consumer /tmp/consumed
+"""
+
+
+def check_root(root, build, work):
+    if os.geteuid() != 0 or shutil.which("mmdebstrap") is None:
+        skip("a root is made by root with mmdebstrap (scripts/install-deps --judges)")
+    if not packages(build):
+        make(build)
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    debian = Root(work / "root")
+    debian.make()
+    try:
+        try_packages(root, build, work, debian)
+    finally:
+        shutil.rmtree(debian.folder, ignore_errors=True)
+    return 0
+
+
+def try_packages(root, build, work, debian):
+    for deb in packages(build):
+        lower_version(deb, work)
+    shutil.copytree(work / "lower", debian.folder / "packages" / "lower", ignore=lambda _d, names:
+                    [name for name in names if not name.endswith(".deb")])
+    for deb in packages(build):
+        shutil.copy(deb, debian.folder / "packages")
+    shutil.copytree(root / "tests" / "consumer", debian.folder / "packages" / "consumer")
+    debian.run("apt-get update -qq")
+    before = debian.files()
+
+    begin = time.monotonic()
+    debian.run("apt-get install -y -qq /packages/plumbline_*.deb >/dev/null")
+    installed = time.monotonic()
+    debian.run(MAP)
+    print(f"installed in {installed - begin:.0f} s, from there to picture and report {time.monotonic() - installed:.0f} s")
+    debian.run(MISSING)
+    debian.run("apt-get install -y -qq --allow-downgrades /packages/lower/*.deb >/dev/null")
+    debian.run("apt-get install -y -qq /packages/*.deb >/dev/null; dpkg-query -W -f '${Package} ${Version}\\n' plumbline")
+    debian.run("dpkg-query -W -f '${Version}\\n' plumbline plumbline-net python3-plumbline | { ! grep before; }")
+    debian.run(PYTHON)
+    debian.run(CONSUMER)
+    debian.run("man -w plumbline-map >/dev/null 2>&1 || test -e /usr/share/man/man1/plumbline-map.1.gz || "
+               "echo 'man pages are left out of this root by its dpkg settings'")
+
+    debian.run(f"apt-get purge -y -qq --autoremove {' '.join(PACKAGES)} g++ cmake ninja-build >/dev/null")
+    left = sorted(file for file in debian.files() - before if "plumbline" in file)
+    assert not left, f"left behind after the removal: {left}"
+
+
+def stage_steps(dockerfile):
+    """Instructions of the last stage with their arguments, lines that go on joined."""
+    text = re.sub(r"\\\n", " ", "".join(line for line in dockerfile.read_text().splitlines(True) if not line.startswith("#")))
+    steps = [line.split(None, 1) for line in text.splitlines() if line.strip()]
+    last = max(number for number, step in enumerate(steps) if step[0] == "FROM")
+    return steps[last + 1:]
+
+
+def check_image(root, build, work):
+    """The packages are those of the first stage, which runs scripts/package."""
+    if os.geteuid() != 0 or shutil.which("mmdebstrap") is None:
+        skip("a root is made by root with mmdebstrap (scripts/install-deps --judges)")
+    if not packages(build):
+        make(build)
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    debian = Root(work / "root")
+    debian.make()
+    try:
+        shutil.copytree(build / "packages", debian.folder / "packages", ignore=lambda _d, names:
+                        [name for name in names if not name.endswith(".deb")])
+        user, entry, folder = "root", [], "/"
+        for instruction, argument in stage_steps(root / "Dockerfile"):
+            if instruction == "RUN":
+                debian.run(argument)
+            elif instruction == "USER":
+                user = argument.strip()
+            elif instruction == "WORKDIR":
+                folder = argument.strip()
+            elif instruction == "ENTRYPOINT":
+                entry = json.loads(argument)
+        assert user != "root" and entry == ["plumbline"], "the image runs as root, or something else"
+        debian.run(f"mkdir -p {folder} && chown {user} {folder} && cd {folder} && "
+                   f"su {user} -c '{entry[0]} map synth:room?frames=20\\&width=160\\&height=120 -o out -q && test -s out/map.ply'")
+        assert not (debian.folder / "packages").exists(), "the image still has the packages"
+    finally:
+        shutil.rmtree(debian.folder, ignore_errors=True)
+    return 0
+
+
+def check_service(root, _build, _work):
+    if shutil.which("systemd-analyze") is None:
+        skip("systemd-analyze is not installed")
+    unit = root / "scripts" / "plumbline-hub.service"
+    said = subprocess.run(["systemd-analyze", "verify", "--man=no", str(unit)], capture_output=True, text=True)
+    about_it = [line for line in said.stderr.splitlines() if "plumbline-hub" in line and "not executable" not in line]
+    print("\n".join(about_it))
+    exposure = subprocess.run(["systemd-analyze", "security", "--offline=true", "--threshold=40", str(unit)],
+                              capture_output=True, text=True)
+    print("\n".join(exposure.stdout.splitlines()[-2:]), exposure.stderr)
+    return 1 if about_it or exposure.returncode != 0 else 0
+
+
+if __name__ == "__main__":
+    check = {"packages": check_packages, "root": check_root, "image": check_image, "service": check_service}[sys.argv[4]]
+    sys.exit(check(*(Path(argument).resolve() for argument in sys.argv[1:4])))
