@@ -45,7 +45,7 @@ inline std::string malformed_at(const std::string& text) {
       open.pop_back();
     } else if (text[end - 1] != '/') {
       open.push_back(name);
-      if (name == "style") i = text.find("</style>", end) - 1;
+      if (name == "style" || name == "script") i = text.find("</" + name + ">", end) - 1;
     }
   }
   return open.empty() ? std::string() : "not closed: " + open.back();

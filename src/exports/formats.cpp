@@ -5,9 +5,10 @@ namespace plumbline::exports {
 
 const std::vector<Format>& formats() {
   static const std::vector<Format> kTable{
-      colmap_format(), nerfstudio_format(), grid_format(),  las_format(),  glb_format(),  poses_format(),
-      tum_format(),    kitti_format(),      euroc_format(), path_format(), plan_format(), octomap_format(),
-      ply_format(),    pcd_format(),        csv_format(),   xyz_format(),  mesh_format(), lines_format(),
+      colmap_format(), nerfstudio_format(), grid_format(),  las_format(),   glb_format(),
+      poses_format(),  tum_format(),        kitti_format(), euroc_format(), path_format(),
+      plan_format(),   octomap_format(),    ply_format(),   pcd_format(),   csv_format(),
+      xyz_format(),    mesh_format(),       lines_format(), html_format(),
   };
   return kTable;
 }

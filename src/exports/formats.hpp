@@ -46,5 +46,6 @@ Format csv_format();
 Format xyz_format();
 Format mesh_format();
 Format lines_format();
+Format html_format();
 
 }  // namespace plumbline::exports

@@ -35,6 +35,8 @@ void ExportOptions::declare(core::OptionTable& table) {
   table.boolean("ascii", ascii, "Text instead of binary");
   table.number("reach", reach_m, {0.001, 10.0}, "m",
                "Of a mesh: surface further than this from every point is left out");
+  table.integer("points", points, {0, 2000000000}, "",
+                "Points of the cloud, at most, which is thinned by voxels; 0: all");
   table.number("cut", cut_m, {0.0, 100.0}, "m", "Height of the cut over the floor");
   table.numbers("section", section, 0, {-kFar_m, kFar_m}, "m",
                 "A vertical section along the line x,y,x,y instead of the plan");

@@ -17,7 +17,7 @@ LAYERS = [
     ["sensor"],
     ["dataset", "features", "cloud", "optimize"],
     ["maps"],
-    ["tracking", "places", "evaluate", "synth"],
+    ["tracking", "places", "evaluate", "synth", "viewer"],
     ["mapping"],
     ["viz", "exports"],
     ["pipeline", "report"],
@@ -27,7 +27,7 @@ LAYERS = [
 LAYER_OF = {module: height for height, layer in enumerate(LAYERS) for module in layer}
 # Folders of a module that must not see another one: who runs a graph knows no stage.
 BLIND = {"pipeline": [("run", "stages"), ("graph", "stages")]}
-FOLDERS = {"maps": "maps", "viz": "viz", "report": "viz/report"}  # of modules that are not below src/
+FOLDERS = {"maps": "maps", "viz": "viz", "report": "viz/report", "viewer": "viz/viewer"}  # of modules that are not below src/
 
 # A library that only these modules may include or link. Both patterns match from the start of the name.
 CONFINED = [

@@ -43,7 +43,8 @@ core::Result<void> check_output(const fs::path& file, bool replace) {
 
 }  // namespace
 
-core::Result<ReportSummary> write_report(const ReportRequest& request) {
+core::Result<ReportSummary> write_report(const ReportRequest& request, const core::Executor& executor,
+                                         core::Log& log) {
   const fs::path file = request.output.empty() ? request.result / "report.html" : request.output;
   auto data = read_report_data(request.result);
   if (!data) return tl::unexpected<core::Error>(data.error());
@@ -60,9 +61,13 @@ core::Result<ReportSummary> write_report(const ReportRequest& request) {
   auto pictures = pictures_html(*data, scratch);  // first: damaged ones are told in the head
   if (!pictures) return tl::unexpected<core::Error>(pictures.error());
 
+  auto viewer = viewer_html(*data, request, executor, log);
+  if (!viewer) return tl::unexpected<core::Error>(viewer.error());
+
   const std::string page = page_html(
       "Plumbline report: " + data->name, head_html(*data),
-      {{"pictures", "The map", std::move(*pictures)},
+      {{"map", "The map to walk through", std::move(*viewer)},
+       {"pictures", "Pictures", std::move(*pictures)},
        {"path", "The path", path_html(*data)},
        {"exports", "Exports", exports_html(*data)},
        {"tracking", "Tracking over time", tracking_html(*data)},

@@ -41,24 +41,6 @@ std::string bytes_text(double bytes) {
   return bytes < 1e9 ? number_text(bytes / 1e6, 1, "MB") : number_text(bytes / 1e9, 2, "GB");
 }
 
-std::string base64(std::string_view bytes) {
-  static constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  out.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t three = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      three = three << 8U | (k < left ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      out += k <= left ? kDigits[three >> (18U - 6U * k) & 63U] : '=';
-    }
-  }
-  return out;
-}
-
 HtmlTable::HtmlTable(const std::string& columns) {
   for (std::size_t from = 0; from <= columns.size();) {
     const std::size_t to = std::min(columns.find('|', from), columns.size());

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "plumbline/viewer/page.hpp"
 #include "plumbline/viz/svg_chart.hpp"
 
 namespace plumbline::report {
@@ -18,7 +19,7 @@ std::string number_text(double value, int decimals, std::string_view unit = {});
 /// "54.7 MB"
 std::string bytes_text(double bytes);
 
-std::string base64(std::string_view bytes);
+using viewer::base64;
 
 class HtmlTable {
  public:

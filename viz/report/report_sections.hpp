@@ -4,6 +4,7 @@
 // The parts of a report, each from what was read of the result folder; empty where there is nothing to tell.
 #include <string>
 
+#include "plumbline/report/report.hpp"
 #include "report_data.hpp"
 #include "report_html.hpp"
 
@@ -13,6 +14,10 @@ namespace plumbline::report {
 std::string head_html(const ReportData& data);
 /// The folder's snapshots; where it has none, drawn now. `scratch`: where a picture may be put meanwhile.
 core::Result<std::string> pictures_html(ReportData& data, const std::filesystem::path& scratch);
+/// The map to turn and walk through; empty without a cloud. When it cannot be shown, that is told in `data`.
+/// Errors (kInput): request.other cannot be read.
+core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& request,
+                                      const core::Executor& executor, core::Log& log);
 /// The paths from above, over the plan of the cloud.
 std::string path_html(const ReportData& data);
 /// Exports that lie in the folder.

@@ -31,6 +31,8 @@ struct ExportOptions {
   // Clouds and meshes.
   bool ascii = false;
   double reach_m = 0.05;  ///< of a mesh: surface further than this from every point is left out
+  // Pages.
+  int points = 1500000;  ///< of the cloud, at most; thinned by voxels; 0: all
   // Plans.
   double cut_m = 1.2;           ///< over the floor
   std::vector<double> section;  ///< x y x y: a vertical cut along this line instead; empty: a plan

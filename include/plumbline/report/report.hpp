@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "plumbline/core/error.hpp"
+#include "plumbline/core/executor.hpp"
+#include "plumbline/core/log.hpp"
 
 namespace plumbline::report {
 
@@ -15,6 +17,8 @@ struct ReportRequest {
   std::filesystem::path result;  ///< folder of map or fuse
   std::filesystem::path output;  ///< empty: report.html in the folder
   std::filesystem::path truth;   ///< empty: none. A recording, a folder of recordings by robot, or a TUM file
+  std::filesystem::path other;   ///< empty: none. A second result, laid over the map to walk through
+  std::size_t points = 1500000;  ///< of the map to walk through, at most, thinned by voxels; 0: all
   bool replace = false;          ///< an earlier report, and nothing else, may be replaced
 };
 
@@ -28,6 +32,7 @@ struct ReportSummary {
 /// folder. What is missing or damaged in the folder is left out and told, on the page and in `missing`.
 /// Errors: kInput (no result, a run that was interrupted, summary.json damaged, no truth that fits), kUsage
 /// (the file exists), kOutput (cannot be written; nothing is left behind).
-core::Result<ReportSummary> write_report(const ReportRequest& request);
+core::Result<ReportSummary> write_report(const ReportRequest& request, const core::Executor& executor,
+                                         core::Log& log);
 
 }  // namespace plumbline::report

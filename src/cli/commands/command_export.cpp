@@ -9,7 +9,7 @@
 #include "option_flags.hpp"
 #include "plumbline/exports/export.hpp"
 #include "plumbline/maps/stored_result.hpp"
-#include "plumbline/pipeline/input.hpp"
+#include "recording_opener.hpp"
 #include "silenced_stdio.hpp"
 
 namespace plumbline::cli {
@@ -48,20 +48,6 @@ core::Result<void> export_keyframes(const ExportCommand& command) {
   const auto count = stored->write_keyframe_clouds(command.keyframes);
   if (!count) return tl::unexpected<core::Error>(count.error());
   return {};
-}
-
-/// How a recording is opened again, as it was for the map.
-exports::OpenRecording recording_opener(Session& session) {
-  return [&session](
-             const exports::RecordingName& name) -> core::Result<std::unique_ptr<dataset::FrameSource>> {
-    const auto folder = session.pipelines_folder();
-    if (!folder) return tl::unexpected<core::Error>(folder.error());
-    dataset::OpenOptions open;
-    open.camera = name.camera;
-    open.format = name.format.empty() ? "auto" : name.format;
-    open.cameras_folder = *folder / "cameras";
-    return pipeline::open_input(name.input, open, *folder / "scenes", session.executor(), session.console());
-  };
 }
 
 core::Result<void> run_export(ExportCommand& command, Session& session) {

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "app.hpp"
+#include "live_page.hpp"
 #include "network_options.hpp"
 #include "plumbline/net/hub.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
@@ -17,7 +18,8 @@ const char* const kTwoTerminals =
     "                    plumbline robot 'synth:room?frames=240&seed=1' --from 2 --name r1 --interface lo\n"
     "Hub and robots may start in any order. More: docs/guide/network.md";
 
-int hub(Session& session, net::HubRequest request, double quota_gb, const std::string& publish) {
+int hub(Session& session, net::HubRequest request, double quota_gb, const std::string& publish,
+        const PageAddress& page) {
   if (auto equipped = session.equip(request.fuse); !equipped) return session.fail(equipped.error());
   request.quota_bytes = static_cast<std::uint64_t>(quota_gb * 1e9);
   request.fresh_id = fresh_id();
@@ -29,9 +31,16 @@ int hub(Session& session, net::HubRequest request, double quota_gb, const std::s
       !prepared)
     return session.fail(prepared.error());
   Console& console = session.console();
+  const auto live = live_map(page, request.fuse.output, console);
+  if (!live) return session.fail(live.error());
+
   const auto summary = net::run_hub(
       request, session.executor(), console, stop_on_signals(),
-      [&](const std::string& line) { console.status(line); }, console.counting("clouds"));
+      [&](const std::string& line) {
+        console.status(line);
+        if (*live) (*live)->tell(line);
+      },
+      console.counting("clouds"));
   return session.finish(summary, request.fuse.output);
 }
 
@@ -41,9 +50,12 @@ void add_hub(CLI::App& app, Session& session) {
   const auto request = std::make_shared<net::HubRequest>();
   const auto quota_gb = std::make_shared<double>(20.0);
   const auto publish = std::make_shared<std::string>();
-  CLI::App* command = add_command(
-      app, session, "hub", "Collect the maps of robots over a network and fuse them",
-      [&session, request, quota_gb, publish] { return hub(session, *request, *quota_gb, *publish); });
+  const auto page = std::make_shared<PageAddress>();
+  CLI::App* command =
+      add_command(app, session, "hub", "Collect the maps of robots over a network and fuse them",
+                  [&session, request, quota_gb, publish, page] {
+                    return hub(session, *request, *quota_gb, *publish, *page);
+                  });
   command->footer(kTwoTerminals);
 
   command->add_option("-o,--output", request->fuse.output, "Folder for the result")
@@ -54,6 +66,7 @@ void add_hub(CLI::App& app, Session& session) {
       ->check(CLI::Range(1, 64));
   add_network_options(*command, request->network);
   add_publish_option(*command, *publish);
+  add_live_options(*command, *page);
 
   command->add_option("--quota", *quota_gb, "Disk space for the map of each robot, GB (default: 20)")
       ->type_name("GB")

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app.hpp"
+#include "live_page.hpp"
 #include "plumbline/pipeline/map_recording.hpp"
 #include "signals.hpp"
 
@@ -15,7 +16,7 @@ namespace plumbline::cli {
 namespace {
 
 int map(Session& session, pipeline::MapRequest request, const std::vector<std::string>& inputs,
-        const std::string& publish) {
+        const std::string& publish, const PageAddress& page) {
   const bool as_given = request.open.poses == dataset::PoseUse::kGiven;
   if (as_given && request.pipeline == pipeline::MapRequest().pipeline) request.pipeline = "known_poses";
   request.input = inputs.front();
@@ -34,6 +35,9 @@ int map(Session& session, pipeline::MapRequest request, const std::vector<std::s
     return session.fail(prepared.error());
 
   Console& console = session.console();
+  const auto live = live_map(page, request.output, console);
+  if (!live) return session.fail(live.error());
+
   const auto summary = pipeline::map_recording(request, session.executor(), console, stop_on_signals(),
                                                console.counting("frames"));
   return session.finish(summary, request.output);
@@ -77,10 +81,12 @@ void add_map(CLI::App& app, Session& session) {
   const auto request = std::make_shared<pipeline::MapRequest>();
   const auto inputs = std::make_shared<std::vector<std::string>>();
   const auto publish = std::make_shared<std::string>();
+  const auto page = std::make_shared<PageAddress>();
 
-  CLI::App* command =
-      add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
-                  [&session, request, inputs, publish] { return map(session, *request, *inputs, *publish); });
+  CLI::App* command = add_command(app, session, "map", "Map a recording: trajectory, dense cloud, pictures",
+                                  [&session, request, inputs, publish, page] {
+                                    return map(session, *request, *inputs, *publish, *page);
+                                  });
 
   command
       ->add_option(
@@ -94,6 +100,7 @@ void add_map(CLI::App& app, Session& session) {
 
   add_publish_option(*command, *publish);
   add_map_options(*command, session, *request);
+  add_live_options(*command, *page);
 
   command
       ->add_option("--debug-video", request->debug_video,

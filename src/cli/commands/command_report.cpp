@@ -11,7 +11,7 @@ namespace plumbline::cli {
 namespace {
 
 int report(Session& session, const report::ReportRequest& request) {
-  const auto done = report::write_report(request);
+  const auto done = report::write_report(request, session.executor(), session.console());
   if (!done) return session.fail(done.error());
   for (const std::string& line : done->missing) session.console().warning(line);
   if (!session.quiet) {
@@ -27,6 +27,8 @@ void add_report(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "report", "Write an HTML report of a result: OUT/report.html",
                                   [&session, request] { return report(session, *request); });
   command->add_option("OUT", request->result, "Result folder of plumbline map or fuse")->required();
+  command->add_option("OTHER", request->other,
+                      "A second result, laid over the first in the map to walk through");
   command->add_option("-o,--output", request->output, "File to write (default: OUT/report.html)")
       ->type_name("FILE.html");
   command
@@ -34,6 +36,10 @@ void add_report(CLI::App& app, Session& session) {
                    "Compare the paths with the true ones: a recording with groundtruth.txt, a folder with "
                    "one for each robot, or a file in TUM format")
       ->type_name("FOLDER|FILE");
+  command
+      ->add_option("--points", request->points,
+                   "Points of the map to walk through, at most, thinned by voxels; 0: all (default: 1500000)")
+      ->type_name("N");
   command->add_flag("--force", request->replace, "Replace an earlier report");
 }
 

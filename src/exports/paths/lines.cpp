@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // 3D line landmarks as edges.
+#include "paths/lines.hpp"
+
 #include "formats.hpp"
-#include "plumbline/maps/line_export.hpp"
 
 namespace plumbline::exports {
-namespace {
 
 core::Result<std::vector<maps::LineSegment3>> lines_of(const MapSource& source) {
   std::error_code ec;
@@ -19,6 +19,8 @@ core::Result<std::vector<maps::LineSegment3>> lines_of(const MapSource& source) 
   }
   return lines;
 }
+
+namespace {
 
 core::Result<ExportSummary> write_lines(MapSource& source, const std::filesystem::path& output) {
   auto lines = lines_of(source);

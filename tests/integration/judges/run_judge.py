@@ -393,6 +393,46 @@ def case_dxf(case):
     print(run(SYSTEM_PYTHON, HERE / "judge_dxf.py", case.export("world.dxf", "--datum", "52.5,13.4,30")).strip())
 
 
+def viewer(what, page, *numbers):
+    """Debian's Chromium uses a page as a person does."""
+    need("chromium")
+    need_npm("puppeteer-core")
+    work = page.with_suffix("")
+    work.mkdir(exist_ok=True)
+    print(node("judge_viewer.mjs", what, page, work, *numbers).strip())
+
+
+def case_viewer(case):
+    viewer("whole", case.export("room.html"))
+    viewer("without", case.work / "room.html")
+
+
+def office_truth(case, spacing):
+    """Exact points of the generated office, in its own frame."""
+    world = case.work / f"office_{spacing}"
+    if not (world / "reference.ply").is_file():
+        shutil.rmtree(world, ignore_errors=True)
+        run(case.program, "synth", "office", "-o", world, "--frames", 2, "--width", 64, "--height", 48,
+            "--reference-spacing", spacing, "-q")
+    return world / "reference.ply"
+
+
+def case_viewer_width(case):
+    """The door of 0.95 m at 5.45 m of the wall from (14, 1.86) to (0, 1.86), measured between its jambs."""
+    page = case.work / "office.html"
+    page.unlink(missing_ok=True)
+    run(case.program, "export", office_truth(case, "1cm"), "-o", page)
+    x = 14.0 - 5.45
+    viewer("width", page, x - 0.475, 1.86, 1.0, x + 0.475, 1.86, 1.0, 0.95)
+
+
+def case_viewer_large(case):
+    page = case.work / "large.html"
+    page.unlink(missing_ok=True)
+    said = run(case.program, "export", office_truth(case, "7mm"), "-o", page, "--points", 5000000, "-v")
+    viewer("large", page, re.search(r"(\d+) points", said).group(1))
+
+
 def case_proj(case):
     need("cs2cs")
     las = case.export("proj.las", "--datum", "52.5,13.4,30")

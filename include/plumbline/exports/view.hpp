@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A map as the scene of a page that turns it in the browser (plumbline/viewer/page.hpp).
+#include <string>
+#include <vector>
+
+#include "plumbline/exports/export.hpp"
+#include "plumbline/viewer/scene.hpp"
+
+namespace plumbline::exports {
+
+/// By this a page that holds nothing but the viewer is known.
+inline constexpr const char* kViewGenerator = "plumbline view";
+
+struct MapView {
+  viewer::Scene scene;
+  std::vector<std::string> notes;  ///< whole sentences: what is missing of the scene, and why
+};
+
+/// All that the map has to show: cloud with its layers, paths, keyframes with small pictures where the
+/// request can open recordings, lines, loops, plan. Of the options of `request`, the selection, `points`,
+/// `voxel_m` and `cut_m` count. Errors (kInput): there is no map, or no cloud in it.
+core::Result<MapView> view_of(const ExportRequest& request, const core::Executor& executor, core::Log& log,
+                              const ExportProgress& progress);
+
+/// The same with the cloud of a second map over it, moved into the first one's frame by cameras of the same
+/// stamp; both tell the distance to the other one. Errors (kInput) of either.
+core::Result<MapView> view_of_two(const ExportRequest& first, const ExportRequest& second,
+                                  const core::Executor& executor, core::Log& log,
+                                  const ExportProgress& progress);
+
+}  // namespace plumbline::exports

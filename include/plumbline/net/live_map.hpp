@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// A map in the browser while it grows: follows the stores of a run, which are read as anybody may read them,
+// so that the run waits for nothing.
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "plumbline/net/page_server.hpp"
+
+namespace plumbline::net {
+
+/// Serves a page and feeds it from every map.db in a folder, beside the run that writes them. Between two
+/// looks it sleeps twenty times as long as a look took, a second at least.
+class LiveMap {
+ public:
+  /// `output`: OUT of the run; OUT.partial is followed while it is there. Errors as PageServer::start.
+  static core::Result<std::unique_ptr<LiveMap>> start(const PageServerOptions& options,
+                                                      const std::filesystem::path& output);
+  ~LiveMap();  ///< tells the page that the run has ended
+
+  [[nodiscard]] std::string address() const;
+  /// One line for people, shown under the map. Thread-safe.
+  void tell(const std::string& words);
+
+ private:
+  struct Impl;
+  LiveMap();
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumbline::net

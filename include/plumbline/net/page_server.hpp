@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// One page over HTTP, and what is new as a stream of server-sent events; for browsers on this machine unless
+// told otherwise.
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "plumbline/core/error.hpp"
+
+namespace plumbline::net {
+
+struct PageServerOptions {
+  std::string host = "127.0.0.1";  ///< address to listen at
+  int port = 8080;                 ///< 0: any that is free
+  std::string token;  ///< empty: none. Else asked for as ?token=..., or as "Authorization: Bearer ..."
+};
+
+/// "HOST:PORT", "HOST" or "PORT"; [::1] in brackets. Errors (kUsage).
+core::Result<PageServerOptions> page_server_options(const std::string& address, const std::string& token);
+
+/// How much a server takes at most, whatever comes: connections at once, the rest are closed unread; event
+/// streams; threads for pages beside them; events that wait for a slow stream, which loses the oldest beyond.
+struct PageServerLimits {
+  static constexpr std::size_t kSockets = 32;
+  static constexpr std::size_t kStreams = 8;
+  static constexpr std::size_t kPageThreads = 4;
+  static constexpr std::size_t kWaitingEvents = 256;
+};
+
+/// Serves GET / (the page) and GET /events. Refused: other paths and methods (404), a Host or an Origin that
+/// is not the server's own (403), a wrong token (401), a stream too many (503). A request has a second to
+/// come. Thread-safe; send() never waits for a client.
+class PageServer {
+ public:
+  /// Errors (kUsage): the address cannot be listened at; (kInternal): the part is missing.
+  static core::Result<PageServer> start(const PageServerOptions& options, std::string page);
+  PageServer(PageServer&& other) noexcept;
+  PageServer& operator=(PageServer&&) = delete;
+  ~PageServer();  ///< ends all connections
+
+  [[nodiscard]] int port() const;
+  /// "http://127.0.0.1:8080/", with the token.
+  [[nodiscard]] std::string address() const;
+  /// An event for each stream that is open: one line of JSON. With a `topic` it is kept, in the place of the
+  /// last one of the same, for streams that open later.
+  void send(const std::string& json, const std::string& topic = {});
+
+ private:
+  PageServer() = default;
+  PageServerOptions options_;
+  void* server_ = nullptr;  ///< of the part
+};
+
+}  // namespace plumbline::net

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// plumbline view OUT [OTHER]
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "app.hpp"
+#include "plumbline/exports/view.hpp"
+#include "plumbline/net/page_server.hpp"
+#include "plumbline/viewer/page.hpp"
+#include "recording_opener.hpp"
+#include "signals.hpp"
+
+namespace plumbline::cli {
+namespace {
+
+struct ViewCommand {
+  exports::ExportRequest request;
+  std::filesystem::path other;
+  std::string http = "127.0.0.1:8080";
+  std::string token;
+};
+
+core::Result<void> run_view(ViewCommand& command, Session& session) {
+  const auto options = net::page_server_options(command.http, command.token);
+  if (!options) return tl::unexpected<core::Error>(options.error());
+  Console& console = session.console();
+  command.request.open = recording_opener(session);
+  exports::ExportRequest other = command.request;
+  other.input = command.other;
+
+  auto view = command.other.empty()
+                  ? exports::view_of(command.request, session.executor(), console, console.counting("views"))
+                  : exports::view_of_two(command.request, other, session.executor(), console,
+                                         console.counting("views"));
+  console.end_progress();
+  if (!view) return tl::unexpected<core::Error>(view.error());
+  for (const std::string& note : view->notes) console.info(note);
+
+  auto server = net::PageServer::start(*options, viewer::page(view->scene, exports::kViewGenerator));
+  if (!server) return tl::unexpected<core::Error>(server.error());
+  fmt::print("{}\n", server->address());
+  std::fflush(stdout);
+  const core::StopToken& stop = stop_on_signals();
+  while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  return {};
+}
+
+}  // namespace
+
+void add_view(CLI::App& app, Session& session) {
+  const auto state = std::make_shared<ViewCommand>();
+  CLI::App* command =
+      add_command(app, session, "view", "Show a map in the browser, to walk through and measure in",
+                  [&session, state] { return run_view(*state, session); });
+  command->add_option("OUT", state->request.input, "A result folder, map.db, or a cloud file")->required();
+  command->add_option("OTHER", state->other, "A second one, laid over the first");
+  command
+      ->add_option("--http", state->http,
+                   "Address to serve the page at, until Ctrl-C (default: 127.0.0.1:8080)")
+      ->type_name("HOST:PORT");
+  command->add_option("--http-token", state->token, "Asked of every browser: the address printed has it")
+      ->type_name("TEXT");
+  command
+      ->add_option("--points", state->request.options.points,
+                   "Points of the cloud, at most, thinned by voxels; 0: all (default: 1500000)")
+      ->type_name("N");
+}
+
+}  // namespace plumbline::cli

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "app.hpp"
+#include "plumbline/net/live_map.hpp"
+
+namespace plumbline::cli {
+
+/// Where a map can be watched in the browser while it grows.
+struct PageAddress {
+  std::string http;   ///< HOST:PORT; empty: nowhere
+  std::string token;  ///< asked of every browser; empty: none is
+};
+
+/// --http and --http-token.
+void add_live_options(CLI::App& command, PageAddress& page);
+
+/// Serves the map that grows in `output`, and tells where; null: nowhere. Errors as LiveMap::start.
+core::Result<std::unique_ptr<net::LiveMap>> live_map(const PageAddress& page,
+                                                     const std::filesystem::path& output, Console& console);
+
+}  // namespace plumbline::cli

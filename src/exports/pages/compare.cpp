@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "pages/compare.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <nanoflann.hpp>
+
+#include "plumbline/geometry/alignment.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// Points as nanoflann asks for them; `shift`: of these points in the frame of others.
+struct SearchedPoints {
+  const viewer::Points* points = nullptr;
+
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return points->positions.size(); }
+  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t k) const { return points->positions[i][k]; }
+  template <typename Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+};
+using PointTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, SearchedPoints>,
+                                                      SearchedPoints, 3, std::uint32_t>;
+
+/// Of each point the distance to the nearest one of `others`, metres.
+std::vector<float> distances(const viewer::Points& points, const viewer::Points& others,
+                             const core::Executor& executor) {
+  std::vector<float> out(points.positions.size(), std::nanf(""));
+  if (others.positions.empty()) return out;
+  const SearchedPoints searched{&others};
+  const PointTree tree(3, searched, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  std::array<float, 3> shift{};
+  for (std::size_t k = 0; k < 3; ++k) shift[k] = static_cast<float>(points.shift[k] - others.shift[k]);
+
+  constexpr std::size_t kBlock = 4096;
+  executor.parallel_for((out.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    const std::size_t last = std::min(out.size(), (block + 1) * kBlock);
+    for (std::size_t i = block * kBlock; i < last; ++i) {
+      const auto& [x, y, z] = points.positions[i];
+      const std::array<float, 3> at{x + shift[0], y + shift[1], z + shift[2]};
+      std::uint32_t nearest = 0;
+      float squared = 0.0F;
+      tree.knnSearch(at.data(), 1, &nearest, &squared);
+      out[i] = std::sqrt(squared);
+    }
+  });
+  return out;
+}
+
+}  // namespace
+
+std::optional<geometry::Rigid3> first_from_second(const std::vector<ExportPose>& first,
+                                                  const std::vector<ExportPose>& second) {
+  constexpr double kSame_s = 5e-4;
+  std::vector<Eigen::Vector3d> from;
+  std::vector<Eigen::Vector3d> to;
+  const auto earlier = [](const ExportPose& a, const ExportPose& b) {
+    return a.robot != b.robot ? a.robot < b.robot : a.stamp < b.stamp;
+  };
+
+  for (const ExportPose& pose : second) {
+    ExportPose wanted = pose;
+    wanted.stamp -= kSame_s;
+    const auto found = std::lower_bound(first.begin(), first.end(), wanted, earlier);
+    if (found == first.end() || found->robot != pose.robot || found->stamp > pose.stamp + kSame_s) continue;
+    // With the places a metre along each axis, so that a straight path tells a turn about itself as well.
+    for (int k = -1; k < 3; ++k) {
+      const Eigen::Vector3d way =
+          k < 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(Eigen::Vector3d::Unit(k));
+      from.push_back(pose.world_from_camera * way);
+      to.push_back(found->world_from_camera * way);
+    }
+  }
+  if (from.size() < 12) return std::nullopt;
+  return geometry::align_points(from, to);
+}
+
+void move(viewer::Points& points, const geometry::Rigid3& target_from_source) {
+  const Eigen::Vector3d shift(points.shift[0], points.shift[1], points.shift[2]);
+  for (auto& p : points.positions) {
+    const Eigen::Vector3d moved = target_from_source * (shift + Eigen::Vector3d(p[0], p[1], p[2])) - shift;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(moved[static_cast<int>(k)]);
+  }
+  for (auto& n : points.normals) {
+    const Eigen::Vector3d turned = target_from_source.rotation * Eigen::Vector3d(n[0], n[1], n[2]);
+    for (std::size_t k = 0; k < 3; ++k) n[k] = static_cast<float>(turned[static_cast<int>(k)]);
+  }
+}
+
+void add_distances(viewer::Points& first, viewer::Points& second, const core::Executor& executor) {
+  const auto layer = [](std::vector<float> values) {
+    viewer::Layer made{"distance", "Distance to the other map", "m", viewer::Scale::kLogarithmic, 0.001, 0.2,
+                       24};
+    made.values = std::move(values);
+    return made;
+  };
+  viewer::Layer of_first = layer(distances(first, second, executor));
+  viewer::Layer of_second = layer(distances(second, first, executor));
+  first.layers.push_back(std::move(of_first));
+  second.layers.push_back(std::move(of_second));
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A page that holds a map to walk through, and nothing else.
+#include "plumbline/exports/view.hpp"
+
+#include <fmt/format.h>
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "formats.hpp"
+#include "pages/compare.hpp"
+#include "pages/seen_from.hpp"
+#include "pages/thumbnails.hpp"
+#include "paths/lines.hpp"
+#include "plans/walls.hpp"
+#include "plumbline/cloud/dense_fusion.hpp"
+#include "plumbline/core/output_file.hpp"
+#include "plumbline/viewer/page.hpp"
+
+namespace plumbline::exports {
+namespace {
+
+/// Cells of this size that points of the cloud lie in.
+std::size_t occupied_cells(const cloud::Cloud& cloud, double cell_m) {
+  std::vector<std::array<std::int32_t, 3>> cells;
+  cells.reserve(cloud.size());
+  for (const cloud::Point& p : cloud) {
+    cells.push_back({static_cast<std::int32_t>(std::floor(p.x / cell_m)),
+                     static_cast<std::int32_t>(std::floor(p.y / cell_m)),
+                     static_cast<std::int32_t>(std::floor(p.z / cell_m))});
+  }
+  std::sort(cells.begin(), cells.end());
+  return static_cast<std::size_t>(std::unique(cells.begin(), cells.end()) - cells.begin());
+}
+
+/// The cloud in the smallest voxels, about, that leave no more than `most` points.
+cloud::CloudFile thinned_cloud(const cloud::CloudFile& file, std::size_t most) {
+  double cell_m = 0.005;
+  for (int round = 0; round < 12; ++round) {
+    const std::size_t count = occupied_cells(*file.cloud, cell_m);
+    if (count <= most) break;
+    // Surfaces have four times as few points in voxels twice as wide.
+    cell_m *= std::max(1.03, 1.01 * std::sqrt(static_cast<double>(count) / static_cast<double>(most)));
+  }
+
+  cloud::FusedCloud coarse = cloud::coarser(*file.cloud, file.columns, cell_m);
+  cloud::CloudFile out;
+  out.cloud = std::move(coarse.cloud);
+  out.columns = std::move(coarse.columns);
+  out.shift = file.shift;
+  out.has_color = file.has_color;
+  out.has_normals = file.has_normals;
+  return out;
+}
+
+/// Two values that a share of the others lie below and above.
+std::pair<double, double> middle_range(const std::vector<float>& values) {
+  std::vector<float> sorted;
+  for (const float v : values) {
+    if (std::isfinite(v)) sorted.push_back(v);
+  }
+  if (sorted.empty()) return {0.0, 1.0};
+  std::sort(sorted.begin(), sorted.end());
+  const auto at = [&](double share) {
+    return static_cast<double>(
+        sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))]);
+  };
+  return {at(0.02), at(0.98)};
+}
+
+void add_layers(const cloud::CloudFile& file, const MapSource& source, viewer::Points& points) {
+  const cloud::CloudColumns& columns = file.columns;
+  if (!columns.confidence.empty()) {
+    viewer::Layer layer{"confidence", "Confidence", "", viewer::Scale::kLinear};
+    layer.steps = 20;
+    layer.values = columns.confidence;
+    points.layers.push_back(std::move(layer));
+  }
+
+  for (const cloud::CloudColumns::Other& other : columns.others) {
+    if (other.name != "sigma") continue;
+    viewer::Layer layer{"sigma", "Standard deviation", "m", viewer::Scale::kLogarithmic};
+    const auto [low, high] = middle_range(other.values);
+    layer.low = std::max(low, 1e-5);
+    layer.high = std::max(high, 1.1 * layer.low);
+    layer.steps = 20;
+    layer.values = other.values;
+    points.layers.push_back(std::move(layer));
+  }
+
+  if (!columns.robot.empty() && source.robots().size() > 1) {
+    viewer::Layer layer{"robot", "Robot", "", viewer::Scale::kCategory};
+    std::size_t most = 0;
+    for (const maps::RobotInfo& robot : source.robots())
+      most = std::max(most, static_cast<std::size_t>(std::max(0, robot.number)));
+    layer.names.resize(most + 1);
+    for (const maps::RobotInfo& robot : source.robots())
+      layer.names[static_cast<std::size_t>(std::max(0, robot.number))] = robot.name;
+    layer.values.assign(columns.robot.begin(), columns.robot.end());
+    points.layers.push_back(std::move(layer));
+  }
+}
+
+viewer::Points points_of(const cloud::CloudFile& file, const MapSource& source) {
+  viewer::Points points;
+  points.name = source.name();
+  points.colored = file.has_color;
+  points.shift = {file.shift.x(), file.shift.y(), file.shift.z()};
+  const std::size_t count = file.cloud->size();
+  points.positions.reserve(count);
+  points.colors.reserve(count);
+  if (file.has_normals) points.normals.reserve(count);
+  for (const cloud::Point& p : *file.cloud) {
+    points.positions.push_back({p.x, p.y, p.z});
+    points.colors.push_back({p.r, p.g, p.b});
+    if (file.has_normals) points.normals.push_back({p.normal_x, p.normal_y, p.normal_z});
+  }
+  add_layers(file, source, points);
+  return points;
+}
+
+/// Path of each robot, a pose each 2 cm or 5 degrees.
+void add_paths(const MapSource& source, viewer::Scene& scene) {
+  constexpr double kStep_m = 0.02;
+  constexpr double kTurn = 0.087;
+  const auto poses = source.poses(false);
+  if (!poses) return;
+  for (std::size_t i = 0; i < poses->size(); ++i) {
+    const ExportPose& pose = (*poses)[i];
+    const bool begins = scene.paths.empty() || scene.paths.back().robot != pose.robot;
+    if (begins) scene.paths.push_back({pose.robot, pose.robot_name, {}, {}});
+    viewer::CameraPath& path = scene.paths.back();
+    const bool ends = i + 1 == poses->size() || (*poses)[i + 1].robot != pose.robot;
+    if (!begins && !ends) {
+      const geometry::Rigid3& before = path.world_from_camera.back();
+      const double moved = (pose.world_from_camera.translation - before.translation).norm();
+      const double cosine = pose.world_from_camera.rotation.col(2).dot(before.rotation.col(2));
+      if (moved < kStep_m && cosine > std::cos(kTurn)) continue;
+    }
+    path.stamps.push_back(pose.stamp);
+    path.world_from_camera.push_back(pose.world_from_camera);
+  }
+}
+
+/// Keyframes with their pictures, what each of them saw best, and the loops between them.
+core::Result<void> add_keyframes(const MapSource& source, const cloud::CloudFile& file, MapView& view) {
+  const auto poses = source.poses(true);
+  if (!poses) return {};
+  std::map<core::KeyframeId, std::size_t> numbers;
+  std::map<core::KeyframeId, Eigen::Vector3d> places;
+  for (const ExportPose& pose : *poses) {
+    if (pose.keyframe.valid()) {
+      numbers[pose.keyframe] = view.scene.keyframes.size();
+      places[pose.keyframe] = pose.world_from_camera.translation;
+    }
+    view.scene.keyframes.push_back({pose.robot, pose.stamp, pose.world_from_camera, {}});
+  }
+  add_thumbnails(source, view);
+  if (!source.has_store()) return {};
+
+  auto seen = best_views(source, file, numbers);
+  if (!seen) return tl::unexpected(seen.error());
+  if (!seen->empty()) {
+    viewer::Layer layer{"view", "Time seen", "s", viewer::Scale::kView};
+    layer.values = std::move(*seen);
+    view.scene.clouds.front().layers.push_back(std::move(layer));
+  }
+
+  const auto store = source.store("loops");
+  for (const maps::LoopEdge& loop : (*store)->stored().map.loops()) {
+    const auto a = places.find(loop.a);
+    const auto b = places.find(loop.b);
+    if (a != places.end() && b != places.end())
+      view.scene.arcs.push_back({loop.a.robot != loop.b.robot, a->second, b->second});
+  }
+  return {};
+}
+
+void add_lines(const MapSource& source, viewer::Scene& scene) {
+  const auto lines = lines_of(source);
+  if (!lines) return;
+  for (const auto& [start, end] : *lines) {
+    if (source.selects(start) && source.selects(end)) scene.lines.emplace_back(start, end);
+  }
+}
+
+/// Walls, doors and rooms at the height of the cut; nothing where none are found.
+void add_plan(MapSource& source, MapView& view) {
+  viewer::Scene& scene = view.scene;
+  if (!scene.z_up) return;
+  const auto plan = find_walls(source);
+  if (!plan) {
+    view.notes.push_back("without a floor plan: " + plan.error().message);
+    return;
+  }
+
+  const double height = source.floor_m() + source.options().cut_m;
+  const auto at = [&](const Eigen::Vector2d& p) { return Eigen::Vector3d(p.x(), p.y(), height); };
+  for (const WallLine& wall : plan->walls) {
+    double from = wall.s0;
+    for (const WallOpening& opening : wall.openings) {
+      scene.walls.emplace_back(at(wall.at(from)), at(wall.at(opening.s0)));
+      from = opening.s1;
+    }
+    scene.walls.emplace_back(at(wall.at(from)), at(wall.at(wall.s1)));
+  }
+  for (const WallDoor& door : plan->doors)
+    scene.doors.emplace_back(at(0.5 * (door.jambs[0] + door.far_jambs[0])),
+                             at(0.5 * (door.jambs[1] + door.far_jambs[1])));
+  for (const WallRoom& room : plan->rooms)
+    scene.rooms.emplace_back(at(room.label), fmt::format("{:.2f} m²", room.area_m2));
+  scene.plan_height_m = height;
+}
+
+/// The cloud with so many points as are wanted, for the page and as it is.
+core::Result<std::pair<cloud::CloudFile, viewer::Points>> shown_cloud(MapSource& source) {
+  const auto whole = source.cloud();
+  if (!whole) return tl::unexpected(whole.error());
+  const auto most = static_cast<std::size_t>(source.options().points);
+  const std::size_t all = (*whole)->cloud->size();
+  const bool thin = most > 0 && all > most;
+  cloud::CloudFile file = thin ? thinned_cloud(**whole, most) : **whole;
+
+  viewer::Points points = points_of(file, source);
+  if (thin) points.of = all;
+  return std::pair(std::move(file), std::move(points));
+}
+
+core::Result<MapView> view_of(MapSource& source) {
+  auto cloud = shown_cloud(source);
+  if (!cloud) return tl::unexpected(cloud.error());
+  MapView view;
+  viewer::Scene& scene = view.scene;
+  scene.name = source.name();
+  scene.frame = source.frame_text();
+  scene.z_up = source.need_upright("").has_value();
+  scene.floor_m = source.floor_m();
+  scene.clouds.push_back(std::move(cloud->second));
+
+  add_paths(source, scene);
+  if (auto added = add_keyframes(source, cloud->first, view); !added) return tl::unexpected(added.error());
+  add_lines(source, scene);
+  add_plan(source, view);
+  return view;
+}
+
+/// Whether a file is a page of the viewer.
+bool is_view(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string head(512, '\0');
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head.rfind("<!DOCTYPE html>", 0) == 0 && head.find(kViewGenerator) != std::string::npos;
+}
+
+core::Result<ExportSummary> write_view(MapSource& source, const std::filesystem::path& output) {
+  std::error_code ec;
+  if (std::filesystem::is_regular_file(output, ec) && !is_view(output)) {
+    return core::usage_error(fmt::format(
+        "{}: exists and is no page of a map; name another file (only such pages are ever replaced)",
+        output.string()));
+  }
+  auto view = view_of(source);
+  if (!view) return tl::unexpected(view.error());
+  viewer::Cost cost;
+  const std::string page = viewer::page(view->scene, kViewGenerator, &cost);
+  if (auto written = core::write_file(output, page); !written) return tl::unexpected(written.error());
+
+  ExportSummary summary;
+  summary.written = {output};
+  summary.notes = std::move(view->notes);
+  const auto each = [&](std::size_t bytes) {
+    return static_cast<double>(bytes) / static_cast<double>(std::max<std::size_t>(1, cost.points));
+  };
+  summary.notes.push_back(fmt::format(
+      "{} points{}, {:.1f} MB: {:.2f} bytes a point for place and colour, {:.2f} for normals, "
+      "{:.2f} for {} further layers",
+      cost.points,
+      view->scene.clouds.front().of > 0 ? fmt::format(" of {}", view->scene.clouds.front().of) : "",
+      static_cast<double>(page.size()) / 1e6, each(cost.place_and_color), each(cost.normals),
+      each(cost.layers), view->scene.clouds.front().layers.size()));
+  return summary;
+}
+
+}  // namespace
+
+core::Result<MapView> view_of(const ExportRequest& request, const core::Executor& executor, core::Log& log,
+                              const ExportProgress& progress) {
+  auto source = MapSource::open(request, executor, log, progress);
+  if (!source) return tl::unexpected(source.error());
+  return view_of(*source);
+}
+
+core::Result<MapView> view_of_two(const ExportRequest& first, const ExportRequest& second,
+                                  const core::Executor& executor, core::Log& log,
+                                  const ExportProgress& progress) {
+  auto one = MapSource::open(first, executor, log, progress);
+  if (!one) return tl::unexpected(one.error());
+  auto other = MapSource::open(second, executor, log, progress);
+  if (!other) return tl::unexpected(other.error());
+  auto view = view_of(*one);
+  if (!view) return view;
+  auto added = shown_cloud(*other);
+  if (!added) return tl::unexpected(added.error());
+
+  const auto poses = one->poses(false);
+  const auto other_poses = other->poses(false);
+  std::optional<geometry::Rigid3> moved;
+  if (poses && other_poses) moved = first_from_second(*poses, *other_poses);
+  if (moved) {
+    move(added->second, *moved);
+  } else {
+    view->notes.push_back(fmt::format("{} and {} have no frames in common: each lies in its own frame",
+                                      one->name(), other->name()));
+  }
+
+  viewer::Scene& scene = view->scene;
+  if (added->second.name == scene.clouds.front().name) added->second.name += " (second)";
+  add_distances(scene.clouds.front(), added->second, executor);
+  scene.clouds.push_back(std::move(added->second));
+  return view;
+}
+
+Format html_format() {
+  return {"html",
+          {".html"},
+          {Content::kCloud},
+          "",
+          "Page to walk through the map in a browser",
+          "One file that opens from disk, without a network: the cloud with levels of detail, coloured by "
+          "photo, height, "
+          "normal, confidence, σ, robot or time seen; the cameras' path with the keyframes' pictures, lines, "
+          "loops, the "
+          "floor plan; measuring, cutting, saving of what is shown. Small pictures of keyframes are taken "
+          "from the "
+          "recording as long as it is there. `--points` thins the cloud by voxels. [viewer.md](viewer.md) "
+          "tells how it "
+          "is used.",
+          {"points", "voxel", "cut"},
+          &write_view};
+}
+
+}  // namespace plumbline::exports

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plumbline/net/live_map.hpp"
+
+#include <pcl/point_cloud.h>
+#include <pcl/point_types.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "plumbline/cloud/sensor_pose.hpp"
+#include "plumbline/maps/frame_pose.hpp"
+#include "plumbline/maps/store.hpp"
+#include "plumbline/viewer/page.hpp"
+
+namespace plumbline::net {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kVoxel_m = 0.03;         // of what is sent
+constexpr std::size_t kPiecesAtOnce = 8;  // keyframes' clouds in one look
+constexpr double kMoved_m = 0.02;         // from which on a keyframe's cloud is sent anew
+constexpr double kTurned = 0.01;          // radians
+
+/// The keyframe's cloud thinned, where the keyframe lies.
+viewer::Points placed(const cloud::Cloud& cloud, const geometry::Rigid3& world_from_camera) {
+  viewer::Points points;
+  const geometry::Rigid3 world_from_depth = world_from_camera * cloud::sensor_pose(cloud);
+  std::set<std::array<int, 3>> taken;
+  for (const cloud::Point& point : cloud) {
+    const Eigen::Vector3d p = world_from_depth * point.getVector3fMap().cast<double>();
+    if (!p.allFinite()) continue;
+    const auto cell = [&](int k) { return static_cast<int>(std::floor(p[k] / kVoxel_m)); };
+    if (!taken.insert({cell(0), cell(1), cell(2)}).second) continue;
+    const Eigen::Vector3d n = world_from_depth.rotation * point.getNormalVector3fMap().cast<double>();
+    points.positions.push_back(
+        {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
+    points.normals.push_back(
+        {static_cast<float>(n.x()), static_cast<float>(n.y()), static_cast<float>(n.z())});
+    points.colors.push_back({point.r, point.g, point.b});
+  }
+  return points;
+}
+
+bool far_from(const geometry::Rigid3& a, const geometry::Rigid3& b) {
+  const double cosine = std::clamp((0.5 * ((a.rotation.transpose() * b.rotation).trace() - 1.0)), -1.0, 1.0);
+  return (a.translation - b.translation).norm() > kMoved_m || std::acos(cosine) > kTurned;
+}
+
+Json numbers(const Eigen::Vector3d& p) {
+  const Eigen::Vector3d at = viewer::upright(p, false);
+  Json list = Json::array();
+  for (int k = 0; k < 3; ++k) list.push_back(std::round(at[k] * 1e3) / 1e3);
+  return list;
+}
+
+/// Every map.db below a folder.
+std::vector<fs::path> stores_in(const fs::path& folder) {
+  std::vector<fs::path> stores;
+  std::error_code ec;
+  for (fs::recursive_directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec)) {
+    if (at.depth() > 3) at.disable_recursion_pending();
+    if (at->path().filename() == maps::kStoreFile) stores.push_back(at->path());
+  }
+  std::sort(stores.begin(), stores.end());
+  return stores;
+}
+
+}  // namespace
+
+struct LiveMap::Impl {
+  explicit Impl(PageServer&& started) : server(std::move(started)) {}
+
+  void follow();
+  void look();
+  void look_at(const fs::path& store, Json& robots);
+  void show(const maps::StoreReader& reader, const maps::StoredMap& map, const std::string& store,
+            std::size_t& budget);
+
+  PageServer server;
+  fs::path output;
+  std::map<std::pair<std::string, core::KeyframeId>, geometry::Rigid3> sent;
+  std::map<std::string, int> colors;  ///< of robots, by name, as they came
+  std::string words;                  ///< of tell()
+  std::mutex mutex;
+  std::condition_variable wake;
+  bool ended = false;
+  std::size_t at_once = kPiecesAtOnce;
+  std::thread thread;
+};
+
+/// Sends keyframes' clouds that are new or have moved.
+void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap& map,
+                         const std::string& store, std::size_t& budget) {
+  const auto with_cloud = reader.cloud_ids();
+  if (!with_cloud) return;
+  const std::set<core::KeyframeId> there(with_cloud->begin(), with_cloud->end());
+  for (const maps::KeyframePose& keyframe : maps::keyframe_poses(map.map)) {
+    if (budget == 0) return;
+    const auto key = std::pair(store, keyframe.id);
+    const auto before = sent.find(key);
+    const bool known = before != sent.end() && !far_from(before->second, keyframe.world_from_camera);
+    if (known || there.count(keyframe.id) == 0) continue;
+
+    const auto cloud = reader.cloud(keyframe.id);
+    if (!cloud) continue;
+    const std::string name =
+        store + "/" + std::to_string(keyframe.id.robot) + "/" + std::to_string(keyframe.id.index);
+    const std::string json = viewer::cloud_json(placed(**cloud, keyframe.world_from_camera), false);
+    std::string robot_name;
+    for (const maps::RobotInfo& robot : map.header.robots) {
+      if (robot.number == keyframe.id.robot) robot_name = robot.name;
+    }
+    server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" + std::to_string(colors[robot_name]) +
+                    ",\"cloud\":" + json + "}",
+                name);
+    sent[key] = keyframe.world_from_camera;
+    --budget;
+  }
+}
+
+void LiveMap::Impl::look_at(const fs::path& store, Json& robots) {
+  const auto blank = maps::is_blank_store(store);
+  if (!blank || *blank) return;
+  auto reader = maps::StoreReader::open(store);
+  if (!reader) return;  // its writer is just beginning
+  const auto each = reader->load_each();
+  if (!each) return;
+
+  std::size_t budget = at_once;
+  for (const maps::StoredMap& map : *each) {
+    const auto paths = maps::by_robot(maps::poses_of(map.map, map.frames));
+    for (const maps::RobotInfo& robot : map.header.robots) {
+      colors.emplace(robot.name, static_cast<int>(colors.size()));
+      const auto path = paths.find(robot.number);
+      if (path == paths.end() || path->second.empty()) continue;
+      Json places = Json::array();
+      for (std::size_t i = 0; i < path->second.size(); i += 1 + path->second.size() / 500)
+        places.push_back(numbers(path->second[i].world_from_camera.translation));
+      robots.push_back({{"name", robot.name.empty() ? "robot" : robot.name},
+                        {"number", colors[robot.name]},
+                        {"p", numbers(path->second.back().world_from_camera.translation)},
+                        {"path", std::move(places)},
+                        {"keyframes", map.map.keyframe_count()},
+                        {"stamp", path->second.back().stamp}});
+    }
+    show(*reader, map, store.parent_path().filename().string(), budget);
+  }
+}
+
+void LiveMap::Impl::look() {
+  std::error_code ec;
+  fs::path folder = output;
+  folder += ".partial";
+  if (!fs::exists(folder, ec)) folder = output;
+  Json robots = Json::array();
+  for (const fs::path& store : stores_in(folder)) look_at(store, robots);
+  if (robots.empty()) return;
+
+  std::string told;
+  {
+    const std::lock_guard lock(mutex);
+    told = words;
+  }
+  if (told.empty()) {
+    for (const Json& robot : robots) {
+      told += told.empty() ? "" : "; ";
+      told += robot["name"].get<std::string>() + ": " + robot["keyframes"].dump() + " keyframes";
+    }
+  }
+  server.send(Json({{"robots", robots}, {"told", told}}).dump(-1, ' ', false, Json::error_handler_t::replace),
+              "robots");
+}
+
+void LiveMap::Impl::follow() {
+  std::unique_lock lock(mutex);
+  while (!ended) {
+    lock.unlock();
+    const Clock::time_point begin = Clock::now();
+    look();
+    const Clock::duration took = Clock::now() - begin;
+    lock.lock();
+    wake.wait_for(lock, std::max<Clock::duration>(std::chrono::seconds(1), 20 * took), [&] { return ended; });
+  }
+}
+
+LiveMap::LiveMap() = default;
+
+core::Result<std::unique_ptr<LiveMap>> LiveMap::start(const PageServerOptions& options,
+                                                      const fs::path& output) {
+  viewer::Scene scene;
+  scene.name = output.filename().string();
+  scene.frame = "frame: of the first camera; metres";
+  scene.z_up = false;
+  scene.live = "events";
+  auto server = PageServer::start(options, viewer::page(scene, "plumbline live"));
+  if (!server) return tl::unexpected(server.error());
+
+  std::unique_ptr<LiveMap> live(new LiveMap);
+  live->impl_ = std::make_unique<Impl>(std::move(*server));
+  live->impl_->output = output;
+  live->impl_->thread = std::thread([impl = live->impl_.get()] { impl->follow(); });
+  return live;
+}
+
+LiveMap::~LiveMap() {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->ended = true;
+  }
+  impl_->wake.notify_all();
+  impl_->thread.join();
+  impl_->at_once = std::numeric_limits<std::size_t>::max();
+  impl_->look();
+  impl_->server.send(R"({"done":true})", "done");
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // for clients to take it
+}
+
+std::string LiveMap::address() const { return impl_->server.address(); }
+
+void LiveMap::tell(const std::string& words) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->words = words;
+}
+
+}  // namespace plumbline::net

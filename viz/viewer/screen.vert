@@ -1,0 +1,5 @@
+#version 300 es
+// SPDX-License-Identifier: BSD-3-Clause
+void main() {
+  gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4. - 1., 0., 1.);
+}
