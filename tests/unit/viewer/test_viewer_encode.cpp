@@ -158,7 +158,9 @@ TEST(ViewerEncode, EveryPointComesBackOnceWithWhatItHas) {
     EXPECT_GT(unfolded(r.fold).dot(Eigen::Vector3d(nx, ny, nz)), 0.997);
     const float confidence = points.layers[0].values[i];
     EXPECT_EQ(r.layers[0] == 0, std::isnan(confidence));
-    if (r.layers[0] > 0) EXPECT_NEAR((r.layers[0] - 1) / 32.0, confidence, 0.017);
+    if (r.layers[0] > 0) {
+      EXPECT_NEAR((r.layers[0] - 1) / 32.0, confidence, 0.017);
+    }
     EXPECT_EQ(r.layers[1] - 1, static_cast<int>(points.layers[1].values[i]));
     ++compared;
   }
