@@ -17,7 +17,7 @@ struct Prediction {
 
 bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_world,
              const Eigen::Vector3d& centre, const sensor::Pinhole& camera, double log_scale,
-             Prediction& prediction) {
+             double octaves_closer, Prediction& prediction) {
   const Eigen::Vector3d p = camera_from_world * point.position;
   if (p.z() < 0.1) return false;
   const Eigen::Vector2d pixel = camera.project(p);
@@ -25,11 +25,24 @@ bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_wo
   const Eigen::Vector3d ray = point.position - centre;
   const double distance = ray.norm();
   if (ray.dot(point.view_direction) < 0.4 * distance) return false;  // seen from another side
-  const double octave = point.reference_octave + std::log(point.reference_distance / distance) / log_scale;
-  if (octave < -2.5 || octave > 9.5) return false;
+  const double octave =
+      point.reference_octave + std::log(point.reference_distance / distance) / log_scale + octaves_closer;
+  // Of another camera's landmarks many are smaller than what this one sees at all.
+  const double beyond = octaves_closer == 0.0 ? 2.5 : 0.5;
+  if (octave < -beyond || octave > 7.0 + beyond) return false;
   prediction = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y()),
                 static_cast<int>(std::lround(octave))};
   return true;
+}
+
+/// By how many octaves the camera sees landmarks larger than their own cameras do from the same distance; by
+/// robot.
+std::vector<double> octaves_closer(const std::vector<double>& focals_px, const sensor::Pinhole& camera,
+                                   double log_scale) {
+  std::vector<double> octaves;
+  octaves.reserve(focals_px.size());
+  for (const double focal : focals_px) octaves.push_back(std::log(camera.fx / focal) / log_scale);
+  return octaves;
 }
 
 /// How far the image has turned about its own axis since a keyframe, degrees; asked for many points in
@@ -108,6 +121,7 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
                                      const AssociationOptions& options, std::vector<core::PointId>* visible) {
   const Eigen::Vector3d centre = camera_from_world.inverse().translation;
   const double log_scale = std::log(options.scale_factor);
+  const std::vector<double> closer = octaves_closer(options.focals_px, camera, log_scale);
   Roll roll(map, camera_from_world);
   const auto max_turn = static_cast<float>(options.max_point_angle_rad * 180.0 / 3.14159265358979);
   std::vector<PointMatch> by_feature(frame.points.size());
@@ -116,8 +130,12 @@ std::vector<PointMatch> match_points(const maps::Map& map, const std::vector<cor
   for (core::PointId id : points) {
     const maps::MapPoint* point = map.find(id);
     Prediction prediction;
-    if (point == nullptr || !predict(*point, camera_from_world, centre, camera, log_scale, prediction))
+    const auto robot = static_cast<std::size_t>(id.robot);
+    const double octaves = robot < closer.size() ? closer[robot] : 0.0;
+    if (point == nullptr ||
+        !predict(*point, camera_from_world, centre, camera, log_scale, octaves, prediction)) {
       continue;
+    }
     if (visible != nullptr) visible->push_back(id);
     near.clear();
     const double grown = radius * std::pow(options.scale_factor, std::clamp(prediction.octave, 0, 4));

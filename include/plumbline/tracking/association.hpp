@@ -36,6 +36,9 @@ struct AssociationOptions {
   int max_line_hamming = 90;
   double max_line_angle_rad = 0.2;
   double min_line_ratio = 0.0;  ///< of the lengths of a predicted and a measured line
+  /// Focal lengths (px) of the cameras that the landmarks are from, by robot; of robots beyond: that of the
+  /// camera. A camera of twice the focal length sees a landmark as if it were half as far away.
+  std::vector<double> focals_px;
   void declare(core::OptionTable& table);
 };
 

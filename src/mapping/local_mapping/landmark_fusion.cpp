@@ -100,6 +100,14 @@ void fuse_into(maps::Map& map, const std::vector<PointId>& points, KeyframeId ke
   }
 }
 
+/// By robot; of numbers that are no robot's that of the first one.
+std::vector<double> focals_of(const std::map<std::int32_t, sensor::Pinhole>& cameras) {
+  std::vector<double> focals(static_cast<std::size_t>(cameras.rbegin()->first) + 1,
+                             cameras.begin()->second.fx);
+  for (const auto& [robot, camera] : cameras) focals[static_cast<std::size_t>(robot)] = camera.fx;
+  return focals;
+}
+
 }  // namespace
 
 void FusionOptions::declare(core::OptionTable& table) {
@@ -110,7 +118,9 @@ void FusionOptions::declare(core::OptionTable& table) {
 
 FusionSummary fuse_points(maps::Map& map, KeyframeId keyframe, const std::vector<KeyframeId>& neighbours,
                           const std::map<std::int32_t, sensor::Pinhole>& cameras,
-                          const FusionOptions& options) {
+                          const FusionOptions& given) {
+  FusionOptions options = given;
+  if (cameras.size() > 1) options.association.focals_px = focals_of(cameras);
   FusionSummary summary;
   for (KeyframeId other : neighbours) {
     fuse_into(map, unseen_points(map, {keyframe}, other), other, cameras.at(other.robot), options, summary);

@@ -2,6 +2,7 @@
 #include "loop_closing/place_matches.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
@@ -44,10 +45,35 @@ bool clearly_nearest(const FrameFeatures& image, const int* distances, std::size
   return true;
 }
 
+std::vector<float> sizes_of(const FrameFeatures& image, double focal_px, double scale_factor) {
+  std::vector<float> sizes;
+  sizes.reserve(image.points.size());
+  for (const features::PointFeature& f : image.points) {
+    const double size = std::log(static_cast<double>(f.depth) / focal_px) / std::log(scale_factor) + f.octave;
+    sizes.push_back(f.depth > 0.0F ? static_cast<float>(size) : std::nanf(""));
+  }
+  return sizes;
+}
+
+/// Pairs of other sizes are as unlike as can be.
+void close(const SizeGate& gate, std::size_t row, int* distances) {
+  constexpr int kUnlike = 256;
+  const float size = gate.size_in_a[row];
+  for (std::size_t j = 0; j < gate.size_in_b.size(); ++j) {
+    if (std::abs(gate.size_in_b[j] - size) > gate.tolerance) distances[j] = kUnlike;
+  }
+}
+
 }  // namespace
 
+SizeGate size_gate(const FrameFeatures& a, double focal_a_px, const FrameFeatures& b, double focal_b_px,
+                   double scale_factor) {
+  return {sizes_of(a, focal_a_px, scale_factor), sizes_of(b, focal_b_px, scale_factor)};
+}
+
 std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeatures& a,
-                                                                 const FrameFeatures& b) {
+                                                                 const FrameFeatures& b,
+                                                                 const SizeGate* gate) {
   const std::size_t rows = a.descriptors.size();
   const std::size_t columns = b.descriptors.size();
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
@@ -59,6 +85,7 @@ std::vector<std::pair<std::size_t, std::size_t>> alike_both_ways(const FrameFeat
   for (std::size_t i = 0; i < rows; ++i) {
     int* row = table.data() + i * columns;
     features::hamming_distances(a.descriptors[i], b.descriptors.data(), columns, row);
+    if (gate != nullptr) close(*gate, i, row);
     nearest_in_b[i] = take_nearest(row, static_cast<std::uint32_t>(columns), static_cast<std::uint32_t>(i),
                                    nearest_in_a.data());
   }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "loop_closing/place_bundle.hpp"
@@ -32,6 +33,7 @@ constexpr double kPointGate = 7.8;
 constexpr double kLineGate = 9.2;
 constexpr double kLineSigma_px = 1.0;
 constexpr std::size_t kSurfaceKeyframes = 5;
+constexpr double kSimilarFocals = 0.2;  // logarithm of their ratio: images of one scale
 
 const FrameFeatures& features_of(const PlaceView& view) {
   static const FrameFeatures kNone;
@@ -58,7 +60,10 @@ PosePairs pairs_by_descriptor(const PlaceView& query, const PlaceView& match,
   const FrameFeatures& q = features_of(query);
   const FrameFeatures& m = features_of(match);
   PosePairs pairs;
-  for (const auto& [i, best] : alike_both_ways(m, q)) {
+  const bool differ = std::abs(std::log(query.camera.fx / match.camera.fx)) > kSimilarFocals;
+  std::optional<SizeGate> gate;
+  if (differ) gate = size_gate(m, match.camera.fx, q, query.camera.fx, how.orb_scale_factor);
+  for (const auto& [i, best] : alike_both_ways(m, q, gate ? &*gate : nullptr)) {
     PointPair pair;
     if (!point_in_space(match, i, pair.match)) continue;
     const features::PointFeature& f = q.points[best];
@@ -114,6 +119,10 @@ class Growth {
     lines_ = match.map->lines_seen_by(around);
     problem.camera = query.camera;
     association_.scale_factor = options.orb_scale_factor;
+    if (match.camera.fx != query.camera.fx) {
+      const auto robots = static_cast<std::size_t>(match.keyframe.robot) + 1;
+      association_.focals_px.assign(robots, match.camera.fx);
+    }
     solver_.depth_rows = options.depth_rows;
   }
 
