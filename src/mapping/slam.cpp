@@ -337,7 +337,7 @@ bool Slam::give_way() {
   maps::split_component(map_, *found);
   joiner_.add(map_, dispute.loops);
   relocalised_.erase(std::next(found).base());
-  closer_.settle_dispute();
+  closer_.remove_dispute();
   closer_.clear_pending();
   ++taken_back_;
   tracker_.map_changed(map_, tracker_.reference(), tracker_.camera_from_world());

@@ -145,7 +145,7 @@ class LoopCloser {
   /// What spoke against the path, in the order in which enough loops agreed.
   [[nodiscard]] const std::vector<LoopDispute>& disputes() const { return disputes_; }
   /// The path gave way to the newest dispute.
-  void settle_dispute() { disputes_.pop_back(); }
+  void remove_dispute() { disputes_.pop_back(); }
   [[nodiscard]] const places::Database& database() const { return database_; }
 
  private:

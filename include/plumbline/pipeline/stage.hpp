@@ -200,7 +200,7 @@ struct CheckContext {
   [[nodiscard]] std::filesystem::path find(const std::string& file, const core::ConfigMark& mark) const;
 };
 
-/// Life of a stage: constructed, declare, check, start, process once a frame, finish, report, doubts.
+/// Life of a stage: constructed, declare, check, start, process once a frame, finish, report, doubt.
 class Stage {
  public:
   virtual ~Stage() = default;
@@ -233,7 +233,7 @@ class Stage {
   /// Fills in what this stage knows in the sections of summary.json; in graph order.
   virtual void report(nlohmann::ordered_json& /*summary*/) const {}
   /// Adds why the result must not be trusted, as far as this stage knows. `summary`: what all have reported.
-  virtual void doubt(const nlohmann::ordered_json& /*summary*/, std::vector<Doubt>& /*doubts*/) const {}
+  virtual void doubt(const nlohmann::ordered_json& /*summary*/, std::vector<Doubt>& /*reasons*/) const {}
   /// Times of parts of this stage's work, named "stage.part".
   [[nodiscard]] virtual std::vector<StageTiming> parts() const { return {}; }
   /// Asked before the run: it draws what it sees of each frame (RunHooks::debug_folder).

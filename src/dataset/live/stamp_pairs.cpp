@@ -3,14 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
+
+#include "layout.hpp"
 
 namespace plumbline::dataset {
 namespace {
 
 constexpr std::size_t kMostAlone = 64;  // images of one kind that wait for the other
 constexpr std::int64_t kMicrosecond_ns = 1000;
+constexpr double kStampResolution_s = 1e-6;
 
 }  // namespace
 
@@ -26,7 +28,9 @@ void StampPairs::add(List& list, Stamped image) {
 }
 
 std::int64_t StampPairs::gap(const Stamped& color, const Stamped& depth) const {
-  return (std::abs(depth.stamp_ns + delay_ns_ - color.stamp_ns) + kMicrosecond_ns / 2) / kMicrosecond_ns;
+  // In the same numbers, and rounded likewise: of gaps that are all but alike the same one is smaller.
+  const double moment_s = seconds_of(color.stamp_ns) - static_cast<double>(delay_ns_) * 1e-9;
+  return std::llround(std::abs(seconds_of(depth.stamp_ns) - moment_s) / kStampResolution_s);
 }
 
 std::optional<std::size_t> StampPairs::nearest_depth(std::size_t color) const {

@@ -32,7 +32,7 @@ using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kVoxel_m = 0.03;         // of what is sent
-constexpr std::size_t kPiecesAtOnce = 8;  // keyframes' clouds in one look
+constexpr std::size_t kCloudsAtOnce = 8;  // keyframes' clouds in one look
 constexpr double kMoved_m = 0.02;         // from which on a keyframe's cloud is sent anew
 constexpr double kTurned = 0.01;          // radians
 
@@ -99,7 +99,7 @@ struct LiveMap::Impl {
   std::mutex mutex;
   std::condition_variable wake;
   bool ended = false;
-  std::size_t at_once = kPiecesAtOnce;
+  std::size_t at_once = kCloudsAtOnce;
   std::thread thread;
 };
 
@@ -171,18 +171,18 @@ void LiveMap::Impl::look() {
   for (const fs::path& store : stores_in(folder)) look_at(store, robots);
   if (robots.empty()) return;
 
-  std::string told;
+  std::string reported;
   {
     const std::lock_guard lock(mutex);
-    told = words;
+    reported = words;
   }
-  if (told.empty()) {
+  if (reported.empty()) {
     for (const Json& robot : robots) {
-      told += told.empty() ? "" : "; ";
-      told += robot["name"].get<std::string>() + ": " + robot["keyframes"].dump() + " keyframes";
+      reported += told.empty() ? "" : "; ";
+      reported += robot["name"].get<std::string>() + ": " + robot["keyframes"].dump() + " keyframes";
     }
   }
-  server.send(Json({{"robots", robots}, {"told", told}}).dump(-1, ' ', false, Json::error_handler_t::replace),
+  server.send(Json({{"robots", robots}, {"reported", told}}).dump(-1, ' ', false, Json::error_handler_t::replace),
               "robots");
 }
 

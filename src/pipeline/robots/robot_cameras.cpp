@@ -95,7 +95,7 @@ void RobotCameras::use(std::size_t robot, mapping::Slam& slam) {
   });
 }
 
-void RobotCameras::ask_finished(const Slams& slams) {
+void RobotCameras::estimate_finished(const Slams& slams) {
   if (!refine_) return;
   // What is live ended before the answer was used: as if nobody had asked, for nobody asks of a recording.
   if (recordings_->live() && !waiting_.empty() && recordings_->size() <= use_from_) {
@@ -138,10 +138,10 @@ Json RobotCameras::section() const {
   return list;
 }
 
-void RobotCameras::doubt(std::vector<Doubt>& doubts) const {
+void RobotCameras::doubt(std::vector<Doubt>& reasons) const {
   for (const Json& camera : section()) {
     const auto text = camera.at("doubt").get<std::string>();
-    if (!text.empty()) doubts.push_back({Doubt::About::kCamera, text});
+    if (!text.empty()) reasons.push_back({Doubt::About::kCamera, text});
   }
 }
 

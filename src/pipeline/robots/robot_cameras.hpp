@@ -34,14 +34,14 @@ class RobotCameras {
   /// After a frame was tracked: asks the maps as they are now, beside the tracker, once.
   void after(std::size_t frame, const Slams& slams);
   /// Asks the finished maps, until they have nothing new to say.
-  void ask_finished(const Slams& slams);
+  void estimate_finished(const Slams& slams);
 
   /// What an interrupted run knew of a robot's camera; then resume().
   void restore(const RobotInfo& stored, mapping::Slam& slam);
   void resume();
 
   [[nodiscard]] Json section() const;
-  void doubt(std::vector<Doubt>& doubts) const;
+  void doubt(std::vector<Doubt>& reasons) const;
 
  private:
   /// The maps while they are being asked.

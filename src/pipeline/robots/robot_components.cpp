@@ -68,7 +68,7 @@ Json section_of(const ComponentFate& component) {
   return section;
 }
 
-void doubt_components_apart(const Json& summary, std::vector<Doubt>& doubts) {
+void doubt_components_apart(const Json& summary, std::vector<Doubt>& reasons) {
   std::size_t apart = 0;
   double frames = 0.0;
   std::string names;
@@ -85,7 +85,7 @@ void doubt_components_apart(const Json& summary, std::vector<Doubt>& doubts) {
   const double percent = read > 0.0 ? 100.0 * frames / read : 0.0;
   const std::string which =
       apart == 1 ? "a second map that shares" : fmt::format("{} more maps that share", apart);
-  doubts.push_back(
+  reasons.push_back(
       {Doubt::About::kComponents,
        fmt::format(
            "{:.0f} % of the frames form {} no place with the first: film a place of both (components/: {})",

@@ -38,6 +38,6 @@ struct ComponentFate {
 Json section_of(const ComponentFate& component);
 
 /// Components that are not part of the result.
-void doubt_components_apart(const Json& summary, std::vector<Doubt>& doubts);
+void doubt_components_apart(const Json& summary, std::vector<Doubt>& reasons);
 
 }  // namespace plumbline::pipeline

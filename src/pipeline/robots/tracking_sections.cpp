@@ -88,13 +88,13 @@ Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others)
           {"note", "this map depends on what the network brought and when: another run gives other bytes"}};
 }
 
-void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& doubts) {
+void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& reasons) {
   const Json& disputes = summary.at("loops").at("disputes");
   if (disputes.empty()) return;
   const Json& worst = *std::max_element(disputes.begin(), disputes.end(), [](const Json& x, const Json& y) {
     return x.at("correction_m").get<double>() < y.at("correction_m").get<double>();
   });
-  doubts.push_back(
+  reasons.push_back(
       {Doubt::About::kDisputedLoops,
        fmt::format("{} loops agree that keyframe {} lies {:.2f} m from where the map has it, beside "
                    "keyframe {}; that is more than drift explains on {:.1f} m: the path is wrong "

@@ -20,6 +20,6 @@ void report_joins(const std::string& robot, const mapping::Slam& slam,
 Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others);
 
 /// Loops that agree with one another against the path.
-void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& doubts);
+void doubt_disputed_loops(const Json& summary, std::vector<Doubt>& reasons);
 
 }  // namespace plumbline::pipeline

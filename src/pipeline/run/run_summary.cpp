@@ -67,17 +67,17 @@ double tracked_percent(const Json& frames) {
 
 /// The gravest doubt; of lost frames together with what is mapped apart from the rest.
 std::string reason_of(const Graph& graph, const Json& summary) {
-  std::vector<Doubt> doubts;
-  for (const Node& node : graph.nodes) node.stage->doubt(summary, doubts);
-  if (doubts.empty()) return {};
-  std::stable_sort(doubts.begin(), doubts.end(),
+  std::vector<Doubt> reasons;
+  for (const Node& node : graph.nodes) node.stage->doubt(summary, reasons);
+  if (reasons.empty()) return {};
+  std::stable_sort(reasons.begin(), reasons.end(),
                    [](const Doubt& x, const Doubt& y) { return x.about < y.about; });
 
-  std::string reason = doubts.front().text;
-  const auto apart = std::find_if(doubts.begin(), doubts.end(), [](const Doubt& doubt) {
+  std::string reason = reasons.front().text;
+  const auto apart = std::find_if(reasons.begin(), reasons.end(), [](const Doubt& doubt) {
     return doubt.about == Doubt::About::kComponents;
   });
-  if (doubts.front().about == Doubt::About::kLostFrames && apart != doubts.end())
+  if (reasons.front().about == Doubt::About::kLostFrames && apart != reasons.end())
     reason += "; " + apart->text;
   return reason;
 }

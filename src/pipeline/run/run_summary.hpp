@@ -22,7 +22,7 @@ struct RunFacts {
   int threads = 0;
 };
 
-/// What the stages report, with the gravest of their doubts.
+/// What the stages report, with the gravest of their reasons.
 RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFacts& facts);
 
 /// One line a frame: its number, stamp, the milliseconds of every stage and of parts of stages (empty =

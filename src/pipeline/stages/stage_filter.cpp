@@ -49,8 +49,8 @@ class FilterStage : public Stage {
     report_left_out_of_map(reports_, summary["cloud"]);
     summary["cloud"]["points"] = points_;
   }
-  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
-    doubt_empty_cloud(summary, doubts);
+  void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
+    doubt_empty_cloud(summary, reasons);
   }
 
  private:

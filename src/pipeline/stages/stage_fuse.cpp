@@ -92,8 +92,8 @@ class FuseStage : public Stage {
                         {"yaw", report_.frame.yaw},
                         {"output_from_map", rows(report_.frame.output_from_map)}};
   }
-  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
-    doubt_empty_cloud(summary, doubts);
+  void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
+    doubt_empty_cloud(summary, reasons);
   }
 
  private:

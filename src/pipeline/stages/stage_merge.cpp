@@ -150,10 +150,10 @@ class MergeStage : public Stage {
     add(summary["path"]["refused_adjustments"], merged_.refused);
     if (context_->input.stored_maps != nullptr) report_stored_frames(result, summary["frames"]);
   }
-  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
-    if (context_->input.stored_maps != nullptr) doubt_lost_frames(summary, doubts);
-    doubt_components_apart(summary, doubts);
-    if (!merged_.unconnected.empty()) doubts.push_back({Doubt::About::kUnconnectedMaps, merged_.unconnected});
+  void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
+    if (context_->input.stored_maps != nullptr) doubt_lost_frames(summary, reasons);
+    doubt_components_apart(summary, reasons);
+    if (!merged_.unconnected.empty()) reasons.push_back({Doubt::About::kUnconnectedMaps, merged_.unconnected});
   }
 
  private:

@@ -125,11 +125,11 @@ class OutputStage : public Stage {
     }
   }
 
-  void doubt(const Json& /*summary*/, std::vector<Doubt>& doubts) const override {
+  void doubt(const Json& /*summary*/, std::vector<Doubt>& reasons) const override {
     if (path_.tears.empty()) return;
     const auto& worst = *std::max_element(path_.tears.begin(), path_.tears.end(),
                                           [](const auto& a, const auto& b) { return a.off_m < b.off_m; });
-    doubts.push_back(
+    reasons.push_back(
         {Doubt::About::kTornMap,
          fmt::format(
              "the map is torn: at {:.3f} s, between keyframes {} and {}, the path jumps by {:.1f} cm "

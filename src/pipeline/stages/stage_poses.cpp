@@ -89,8 +89,8 @@ class PosesStage : public Stage {
       summary["robots"].push_back({{"name", robot.name}, {"keyframes", way.keyframes}});
     }
   }
-  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
-    doubt_lost_frames(summary, doubts);
+  void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
+    doubt_lost_frames(summary, reasons);
   }
 
  private:

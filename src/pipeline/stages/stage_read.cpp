@@ -80,9 +80,9 @@ class ReadStage : public Stage {
     frames["odometry"] = odometry_.load();
     if (source_->live()) summary["live"] = live_section(source_->report());
   }
-  void doubt(const Json& /*summary*/, std::vector<Doubt>& doubts) const override {
+  void doubt(const Json& /*summary*/, std::vector<Doubt>& reasons) const override {
     if (const std::string doubt = source_->doubt(); !doubt.empty())
-      doubts.push_back({Doubt::About::kRecording, doubt});
+      reasons.push_back({Doubt::About::kRecording, doubt});
   }
 
  private:

@@ -106,7 +106,7 @@ class TrackStage : public Stage {
 
     if (!merged) {
       for (const auto& slam : slams_) slam->finish();
-      if (!context_->stop.stop_requested()) cameras_->ask_finished(slams_);
+      if (!context_->stop.stop_requested()) cameras_->estimate_finished(slams_);
     }
     auto written = write_cameras(context_->output_folder, cameras_->robots(), cameras_->now());
     if (!written) return written;
@@ -146,10 +146,10 @@ class TrackStage : public Stage {
     if (context_->hooks.feedback != nullptr)
       summary["feedback"] = feedback_section(slams_, *context_->hooks.feedback);
   }
-  void doubt(const Json& summary, std::vector<Doubt>& doubts) const override {
-    doubt_lost_frames(summary, doubts);
-    doubt_disputed_loops(summary, doubts);
-    cameras_->doubt(doubts);
+  void doubt(const Json& summary, std::vector<Doubt>& reasons) const override {
+    doubt_lost_frames(summary, reasons);
+    doubt_disputed_loops(summary, reasons);
+    cameras_->doubt(reasons);
   }
   [[nodiscard]] std::vector<StageTiming> parts() const override {
     return {{"track.bundle_wait", bundle_wait_ms_, 0.0}, {"track.bundle", bundle_ms_, 0.0}};

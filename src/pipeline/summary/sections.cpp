@@ -129,14 +129,14 @@ std::string left_out_of_map_text(const Json& cloud) {
   return text.empty() ? text : text + ", of the merged cloud";
 }
 
-void doubt_lost_frames(const Json& summary, std::vector<Doubt>& doubts) {
+void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons) {
   const Json& frames = summary.at("frames");
   const auto count = [&](const char* name) { return frames.at(name).get<std::size_t>(); };
   const std::size_t all = count("read") + count("unreadable");
   const std::size_t without = all - std::min(all, count("tracked"));
   const double percent = all > 0 ? 100.0 * static_cast<double>(without) / static_cast<double>(all) : 0.0;
   if (percent <= kMostLostPercent) return;
-  doubts.push_back(
+  reasons.push_back(
       {Doubt::About::kLostFrames, fmt::format("{} of {} frames have no pose ({:.1f} %; up to {:.0f} % would "
                                               "be trusted): {} lost, {} unreadable; "
                                               "the longest loss is {} frames",
@@ -144,13 +144,13 @@ void doubt_lost_frames(const Json& summary, std::vector<Doubt>& doubts) {
                                               count("unreadable"), count("longest_loss"))});
 }
 
-void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& doubts) {
+void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons) {
   const Json& cloud = summary.at("cloud");
   if (summary.at("frames").at("read").get<std::size_t>() == 0) return;
   if (!(cloud.at("voxel_m").get<double>() > 0.0) || cloud.at("points").get<std::size_t>() > 0) return;
   const std::string of_map = left_out_of_map_text(cloud);
   const std::string without = of_map.empty() ? left_out_text(cloud) : of_map;
-  doubts.push_back({Doubt::About::kEmptyCloud,
+  reasons.push_back({Doubt::About::kEmptyCloud,
                     "the cloud is empty: " +
                         (without.empty() ? "no keyframe had usable depth" : "left out were " + without)});
 }

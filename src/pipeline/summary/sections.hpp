@@ -52,8 +52,8 @@ std::string left_out_text(const Json& cloud);
 std::string left_out_of_map_text(const Json& cloud);
 
 /// More frames have no pose than would be trusted.
-void doubt_lost_frames(const Json& summary, std::vector<Doubt>& doubts);
+void doubt_lost_frames(const Json& summary, std::vector<Doubt>& reasons);
 /// The cloud that was to be made is empty.
-void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& doubts);
+void doubt_empty_cloud(const Json& summary, std::vector<Doubt>& reasons);
 
 }  // namespace plumbline::pipeline
