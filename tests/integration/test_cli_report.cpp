@@ -2,6 +2,9 @@
 // A result as one page: plumbline report.
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
+#include <set>
+
 #include "../markup.hpp"
 #include "program.hpp"
 #include "wall_recording.hpp"
@@ -40,15 +43,19 @@ class Report : public ProgramTest {
     }
     return html;
   }
-  /// Well-formed, and nothing in it comes from elsewhere or is run.
+  /// Well-formed, and nothing in it comes from elsewhere; only the map to walk through has scripts.
   static void expect_sound(const std::string& page) {
     const std::string html = without_pictures(page);
     EXPECT_EQ(html.rfind("<!DOCTYPE html>\n<html lang=\"en\">", 0), 0U);
     EXPECT_EQ(malformed_at(html), "");
     for (const char* foreign :
-         {"http:", "https:", "//www", "<script", "<link", "<iframe", "@import", "url(", "file:", "onload"}) {
+         {"http:", "https:", "//www", "<link", "<iframe", "@import", "url(", "file:", "onload"}) {
       EXPECT_EQ(html.find(foreign), std::string::npos) << foreign;
     }
+    const std::size_t viewers = count_of("<div class=\"pv\">", html);
+    EXPECT_EQ(count_of("<script>", html), viewers);
+    EXPECT_EQ(count_of("<script ", html),
+              count_of("class=\"pv-scene\"", html) + count_of("class=\"pv-data\"", html));
     EXPECT_EQ(count_of(" src=\"", html), count_of(" src=\"data:image/png;base64,", html));
     EXPECT_EQ(count_of(" href=\"", html),
               count_of(" href=\"#", html) + count_of(" href=\"data:image/png;base64,", html));
@@ -90,6 +97,37 @@ TEST_F(Report, TellsWhatWasMapped) {
   ASSERT_GT(points, 1000U);
   EXPECT_TRUE(
       has(html, std::to_string(points / 1000) + "\u202F" + std::to_string(points % 1000 + 1000).substr(1)));
+}
+
+TEST_F(Report, HoldsTheMapToWalkThrough) {
+  map_wall("--set output.views=top");
+  const auto scene_of = [](const std::string& html) {
+    const std::string mark = "class=\"pv-scene\">";
+    const std::size_t from = html.find(mark) + mark.size();
+    return nlohmann::json::parse(html.substr(from, html.find("</script>", from) - from));
+  };
+  const nlohmann::json scene = scene_of(page("out"));
+  const nlohmann::json cloud = scene["clouds"].at(0);
+  EXPECT_EQ(cloud["count"], read_json(path("out/summary.json"))["cloud"]["points"]);
+  EXPECT_TRUE(scene["up"].get<bool>());
+  EXPECT_GE(scene["keyframes"].size(), 1U);
+  EXPECT_GE(scene["paths"].at(0)["t"].size(), 2U);
+  std::set<std::string> layers;
+  for (const auto& layer : cloud["layers"]) layers.insert(layer["key"].get<std::string>());
+  EXPECT_EQ(layers, (std::set<std::string>{"confidence", "sigma", "view"}));
+
+  const nlohmann::json thin = scene_of(page("out --points 1000"))["clouds"].at(0);
+  EXPECT_LE(thin["count"].get<std::size_t>(), 1000U);
+  EXPECT_GT(thin["count"].get<std::size_t>(), 300U);
+  EXPECT_EQ(thin["of"], cloud["count"]);
+
+  ASSERT_EQ(run("map wall -o other -q --set fuse.voxel=3cm --set output.views=" + std::string(kSmall)).code,
+            0);
+  const nlohmann::json two = scene_of(page("out other"))["clouds"];
+  ASSERT_EQ(two.size(), 2U);
+  EXPECT_EQ(two[1]["name"], "other");
+  for (const auto& one : two) EXPECT_EQ(one["layers"].back()["key"], "distance");
+  EXPECT_EQ(run("report out nothing --force").code, 3);
 }
 
 TEST_F(Report, SameFolderSameBytesHoweverItIsNamed) {

@@ -46,6 +46,7 @@ core::Result<void> check_output(const fs::path& file, bool replace) {
 core::Result<ReportSummary> write_report(const ReportRequest& request, const core::Executor& executor,
                                          core::Log& log) {
   const fs::path file = request.output.empty() ? request.result / "report.html" : request.output;
+
   auto data = read_report_data(request.result);
   if (!data) return tl::unexpected<core::Error>(data.error());
   if (auto free = check_output(file, request.replace); !free)

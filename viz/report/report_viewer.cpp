@@ -9,6 +9,7 @@ namespace plumbline::report {
 core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& request,
                                       const core::Executor& executor, core::Log& log) {
   if (!data.extent) return std::string();
+
   exports::ExportRequest wanted;
   wanted.input = data.folder;
   wanted.options.points = static_cast<int>(request.points);
@@ -18,11 +19,13 @@ core::Result<std::string> viewer_html(ReportData& data, const ReportRequest& req
   const auto silent = [](std::size_t, std::size_t) {};
   auto view = request.other.empty() ? exports::view_of(wanted, executor, log, silent)
                                     : exports::view_of_two(wanted, other, executor, log, silent);
+
   if (!view && !request.other.empty()) return tl::unexpected<core::Error>(view.error());
   if (!view) {
     data.missing.push_back("the map to walk through is left out: " + view.error().message);
     return std::string();
   }
+
   view->scene.name = data.name;
   view->scene.clouds.front().name = data.name;
   return viewer::fragment(

@@ -167,6 +167,7 @@ std::vector<std::uint8_t> levels_of(const Grid& grid, const std::vector<unsigned
 std::string packed_points(const Points& points, const Grid& grid, const std::vector<std::size_t>& chosen) {
   const std::size_t n = chosen.size();
   std::vector<std::uint8_t> bytes((points.colored ? 9 : 6) * n);
+
   Steps before{};
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -265,6 +266,7 @@ EncodedCloud encode(const Points& points, bool z_up) {
   // Of the finest level the spacing follows from how the next coarser cells fill: four to a cell are as wide
   // apart as half its edge.
   for (const unsigned b : bits) out.spacing_m.push_back(out.step_m * static_cast<double>(1U << b));
+
   unsigned edge = 1;
   while (edge < kBits && cells[edge] * 2 > count) ++edge;
   const double share = static_cast<double>(std::max<std::size_t>(count, 1)) /
@@ -275,6 +277,7 @@ EncodedCloud encode(const Points& points, bool z_up) {
     std::vector<std::size_t> chosen;
     const auto flush = [&] {
       if (chosen.empty()) return;
+
       Chunk chunk;
       chunk.level = static_cast<int>(l);
       chunk.count = chosen.size();

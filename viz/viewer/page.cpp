@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "encode.hpp"
@@ -69,6 +70,7 @@ Json cloud_json(const Points& points, bool z_up, Pieces& pieces, Cost& cost) {
   json["colored"] = points.colored;
   json["origin"] = encoded.origin;
   json["step"] = encoded.step_m;
+
   json["levels"] = Json::array();
   for (const double spacing : encoded.spacing_m) json["levels"].push_back(rounded(spacing));
   json["layers"] = Json::array();
@@ -79,12 +81,14 @@ Json cloud_json(const Points& points, bool z_up, Pieces& pieces, Cost& cost) {
   for (const Chunk& chunk : encoded.chunks) {
     Json data = Json::array({pieces.add(chunk.points)});
     cost.place_and_color += pieces.base64.back().size();
+
     data.push_back(chunk.normals.empty() ? -1 : pieces.add(chunk.normals));
     if (!chunk.normals.empty()) cost.normals += pieces.base64.back().size();
     for (const std::string& layer : chunk.layers) {
       data.push_back(pieces.add(layer));
       cost.layers += pieces.base64.back().size();
     }
+
     json["chunks"].push_back({{"level", chunk.level},
                               {"count", chunk.count},
                               {"low", chunk.low},
@@ -148,14 +152,15 @@ Json scene_json(const Scene& scene, Pieces& pieces, Cost& cost) {
   json["frame"] = scene.frame;
   json["up"] = scene.z_up;
   json["floor"] = rounded(scene.floor_m);
+
   json["clouds"] = Json::array();
   for (const Points& points : scene.clouds)
     json["clouds"].push_back(cloud_json(points, scene.z_up, pieces, cost));
-
   json["inmost"] = inmost_json(scene);
 
   json["paths"] = Json::array();
   for (const CameraPath& path : scene.paths) json["paths"].push_back(path_json(path, scene.z_up));
+
   json["keyframes"] = Json::array();
   for (const Keyframe& k : scene.keyframes) {
     Json keyframe = {{"robot", k.robot},
@@ -198,24 +203,12 @@ std::string in_script(const Json& json) {
 }
 
 std::string markup(const std::string& text) {
+  static const std::map<char, std::string> kEntities{
+      {'<', "&lt;"}, {'>', "&gt;"}, {'&', "&amp;"}, {'"', "&quot;"}};
   std::string out;
   for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
+    const auto entity = kEntities.find(c);
+    out += entity == kEntities.end() ? std::string(1, c) : entity->second;
   }
   return out;
 }

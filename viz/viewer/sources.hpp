@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The page's own code, made of this folder's *.js, *.glsl and *.css when the program is built (embed.cmake).
+// The page's own code, made of this folder's *.js, *.glsl and *.css when the program is built
+// (cmake/embed.cpp).
 
 namespace plumbline::viewer {
 

@@ -11,7 +11,7 @@ namespace plumbline::viewer {
 
 std::string base64(std::string_view bytes);
 
-/// What the page spends on a cloud; bytes as they stand in it, base64 included.
+/// Bytes that clouds take in the page, as they stand in it, base64 included.
 struct Cost {
   std::size_t points = 0;
   std::size_t place_and_color = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a page shows that turns a map in the browser: points with their layers, paths, lines, the plan.
+// A map as a page shows it that turns it in the browser: points with their layers, paths, lines, the plan.
 #include <array>
 #include <cstdint>
 #include <string>

@@ -26,9 +26,11 @@ void add_report(CLI::App& app, Session& session) {
   const auto request = std::make_shared<report::ReportRequest>();
   CLI::App* command = add_command(app, session, "report", "Write an HTML report of a result: OUT/report.html",
                                   [&session, request] { return report(session, *request); });
+
   command->add_option("OUT", request->result, "Result folder of plumbline map or fuse")->required();
   command->add_option("OTHER", request->other,
                       "A second result, laid over the first in the map to walk through");
+
   command->add_option("-o,--output", request->output, "File to write (default: OUT/report.html)")
       ->type_name("FILE.html");
   command
@@ -36,6 +38,7 @@ void add_report(CLI::App& app, Session& session) {
                    "Compare the paths with the true ones: a recording with groundtruth.txt, a folder with "
                    "one for each robot, or a file in TUM format")
       ->type_name("FOLDER|FILE");
+
   command
       ->add_option("--points", request->points,
                    "Points of the map to walk through, at most, thinned by voxels; 0: all (default: 1500000)")

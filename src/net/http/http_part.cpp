@@ -229,6 +229,7 @@ void answer_events(Events& events, httplib::Response& response) {
       response.set_content("as many streams as are allowed are open\n", "text/plain");
       return;
     }
+
     listener = events.listeners.emplace(events.listeners.end());
     listener->most += events.kept.size();
     for (const auto& [topic, event] : events.kept) put(*listener, event);
@@ -253,6 +254,7 @@ void set_routes(Running& running) {
        {"Content-Security-Policy",
         "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
         "connect-src 'self'; frame-ancestors 'none'"}});
+
   running.server.set_pre_routing_handler(
       [&running](const httplib::Request& request, httplib::Response& response) {
         const int status = refused(running, request);
@@ -271,6 +273,7 @@ void set_routes(Running& running) {
           return sink.write(running.page.data() + offset, length);
         });
   });
+
   running.server.Get("/events", [&running](const httplib::Request& /*request*/, httplib::Response& response) {
     answer_events(running.events, response);
   });
@@ -292,8 +295,10 @@ core::Result<void*> start(PageServerOptions& options, std::string page) {
         fmt::format("--http {}:{}: cannot be listened at; is the port in use? Choose another one",
                     options.host, options.port));
   }
+
   options.port = running->port = port;
   running->everywhere = options.host == "0.0.0.0" || options.host == "::";
+
   for (const std::string& name : {options.host, "[" + options.host + "]", std::string("localhost")}) {
     running->hosts.insert(fmt::format("{}:{}", name, port));
     if (port == 80) running->hosts.insert(name);

@@ -108,6 +108,7 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
                          const std::string& store, std::size_t& budget) {
   const auto with_cloud = reader.cloud_ids();
   if (!with_cloud) return;
+
   const std::set<core::KeyframeId> there(with_cloud->begin(), with_cloud->end());
   for (const maps::KeyframePose& keyframe : maps::keyframe_poses(map.map)) {
     if (budget == 0) return;
@@ -121,10 +122,12 @@ void LiveMap::Impl::show(const maps::StoreReader& reader, const maps::StoredMap&
     const std::string name =
         store + "/" + std::to_string(keyframe.id.robot) + "/" + std::to_string(keyframe.id.index);
     const std::string json = viewer::cloud_json(placed(**cloud, keyframe.world_from_camera), false);
+
     std::string robot_name;
     for (const maps::RobotInfo& robot : map.header.robots) {
       if (robot.number == keyframe.id.robot) robot_name = robot.name;
     }
+
     server.send("{\"key\":" + Json(name).dump() + ",\"robot\":" + std::to_string(colors[robot_name]) +
                     ",\"cloud\":" + json + "}",
                 name);
@@ -148,9 +151,11 @@ void LiveMap::Impl::look_at(const fs::path& store, Json& robots) {
       colors.emplace(robot.name, static_cast<int>(colors.size()));
       const auto path = paths.find(robot.number);
       if (path == paths.end() || path->second.empty()) continue;
+
       Json places = Json::array();
       for (std::size_t i = 0; i < path->second.size(); i += 1 + path->second.size() / 500)
         places.push_back(numbers(path->second[i].world_from_camera.translation));
+
       robots.push_back({{"name", robot.name.empty() ? "robot" : robot.name},
                         {"number", colors[robot.name]},
                         {"p", numbers(path->second.back().world_from_camera.translation)},
@@ -168,21 +173,23 @@ void LiveMap::Impl::look() {
   folder += ".partial";
   if (!fs::exists(folder, ec)) folder = output;
   Json robots = Json::array();
+
   for (const fs::path& store : stores_in(folder)) look_at(store, robots);
   if (robots.empty()) return;
 
-  std::string reported;
+  std::string line;
   {
     const std::lock_guard lock(mutex);
-    reported = words;
+    line = words;
   }
-  if (reported.empty()) {
+
+  if (line.empty()) {
     for (const Json& robot : robots) {
-      reported += told.empty() ? "" : "; ";
-      reported += robot["name"].get<std::string>() + ": " + robot["keyframes"].dump() + " keyframes";
+      line += line.empty() ? "" : "; ";
+      line += robot["name"].get<std::string>() + ": " + robot["keyframes"].dump() + " keyframes";
     }
   }
-  server.send(Json({{"robots", robots}, {"reported", told}}).dump(-1, ' ', false, Json::error_handler_t::replace),
+  server.send(Json({{"robots", robots}, {"told", line}}).dump(-1, ' ', false, Json::error_handler_t::replace),
               "robots");
 }
 
