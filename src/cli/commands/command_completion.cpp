@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 
 #include "app.hpp"
@@ -131,13 +132,14 @@ struct CompleteRequest {
   std::vector<std::string> words;  ///< behind the program's name
 };
 
-/// Drops the program's name and what stands before it (`time`, assignments), which a shell has taken off
-/// already.
+/// Without the program's name and whatever stands before it (`time`, assignments).
 std::vector<std::string> words_of(const CompleteRequest& request) {
   if (request.line.empty()) return request.words;
-  std::vector<std::string> words = shell_words(request.line);
-  words.erase(words.begin());
-  return words;
+  const std::vector<std::string> words = shell_words(request.line);
+  const auto program = std::find_if(words.begin(), std::prev(words.end()), [](const std::string& word) {
+    return fs::path(word).filename() == "plumbline";
+  });
+  return {std::next(program), words.end()};
 }
 
 int complete_line(const CompleteRequest& request, const CLI::App& app, const Session& session) {

@@ -42,7 +42,7 @@ _plumbline() {
     candidates+=("${line%%$'\t'*}")
     shown+=("${line%%$'\t'*}  ${line#*$'\t'}")
   done
-  (( $#candidates )) && compadd -l $blank -d shown -a candidates
+  (( $#candidates )) && compadd -l "${blank[@]}" -d shown -a candidates
   case $first in
     files*) _files ;;
     folders*) _files -/ ;;
