@@ -23,7 +23,7 @@ const char* label(core::LogLevel level) {
   return level == core::LogLevel::kWarning ? "warning: " : level == core::LogLevel::kError ? "error: " : "";
 }
 
-/// How much is done of what nobody knows the end of.
+/// Text for progress whose total is not known.
 std::string counted(std::size_t done, const char* what, double elapsed_s) {
   const double rate = elapsed_s > 0.0 ? static_cast<double>(done) / elapsed_s : 0.0;
   return fmt::format("{} {}, {:.1f} a second", done, what, rate);

@@ -12,7 +12,7 @@
 
 namespace plumbline::cli {
 
-/// How progress is shown.
+/// Style of progress output.
 enum class ProgressStyle {
   kAuto,  ///< one line that is rewritten on a terminal, lines now and then elsewhere
   kJson,  ///< one JSON object a line, for programs

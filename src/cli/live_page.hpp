@@ -10,7 +10,7 @@
 
 namespace plumbline::cli {
 
-/// Where a map can be watched in the browser while it grows.
+/// Address at which a growing map can be watched in the browser.
 struct PageAddress {
   std::string http;   ///< HOST:PORT; empty: nowhere
   std::string token;  ///< asked of every browser; empty: none is

@@ -6,7 +6,7 @@
 
 namespace plumbline::cli {
 
-/// How a recording is opened again, as it was for the map; refers to the session.
+/// Function that opens a recording again as it was opened for the map; refers to the session.
 exports::OpenRecording recording_opener(Session& session);
 
 }  // namespace plumbline::cli

@@ -17,8 +17,8 @@ namespace {
 
 using nlohmann::json;
 
-/// How a mode cuts its images out of the whole sensor: the sensor's size in pixels of the mode, and where the
-/// image begins there.
+/// Crop of the whole sensor in one depth mode: the sensor's size in pixels of the mode, and the origin of the
+/// image in it.
 struct AzureMode {
   const char* name;
   int sensor_width;

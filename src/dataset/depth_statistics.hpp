@@ -13,7 +13,7 @@ class DepthStatistics {
  public:
   void add(const cv::Mat& depth_m);  ///< CV_32FC1, 0 = no measurement
   [[nodiscard]] std::optional<double> median() const;
-  /// Of the measured pixels; 0 when there are none.
+  /// Share of the measured pixels; 0 if there are none.
   [[nodiscard]] double share_beyond(double depth_m) const;
   [[nodiscard]] double missing_share() const;  ///< of all pixels, 1 when there are none
 

@@ -17,8 +17,8 @@ namespace plumbline::dataset {
 struct Layout;
 class VideoFrames;
 
-/// Of depth that is stored as floats, metres: what a unit of the 16-bit image is that it becomes. 0.2 mm, up
-/// to 13.1 m.
+/// Units per metre of the 16-bit image into which depth in floating-point metres is converted: steps of 0.2
+/// mm, up to 13.1 m.
 inline constexpr double kFloatDepthScale = 5000.0;
 
 /// The image of a file, of a frame of a video (video_frame_name), of the file that a layout's images are

@@ -12,7 +12,7 @@ struct ImageFormats {
   static constexpr const char* kPart = "images";
   static constexpr std::uint64_t layout() { return core::layout_of<ImageFormats, Bytes, cv::Mat>(); }
 
-  /// As stored; empty when it cannot be.
+  /// The image as it is stored, not converted; empty if it cannot be decoded.
   cv::Mat (*decode)(const Bytes& file);
   /// Empty when it cannot be.
   Bytes (*encode_png)(const cv::Mat& image, int level);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How the pairs of a recording are found on disk, one function per layout.
+// Finds the pairs of a recording on disk, with one function per layout.
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -23,7 +23,8 @@ class AzureKinectFile;
 class ImageStore {
  public:
   virtual ~ImageStore() = default;
-  /// As it is stored; `name` is one of those in the layout's pairs. Error (kInput): names what is wrong.
+  /// The image as it is stored; `name` is one of those in the layout's pairs. Error (kInput): names what is
+  /// wrong.
   [[nodiscard]] virtual core::Result<cv::Mat> image(const std::string& name) const = 0;
   /// The same without decoding, where it is stored as an image file's bytes.
   [[nodiscard]] virtual core::Result<StoredImage> stored(const std::string& name) const = 0;
@@ -37,7 +38,7 @@ struct Layout {
   /// Folder of masks named as the depth images, 0 where there is no measurement; "": none.
   std::string confidence{};
   int color_reduction = 1;  ///< colour images are made smaller by this factor while reading
-  /// What the recording's own description says of its camera, where no camera file is named or found.
+  /// Camera from the recording's own description, for when no camera file is named or found.
   std::optional<sensor::CameraReading> camera{};
   /// The pinhole of each pair (PairInfo::camera) for its stored colour image, where they differ.
   std::vector<sensor::Pinhole> frame_cameras{};
@@ -74,7 +75,8 @@ struct LayoutFormat {
   const char* name;        ///< of --format
   const char* program;     ///< whose it is, for messages
   const char* looked_for;  ///< for messages
-  /// What is needed; of alternatives, separated by '|', one. A name that ends in '/' is a folder.
+  /// Files and folders that must exist; '|' separates alternatives, of which one suffices. A name that ends
+  /// in '/' is a folder.
   std::vector<std::string> parts;
   bool (*recognises)(const std::filesystem::path& folder);
   core::Result<Layout> (*read)(const std::filesystem::path& folder, const LayoutOptions& options,
@@ -98,12 +100,12 @@ const std::vector<const LayoutFormat*>& layout_formats();
 /// The first that recognises the folder; null when none does.
 const LayoutFormat* layout_of(const std::filesystem::path& folder);
 
-/// What to say of a folder that is no recording: what is there, and which layout is nearest.
+/// Message for a folder that is no recording: its content, and the layout that is nearest.
 std::string not_a_recording(const std::filesystem::path& folder);
-/// What to say of a file that is none: what it is, where that can be told, and the way out.
+/// Message for a file that is no recording: its kind if that is known, and what to do instead.
 std::string not_a_recording_file(const std::filesystem::path& file);
 
-/// Whether the path is a folder, or a file; false when it cannot be told.
+/// True if the path is a folder (a file); false if that cannot be determined.
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 
@@ -136,7 +138,7 @@ std::vector<PairInfo> pair_by_stamp(const std::vector<StampedFile>& color,
                                     const std::vector<StampedFile>& depth, double max_gap_s,
                                     double depth_delay_s = 0.0);
 
-/// What to say when pair_by_stamp finds nothing: the nearest gap, both ranges of time, what to do.
+/// Message for when pair_by_stamp finds nothing: the smallest gap, both ranges of time, and what to do.
 std::string no_common_time(const std::string& color_name, const std::vector<StampedFile>& color,
                            const std::string& depth_name, const std::vector<StampedFile>& depth,
                            double max_gap_s);

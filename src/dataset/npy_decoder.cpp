@@ -32,14 +32,14 @@ std::optional<NpyHeader> npy_header(const Bytes& file) {
   return NpyHeader{{reinterpret_cast<const char*>(file.data()) + begin, length}, begin + length};
 }
 
-/// What stands after a key, up to the end of the header; "" without it.
+/// Rest of the header after a key; "" if the key is missing.
 std::string_view after_key(std::string_view text, const std::string& key) {
   const std::size_t at = text.find("'" + key + "'");
   const std::size_t colon = at == std::string_view::npos ? at : text.find(':', at);
   return colon == std::string_view::npos ? std::string_view() : text.substr(colon + 1);
 }
 
-/// Of the numbers in "(480, 640, 1)" those that are not 1; empty when it is no shape.
+/// Sizes in "(480, 640, 1)" that are not 1; empty if the text is no shape.
 std::vector<std::int64_t> npy_shape(std::string_view text) {
   const std::size_t open = text.find('(');
   const std::size_t close = text.find(')', open == std::string_view::npos ? 0 : open);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How a recording on disk is opened: layout, camera, part of it, depth scale.
+// Opening a recording on disk: layout, camera, selected part, depth scale.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -81,8 +81,8 @@ void round_stamps(std::vector<PairInfo>& pairs) {
   }
 }
 
-/// Of frames with one stamp, to the microsecond that trajectories are written with, only the first is kept:
-/// no pose could be told from the others. `pairs` are sorted by stamp.
+/// Keeps only the first of several frames with the same stamp, in the microseconds that trajectories are
+/// written with: their poses could not be told apart. `pairs` are sorted by stamp.
 void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, core::Log& log) {
   const auto microseconds = [](const PairInfo& pair) { return std::llrint(pair.stamp * 1e6); };
   const auto same = [&](const PairInfo& a, const PairInfo& b) { return microseconds(a) == microseconds(b); };

@@ -97,7 +97,7 @@ core::Result<void> add_depth_camera(const fs::path& folder, sensor::Camera& came
   return {};
 }
 
-/// Of the first image of these that can be read.
+/// Size of the first of these images that can be read.
 template <typename Name>
 std::optional<cv::Size> image_size(const Layout& layout, const Name& name) {
   for (const PairInfo& pair : layout.pairs) {
@@ -158,7 +158,7 @@ std::string distortion_text(const sensor::Camera& camera) {
                      more);
 }
 
-/// What was understood, and where each number comes from.
+/// Text that says how the camera was interpreted and where each number comes from.
 std::string understood(const ChosenCamera& chosen, const sensor::Camera& camera, const Layout& layout) {
   const sensor::CameraReading& reading = chosen.reading;
   const sensor::Pinhole& p = camera.color;
@@ -175,8 +175,8 @@ std::string understood(const ChosenCamera& chosen, const sensor::Camera& camera,
   return text;
 }
 
-/// Where depth has another size, to which it is brought up, colour is made smaller by a whole factor, to at
-/// most 960 pixels across.
+/// If depth has another size it is scaled up to that of colour; colour is first reduced by a whole factor, to
+/// at most 960 pixels across.
 void reduce_color(sensor::Camera& camera) {
   constexpr int kWidest = 960;
   sensor::Pinhole& color = camera.color;
@@ -228,8 +228,8 @@ std::optional<cv::Size> usual_size(const Layout& layout, bool depth) {
   return most == sizes.end() ? std::nullopt : std::optional(*most);
 }
 
-/// Where colour and depth have two sizes of one shape and the camera is that of one of them, it is scaled to
-/// the other.
+/// If colour and depth differ in size but not in shape, and the camera is that of one of them, it is scaled
+/// to the other.
 void share_calibration(const Layout& layout, sensor::Camera& camera) {
   constexpr double kSameShape = 0.01;
   if (camera.depth) return;

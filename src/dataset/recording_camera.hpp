@@ -22,18 +22,18 @@ struct ChosenCamera {
 core::Result<std::optional<ChosenCamera>> choose_camera(const std::filesystem::path& folder,
                                                         const OpenOptions& options, core::Log& log);
 
-/// What the file leaves open is taken from the images and the layout (of which Layout::camera is used where
-/// nothing else is chosen, and Layout::frame_cameras forgotten otherwise); without either the camera is a
-/// guess (a warning). One calibration for images of two sizes is scaled to both. Where depth has another
-/// size, colour is made smaller by a whole factor, to at most 960 pixels across. Says what was understood of
-/// another program's file. Error (kUsage): numbers that do not fit the
-/// images' size; no file, and images that no common device takes.
+/// Completes the camera from the images and the layout where the file leaves something open. Layout::camera
+/// is used if nothing else is chosen; otherwise Layout::frame_cameras is dropped. With neither, the camera is
+/// a guess (a warning). One calibration for images of two sizes is scaled to both. If depth has another size,
+/// colour is reduced by a whole factor, to at most 960 pixels across. Logs how another program's file was
+/// understood. Error (kUsage): numbers that do not fit the images' size; or no file, and images of a size
+/// that no common device takes.
 core::Result<sensor::Camera> complete_camera(const std::filesystem::path& folder,
                                              const std::optional<ChosenCamera>& chosen, Layout& layout,
                                              core::Log& log);
 
-/// How many times larger than the camera's the colour images are on both sides, of a camera with a depth
-/// camera of its own; 1 where that is no whole number.
+/// Whole factor by which the stored colour images are larger than the camera's on both sides, for a camera
+/// with a separate depth camera; 1 if there is no whole factor.
 int stored_reduction(const Layout& layout, const sensor::Camera& camera);
 
 }  // namespace plumbline::dataset

@@ -26,7 +26,7 @@ struct RawLine {
 
 inline constexpr std::string_view kWordSeparators = " \t\r\n,\v\f";
 
-/// What stands between the separators.
+/// Words between the separators.
 std::vector<std::string> split_words(std::string_view text, std::string_view separators = kWordSeparators);
 
 /// All lines, or the first `most`, comments and blank ones too, without a byte order mark. Error (kInput):

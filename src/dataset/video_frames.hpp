@@ -44,7 +44,7 @@ class VideoFrames {
 
   /// CV_8UC3, BGR. Error (kInput): the video cannot be decoded, or ends before that frame.
   core::Result<cv::Mat> read(std::int64_t frame);
-  /// As the file says. Error (kInput): the video cannot be decoded.
+  /// Number of frames according to the file. Error (kInput): the video cannot be decoded.
   core::Result<std::int64_t> count();
 
  private:

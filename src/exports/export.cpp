@@ -12,7 +12,7 @@
 namespace plumbline::exports {
 namespace {
 
-/// How `--what` and `--mesh` call it.
+/// Name of the content for `--what` and `--mesh`.
 std::string content_name(Content content) {
   switch (content) {
     case Content::kCloud:
@@ -76,7 +76,7 @@ core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
     const std::size_t length = fitting_ending(format, name);
     const bool fits = holds(format, request.content);
     if (fits) endings.insert(endings.end(), format.endings.begin(), format.endings.end());
-    // What is asked for wins over what only the ending tells.
+    // The requested content outweighs the content that the ending suggests.
     const std::size_t rank = length == 0 ? 0 : 2 * length + (fits ? 1 : 0);
     if (rank <= longest || (!fits && request.content != Content::kCloud)) continue;
     longest = rank;
@@ -121,7 +121,7 @@ core::Result<void> check_options(const ExportRequest& request, const Choice& cho
   return {};
 }
 
-/// As the table tells it.
+/// Endings as the table of formats shows them.
 std::string ending_text(const Format& format) {
   return format.endings.empty() ? "folder" : fmt::format("{}", fmt::join(format.endings, " "));
 }

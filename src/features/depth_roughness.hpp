@@ -8,13 +8,14 @@
 
 namespace plumbline::features {
 
-/// How far the depth image (CV_32FC1, metres, 0 = none) within `reach` pixels of (x, y) is off the plane
-/// through it: root mean square, standard deviations of the sensor's noise. Every `step`-th pixel is asked,
-/// opposite ones together. A huge number where too few were measured.
+/// Deviation of the depth image (CV_32FC1, metres, 0 = none) within `reach` pixels of (x, y) from the plane
+/// through it: root mean square, in standard deviations of the sensor's noise. Every `step`-th pixel is used,
+/// each together with the opposite one. A huge number if too few were measured.
 float depth_roughness(const cv::Mat& depth, int x, int y, int reach, int step);
 
-/// What is rougher than this has a border: so many times as rough as most of the image. A sensor may be
-/// better or worse than its model. `roughness`: one number for each place that was asked, in any order.
+/// Roughness above which there is a depth border: a multiple of the roughness of most of the image, because a
+/// sensor may be better or worse than its model. `roughness`: one number for each sampled position, in any
+/// order.
 float roughness_limit(std::vector<float> roughness);
 
 }  // namespace plumbline::features

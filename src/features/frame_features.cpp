@@ -50,9 +50,9 @@ cv::Mat make_thumbnail_depth(const cv::Mat& depth, const cv::Size& size) {
   return result;
 }
 
-/// Whether depth jumps within `reach` pixels of a corner, or is missing in part (as at a border's shadow): on
-/// a plane, inverse depth on opposite sides has its mean in the middle. Where all of it is missing nothing is
-/// known.
+/// True if depth jumps within `reach` pixels of a corner, or is missing in part (as in a border's shadow): on
+/// a plane, the inverse depths of opposite sides have their mean in the middle. False if all of it is
+/// missing, since then nothing is known.
 bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) {
   const auto at = [&](const Eigen::Vector2f& p) {
     const int u = cvRound(p.x());
@@ -88,7 +88,7 @@ bool at_border(const cv::Mat& depth, const Eigen::Vector2f& pixel, float reach) 
   return 4 * seen < 3 * kPairs;
 }
 
-/// What lies behind a border moves apart from what lies before: patches there are left empty.
+/// Leaves patches at depth borders empty: background and foreground move against each other there.
 void empty_patches_at_borders(const cv::Mat& depth, const OrbExtractor& extractor, OrbFeatures& orb) {
   if (depth.empty()) return;
   constexpr int kSteps = 5;  // from the corner to the end of what is asked

@@ -126,7 +126,8 @@ struct Columns {
   }
 };
 
-// How many samples support a line, as `supports` says; 0 as soon as they cannot become more than `to_beat`.
+// Number of samples that support a line, as `supports` decides; 0 as soon as it can no longer exceed
+// `to_beat`.
 PLUMBLINE_CLONES std::int64_t count_support(const double* s, const double* inverse, std::size_t count,
                                             const InverseDepth& line, double gate, std::int64_t to_beat) {
   const double start = line.start, end = line.end;

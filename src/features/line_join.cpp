@@ -44,7 +44,7 @@ bool belong_together(const Piece& a, const Piece& b, const LineDetectorOptions& 
   return offset <= (overlapping ? std::min(kDuplicateOffset, offset_limit) : offset_limit);
 }
 
-/// What a first look at pairs needs, in columns.
+/// Quantities for the quick test of pairs, in columns.
 struct Glance {
   std::vector<float> dx, dy, mx, my, length;
 
@@ -63,8 +63,8 @@ struct Glance {
   void take_out(std::size_t i) { dx[i] = dy[i] = 0.0F; }
 };
 
-/// Whether any of the pieces [first, last) passes what belong_together() asks first, with `own` as the other
-/// one: about the same direction, and not far to the side.
+/// True if any of the pieces [first, last) passes the first test of belong_together() with the piece `own`:
+/// about the same direction, and not far to the side.
 PLUMBLINE_CLONES bool any_near(const Glance& all, std::size_t first, std::size_t last, std::size_t own,
                                float offset_limit) {
   const float *dx = all.dx.data(), *dy = all.dy.data(), *mx = all.mx.data(), *my = all.my.data();
@@ -75,7 +75,7 @@ PLUMBLINE_CLONES bool any_near(const Glance& all, std::size_t first, std::size_t
   for (std::size_t j = first; j < last; ++j) {
     const float along = own_dx * dx[j] + own_dy * dy[j];
     const float x = mx[j] - own_mx, y = my[j] - own_my;
-    // Of the longer one.
+    // The direction is that of the longer piece.
     const bool longer = own_length >= length[j];
     const float direction_x = longer ? own_dx : dx[j], direction_y = longer ? own_dy : dy[j];
     const float offset = std::abs(direction_x * y - direction_y * x);
@@ -138,7 +138,7 @@ std::vector<LineSegment> join_collinear(std::vector<LineSegment> segments,
   };
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (gone[i] != 0) continue;
-    // What did not fit the shorter line may fit now: each time from the start.
+    // Pieces that did not fit the shorter line may fit the joined one: search from the start again.
     for (std::size_t j = partner_of(i); j < pieces.size(); j = partner_of(i)) {
       pieces[i] = Piece(merged(pieces[i].segment, pieces[j].segment));
       glance.set(i, pieces[i]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What detectors leave open: which side is darker, and where within a pixel the edge lies.
+// Refinement of detected lines: which side is darker, and where within a pixel the edge lies.
 #include <array>
 #include <cmath>
 

@@ -11,7 +11,7 @@ namespace {
 
 using geometry::Vector6d;
 
-/// Where a point lies in the camera a share of the readout after the middle row.
+/// Position of a point in the image at `share` of the readout after the middle row was read.
 Eigen::Vector2d moved_pixel(const PixelDepth& from, double share, const Vector6d& shutter_motion,
                             const sensor::Pinhole& image, double& depth) {
   const RowMotion motion(shutter_motion, share, from.depth > 0.0);
@@ -21,7 +21,7 @@ Eigen::Vector2d moved_pixel(const PixelDepth& from, double share, const Vector6d
   return image.project(p);
 }
 
-/// As it was when its row was read; which row that is follows from where it lies then.
+/// The feature as it was when its row was read; which row that is depends on its position at that time.
 PixelDepth with_shutter(const PixelDepth& feature, const Vector6d& shutter_motion,
                         const sensor::Pinhole& image) {
   constexpr int kRounds = 3;  // each leaves a hundredth of the error

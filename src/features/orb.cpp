@@ -105,7 +105,7 @@ std::vector<Corner> spread(std::vector<Corner> corners, const cv::Size& size, in
   return chosen;
 }
 
-/// Whether the gradients around a pixel nearly all point the same way or its opposite (structure tensor;
+/// True if the gradients around a pixel nearly all point the same way or its opposite (structure tensor;
 /// Harris and Stephens 1988 ask the same of one number).
 bool on_edge(const cv::Mat& level, int x, int y, double min_corner) {
   constexpr int kTensorReach = 3;
@@ -208,7 +208,7 @@ float OrbExtractor::sigma(int octave) const {
 
 namespace {
 
-/// Where corners of a level may lie, `region` being of the full image.
+/// Area of a level in which corners may lie; `region` is in pixels of the full image.
 cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale) {
   const int x0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.x) / scale)) + 3);
   const int y0 = std::max(kEdge, static_cast<int>(std::ceil(static_cast<float>(region.y) / scale)) + 3);
@@ -219,8 +219,8 @@ cv::Rect inner_region(const cv::Rect& region, const cv::Size& level, float scale
   return {x0, y0, x1 - x0, y1 - y0};
 }
 
-/// Where the middle of a level's pixel lies in the full image: both show the same from edge to edge, and a
-/// level is a whole number of pixels wide, not quite its scale.
+/// Position of the middle of a level's pixel in the full image. Both show the same from edge to edge, and a
+/// level is a whole number of pixels wide, which its scale is not exactly.
 Eigen::Vector2f in_full_image(const Corner& corner, const cv::Size& level, const cv::Size& full) {
   const auto there = [](int at, int size, int full_size) {
     return (static_cast<float>(at) + 0.5F) * static_cast<float>(full_size) / static_cast<float>(size) - 0.5F;

@@ -20,7 +20,7 @@ void undo_rolling_shutter(FrameFeatures& features, const sensor::Pinhole& camera
   const geometry::Vector6d motion = readout_s * velocity;
   features.shutter_motion += motion;
 
-  // Where what was at `from` in row `v` lies when the middle row is read.
+  // Position, when the middle row is read, of the point that was at `from` when row `v` was read.
   const auto moved = [&](float v, const Eigen::Vector3d& from, bool has_depth) {
     const double share = static_cast<double>(v) / camera.height - 0.5;
     return RowMotion(motion, -share, has_depth)(from);

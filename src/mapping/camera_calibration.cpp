@@ -187,7 +187,8 @@ CameraChange nothing(const sensor::Camera& camera) {
   return change;
 }
 
-/// What some unknowns, found from the rest of the runs, are worth in each part.
+/// Trial of a set of unknowns: for each part, the values found from the other parts and the cost on this
+/// part.
 struct Trial {
   std::array<double, kParts> held_out{};  ///< costs
   std::array<CameraChange, kParts> found;
@@ -205,7 +206,7 @@ struct Trial {
 };
 
 using Group = std::vector<CameraUnknown>;
-/// What matters most first; each has to explain what those before it leave.
+/// Groups of unknowns, the most important first; each has to explain what those before it leave.
 const std::vector<Group>& groups() {
   static const std::vector<Group> all = {
       {optimize::kReadout},          {optimize::kDelay}, {optimize::kSlopeX},
@@ -235,8 +236,8 @@ std::vector<CameraNumber> numbers_of(const sensor::Camera& camera) {
 
 class Calibrator {
  public:
-  /// Whether linearising at the one says what linearising at the other does: to a thousandth of what is known
-  /// before.
+  /// True if linearising at `a` gives the same as linearising at `b`, to a thousandth of the prior's standard
+  /// deviation.
   [[nodiscard]] bool same(const CameraChange& a, const CameraChange& b) const {
     return ((a - b).array().abs() < 1e-3 * prior_.sigma.array()).all();
   }
@@ -249,8 +250,8 @@ class Calibrator {
                                  options.distortion_prior, options.distortion_prior, options.delay_prior_s}};
   }
 
-  /// What is believed, by the evidence of each part. What one unknown hides of another (a wrong distortion
-  /// hides a wrong focal length) shows when the others are tried again after it was found.
+  /// Chooses the unknowns to change from the evidence of each part. An unknown that another one hides (a
+  /// wrong distortion hides a wrong focal length) shows when it is tried again after the other one was found.
   CameraChange choose(const std::vector<CameraEvidence>& evidence, CameraCalibration& result) const {
     const Trial before = try_out(evidence, {});
     const Group earlier = used_earlier();
@@ -291,8 +292,8 @@ class Calibrator {
   }
 
  private:
-  /// What was believed of the map before this one was made anew. What hides behind it (a distortion that was
-  /// found with a wrong focal length) shows only when it may change, too.
+  /// Unknowns that were changed for the map from which this one was rebuilt. A change that hides behind one
+  /// of them (a distortion that was found with a wrong focal length) shows only if that one may change, too.
   [[nodiscard]] Group used_earlier() const {
     Group all;
     for (const CameraNumber& n : numbers_of(given_)) {

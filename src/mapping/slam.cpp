@@ -119,7 +119,7 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
 }
 
 FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& features) {
-  // What ran beside the tracker comes back at fixed frames, whatever the clock says.
+  // Results of work beside the tracker are used at fixed frames, independent of the clock.
   ++frame_count_;
   BundleReport bundle;
   while (!new_keyframes_.empty() && frame_count_ >= new_keyframes_.front().frame + kConnectAfter)
@@ -171,8 +171,8 @@ FrameReport Slam::process(const sensor::RgbdFrame& frame, const Features& featur
   return report;
 }
 
-/// What surrounds a camera must bear it out for several frames in a row, in which no keyframe changes the
-/// map.
+/// True if surfaces around the camera confirm its place in several frames in a row, during which no keyframe
+/// changes the map.
 bool Slam::believes_place(const sensor::RgbdFrame& frame, const Features& features, int lost_before) {
   constexpr int kFrames = 5;
   constexpr int kOutdated = 5;  // lost frames after which the camera may be anywhere
@@ -263,8 +263,8 @@ void Slam::set_reference(core::KeyframeId keyframe) {
   tracker_.map_changed(map_, keyframe, tracker_.camera_from_world());
 }
 
-/// What the tracker knows moves with its reference keyframe. The motion model is a motion between cameras:
-/// the world's place does not matter to it.
+/// Puts the bundle's result into the map. The tracker's pose moves with its reference keyframe; the motion
+/// model is a motion between cameras and is not affected.
 void Slam::put_back_bundle(BundleReport& report) {
   const std::optional<MapCorrection> correction = bundle_.commit(map_, frame_count_, report);
   if (!correction) return;
@@ -415,7 +415,7 @@ void Slam::recalibrate(const sensor::Camera& camera, const PictureReader& read) 
                        last.camera_from_reference * map_.camera_from_world(last.reference));
 }
 
-/// Of the landmarks that the last frame was matched with, spread over all of them; also such as do not fit.
+/// Landmarks that the last frame was matched with, spread over all of them, including some that do not fit.
 std::shared_ptr<const maps::SeenPoints> Slam::seen_points() const {
   constexpr std::size_t kMost = 150;
   const tracking::TrackResult& track = last_track_;

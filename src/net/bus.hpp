@@ -125,8 +125,8 @@ class HubBus {
   /// Chunks of this robot are received from now on.
   virtual core::Result<void> subscribe(const std::string& robot) = 0;
   virtual std::vector<Chunk> receive(const std::string& robot, int most) = 0;
-  /// How many times this robot has subscribed to feedback; 0: it does not subscribe now. Chunks sent before
-  /// the last subscription may be lost.
+  /// Number of times that this robot has subscribed to feedback; 0 if it is not subscribed now. Chunks sent
+  /// before the last subscription may be lost.
   [[nodiscard]] virtual int feedback_subscriptions(const std::string& robot) = 0;
   /// Sends a chunk of another robot's map to this robot. False: the queue is full; try again. Never waits.
   virtual bool send_feedback(const std::string& robot, const Chunk& chunk) = 0;

@@ -130,7 +130,7 @@ std::optional<Eigen::Vector2d> Lens::ray_of(const Eigen::Vector2d& distorted) co
   constexpr double kFarthest = 20.0;  // 87 degrees off the axis
   const Eigen::Vector2d ray = undistort(distorted);
   const bool found = ray.allFinite() && ray.norm() < kFarthest && (distort(ray) - distorted).norm() < kExact;
-  // Where a polynomial folds back, a second ray comes out at the same place: no lens is like that.
+  // Beyond the fold of a polynomial a second ray is projected to the same position: no lens is like that.
   if (!found || jacobian(ray).determinant() <= 0.0) return std::nullopt;
   return ray;
 }

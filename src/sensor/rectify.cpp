@@ -44,7 +44,7 @@ void correct_slope(const Pinhole& camera, const std::array<double, 2>& slope, cv
   }
 }
 
-/// What a depth pixel covers of another image: a rectangle of a plane.
+/// Area of another image that a depth pixel covers: a rectangle of a plane.
 struct DepthPatch {
   Eigen::Vector2d centre;  ///< pixels
   Eigen::Vector2d half;    ///< of its sides, pixels
@@ -100,7 +100,7 @@ Eigen::Vector2d surface_slope(const cv::Mat& raw, int u, int v) {
 }  // namespace
 
 struct Rectifier::Maps {
-  /// What a pixel of a bent image sees: its ray (x, y, 1), and half the size of its square there.
+  /// Ray (x, y, 1) of a pixel of a distorted image, and half the size of its square there.
   struct LensRay {
     Eigen::Vector2d ray;
     Eigen::Vector2d half;  ///< 0: beyond what the lens shows
@@ -122,7 +122,7 @@ struct Rectifier::Maps {
     if (!(camera.color_from_depth && camera.depth)) fill_nearest(x, y);
   }
 
-  /// Where the lens shows what is at each pixel of the target.
+  /// Positions in the lens's image of what is at each pixel of the target.
   void source_pixels(cv::Mat& x, cv::Mat& y) const {
     const auto matrix = [](const Pinhole& p) { return cv::Matx33d(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1); };
     const cv::Size size(target.width, target.height);

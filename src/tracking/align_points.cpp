@@ -8,7 +8,7 @@
 namespace plumbline::tracking {
 namespace {
 
-/// What a landmark looked like.
+/// Appearance of a landmark in the keyframe that saw it.
 struct Sight {
   const features::CornerPatch* patch = nullptr;
   int octave = 0;                    ///< of the patch
@@ -67,7 +67,7 @@ std::optional<Sight> first_sight(const maps::Map& map, const maps::MapPoint& poi
   return std::nullopt;
 }
 
-/// Where the image shows what the patch stands for, pixels of the full image; `start`: where it may be.
+/// Position in the image at which the patch is found, pixels of the full image; `start`: expected position.
 std::optional<Eigen::Vector2f> align(const Sight& sight, const std::vector<cv::Mat>& levels,
                                      const Eigen::Vector2f& start, double scale_factor) {
   const int last = static_cast<int>(levels.size()) - 1;

@@ -9,7 +9,7 @@
 
 namespace plumbline::tracking {
 
-/// What a frame is aligned with.
+/// Everything that a frame is aligned with.
 struct AlignmentInput {
   const TrackerOptions& options;
   const sensor::Pinhole& camera;

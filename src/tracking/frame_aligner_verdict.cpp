@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a pose that was found is worth.
+// Verdict on a pose that was found.
 #include "frame_aligner.hpp"
 #include "observable_directions.hpp"
 
@@ -13,10 +13,10 @@ constexpr double kNearlyHeld = 0.5;  // of the information that a direction need
 
 }  // namespace
 
-/// Whether measurements speak against the motion model where that holds what surfaces seem not to: after a
-/// second along a bare wall it may be wrong by centimetres when the edge of a door comes into view. Only what
-/// constrains every direction by itself can: before the wall alone, chance speaks for anything. The pose
-/// becomes the measured one.
+/// True if measurements contradict the motion model in directions that surfaces seem not to constrain: after
+/// a second along a bare wall it may be wrong by centimetres when the edge of a door comes into view. Only
+/// measurements that constrain every direction by themselves can contradict it: in front of a bare wall,
+/// chance would. The pose becomes the measured one.
 bool FrameAligner::contradicts_motion_prior() {
   constexpr double kGain =
       4.0;  // of the cost: 1 at most where the model was right, soon above 8 where it was not

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where the tracker looks for the camera, and which of the poses found from there it takes.
+// Start poses for the search for the camera, and the choice among the poses found from them.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +13,7 @@ using geometry::Rigid3;
 
 namespace {
 
-/// What the view shows from a pose of the first keyframe that has enough in view.
+/// Photometric terms of the first keyframe that has enough of its samples in the view.
 std::optional<optimize::PhotometricFamily> comparable(const PhotometricKeyframes& known, const maps::Map& map,
                                                       const std::vector<core::KeyframeId>& keyframes,
                                                       std::size_t level, const PhotometricView& view,
@@ -100,7 +100,7 @@ double Tracker::support(const TrackResult& result) const {
          weights.plane_weight * seen.planes.inliers + weights.photometric_weight * seen.photometric.inliers;
 }
 
-/// Whether the camera would have been jolted as no hand or wheel does between two frames.
+/// True if the camera would have jumped farther than a hand or a wheel moves it between two frames.
 bool Tracker::jumps(double stamp, const Rigid3& camera_from_world) const {
   constexpr double kMost_m = 0.03;
   constexpr double kMost_rad = 0.03;

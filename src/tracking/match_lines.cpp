@@ -25,7 +25,7 @@ bool project_segment(const maps::MapLine& line, const geometry::Rigid3& camera_f
          low.y() < static_cast<float>(camera.height) && segment.length() > 10.0F;
 }
 
-/// What every landmark asks of every line of the frame.
+/// Properties of a line of the frame that every landmark is compared with.
 struct LineCandidate {
   Eigen::Vector2f direction;
   Eigen::Vector2f middle;

@@ -45,8 +45,8 @@ std::vector<double> octaves_closer(const std::vector<double>& focals_px, const s
   return octaves;
 }
 
-/// How far the image has turned about its own axis since a keyframe, degrees; asked for many points in
-/// turn.
+/// Rotation of the image about its own axis since a keyframe, degrees; queried for many points one after
+/// another.
 class Roll {
  public:
   Roll(const maps::Map& map, const geometry::Rigid3& camera_from_world)

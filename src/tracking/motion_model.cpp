@@ -24,8 +24,7 @@ void MotionModel::update(double stamp, const TrackResult& result) {
     const bool known = reliable(stamp);
     const geometry::Vector6d before = velocity_;
     velocity_ = geometry::log_se3(result.camera_from_world * camera_from_world_.inverse()) / dt;
-    // Where little but the motion model holds the camera, steps are noise above all, and would run away with
-    // it.
+    // In directions that little but the motion model holds, steps are noise above all and would accumulate.
     if (known && !result.motion_contradicted)
       velocity_ -= kDoubt * (result.onto_degenerate * (velocity_ - before));
     ++steps_;

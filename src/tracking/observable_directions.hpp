@@ -28,7 +28,7 @@ double degenerate_below(const geometry::Matrix6d& information, bool surface_only
 /// information than `below`.
 geometry::Matrix6d projector_onto_degenerate(const PrincipalDirections& directions, double below);
 
-/// What the motion prior is worth.
+/// Trust in the motion prior.
 enum class MotionTrust {
   kUnknown,  ///< contradicted, or nothing is known of the past: 2 cm, where nothing holds better than that
   kLikely,   ///< beside features: 5 mm, where they hold no better than that
@@ -36,8 +36,8 @@ enum class MotionTrust {
                  ///< does not brake the camera frame by frame
 };
 
-/// What measurements leave open is held by the motion model, in these directions only. None when there are
-/// none.
+/// Prior by the motion model in the directions that measurements leave unconstrained, and only in these. None
+/// if there are none.
 std::optional<optimize::PosePrior> motion_prior(const geometry::Matrix6d& information,
                                                 const geometry::Rigid3& predicted, MotionTrust trust);
 

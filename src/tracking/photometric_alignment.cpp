@@ -43,7 +43,7 @@ float median_size(const std::vector<float>& sizes) {
   return *place;
 }
 
-/// Whether the depth image measured something before the point.
+/// True if the depth image measured something in front of the point.
 bool hidden(const PhotometricView& view, const Eigen::Vector3f& in_depth) {
   const Eigen::Vector2d pixel = view.camera.project(in_depth.cast<double>());
   if (!view.camera.contains(pixel)) return false;
@@ -66,7 +66,7 @@ void weigh_by_depth(const Rigid3& camera_from_reference, optimize::PhotometricFa
     const Eigen::Vector3f along = rotation * (term.point / z);
     const Eigen::Vector3f p = along * z + translation;
     const float per_z = 1.0F / p.z();
-    // Of the pixel by the sample's depth.
+    // Derivative of the pixel with respect to the sample's depth.
     const Eigen::Vector2f shift(fx * (along.x() - p.x() * per_z * along.z()) * per_z,
                                 fy * (along.y() - p.y() * per_z * along.z()) * per_z);
     // by_point = gradient times focal length over depth

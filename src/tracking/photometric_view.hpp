@@ -5,8 +5,8 @@
 
 namespace plumbline::tracking {
 
-/// As associate_photometric(), without gain, noise and weights, which photometric_correlation() does not
-/// need.
+/// Like associate_photometric(), but without gain, noise and weights, which photometric_correlation() does
+/// not need.
 std::optional<optimize::PhotometricFamily> photometric_in_view(const features::PhotometricSamples& samples,
                                                                std::size_t level, const PhotometricView& view,
                                                                const geometry::Rigid3& reference_from_world,

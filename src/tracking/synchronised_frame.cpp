@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the tracker does about images whose parts were not taken at the same moment.
+// Correction of images whose parts were not taken at the same moment.
 #include "plumbline/features/depth_delay.hpp"
 #include "plumbline/features/rolling_shutter.hpp"
 #include "plumbline/tracking/tracker.hpp"

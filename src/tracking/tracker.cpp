@@ -5,7 +5,8 @@ namespace plumbline::tracking {
 
 namespace {
 
-/// What is left of a frame's features once it is tracked: corners lie where they were aligned.
+/// Features without the image pyramid, to be kept once the frame is tracked; corners lie where they were
+/// aligned.
 Tracker::Features without_pyramid(const features::FrameFeatures& features,
                                   const std::vector<PointMatch>& matches, const sensor::Pinhole& camera) {
   auto kept = std::make_shared<features::FrameFeatures>(features);

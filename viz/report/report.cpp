@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether a file is the report of an earlier call.
+/// True if a file is the report of an earlier call.
 bool is_report(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::string head(512, '\0');

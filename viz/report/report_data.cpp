@@ -98,7 +98,7 @@ void add_store(ReportData& data) {
   data.fit = fit_of(stored->stored().map, maps::camera_of(robots, 0).color, cameras);
 }
 
-/// Whether the folder is of plumbline fuse, whose results have no frames.
+/// True if the folder is a result of plumbline fuse, which has no frames.
 bool fused_afterwards(const fs::path& folder) {
   const auto config = core::read_yaml(folder / "config.yaml");
   const core::ConfigNode* run = config ? config->find("run") : nullptr;

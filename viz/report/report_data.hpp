@@ -91,7 +91,7 @@ core::Result<void> add_truth(const std::filesystem::path& truth, ReportData& dat
 
 /// A number of the summary by its place ("/frames/read"); NaN where there is none.
 double number_at(const nlohmann::ordered_json& json, const std::string& place);
-/// Whether there is a true at a place.
+/// True if the JSON has `true` at this path.
 bool flag_at(const nlohmann::ordered_json& json, const std::string& place);
 std::string text_at(const nlohmann::ordered_json& json, const std::string& place);
 /// The list at a place; an empty one where there is none.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What was exported into the folder: plans as pictures, the rest as links.
+// Files that were exported into the folder: plans as pictures, the rest as links.
 #include <fmt/format.h>
 
 #include <algorithm>

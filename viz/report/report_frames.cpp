@@ -53,7 +53,7 @@ void sort_by_robot(ReportData& data) {
   for (auto& [robot, frames] : robots) data.frames.push_back(std::move(frames));
   if (!several || data.paths.size() != 1) return;
 
-  // Of robots that did not meet, the result holds only one: that with the stamps of its poses.
+  // If robots did not meet, the result holds only one of them: the one with the stamps of its poses.
   std::size_t most = 0;
 
   for (const ReportFrames& frames : data.frames) {

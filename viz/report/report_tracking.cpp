@@ -145,7 +145,7 @@ class RobotCharts {
     return svg_chart(chart);
   }
 
-  /// When each component of the map was tracked in, while there was more than one.
+  /// Times in which each component of the map was tracked, while there was more than one.
   [[nodiscard]] std::vector<viz::SvgLine> components() const {
     std::map<int, viz::SvgLine> lines;
     const std::size_t column = table_.column("component");

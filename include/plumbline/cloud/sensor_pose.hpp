@@ -10,9 +10,9 @@
 
 namespace plumbline::cloud {
 
-/// Of a keyframe's cloud this is camera_from_depth. Its points are those of the depth camera at the moment of
-/// the depth image, while poses are those of the colour image, which has its own stamp. Identity unless it
-/// was set.
+/// Sensor pose of a cloud, for a keyframe's cloud camera_from_depth: its points are those of the depth camera
+/// at the moment of the depth image, while poses are those of the colour image, which has its own stamp.
+/// Identity unless it was set.
 inline geometry::Rigid3 sensor_pose(const Cloud& cloud) {
   const Eigen::Vector3f origin = cloud.sensor_origin_.head<3>();
   if (origin.isZero(0.0F) && cloud.sensor_orientation_.coeffs() == Eigen::Quaternionf::Identity().coeffs()) {

@@ -10,8 +10,8 @@
 
 namespace plumbline::dataset {
 
-/// Whether the path is a bag, by its content: a file of any of the kinds, or a folder of files of rosbag2
-/// that is not laid out as a recording of another kind.
+/// True if the path is a bag, by its content: a file of any of the kinds, or a folder of rosbag2 files that
+/// is not laid out as a recording of another kind.
 bool is_bag(const std::filesystem::path& path);
 
 /// A few lines: kind, one for each topic (type, how many messages, a second, from when to when), what is

@@ -44,7 +44,7 @@ struct StoredPair {
   StoredImage depth;
 };
 
-/// What became of the images of a live source.
+/// Counts of a live source's images.
 struct LiveReport {
   std::size_t taken = 0;      ///< frames
   std::size_t dropped = 0;    ///< frames that came while too many waited
@@ -75,37 +75,37 @@ class FrameSource {
   [[nodiscard]] virtual std::unique_ptr<FrameSource> taken_by(const sensor::Camera& /*better*/) const {
     return nullptr;
   }
-  /// Whether frames come while others are read: size() grows, and how many there will be is not known.
+  /// True if frames arrive while others are read: size() grows, and the final number of frames is not known.
   [[nodiscard]] virtual bool live() const { return false; }
-  /// Of a live source: waits, at most so long, until decided(index).
+  /// For a live source: waits, at most so long, until decided(index).
   virtual void wait_for(std::size_t /*index*/, std::chrono::milliseconds /*most*/) const {}
-  /// Of a live source: frame `index` can be read; or it is known that no such frame will come.
+  /// For a live source: true if frame `index` can be read, or if it is known that no such frame will come.
   [[nodiscard]] virtual bool decided(std::size_t /*index*/) const { return true; }
-  /// Of a live source: frame `index`, one of the latest 256 or so, is wanted again later; others are
+  /// For a live source: marks frame `index`, one of the latest 256 or so, as wanted again later; others are
   /// forgotten.
   virtual void keep(std::size_t /*index*/) const {}
-  /// Of a live source: all is done with frame `index`, but that it may be read again if it was kept.
+  /// For a live source: all is done with frame `index`, except that it may be read again if it was kept.
   virtual void release(std::size_t /*index*/) const {}
-  /// Frame `index`, which has been read, is the last one. Of a live source it may wait until that is known,
-  /// or `stop`: then it is not.
+  /// True if frame `index`, which has been read, is the last one. A live source may wait until that is known,
+  /// or until `stop`: then it is false.
   [[nodiscard]] virtual bool is_last(std::size_t index, const core::StopToken& /*stop*/) const {
     return index + 1 == size();
   }
-  /// Of a live source: nobody wants a result any more.
+  /// For a live source: true if nobody wants a result any more.
   [[nodiscard]] virtual bool given_up() const { return false; }
-  /// Of a live source: ends it and what it writes itself. Error (kOutput): the record.
+  /// For a live source: ends it and what it writes itself. Error (kOutput): the record.
   [[nodiscard]] virtual core::Result<void> finish() const { return {}; }
-  /// Of a live source that has ended.
+  /// Report of a live source that has ended.
   [[nodiscard]] virtual LiveReport report() const { return {}; }
-  /// What makes a map of it doubtful whatever comes out, such as depth in an unlikely unit; "" if nothing.
+  /// Reason to doubt any map of this recording, such as depth in an unlikely unit; "" if there is none.
   [[nodiscard]] virtual std::string doubt() const { return ""; }
   /// Truth that comes with the recording, if any.
   [[nodiscard]] virtual std::optional<geometry::Trajectory> truth() const = 0;
-  /// Whether truth() is what the recorder's own odometry said.
+  /// True if truth() is the path from the recorder's own odometry.
   [[nodiscard]] virtual bool truth_is_odometry() const { return false; }
 };
 
-/// What poses are used for that come with a recording.
+/// Use of the poses that come with a recording.
 enum class PoseUse {
   kPrior,   ///< frames have those of the recorder's own odometry (a phone's): RgbdFrame::odometry
   kGiven,   ///< they are taken as they are: the pipeline has no tracking
@@ -123,7 +123,7 @@ struct TopicNames {
   }
 };
 
-/// Of what is live.
+/// Options of live sources.
 struct LiveOptions {
   /// Opens the stream behind an address, and takes the topics that the address names; empty: nothing live is
   /// taken.

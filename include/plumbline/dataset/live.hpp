@@ -11,7 +11,7 @@
 
 namespace plumbline::dataset {
 
-/// Whether an input is the address of something live ("ros2://0"), not a path.
+/// True if an input is the address of a live source ("ros2://0"), not a path.
 bool is_live_address(const std::string& input);
 
 /// Finds the topics and the camera as in a bag (OpenOptions::topics over what is found), takes messages in a

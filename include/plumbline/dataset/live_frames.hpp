@@ -49,11 +49,11 @@ class LiveFrames {
   /// Nobody wants a result any more: the run ends with an error as soon as it can.
   void abandon();
 
-  /// Those that have come and that nobody has begun to read.
+  /// Number of frames that have arrived and that nobody has begun to read.
   [[nodiscard]] std::size_t waiting() const;
   /// Waits until fewer than `most` frames wait, so many seconds at most; false when they did not suffice.
   [[nodiscard]] bool wait_for_room(std::size_t most, double seconds) const;
-  /// Where kept frames are put: a folder with room. Without it they stay in memory.
+  /// Sets the folder for kept frames; it needs room. Without a folder they stay in memory.
   void keep_in(const std::filesystem::path& folder);
 
   /// The frames as a live source, which outlives this.

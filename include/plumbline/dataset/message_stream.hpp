@@ -53,9 +53,9 @@ class MessageSink {
   /// Error (kUsage): the network refuses it.
   virtual core::Result<void> announce(const std::string& topic, const std::string& type,
                                       Retention retention) = 0;
-  /// Of an announced topic. Waits a moment for slow listeners, no more than a second.
+  /// Sends a message of an announced topic. Waits for slow listeners, one second at most.
   virtual core::Result<void> send(const std::string& topic, const std::vector<std::uint8_t>& bytes) = 0;
-  /// How many listen to the topic now.
+  /// Number of current listeners to the topic.
   virtual std::size_t listeners(const std::string& topic) = 0;
   /// Waits until listeners have what was sent, at most so long.
   virtual void flush(std::chrono::milliseconds most) = 0;

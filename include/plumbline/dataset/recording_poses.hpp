@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What can be told of a recording without looking at its images.
+// Facts about a recording that are known without looking at its images.
 #include <filesystem>
 
 #include "plumbline/core/error.hpp"
@@ -10,7 +10,7 @@
 
 namespace plumbline::dataset {
 
-/// Whether a file is a recording that open_recording takes, or refuses with the way out (.r3d).
+/// True if a file is a recording that open_recording takes, or refuses with advice (.r3d).
 bool is_recording_file(const std::filesystem::path& file);
 
 /// The poses that a recording's folder holds, in whatever layout: truth, or the recorder's own odometry.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What there is to know about a recording before it is mapped; `plumbline info` prints it.
+// Facts about a recording before it is mapped; `plumbline info` prints them.
 #include <cstddef>
 #include <string>
 #include <vector>

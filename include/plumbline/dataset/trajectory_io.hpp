@@ -32,12 +32,12 @@ core::Result<TrajectoryReading> read_trajectory_file(const std::filesystem::path
 core::Result<geometry::Trajectory> read_trajectory(const std::filesystem::path& file,
                                                    std::vector<std::string>* notes = nullptr);
 
-/// Whether the file's first row is a pose: for telling trajectories from clouds of points.
+/// True if the file's first row is a pose: distinguishes trajectories from point clouds.
 bool holds_poses(const std::filesystem::path& file);
 
-/// Where one of the two has no stamps, gives its poses those of the other's rows with the same number, and
-/// says so in the notes of `estimate`; where both have none, rows are 0.1 s apart, as in KITTI. Error
-/// (kInput): the files have different numbers of rows.
+/// Gives poses without stamps those of the other file's rows with the same number, and says so in the notes
+/// of `estimate`; if neither file has stamps, rows are 0.1 s apart, as in KITTI. Error (kInput): the files
+/// have different numbers of rows.
 core::Result<void> pair_by_number(TrajectoryReading& estimate, TrajectoryReading& truth);
 
 /// Stamps with 6 decimals, positions and quaternions with 9; written to a temporary file and renamed.

@@ -17,10 +17,10 @@
 
 namespace plumbline::exports {
 
-/// What of a map is written.
+/// Part of a map that is written.
 enum class Content { kCloud, kMesh, kTrajectory, kKeyframes, kLines };
 
-/// How a recording was read when it was mapped.
+/// Input and options with which a recording was read when it was mapped.
 struct RecordingName {
   std::string input;   ///< as given to `map`
   std::string camera;  ///< shipped name or file; empty: the recording's own

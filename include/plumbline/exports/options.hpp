@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What can be told to exports; which format heeds which of them stands in its Format::options.
+// Options of exports; Format::options lists those that a format uses.
 #include <string>
 #include <vector>
 
@@ -11,7 +11,7 @@ namespace plumbline::exports {
 
 /// Lengths in metres, in the frame of the map's results.
 struct ExportOptions {
-  // What of the map.
+  // Selection of a part of the map.
   std::vector<double> box;     ///< x0 y0 z0 x1 y1 z1; empty: all
   std::vector<double> z;       ///< lowest and highest; empty: all
   int storey = -1;             ///< from below, 0 the lowest; -1: all

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a corner looks like, to find it again to a tenth of a pixel. FAST answers to whole pixels of an
-// octave: the same corner lies half a pixel of its octave off from image to image, in x and in y.
+// Appearance of a corner, to find it again to a tenth of a pixel. FAST locates to whole pixels of an octave:
+// the same corner lies half a pixel of its octave off from image to image, in x and in y.
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -32,11 +32,10 @@ struct CornerPatch {
 /// The patch around pixel (x, y) of `level` (CV_8UC1), at least kReach + 1 pixels from its borders.
 CornerPatch cut_patch(const cv::Mat& level, int x, int y, const Eigen::Vector2f& middle);
 
-/// Where the middle of `patch` lies in `level` (CV_8UC1), pixels of the level: least squares over its
+/// Position of the middle of `patch` in `level` (CV_8UC1), pixels of the level: least squares over its
 /// position, gain and offset of the grey values (inverse compositional: Baker and Matthews 2004), from
-/// `start`. `level_from_patch` carries distances of pixels. None when it leaves the image or two pixels
-/// around `start`, does not settle, has no texture in two directions, or is not alike (correlation under
-/// 0.8).
+/// `start`. `level_from_patch` maps differences of pixels. None if it leaves the image or two pixels around
+/// `start`, does not converge, has no texture in two directions, or is not alike (correlation under 0.8).
 std::optional<Eigen::Vector2f> align_patch(const CornerPatch& patch, const cv::Mat& level,
                                            const Eigen::Vector2f& start,
                                            const Eigen::Matrix2f& level_from_patch);

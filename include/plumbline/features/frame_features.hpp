@@ -41,8 +41,8 @@ struct FrameFeatures {
   std::vector<CornerPatch> patches;        ///< of points; no elements: not known
   std::vector<cv::Mat> levels;  ///< CV_8UC1, the image in each octave; empty once the frame is tracked
   std::shared_ptr<const PhotometricImage> photometric;  ///< for direct alignment; null once it is tracked
-  /// Of points: how the surface slants, change of the inverse depth per pixel (1/m). No elements: not known;
-  /// keyframes give theirs up once all of their corners lie where they belong.
+  /// Slant of the surface at each point: change of the inverse depth per pixel (1/m). No elements if not
+  /// known; keyframes give theirs up once all of their corners lie where they belong.
   std::vector<Eigen::Vector2f> slants;
   PointGrid grid;
   std::vector<LineFeature> lines;
@@ -95,7 +95,7 @@ class FeatureExtractor {
   LineExtractor lines_;
 };
 
-/// What depth says of a corner.
+/// Depth measured at a corner.
 struct CornerDepth {
   float z = 0.0F;                                   ///< metres; 0: unknown
   Eigen::Vector2f slant = Eigen::Vector2f::Zero();  ///< as FrameFeatures::slants

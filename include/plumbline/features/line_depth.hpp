@@ -14,7 +14,8 @@
 
 namespace plumbline::features {
 
-/// Of an end of a segment in space: small, since every keyframe keeps two of them for each line.
+/// Noise of one end of a segment in space. The type is small, since every keyframe keeps two of them for each
+/// line.
 struct EndpointNoise {
   float depth = 0.0F;   ///< standard deviation along z, metres
   float across = 0.0F;  ///< in x and in y, metres, from pixel noise

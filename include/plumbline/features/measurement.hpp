@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a camera measured and what is made of it. A measurement is a pixel of the picture as the lens showed
+// Conversion between measurements and features. A measurement is a pixel of the picture as the lens showed
 // it, in the row in which the shutter read it, with the depth as the depth camera gave it. A feature is made
-// of it for a rectified image that was taken all at once. This is the one place where the one becomes the
-// other, so that features follow when the camera turns out to be another one than was believed.
+// from it for a rectified image that was taken all at once. The conversion is only here, so that features
+// follow when the camera turns out to be different.
 #include <Eigen/Core>
 #include <vector>
 
@@ -26,9 +26,9 @@ PixelDepth measurement_of(const PixelDepth& feature, const geometry::Vector6d& s
 PixelDepth feature_of(const PixelDepth& measurement, const geometry::Vector6d& shutter_motion,
                       const sensor::ImageModel& model);
 
-/// How fast the depth on the ray to a place `p` of a surface changes as the camera moves, m/s (camera frame):
-/// the surface is carried along by the camera's motion. 0 where its normal is not known (zero), or the ray
-/// grazes it.
+/// Rate at which the depth on the ray to a point `p` of a surface changes as the camera moves, m/s (camera
+/// frame); the surface is carried along by the camera's motion. 0 if its normal is not known (zero), or the
+/// ray grazes it.
 double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal,
                   const geometry::Vector6d& velocity);
 

@@ -33,7 +33,7 @@ struct PhotometricSample {
 };
 using PhotometricSamples = std::array<std::vector<PhotometricSample>, kPhotometricLevels>;
 
-/// Of each cell of a level's image the pixel with the steepest gradient, where depth is continuous.
+/// Samples of a level's image: of each cell the pixel with the steepest gradient, where depth is continuous.
 /// `depth`: CV_32FC1, metres, 0 = none, of the image's size, registered to it; `camera_from_depth` carries
 /// the depth camera to where the image was taken (they are stamped apart).
 PhotometricSamples sample_photometric(const PhotometricImage& image, const cv::Mat& depth,

@@ -8,13 +8,13 @@
 
 namespace plumbline::features {
 
-/// Where a point of the scene, in the camera's frame, lies a share of the readout later: while row `v` of an
-/// image of `height` rows is read, the share is v / height - 0.5 of the way from the middle row.
+/// Position of a point of the scene, in the camera's frame, a share of the readout later: while row `v` of an
+/// image of `height` rows is read, the share is v / height - 0.5 of the readout after the middle row.
 class RowMotion {
  public:
   /// `shutter_motion`: FrameFeatures::shutter_motion. Of what has no depth only the turn is known.
   RowMotion(const geometry::Vector6d& shutter_motion, double share, bool has_depth);
-  /// What would come nearer than 5 cm, or behind the camera, stays.
+  /// The moved point. A point that would come nearer than 5 cm, or behind the camera, is not moved.
   Eigen::Vector3d operator()(const Eigen::Vector3d& p) const;
 
  private:

@@ -15,7 +15,7 @@
 
 namespace plumbline::mapping {
 
-/// What one adjustment took; times are for people, nothing is decided by them.
+/// Report of one adjustment; the times are for people, nothing is decided by them.
 struct BundleReport {
   core::KeyframeId keyframe;  ///< around which; invalid: nothing was put back
   optimize::BundleSummary summary;
@@ -36,7 +36,7 @@ class BackgroundBundle {
 
   /// Asks for the surroundings of a keyframe that was made at `frame`.
   void request(const maps::Map& map, core::KeyframeId keyframe, std::int64_t frame);
-  /// Whether a bundle is to be put back now.
+  /// True if the bundle is to be put back at this frame.
   [[nodiscard]] bool due(std::int64_t frame) const { return running_ != nullptr && frame >= running_->due; }
   /// Waits for the bundle under way, puts it back, begins the next one if one was asked for. What moved;
   /// nothing when the bundle was of no use.

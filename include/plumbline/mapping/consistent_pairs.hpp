@@ -40,9 +40,8 @@ struct ConsistentSet {
   double span_m = 0.0;  ///< largest distance between two members' cameras, in the map where it is smaller
 };
 
-/// Whether two pairs are consistent: the pose of the other one's keyframes, found by way of each, is the
-/// same within the limits. The map says how A's keyframes lie to each
-/// other, and B's.
+/// True if two pairs are consistent: the pose of the other one's keyframes, found by way of each, is the same
+/// within the limits. The maps give the relative poses of A's keyframes and of B's.
 bool agree(const maps::Map& map_a, const maps::Map& map_b, const PlacePair& one, const PlacePair& two,
            const ConsistencyOptions& options);
 

@@ -11,8 +11,9 @@
 
 namespace plumbline::mapping {
 
-/// When the pairs that agree had five keyframes on both sides, or all where there are fewer; negative: not
-/// known. `made`: when keyframes were; a pair is there when both of its are.
+/// Time at which the agreeing pairs covered five keyframes on both sides, or all if there are fewer;
+/// negative: not known. `made`: times at which keyframes were made; a pair exists when both of its keyframes
+/// do.
 inline double evident_s(const MergeEvidence& merge, const std::map<core::KeyframeId, double>& made) {
   constexpr std::size_t kEnough = 5;
   std::map<core::KeyframeId, double> paired;  // of each keyframe, first

@@ -18,7 +18,7 @@ class FrameTrajectory {
   FrameTrajectory() = default;
   explicit FrameTrajectory(std::vector<maps::FramePose> poses) : poses_(std::move(poses)) {}
 
-  /// What the tracker measured of a frame, in the map that it was tracked in; for record().
+  /// The tracker's measurement of a frame, in the map that it was tracked in; for record().
   [[nodiscard]] maps::FramePose measured(const maps::Map& map, double stamp,
                                          const tracking::TrackResult& track) const;
   /// Adds a frame where it lies in the map as it is now.
@@ -27,7 +27,7 @@ class FrameTrajectory {
 
   /// The motion of camera_from_world between the last two frames, per second; zero when that is not known.
   [[nodiscard]] geometry::Vector6d velocity(const maps::Map& map) const;
-  /// How the camera moved from the colour to the depth image of the frame recorded last.
+  /// Motion of the camera from the colour to the depth image of the frame recorded last.
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const maps::Map& map,
                                                    const sensor::RgbdFrame& frame) const;
   [[nodiscard]] const std::vector<maps::FramePose>& poses() const { return poses_; }

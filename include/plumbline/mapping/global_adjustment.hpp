@@ -25,8 +25,8 @@ namespace plumbline::mapping {
 /// The camera of each robot that has keyframes in the map.
 using Cameras = std::map<std::int32_t, sensor::Pinhole>;
 
-/// Where keyframe b lies relative to keyframe a, measured. The information of
-/// xi = log(b_from_a_estimate * b_from_a^-1), xi = (rho, phi) in metres and radians, may be singular.
+/// Measured pose of keyframe b relative to keyframe a. The information of xi = log(b_from_a_estimate *
+/// b_from_a^-1), xi = (rho, phi) in metres and radians, may be singular.
 struct PoseEdge {
   core::KeyframeId a;
   core::KeyframeId b;
@@ -35,13 +35,14 @@ struct PoseEdge {
   bool trusted = false;  ///< never taken for wrong
 };
 
-/// How keyframes lie to each other in the map now: each to the one before it of its robot, to those it shares
-/// at least `min_shared` landmarks with (at most `max_neighbours`), and to those its surface is aligned with.
-/// All trusted; the information grows with what they share. The body of a pose graph.
+/// Relative poses of keyframes in the map now: of each to its predecessor of the same robot, to those it
+/// shares at least `min_shared` landmarks with (at most `max_neighbours`), and to those its surface is
+/// aligned with. All are trusted; the information grows with what they share. They are the body of a pose
+/// graph.
 std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared = 30, int max_neighbours = 6);
 
-/// What the map's own way from keyframe `a` to `b` of one robot may be off, were the errors from one keyframe
-/// to the next independent: covariance of log(b_from_a_estimate * b_from_a^-1).
+/// Covariance of the map's own path from keyframe `a` to `b` of one robot, if the errors from one keyframe to
+/// the next were independent: of log(b_from_a_estimate * b_from_a^-1).
 geometry::Matrix6d path_covariance(const maps::Map& map, core::KeyframeId a, core::KeyframeId b);
 
 /// The loops of the map that were closed: edges that may be taken for wrong.
@@ -59,7 +60,7 @@ struct MapGraphResult {
 MapGraphResult solve_map_graph(const maps::Map& map, const std::vector<PoseEdge>& extra, bool robust,
                                core::KeyframeId anchor = {});
 
-/// Where relative poses that are all believed put the keyframes, by id; the map's first one is held. None:
+/// Keyframe poses that follow from trusted relative poses, by id; the map's first keyframe is held. Empty if
 /// the graph could not be solved.
 KeyframePoses solve_trusted_graph(const maps::Map& map, const std::vector<PoseEdge>& edges);
 
@@ -109,7 +110,7 @@ struct GlobalAdjustmentSummary {
   std::string message;   ///< why not, or what the solver said
 };
 
-/// Those that their verdicts do not reject; all where there are none.
+/// Edges that are not rejected by the pose graph's verdicts; all of them if there are no verdicts.
 std::vector<PoseEdge> believed_edges(const std::vector<PoseEdge>& edges,
                                      const std::vector<optimize::EdgeVerdict>& verdicts);
 
@@ -119,10 +120,10 @@ std::vector<PoseEdge> believed_edges(const std::vector<PoseEdge>& edges,
 GlobalAdjustmentSummary adjust_map(maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
                                    const GlobalAdjustmentOptions& options, core::KeyframeId anchor = {});
 
-/// How exactly a keyframe's pose is known beside the anchor's.
+/// Accuracy of a keyframe's pose relative to the anchor's.
 struct KeyframeAccuracy {
   core::KeyframeId keyframe;
-  /// Of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians.
+  /// Covariance of (rho, phi) in Exp(rho, phi) camera_from_world, metres and radians.
   geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
   int points = 0;  ///< observations that hold it
   int lines = 0;
@@ -137,9 +138,9 @@ struct KeyframeAccuracy {
   }
 };
 
-/// Of the keyframes of a map that adjust_map has left with the same `extra` (but for rejected ones), by id:
-/// what its observations say, their noise being as large as SigmaFactors make it. Empty when something leaves
-/// a keyframe free, and for more than 600 keyframes: time grows with the cube of their number.
+/// Accuracy of the keyframes of a map that adjust_map has left with the same `extra` (except rejected edges),
+/// by id: from its observations, their noise scaled by SigmaFactors. Empty if something leaves a keyframe
+/// free, and for more than 600 keyframes: time grows with the cube of their number.
 std::vector<KeyframeAccuracy> keyframe_accuracy(const maps::Map& map, const Cameras& cameras,
                                                 const std::vector<PoseEdge>& extra,
                                                 const GlobalAdjustmentOptions& options,

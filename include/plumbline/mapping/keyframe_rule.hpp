@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// When does a frame become a keyframe? Two rules: by what moved and what is lost (plain), or by the sides
+// Decides which frames become keyframes. Two rules: by what moved and what is lost (plain), or by the sides
 // from which landmarks are seen (cone, docs/method/mapping.md).
 #include <cstdint>
 
@@ -15,8 +15,8 @@ namespace plumbline::mapping {
 struct KeyframeRuleOptions {
   enum class Rule { kPlain, kCone };
   Rule rule = Rule::kPlain;
-  /// When a keyframe is made whatever the rule says: tracking gets thin; it is nearly lost (fewer than
-  /// min_features); never.
+  /// Case in which a keyframe is made whatever the rule says: tracking gets thin; it is nearly lost (fewer
+  /// than min_features); never.
   enum class Urgent { kThin, kNearlyLost, kOff };
   Urgent urgent = Urgent::kThin;
   int min_frames = 2;
@@ -38,7 +38,7 @@ struct KeyframeRuleOptions {
   void declare(core::OptionTable& table);
 };
 
-/// What the cone rule saw (docs/method/mapping.md); the counts are against the reference keyframe.
+/// Terms of the cone rule (docs/method/mapping.md); the counts are relative to the reference keyframe.
 struct ConeTerms {
   double shared = 1.0;  ///< landmarks of the keyframe matched, as a share of those right after it
   ConeCounts now;

@@ -27,7 +27,7 @@ struct TriangulationOptions {
   void declare(core::OptionTable& table);
 };
 
-/// What the newest keyframe's corners are aligned in.
+/// Image in which the newest keyframe's corners are aligned.
 struct NewestImage {
   const std::vector<cv::Mat>& levels;  ///< the newest keyframe's image in each octave
   features::FrameFeatures& newest;     ///< its features, those that the map holds

@@ -26,10 +26,11 @@ struct LocalBundleOptions {
   ObservationNoise noise;
 };
 
-/// What may move: `keyframe`, then `also` (those that no bundle has adjusted yet), then what it shares most
-/// with. Held are keyframes around these: those before and after on the tracker's way
-/// (maps::Keyframe::reference), so that all that moves is tied to something that does not by what the tracker
-/// saw between them, and those that see the same landmarks.
+/// Takes a bundle out of the map. The keyframes that may move are `keyframe`, `also` (those that no bundle
+/// has adjusted yet), and those that share most with `keyframe`. Two kinds of keyframes around these are
+/// held: those before and after on the tracker's path (maps::Keyframe::reference), so that everything that
+/// moves is tied to something fixed by what the tracker saw between them, and those that see the same
+/// landmarks.
 LocalBundle take_local_bundle(const maps::Map& map, core::KeyframeId keyframe, const sensor::Pinhole& camera,
                               const LocalBundleOptions& options,
                               const std::vector<core::KeyframeId>& also = {});

@@ -49,7 +49,7 @@ std::vector<LocalMap> make_local_maps(const maps::Map& map,
                                       const std::map<core::KeyframeId, CoarseSurface>& surfaces,
                                       const LocalMapOptions& options, const core::Executor& executor);
 
-/// As PCL's registration wants it: with its tree.
+/// The surface with its search tree, in the form that PCL's registration needs.
 cloud::SurfaceSearch search_of(const CoarseSurface& surface);
 
 struct AlignmentOptions {
@@ -110,7 +110,7 @@ std::vector<SurfaceAlignment> align_pairs(const maps::Map& map, const std::vecto
                                           const std::vector<LocalMapPair>& pairs,
                                           const AlignmentOptions& options, const core::Executor& executor);
 
-/// What may be used of them, between the anchors.
+/// Edges between the anchors, of the alignments that may be used.
 std::vector<PoseEdge> to_edges(const std::vector<LocalMap>& local_maps,
                                const std::vector<LocalMapPair>& pairs,
                                const std::vector<SurfaceAlignment>& alignments);

@@ -73,8 +73,8 @@ class LocalMapper {
       const tracking::TrackResult& track, const tracking::PhotometricKeyframes& photometric,
       const std::vector<core::KeyframeId>& neighbours, const core::Executor& executor) const;
 
-  /// What a new keyframe has to say about the map around it, in this order: doubles are fused, landmarks
-  /// that did not prove themselves go.
+  /// Improves the map around a new keyframe: first duplicate landmarks are fused, then those that did not
+  /// prove themselves are removed.
   void refine(maps::Map& map, core::KeyframeId keyframe);
 
  private:

@@ -116,8 +116,7 @@ class LoopCloser {
 
   /// From now on detect() finds loops by way of other robots' maps, too.
   void use(std::shared_ptr<const OtherMapsInbox> others);
-  /// Where an image was taken that the tracker cannot place: camera_from_world, as other robots' maps know
-  /// it.
+  /// Pose of an image that the tracker cannot place, camera_from_world, according to other robots' maps.
   std::optional<geometry::Rigid3> locate(const sensor::RgbdFrame& frame,
                                          const std::shared_ptr<const features::FrameFeatures>& features,
                                          const tracking::SurfaceSamplerOptions& surface);
@@ -131,7 +130,7 @@ class LoopCloser {
   /// Drops loops that wait for others to agree with them: they were measured with another camera.
   void clear_pending();
 
-  /// As an edge of the pose graph: where the query lies relative to the match.
+  /// The loop as an edge of the pose graph: the pose of the query relative to the match.
   static PoseEdge to_edge(const Loop& loop);
 
   /// Keyframes of the map that an image looks like, best first; for a tracker that is lost.
@@ -142,7 +141,7 @@ class LoopCloser {
   [[nodiscard]] const LoopCounts& counts() const { return counts_; }
   /// Every candidate that was verified so far.
   [[nodiscard]] const std::vector<LoopTrial>& trials() const { return trials_; }
-  /// What spoke against the path, in the order in which enough loops agreed.
+  /// Evidence against the tracked path, in the order in which enough loops agreed.
   [[nodiscard]] const std::vector<LoopDispute>& disputes() const { return disputes_; }
   /// The path gave way to the newest dispute.
   void remove_dispute() { disputes_.pop_back(); }

@@ -73,7 +73,7 @@ struct OverlayFit {
   int matched = 0;       ///< of these, that the other one has too
   int contradicted = 0;  ///< where the other one saw through
   double chance = 0.0;   ///< so many would match any other landmarks that lie as densely
-  /// Of the expected that match, beyond chance.
+  /// Share of the expected landmarks that match, beyond chance.
   [[nodiscard]] double share() const {
     return expected > 0 ? std::max(0.0, matched - chance) / expected : 0.0;
   }
@@ -93,10 +93,10 @@ struct Consistency {
   std::vector<VerifiedPair> pairs;  ///< of the set
 };
 
-/// How two worlds lie, as a set of pairs says.
+/// Relative pose of two worlds according to a set of pairs.
 struct Alignment {
   geometry::Rigid3 a_from_b;
-  /// Of log(a_from_b_true * a_from_b^-1), at the middle of b's keyframes.
+  /// Covariance of log(a_from_b_true * a_from_b^-1), at the middle of b's keyframes.
   geometry::Matrix6d covariance = geometry::Matrix6d::Identity();
   double spread_m = 0.0;  ///< RMS of where the pairs put b's cameras, about the mean
 };

@@ -23,7 +23,7 @@
 
 namespace plumbline::mapping {
 
-/// How far two robots have come (Fig. 3 of the paper).
+/// Progress of the meeting of two robots (Fig. 3 of the paper).
 enum class MeetingStep { kNone, kSimilar, kVerified, kLocalMapAsked, kMet, kTakenBack };
 
 struct MeetingEvent {
@@ -36,13 +36,13 @@ struct MeetingEvent {
   std::shared_ptr<const FusedMap> preview;  ///< of kMet: all maps that hang together now; parts: robots
 };
 
-/// Where a robot is in the frame that it shares with others.
+/// Pose of a robot in the frame that it shares with others.
 struct RobotPlace {
   std::size_t anchor = 0;  ///< the robot whose world is the common frame: the first of those that met
   geometry::Rigid3 anchor_from_robot;   ///< worlds
   geometry::Rigid3 anchor_from_camera;  ///< of the newest keyframe
-  /// Of that camera's position (metres) and rotation (radians) as the merges on the way from the anchor know
-  /// it, in the anchor's axes; what the robots' own maps drift is not in it.
+  /// Covariance of that camera's position (metres) and rotation (radians), from the merges between it and the
+  /// anchor, in the anchor's axes; drift of the robots' own maps is not in it.
   geometry::Matrix6d covariance = geometry::Matrix6d::Zero();
 };
 
@@ -58,12 +58,12 @@ class MergeServer {
   /// A keyframe that is new in `map`, its robot's, at a frame of the log; frames never decrease. Throws
   /// std::invalid_argument: no such robot or keyframe.
   void add(std::shared_ptr<const maps::Map> map, core::KeyframeId keyframe, std::int64_t frame);
-  /// What is to be committed at this frame; mostly nothing. To be called for every frame, after add().
+  /// Events that are to be committed at this frame; mostly none. To be called for every frame, after add().
   std::vector<MeetingEvent> commit(std::int64_t frame);
   /// All that is left, when the log has ended.
   std::vector<MeetingEvent> finish();
 
-  /// As of the last commit; none: it has met nobody.
+  /// Pose of the robot as of the last commit; none if it has met nobody.
   [[nodiscard]] std::optional<RobotPlace> place(std::size_t robot) const;
 
  private:
@@ -84,7 +84,7 @@ class MergeServer {
     core::KeyframeId b;
     geometry::Rigid3 a_from_b;  ///< their cameras
   };
-  /// What the work beside the caller owns while it runs.
+  /// Data of the background work while it runs.
   struct Work {
     std::vector<std::shared_ptr<const maps::Map>> maps;  ///< by robot, as told last
     std::vector<MapPart> parts;                          ///< the same

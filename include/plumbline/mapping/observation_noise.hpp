@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a keyframe's features say of landmarks in bundles, of a few keyframes or of the whole map, and how
-// much they are believed: standard deviations as they were found at true poses
-// (docs/notes/2026-11-24-mapping.md).
+// Noise of a keyframe's features in bundles of a few keyframes or of the whole map: standard deviations as
+// they were found at true poses (docs/notes/2026-11-24-mapping.md).
 #include <string>
 
 #include "plumbline/core/options.hpp"
@@ -26,8 +25,8 @@ struct ObservationNoise {
   /// All but the scale factor, which is that of the features.
   void declare(core::OptionTable& table, const std::string& prefix);
 
-  /// As a bundle's camera of the same intrinsics saw it; which pose and which landmark is left to the caller.
-  /// `motion_factor`: all standard deviations are so many times as large.
+  /// Observation of a corner for a bundle whose camera has the same intrinsics; the caller sets pose and
+  /// landmark. `motion_factor`: factor on all standard deviations.
   [[nodiscard]] optimize::BundlePointObservation of(const features::PointFeature& corner, bool is_aligned,
                                                     double motion_factor = 1.0) const;
   /// `motion_factor` of a keyframe that was taken while the camera turned at this rate, rad/s.

@@ -17,7 +17,7 @@ struct OtherMaps {
   Cameras cameras;  ///< by robot
 };
 
-/// Where they come in from another thread. Nobody waits for anybody; thread-safe.
+/// Receives the other robots' maps from another thread. Neither side waits; thread-safe.
 class OtherMapsInbox {
  public:
   void put(std::shared_ptr<const OtherMaps> maps) { std::atomic_store(&newest_, std::move(maps)); }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Whether a camera that was lost is where it was found by appearance.
+// Check that a lost camera really is where it was found by appearance.
 #include <memory>
 
 #include "plumbline/mapping/place_verification.hpp"
@@ -14,7 +14,7 @@ namespace plumbline::mapping {
 maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
                     const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface);
 
-/// Where a camera was lost.
+/// Last known position of a lost camera.
 struct LostAt {
   core::KeyframeId reference;          ///< in whose surroundings
   geometry::Rigid3 camera_from_world;  ///< the last pose that was known

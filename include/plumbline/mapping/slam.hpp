@@ -40,7 +40,7 @@ struct SlamOptions {
   void declare(core::OptionTable& table);
 };
 
-/// What happened to one frame; one line of frames.csv.
+/// Report of one frame; one line of frames.csv.
 struct FrameReport {
   std::int64_t frame_index = -1;
   double stamp = 0.0;
@@ -115,7 +115,7 @@ class Slam {
   [[nodiscard]] const std::vector<LoopTrial>& loop_trials() const { return closer_.trials(); }
   /// Keyframes by what they look like; empty without loops.
   [[nodiscard]] const places::Database& places() const { return closer_.database(); }
-  /// What the tracker said about the last frame; for images of it.
+  /// The tracker's result for the last frame; for drawing it.
   [[nodiscard]] const tracking::TrackResult& last_track() const { return last_track_; }
   /// Every frame in order, relative to its keyframe.
   [[nodiscard]] const std::vector<maps::FramePose>& frame_poses() const { return frames_.poses(); }
@@ -124,20 +124,21 @@ class Slam {
 
  private:
   void start_map(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
-  /// Whether the camera is believed to be where it was found again; while it is not, its frames have no pose.
+  /// True if the camera is believed to be where it was found again; as long as it is not, its frames have no
+  /// pose.
   bool believes_place(const sensor::RgbdFrame& frame, const Features& features, int lost_before);
   void begin_component(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
   void join_components(core::KeyframeId keyframe);
   void insert_keyframe(const sensor::RgbdFrame& frame, const Features& features, FrameReport& report);
-  /// What came of a keyframe beside the tracker goes into the map, and what waited for it is begun.
+  /// Puts the results of background work on a keyframe into the map, and begins the work that waited for it.
   void connect_keyframe(BundleReport& report);
   void set_reference(core::KeyframeId keyframe);
   void put_back_bundle(BundleReport& report);
   void connect_keyframes();
   void commit_bundles();
   void close_loops(core::KeyframeId keyframe);
-  /// Whether a relocalisation gave way to the newest dispute: what came after it is a component of its own
-  /// now.
+  /// True if a relocalisation was taken back because of the newest dispute: the keyframes after it are now a
+  /// component of their own.
   bool give_way();
 
   [[nodiscard]] std::shared_ptr<const maps::SeenPoints> seen_points() const;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How two keyframes lie to each other as their surfaces say: samples of one are aligned, point to plane, with
-// the depth image of the other (docs/method/mapping.md), and its grey values with the other's image, for
-// local bundle adjustment.
+// Relative pose of two keyframes from their surfaces: samples of one are aligned, point to plane, with the
+// depth image of the other (docs/method/mapping.md), and its grey values with the other's image, for local
+// bundle adjustment.
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
@@ -18,7 +18,7 @@ struct SurfaceEdgeOptions {
   double hold_m = 0.01;       ///< see align_surface_edge
 };
 
-/// What two keyframes' images say beside their surfaces: nothing when one is null.
+/// Image evidence of two keyframes besides their surfaces; unused if one of them is null.
 struct EdgeImages {
   const features::PhotometricSamples* of_a = nullptr;
   const features::PhotometricImage* of_b = nullptr;

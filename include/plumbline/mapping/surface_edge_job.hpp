@@ -12,7 +12,7 @@
 
 namespace plumbline::mapping {
 
-/// What the new keyframe's images say.
+/// Surface and image data of the new keyframe.
 struct NewestSurface {
   core::KeyframeId keyframe;
   cv::Mat depth;                                            ///< CV_32FC1, metres

@@ -11,7 +11,7 @@
 
 namespace plumbline::mapping {
 
-/// What a keyframe's pose shall be: camera_from_world.
+/// New poses of keyframes: camera_from_world.
 using KeyframePoses = std::vector<std::pair<core::KeyframeId, geometry::Rigid3>>;
 
 /// Two neighbours on the way that new poses would tear apart.
@@ -23,9 +23,9 @@ struct Contradiction {
   [[nodiscard]] std::string text() const;
 };
 
-/// Whether `poses` contradict what the tracker measured between a keyframe and the one it followed then:
-/// beyond noise (maps::beyond_noise), and by more than the map as it is does. The worst; none: the poses may
-/// be put into the map. A correction that is spread over the way, as a loop's is, contradicts nothing.
+/// Worst contradiction between `poses` and what the tracker measured between a keyframe and the one it
+/// followed then: beyond noise (maps::beyond_noise), and larger than in the map as it is. None: the poses may
+/// be put into the map. A correction that is spread over the path, as a loop's is, contradicts nothing.
 std::optional<Contradiction> contradiction(const maps::Map& map, const KeyframePoses& poses);
 
 }  // namespace plumbline::mapping

@@ -54,8 +54,8 @@ struct GridBalance {
 };
 GridBalance grid_balance(const GridCounts& grid);
 
-/// What the balance is asked for: ecog above the offset, as the method that the rule is from has it; below,
-/// as the paper prints; nothing.
+/// Condition on the balance: ecog above the offset, as in the method on which the rule is based; below, as
+/// the paper prints; none.
 enum class Balance { kAbove, kBelow, kOff };
 bool balanced(const GridBalance& balance, Balance asked);
 

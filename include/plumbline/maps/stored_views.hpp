@@ -30,7 +30,7 @@ struct StoredViews {
   [[nodiscard]] core::Result<cloud::CloudPtr> read(std::size_t view) const;
 };
 
-/// When clouds of frames came; those that are not there came before.
+/// Order of arrival of the frames' clouds; frames that are not listed came before all of these.
 using Arrivals = std::map<FrameId, std::size_t>;
 
 /// `reader` must outlive the views. `robots`: what their cameras turned out to be. Frames stand in the order

@@ -20,8 +20,8 @@ struct PageServerOptions {
 /// "HOST:PORT", "HOST" or "PORT"; [::1] in brackets. Errors (kUsage).
 core::Result<PageServerOptions> page_server_options(const std::string& address, const std::string& token);
 
-/// How much a server takes at most, whatever comes: connections at once, the rest are closed unread; event
-/// streams; threads for pages beside them; events that wait for a slow stream, which loses the oldest beyond.
+/// Limits of a server, whatever comes: connections at once (the rest are closed unread); event streams;
+/// threads for pages besides them; events that wait for a slow stream, which loses the oldest beyond.
 struct PageServerLimits {
   static constexpr std::size_t kSockets = 32;
   static constexpr std::size_t kStreams = 8;

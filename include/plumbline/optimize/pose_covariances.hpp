@@ -8,10 +8,10 @@
 
 namespace plumbline::optimize {
 
-/// How exactly the poses of an adjusted problem are known beside those that are fixed: covariance of (rho,
-/// phi) in Exp(rho, phi) camera_from_world, metres and radians, landmarks and other poses being free; zero
-/// for fixed ones. Standard deviations and losses are taken at their word, outliers are left out. Empty when
-/// something leaves a pose free. Memory and time grow with the square and the cube of the poses.
+/// Accuracy of the poses of an adjusted problem relative to those that are fixed: covariance of (rho, phi) in
+/// Exp(rho, phi) camera_from_world, metres and radians, with landmarks and other poses free; zero for fixed
+/// poses. Standard deviations and losses are assumed to be right, outliers are left out. Empty if something
+/// leaves a pose free. Memory grows with the square, and time with the cube of the number of poses.
 std::vector<geometry::Matrix6d> pose_covariances(const BundleProblem& problem, const BundleOptions& options);
 
 }  // namespace plumbline::optimize

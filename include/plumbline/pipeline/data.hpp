@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What flows between the stages of this library.
+// Types of the values that flow between the stages of this library.
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -35,7 +35,7 @@ struct FrameRow {
   std::string columns;    ///< the rest, comma-separated, as MapResult::frame_columns names it
 };
 
-/// What tracking decided about one frame.
+/// The tracker's decision about one frame.
 struct TrackedFrame {
   std::int32_t robot = 0;
   core::KeyframeId keyframe;  ///< valid when this frame became a keyframe
@@ -61,7 +61,7 @@ struct RobotMap {
   bool component = false;  ///< one of several that its robots' map consists of
 };
 
-/// What there is to be merged.
+/// Maps to be merged.
 struct RobotMaps {
   std::vector<RobotMap> maps;
   std::string frame_columns;     ///< as MapResult
@@ -94,7 +94,7 @@ struct KeyframeCloud {
   std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it;
                                                              ///< null: it waits in a store
   std::function<core::Result<std::vector<std::uint8_t>>()> stored;  ///< reads it there
-  /// Of a keyframe, mapping::coarse_surface of the cloud; null: none was kept.
+  /// mapping::coarse_surface of the keyframe's cloud; null: none was kept.
   std::shared_ptr<const maps::StoredSurface> surface;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a command's INPUT may be.
+// Kinds of INPUT of the commands.
 #include <filesystem>
 #include <memory>
 #include <string>

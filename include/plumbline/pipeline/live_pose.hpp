@@ -10,7 +10,7 @@
 
 namespace plumbline::pipeline {
 
-/// What the tracker knows of a frame as soon as it has gone through it.
+/// The tracker's result for a frame, available as soon as the frame is tracked.
 struct LivePose {
   std::size_t frame = 0;  ///< number within the run
   double stamp = 0.0;     ///< seconds

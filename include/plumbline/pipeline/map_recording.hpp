@@ -41,7 +41,7 @@ struct MapRequest : RunRequest {
       alter_map;  ///< for tests: changes the map when tracking has ended; may be empty
 };
 
-/// Whether there is nothing to go on with: OUT is whole and no run was interrupted since.
+/// True if there is nothing to resume: OUT is whole and no run was interrupted since.
 bool is_finished(const std::filesystem::path& out);
 
 /// Robots are numbered by the names of their folders (where these are alike, by the folders that they lie

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What comes of robots that meet while they map: lines in the log (Fig. 3 of the paper), and for each meeting
-// a folder meetings/0001_A_B with poses, evidence and a picture of the maps in one frame. Previews: the
-// finished maps have the last word.
+// Record of robots that meet while they map: lines in the log (Fig. 3 of the paper), and for each meeting a
+// folder meetings/0001_A_B with poses, evidence and a picture of the maps in one frame. These are previews:
+// the finished maps decide.
 #include <cstdint>
 #include <filesystem>
 #include <string>

@@ -19,7 +19,7 @@ class RunObserver {
   virtual ~RunObserver() = default;
   /// Before all else, and when another one comes: the robots, by number.
   virtual void begins(const std::vector<std::string>& /*robots*/) {}
-  /// Of several robots: where the map of one lies in the frame that it shares with others.
+  /// For several robots: the pose of one robot's map in the frame that it shares with others.
   virtual void placed(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*shared_from_map*/) {
   }
   /// A frame that was tracked, in the order of frames. `odometry_from_camera` is the same way without the
@@ -33,8 +33,8 @@ class RunObserver {
   /// The cloud of a keyframe, in whatever order; points that are not finite are none.
   virtual void added(std::int32_t /*robot*/, double /*stamp*/, const geometry::Rigid3& /*map_from_cloud*/,
                      const cloud::Cloud& /*cloud*/) {}
-  /// When all is done: the tracked frames of each robot, by number, and the merged cloud, all in one frame:
-  /// that of the map of a robot alone, else the one in which the robots' maps were merged.
+  /// Called when all is done, with the tracked frames of each robot, by number, and the merged cloud, all in
+  /// one frame: that of the map of a robot alone, else the one in which the robots' maps were merged.
   virtual void finished(const std::vector<geometry::Trajectory>& /*paths*/,
                         const geometry::Rigid3& /*map_from_cloud*/, const cloud::Cloud& /*cloud*/) {}
 };

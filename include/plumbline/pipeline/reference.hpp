@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is reported of the stages to people and editors, made from their own declarations.
+// Reference of the stages for people and editors, made from their own declarations.
 #include <string>
 #include <vector>
 

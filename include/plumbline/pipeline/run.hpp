@@ -15,7 +15,7 @@ namespace plumbline::pipeline {
 
 class RunObserver;
 
-/// What `map` and `fuse` are both asked for.
+/// Request that `map` and `fuse` have in common.
 struct RunRequest {
   std::filesystem::path output;            ///< the result folder
   std::string pipeline;                    ///< shipped name or file

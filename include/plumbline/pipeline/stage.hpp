@@ -52,13 +52,13 @@ class RunObserver;
 struct ResumedRun;
 class RobotRecordings;
 
-/// How often a port carries a value.
+/// Rate at which a port carries values.
 enum class Rate {
   kFrame,  ///< once a frame, or nothing for a frame (unreadable, no keyframe ...)
   kEnd,    ///< once, after the last frame
 };
 
-/// What flows through a port: a name for users and the C++ type behind it.
+/// Type of the values of a port: a name for users and the C++ type behind it.
 struct PortType {
   std::string name;
   std::type_index type;
@@ -123,7 +123,7 @@ class StageIo {
 /// Frames under way side by side, at most, whatever the number of threads.
 constexpr std::size_t kMostUnderWay = 64;
 
-/// What a run reads.
+/// Input of a run.
 struct RunInput {
   const dataset::FrameSource* source = nullptr;          ///< what a read stage reads; null: there is none
   RobotRecordings* recordings = nullptr;                 ///< `source`, when recordings are mapped; else null
@@ -133,14 +133,14 @@ struct RunInput {
   std::string text;    ///< what is mapped, as text that another recording does not give
 };
 
-/// What is kept in map.db.
+/// Data kept in map.db.
 struct RunStore {
   std::string configuration;  ///< the effective one, YAML; the same for any number of threads
   bool keeps_map = false;     ///< some stage keeps_map
   bool keeps_clouds = false;  ///< and it gets the clouds that are to be laid down
 };
 
-/// What reaches into a run, or looks on.
+/// Hooks of callers that change a run or observe it.
 struct RunHooks {
   std::filesystem::path debug_folder;                       ///< where its pictures go; empty: nowhere
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
@@ -150,7 +150,7 @@ struct RunHooks {
   std::function<void(const std::string&)> finishing;  ///< RunRequest::finishing
 };
 
-/// What a run lends to its stages; outlives them.
+/// Resources that a run lends to its stages; outlives them.
 struct RunContext {
   const core::Executor* executor = nullptr;
   core::Log* log = nullptr;
@@ -188,7 +188,7 @@ struct StageTiming {
   [[nodiscard]] double quantile_ms(double q) const;  ///< over the frames it worked on; 0 when there are none
 };
 
-/// What a stage may look at while the graph is checked.
+/// Information that a stage may use while the graph is checked.
 struct CheckContext {
   std::filesystem::path pipeline_folder;           ///< of the pipeline file
   std::filesystem::path pipelines_folder;          ///< shipped pipelines, filters and cameras
@@ -218,7 +218,7 @@ class Stage {
   /// TrackedFrame::changes.
   [[nodiscard]] virtual bool keeps_map() const { return false; }
   virtual core::Result<void> start(const RunContext& /*context*/) { return {}; }
-  /// Of sources: how many frames there are; asked after start.
+  /// Number of frames of a source; asked after start.
   [[nodiscard]] virtual std::size_t frames() const { return 0; }
   /// One frame, when all required per-frame inputs hold a value. Stateless stages are called from several
   /// threads at a time and in any order, serial ones in frame order. An error ends the run; what concerns
@@ -264,7 +264,7 @@ struct StageType {
 
   /// Gives frames without taking any.
   [[nodiscard]] bool is_source() const;
-  /// Of a stage that is just made.
+  /// Options of a newly made stage.
   [[nodiscard]] std::vector<core::OptionSpec> options() const;
 };
 using StageTypePtr = std::shared_ptr<const StageType>;

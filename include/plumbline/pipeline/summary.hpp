@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is said of a finished run.
+// Summary of a finished run.
 #include <string>
 
 namespace plumbline::pipeline {

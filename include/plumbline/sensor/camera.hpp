@@ -34,7 +34,7 @@ struct Pinhole {
     return pixel.x() >= border && pixel.y() >= border && pixel.x() <= width - 1 - border &&
            pixel.y() <= height - 1 - border;
   }
-  /// Of the image resized to that many pixels; the middle of pixel (0, 0) is at (0, 0).
+  /// Pinhole of the image resized to that many pixels; the middle of pixel (0, 0) is at (0, 0).
   [[nodiscard]] Pinhole resized(int to_width, int to_height) const {
     const double sx = static_cast<double>(to_width) / width;
     const double sy = static_cast<double>(to_height) / height;
@@ -51,12 +51,13 @@ struct Camera {
   double fps = 30.0;
   /// Rolling shutter: from the first row of a colour image to the last, seconds; 0: all rows at once.
   std::optional<double> readout_s;  ///< none: not known
-  /// When present, depth is not registered to colour: the reader does that.
+  /// Pose of the depth camera, if depth is not registered to colour: the reader then registers it.
   std::optional<geometry::Rigid3> color_from_depth;
   std::optional<Pinhole> depth;  ///< intrinsics of the depth image when color_from_depth is present
   Lens depth_lens;               ///< of the depth image when color_from_depth is present
-  /// What depth gets wrong across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the
-  /// ray (x, y, 1) of the undistorted colour camera. A depth camera whose axis is not where its maker thinks.
+  /// Error of depth across the image, 1/m: 1 / z = 1 / z_measured + depth_slope . (x, y) along the ray (x, y,
+  /// 1) of the undistorted colour camera. It describes a depth camera whose axis is not where its maker
+  /// thinks.
   std::array<double, 2> depth_slope{};
   double depth_delay_s = 0.0;  ///< so much later than their stamps say were depth images taken
   bool guess = false;          ///< typical values, of no file

@@ -12,7 +12,7 @@
 
 namespace plumbline::sensor {
 
-/// What a camera file says.
+/// Content of a camera file.
 struct CameraReading {
   Camera camera;
   std::string program;             ///< whose kind of file it is; "" is our own
@@ -32,11 +32,11 @@ core::Result<CameraReading> read_camera_file(const std::filesystem::path& file);
 core::Result<CameraReading> find_camera(const std::string& name_or_file,
                                         const std::filesystem::path& cameras_folder);
 
-/// Whether the file looks like another program's camera file; of plain numbers, which could be anything, only
-/// with `numbers_too`. False when it cannot be read.
+/// True if the file looks like another program's camera file; a file of plain numbers, which could be
+/// anything, only counts with `numbers_too`. False if it cannot be read.
 bool is_foreign_camera_file(const std::filesystem::path& file, bool numbers_too);
 
-/// What is wrong with the camera's numbers for images of its size, "" if nothing.
+/// Problem with the camera's numbers for images of its size; "" if there is none.
 std::string camera_problem(const Camera& camera);
 
 /// Lines of a camera.yaml with what is known of `camera`, and places to fill in where it is 0.

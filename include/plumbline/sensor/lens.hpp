@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a lens does to rays: the ray (x, y, 1) of a point comes out as (x', y', 1), and the pixel is
-// (fx x' + cx, fy y' + cy). The models and the order of their coefficients are OpenCV's.
+// Distortion of rays by a lens: the ray (x, y, 1) of a point comes out as (x', y', 1), and the pixel is (fx
+// x' + cx, fy y' + cy). The models and the order of their coefficients are OpenCV's.
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
@@ -27,10 +27,10 @@ struct Lens {
   LensModel model = LensModel::kRadialTangential;
   Distortion k{};
 
-  /// Whether it does anything to a ray; an equidistant lens always does.
+  /// True if the lens changes rays; an equidistant lens always does.
   [[nodiscard]] bool distorts() const;
   [[nodiscard]] Eigen::Vector2d distort(const Eigen::Vector2d& ray) const;
-  /// Of distort() by the ray.
+  /// Derivative of distort() with respect to the ray.
   [[nodiscard]] Eigen::Matrix2d jacobian(const Eigen::Vector2d& ray) const;
   /// distort() by k1 is `by_k1` times the ray, and by k2 `k2_by_k1` times that.
   struct ByCoefficients {

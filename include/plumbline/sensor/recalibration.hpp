@@ -34,15 +34,15 @@ class ImageModel {
   Camera camera_;
 };
 
-/// What a camera `before` was believed to be and what it is believed to be `after`, for images of one
-/// pinhole. Const methods are thread-safe.
+/// Change of what a camera is believed to be, from `before` to `after`, for images of one pinhole. Const
+/// methods are thread-safe.
 class Recalibration {
  public:
   Recalibration(const Pinhole& image, const Camera& before, const Camera& after);
 
   [[nodiscard]] const ImageModel& before() const { return before_; }
   [[nodiscard]] const ImageModel& after() const { return after_; }
-  /// Where what lay at a rectified pixel lies now; by interpolation in a table, to a few thousandths of a
+  /// New position of what lay at a rectified pixel; by interpolation in a table, to a few thousandths of a
   /// pixel.
   [[nodiscard]] Eigen::Vector2d pixel(const Eigen::Vector2d& rectified) const;
   /// The depth (> 0) that was read at `before`, now that this is the pixel `now`. 0: none any more.

@@ -16,9 +16,9 @@ void align_points(const maps::Map& map, const features::FrameFeatures& frame, co
                   const geometry::Rigid3& camera_from_world, double scale_factor,
                   std::vector<PointMatch>& matches);
 
-/// Where an image (`levels`, of `camera_from_world`) shows the corner that a keyframe saw of what lies at
-/// `position`, pixels of the full image; `start`: where it should be, to two pixels of the corner's octave.
-/// None when the keyframe saw it too differently, or the images do not agree.
+/// Position in an image (`levels`, of `camera_from_world`) of the corner that a keyframe saw of what lies at
+/// `position`, pixels of the full image; `start`: expected position, to two pixels of the corner's octave.
+/// None if the keyframe saw it too differently, or the images do not agree.
 std::optional<Eigen::Vector2f> align_observation(const maps::Map& map, const maps::Observation& seen,
                                                  const Eigen::Vector3d& position,
                                                  const std::vector<cv::Mat>& levels,

@@ -14,8 +14,8 @@ struct TrackResult;
 
 class MotionModel {
  public:
-  /// What the recorder's odometry says of the frame that is looked for next, world_from_camera in a world of
-  /// its own; none: it says nothing.
+  /// Sets the recorder's odometry for the frame that is tracked next, world_from_camera in a world of its
+  /// own; none: it has no pose.
   void set_odometry(const std::optional<geometry::Rigid3>& pose) { odometry_ = pose; }
   /// camera_from_world at a time: by odometry, from the last tracked frame on, or else by velocity, at most
   /// 0.2 s after the last pose.
@@ -27,7 +27,7 @@ class MotionModel {
   void update(double stamp, const TrackResult& result);
   /// A frame was not.
   void lost();
-  /// What was found since so many frames were lost was a mistake.
+  /// Takes back all poses found since so many frames were lost.
   void lost_since(int frames) { lost_frames_ = frames; }
   /// The camera turned up elsewhere: the past says nothing.
   void reset();
@@ -46,9 +46,9 @@ class MotionModel {
   [[nodiscard]] bool outdated() const { return lost_frames_ >= (knows_odometry() ? 60 : 5); }
   /// After some more it says nothing.
   [[nodiscard]] bool expired() const { return lost_frames_ >= (knows_odometry() ? 300 : 30); }
-  /// Of the search for features around their prediction.
+  /// Radius of the search for features around their prediction, pixels.
   [[nodiscard]] double search_radius_px() const { return 12.0 + 4.0 * std::min(lost_frames_, 5); }
-  /// Whether it may still hold alone what no measurement does.
+  /// True if the motion model may still hold alone what no measurement holds.
   [[nodiscard]] bool may_dead_reckon() const {
     return continuous() && dead_reckoning_s_ < (knows_odometry() ? 20.0 : 2.5);
   }
@@ -58,8 +58,8 @@ class MotionModel {
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
   [[nodiscard]] double last_stamp() const { return stamp_; }
-  /// Of the camera, (m/s, rad/s) in its frame: camera_from_world(t + dt) = Exp(velocity dt)
-  /// camera_from_world(t). Zero when that is not known.
+  /// Velocity of the camera, (m/s, rad/s) in its frame: camera_from_world(t + dt) = Exp(velocity dt)
+  /// camera_from_world(t). Zero if it is not known.
   [[nodiscard]] geometry::Vector6d velocity() const {
     return continuous() ? velocity_ : geometry::Vector6d(geometry::Vector6d::Zero());
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the tracker sees, drawn onto the image: for eyes, not for estimation.
+// Drawing of the tracker's results onto the image: for eyes, not for estimation.
 #include <opencv2/core/mat.hpp>
 
 #include "plumbline/features/frame_features.hpp"
@@ -12,7 +12,7 @@
 
 namespace plumbline::tracking {
 
-/// How many times longer than in truth residuals are drawn.
+/// Factor by which residuals are drawn longer than they are.
 constexpr double kResidualZoom = 8.0;
 
 /// CV_8UC3 BGR image of the frame's size with

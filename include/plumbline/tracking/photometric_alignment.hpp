@@ -59,7 +59,7 @@ class PhotometricKeyframes {
 /// A term weighs less the further an error of its depth would move it across its gradient.
 bool update_photometric(optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
 
-/// Whether the image is the expected one, as far as that can be told at a pose.
+/// True if the image is the expected one, as far as that can be determined at a pose.
 bool photometric_agrees(const optimize::PhotometricFamily& family, const geometry::Rigid3& camera_from_world);
 
 struct ShiftedPose {

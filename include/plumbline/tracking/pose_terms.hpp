@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What matched landmarks say of a pose (optimize/pose_solver.hpp), in the order of the matches.
+// Terms of matched landmarks for the pose (optimize/pose_solver.hpp), in the order of the matches.
 #include <cstddef>
 #include <vector>
 

@@ -34,8 +34,8 @@ struct LookAlike {
   double correlation = 0.0;
 };
 
-/// Those of `candidates` that the image looks like, most alike first, at most `count`. An image without
-/// contrast looks like nothing.
+/// Up to `count` of `candidates` that look like the image, most alike first. An image without contrast looks
+/// like nothing.
 std::vector<LookAlike> look_alikes(const maps::Map& map, const std::vector<core::KeyframeId>& candidates,
                                    const features::FrameFeatures& features, int count);
 

@@ -53,7 +53,7 @@ struct TrackerOptions {
   void declare(core::OptionTable& table);
 };
 
-/// What the tracker found out about one frame.
+/// Result of tracking one frame.
 struct TrackResult {
   TrackState state = TrackState::kLost;
   core::KeyframeId reference;  ///< in whose surroundings the camera is
@@ -68,8 +68,8 @@ struct TrackResult {
   optimize::PoseSummary estimate;
   int surface_in_view = 0;     ///< samples of the local surface where the depth image has a measurement
   double surface_share = 0.0;  ///< share of the local surface in view that the depth image confirms
-  /// Of the information matrix of the families that are trusted, 1/m^2, rotations scaled by the scene's
-  /// depth.
+  /// Smallest eigenvalue of the information matrix of the families that are trusted, 1/m^2, rotations scaled
+  /// by the scene's depth.
   double min_eigenvalue = 0.0;
   bool continuous =
       false;  ///< the frame before is tracked and no more than a step away: the motion model knew
@@ -100,8 +100,8 @@ class Tracker {
   /// Localises a frame in `map`. An empty map gives kInitialising.
   TrackResult track(const maps::Map& map, const sensor::RgbdFrame& frame, const Features& features);
 
-  /// What the camera's file says of its shutter (sensor::Camera::readout_s), in the place of the option;
-  /// none: as it was. A readout of 0 is a global shutter's.
+  /// Sets the readout time from the camera's file (sensor::Camera::readout_s), in place of the option; none:
+  /// unchanged. A readout of 0 is a global shutter's.
   void set_shutter(std::optional<double> readout_s);
 
   /// The camera turned out to be another one: what is kept of keyframes' intensities is made anew.
@@ -137,7 +137,7 @@ class Tracker {
                          const geometry::Rigid3& camera_from_world)>;
   void set_place_judge(PlaceJudge judge) { is_place_ = std::move(judge); }
 
-  /// Of the last tracked frame, in the map as it is now.
+  /// Pose of the last tracked frame, in the map as it is now.
   [[nodiscard]] const geometry::Rigid3& camera_from_world() const { return motion_.camera_from_world(); }
   /// The last frame was lost, and several before it.
   [[nodiscard]] bool astray() const { return motion_.outdated(); }
@@ -199,7 +199,7 @@ class Tracker {
   cv::Mat thumbnail_depth_;
 };
 
-/// Of the surface in view, what a pose must explain that little else speaks for.
+/// Share of the visible surface that must be confirmed if little else supports the pose.
 constexpr double kMostOfTheSurface = 0.75;
 
 }  // namespace plumbline::tracking

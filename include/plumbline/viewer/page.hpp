@@ -11,7 +11,7 @@ namespace plumbline::viewer {
 
 std::string base64(std::string_view bytes);
 
-/// Bytes that clouds take in the page, as they stand in it, base64 included.
+/// Size of a cloud's data in the page; bytes as they stand in it, base64 included.
 struct Cost {
   std::size_t points = 0;
   std::size_t place_and_color = 0;

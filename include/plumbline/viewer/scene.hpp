@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A map as a page shows it that turns it in the browser: points with their layers, paths, lines, the plan.
+// Content of a page that shows a map in the browser: points with their layers, paths, lines, the plan.
 #include <array>
 #include <cstdint>
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace plumbline::viewer {
 
-/// How the values of a layer become colours.
+/// Mapping of a layer's values to colours.
 enum class Scale {
   kLinear,       ///< from `low` to `high`
   kLogarithmic,  ///< the same, by the logarithm; 0 < low

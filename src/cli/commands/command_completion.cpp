@@ -150,7 +150,7 @@ int complete_line(const CompleteRequest& request, const CLI::App& app, const Ses
                                                                               : "none";
   fmt::print("{}{}\n", paths, completion.open ? " open" : "");
 
-  // Of "track.loops=o" bash wants only what is behind the last break.
+  // In "track.loops=o" bash completes only what follows the last word break.
   const std::string last = words.empty() ? "" : words.back();
   const bool split = !request.line.empty() && last.size() > request.word.size();
   const std::size_t before = split ? last.size() - request.word.size() : 0;

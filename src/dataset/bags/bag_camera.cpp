@@ -138,7 +138,8 @@ Transforms read_all_transforms(const BagSurvey& survey) {
   return transforms;
 }
 
-/// What RealSense's recorder has beside an image topic: "/device_0/sensor_0/Depth_0" of ".../image/data".
+/// Base name of the topics that RealSense's recorder writes beside an image topic:
+/// "/device_0/sensor_0/Depth_0" for ".../image/data".
 std::string realsense_stream(const std::string& image) {
   const std::size_t at = image.find(kRealSenseImage);
   return image.rfind("/device_", 0) == 0 && at != std::string::npos ? image.substr(0, at) : "";
@@ -187,7 +188,7 @@ bool same_pixels(const sensor::Pinhole& a, const sensor::Pinhole& b) {
          a.cy == b.cy;
 }
 
-/// Where depth is not in colour's pixels, its own camera.
+/// Adds a depth camera of its own if depth is not registered to colour.
 core::Result<void> add_depth_camera(const BagSurvey& survey, const ChosenTopics& topics,
                                     const InfoCamera& color, const InfoCamera& depth,
                                     sensor::CameraReading& reading) {

@@ -28,7 +28,7 @@ struct BagTopic {
   std::string encoding;  ///< of messages: "cdr", "ros1", "json", "protobuf" ...
 };
 
-/// Where a message is; what the numbers mean is the file's affair.
+/// Location of a message in its file; only the file's reader can interpret the numbers.
 struct MessagePlace {
   std::uint64_t at = 0;
   std::uint64_t offset = 0;
@@ -58,7 +58,7 @@ class BagFile {
   [[nodiscard]] virtual core::Result<Bytes> read(const MessagePlace& place) const = 0;
   /// All that the scan has met.
   [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
-  /// What a reader of the map should know, one sentence each.
+  /// Remarks for a reader of the map, one sentence each.
   [[nodiscard]] virtual const std::vector<std::string>& notes() const = 0;
   /// The camera.yaml that `plumbline convert` puts beside the messages; "" if there is none.
   [[nodiscard]] virtual std::string camera_yaml() const { return ""; }

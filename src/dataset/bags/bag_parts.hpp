@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What reads and writes bags, as a part of its own (core/part.hpp): CycloneDDS, which brings OpenSSL along,
-// SQLite and libraries of compression are loaded by who opens one.
+// Reading and writing bags, as a part of its own (core/part.hpp): CycloneDDS (which brings OpenSSL along),
+// SQLite and the compression libraries are loaded only when a bag is opened.
 #include "bags/bag_writer.hpp"
 #include "bags/messages.hpp"
 #include "plumbline/core/part.hpp"

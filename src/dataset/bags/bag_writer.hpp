@@ -9,8 +9,8 @@
 
 namespace plumbline::dataset {
 
-/// What is written appears whole, with finish(), or not at all. Errors (kOutput) come out there. Memory does
-/// not grow with the messages.
+/// Writes a bag. The file appears whole, with finish(), or not at all; errors (kOutput) are returned there.
+/// Memory does not grow with the number of messages.
 class BagWriter {
  public:
   virtual ~BagWriter() = default;

@@ -19,7 +19,7 @@ constexpr int kAsItIs = -1;  // no conversion
 // A few bytes of RVL can stand for any number of zeros, so nothing but this bounds what they ask for.
 constexpr std::uint64_t kMostRvlPixels = std::uint64_t{1} << 24;
 
-/// How an encoding's bytes become an image.
+/// Rule by which the bytes of one encoding become an image.
 struct RawEncoding {
   const char* name;
   int type;

@@ -12,9 +12,9 @@ namespace plumbline::dataset {
 
 using MessageImage = tl::expected<cv::Mat, std::string>;
 
-/// Whether images of this encoding are depth: 16UC1, mono16, 32FC1.
+/// True for encodings of depth images: 16UC1, mono16, 32FC1.
 bool is_depth_encoding(const std::string& encoding);
-/// Whether it is the transport compressedDepth, by its format.
+/// True if `format` is that of the transport compressedDepth.
 bool is_compressed_depth(const std::string& format);
 
 /// sensor_msgs/Image: rgb8 bgr8 rgba8 bgra8 mono8 8UC1 8UC3 8UC4 rgb16 bgr16 yuv422 uyvy yuyv yuv422_yuy2;

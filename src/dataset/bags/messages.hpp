@@ -74,7 +74,7 @@ using DecodedMessage = tl::expected<Message, std::string>;
 
 /// Reads messages of one encoding; every length is checked before memory is taken. Thread-safe.
 struct MessageDecoder {
-  /// Of a message that begins with a std_msgs/Header; `size` may end anywhere behind it.
+  /// Stamp of a message that begins with a std_msgs/Header, ns; the bytes may end anywhere after the header.
   DecodedMessage<std::int64_t> (*stamp)(const std::uint8_t* head, std::size_t size);
   DecodedMessage<ImageMessage> (*image)(const Bytes& bytes);
   DecodedMessage<CompressedImageMessage> (*compressed_image)(const Bytes& bytes);

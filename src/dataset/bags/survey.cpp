@@ -169,7 +169,7 @@ core::Result<BagSurvey> survey_bag(const fs::path& path) {
     survey.kind = kind_of_file(file);
     const auto added = surveyor.add(file);
     if (added) continue;
-    // Of several files one may be damaged; of one, nothing is left.
+    // One damaged file among several is only noted; if there is no other file, it is an error.
     if (first_problem.message.empty()) first_problem = added.error();
     survey.notes.push_back(added.error().message);
   }

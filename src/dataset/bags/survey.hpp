@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What is in a bag: topics, how many messages when, and where the images are.
+// Survey of a bag: its topics, their message counts and times, and the topics that hold images.
 #include <memory>
 #include <optional>
 #include <string>

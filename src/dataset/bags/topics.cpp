@@ -37,13 +37,13 @@ bool is_infrared(const std::string& topic) {
          contains(topic, "_ir/") || contains(topic, "Infrared");
 }
 
-/// Whether the name says that depth was brought into the colour camera by the driver.
+/// True if the name says that the driver registered depth to the colour camera.
 bool named_aligned(const std::string& topic) {
   return contains(topic, "aligned_depth") || contains(topic, "registered") ||
          contains(topic, "depth_to_color") || contains(topic, "depth_to_rgb");
 }
 
-/// How many of the names' parts, from the left, are the same.
+/// Number of leading parts that two topic names have in common.
 std::size_t common_parts(const std::string& a, const std::string& b) {
   std::size_t parts = 0;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()) && a[i] == b[i]; ++i) parts += a[i] == '/' ? 1 : 0;
@@ -89,7 +89,7 @@ std::vector<Candidate> image_topics(const BagSurvey& survey) {
   return candidates;
 }
 
-/// Of the transports of one image the first raw one, else the one with most messages.
+/// Keeps one transport of each image: the first raw one, or else the one with most messages.
 std::vector<Candidate> one_of_each_image(const std::vector<Candidate>& candidates) {
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates) {

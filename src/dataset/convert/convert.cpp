@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What stands at `out` must be a copy of before, and may be replaced.
+/// Checks that nothing is at `out`, or an earlier copy that may be replaced.
 core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return {};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What a recording is copied to.
+// Targets that a recording can be copied to.
 #include <memory>
 #include <optional>
 
@@ -32,7 +32,8 @@ core::Result<std::unique_ptr<CopyTarget>> make_mcap_target(const std::filesystem
 std::unique_ptr<CopyTarget> make_message_target(std::unique_ptr<BagWriter> bag, const sensor::Camera& camera,
                                                 bool standard_depth, core::Log& log);
 
-/// Of a stamp: whole microseconds where these are the same: of seconds since 1970 a double keeps no more.
+/// Stamp in nanoseconds, rounded to whole microseconds if that is the same time: a double that counts seconds
+/// since 1970 resolves no more.
 std::int64_t nanoseconds(double seconds);
 
 /// The image's pixels, decoded where they are a file's bytes. Error (kInput): damaged.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the readers of several layouts need: numbered images, poses in files of their own.
+// Helpers for the readers of several layouts: numbered images, poses in files of their own.
 #include <algorithm>
 #include <cctype>
 #include <cmath>

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether one of the alternatives of a part is there.
+/// True if one of the alternatives of a part exists.
 bool has_part(const fs::path& folder, const std::string& part) {
   const std::vector<std::string> names = split_words(part, "|");
   return std::any_of(names.begin(), names.end(), [&](const std::string& name) {

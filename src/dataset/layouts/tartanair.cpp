@@ -63,7 +63,7 @@ geometry::Trajectory tartanair_truth(const fs::path& file, double fps, core::Log
   return truth;
 }
 
-/// As its authors publish it.
+/// Camera as the data set's authors publish it.
 sensor::CameraReading tartanair_camera() {
   sensor::CameraReading reading;
   reading.program = "TartanAir, the same for all of it";

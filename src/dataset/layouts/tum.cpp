@@ -101,8 +101,8 @@ core::Result<std::vector<PairInfo>> read_two_lists(const fs::path& folder, const
   return pairs;
 }
 
-/// Whether the first file of a line of four words is the depth image. TUM's own tool writes colour first;
-/// ICL-NUIM's lists begin with depth.
+/// True if the first file of a line of four words is the depth image. TUM's own tool writes colour first; the
+/// lists of ICL-NUIM begin with depth.
 bool depth_first(const std::string& first, const std::string& second) {
   const auto says_depth = [](const std::string& name) { return name.find("depth") != std::string::npos; };
   const auto says_color = [](const std::string& name) {

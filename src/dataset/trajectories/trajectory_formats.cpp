@@ -93,7 +93,7 @@ const TrajectoryFormat& format_of(const TrajectoryText& text) {
                         [&](const TrajectoryFormat* format) { return format->recognises(text); });
 }
 
-/// How many units of the stamp a second has.
+/// Units of the stamp per second.
 double units_per_second(const TrajectoryText& text) {
   const std::string name = text.header ? text.header->stamp_name : "";
   const auto says = [&](const char* unit) { return name.find(unit) != std::string::npos; };

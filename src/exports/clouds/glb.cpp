@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// What goes into the file: positions in glTF's axes (y up), colours as light, not as screens want them.
+/// Content of the file: positions in glTF's axes (y up), colours as linear light, not as sRGB.
 struct GlbData {
   std::vector<std::array<float, 3>> positions;
   std::vector<std::array<float, 3>> normals;  ///< empty for points
@@ -27,7 +27,7 @@ struct GlbData {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< empty: points
 };
 
-/// Of a channel of sRGB (IEC 61966-2-1), in 65535ths.
+/// Linear light of each sRGB value (IEC 61966-2-1), in 65535ths.
 std::array<std::uint16_t, 256> linear_light() {
   std::array<std::uint16_t, 256> table{};
   for (std::size_t i = 0; i < table.size(); ++i) {

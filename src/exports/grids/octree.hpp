@@ -9,7 +9,7 @@
 
 namespace plumbline::exports {
 
-/// What an OctoMap is made of.
+/// Input for making an OctoMap.
 struct OctreeWork {
   double resolution_m = 0.05;
   bool color = false;  ///< ColorOcTree with probabilities (.ot), else the binary OcTree (.bt)

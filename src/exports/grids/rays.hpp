@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the map's cameras saw through: the rays from a view to what it measured.
+// Free space seen by the map's cameras: the rays from a view to its measured points.
 #include <functional>
 #include <vector>
 

@@ -16,7 +16,7 @@ octomap::point3d point3d_of(const Eigen::Vector3d& p) {
   return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
 }
 
-/// What one view saw through becomes free; each cell once, however many rays crossed it.
+/// Marks the cells that one view saw through as free, each once, however many rays cross it.
 template <typename Tree>
 void add_free(const ViewRays& view, const Eigen::AlignedBox3d& box, Tree& tree) {
   const double margin_m = tree.getResolution();

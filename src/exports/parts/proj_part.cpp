@@ -27,7 +27,7 @@ Context quiet_context() {
   return context;
 }
 
-/// Whether both axes are in metres.
+/// True if both axes are in metres.
 bool in_metres(PJ_CONTEXT* context, const PJ* system) {
   const Pj axes(proj_crs_get_coordinate_system(context, system));
   double factor = 0.0;

@@ -11,7 +11,7 @@
 
 namespace plumbline::exports {
 
-/// How a format writes the paths of robots, each in order of time, into one file.
+/// Function of a format that writes the robots' paths, each in order of time, into one file.
 using WritePaths = std::function<void(core::OutputFile&, const std::vector<std::vector<ExportPose>>&)>;
 
 /// The selected poses, by robot; of the body where --body is given. Errors (kUsage): no such body; those of

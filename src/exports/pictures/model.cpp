@@ -27,7 +27,7 @@ class ColorCells {
       ++cell.count;
     }
   }
-  /// Of the cells around a place; grey where there is no cloud.
+  /// Mean colour of the cells around a position; grey if there is no cloud.
   [[nodiscard]] std::array<std::uint8_t, 3> at(const Eigen::Vector3d& place) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
@@ -63,7 +63,7 @@ class ColorCells {
   std::unordered_map<std::uint64_t, Cell> cells_;
 };
 
-/// How far a picture shows a point from where it is projected.
+/// Distance in the picture between a feature and the projection of its landmark, pixels.
 double distance_px(const MapSource& source, const maps::Map& map, const ExportPose& pose, int feature,
                    const Eigen::Vector3d& position) {
   const auto& seen = map.keyframe(pose.keyframe).features->points[static_cast<std::size_t>(feature)];

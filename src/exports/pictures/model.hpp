@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What models of pictures hold besides poses: points, their tracks, and the pictures themselves.
+// Content of picture models besides poses: points, their tracks, and the pictures themselves.
 #include <array>
 #include <cstdint>
 #include <vector>

@@ -52,7 +52,7 @@ struct Drawing {
   [[nodiscard]] std::pair<Eigen::Vector2d, Eigen::Vector2d> bounds() const;
 };
 
-/// How a drawing lies on a sheet of paper: the scale, a round one, and its size with a margin.
+/// Placement of a drawing on a sheet of paper: a round scale, and the size with a margin.
 struct DrawingSheet {
   double per_metre_mm = 20.0;  ///< 1 : 50
   int scale = 50;

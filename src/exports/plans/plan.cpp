@@ -150,7 +150,7 @@ core::Result<Drawing> plan_drawing(MapSource& source, ExportSummary& summary) {
   return drawing;
 }
 
-/// What a vertical cut shows: the cells, 2 cm wide, that points of the cloud near it fall into.
+/// Drawing of a vertical cut: the cells, 2 cm wide, that contain points of the cloud near the cut.
 core::Result<Drawing> section_drawing(MapSource& source, ExportSummary& summary) {
   constexpr double kHalfThick_m = 0.03;
   constexpr double kCell_m = 0.02;

@@ -138,7 +138,7 @@ std::vector<std::pair<int, int>> filled_runs(const WallRaster& raster) {
   return runs;
 }
 
-/// How much of a run looks like a wall.
+/// Measures of how much a run resembles a wall.
 struct RunLook {
   double high = 0.0;    ///< share of its columns that reach where furniture does not
   double at_cut = 0.0;  ///< share of the cells around the cut that show surface
@@ -207,7 +207,7 @@ std::vector<Side> sides_on(const evaluate::SurfaceSamples& samples, const evalua
   return sides;
 }
 
-/// Whether two pieces are one wall with something flat on it.
+/// True if two pieces are one wall with something flat on it.
 bool covers(const WallLine& large, const WallLine& small) {
   constexpr double kApart_m = 0.12;
   constexpr double kShare = 0.6;

@@ -44,7 +44,7 @@ double mean_share(int a, int b, const Share& share) {
   return sum / std::max(1, b - a + 1);
 }
 
-/// What opening means at a cut.
+/// Heights between which a column must be free to count as open, metres.
 struct Cut {
   double low_m;
   double high_m;
@@ -56,7 +56,7 @@ bool open_column(const WallRaster& raster, int column, const Cut& cut) {
   return raster.seen(column, 0.25, 0.8) <= kMost && raster.seen(column, cut.low_m, cut.high_m) <= kMost;
 }
 
-/// Whether cameras looked through; or, where that is not known, whether there is a lintel above.
+/// True if cameras looked through; if the rays are not known, true if there is a lintel above.
 bool is_passage(const WallRaster& raster, int a, int b, const Cut& cut) {
   constexpr double kLeastCrossed = 0.08;
   constexpr double kLeastLintel = 0.3;
@@ -136,7 +136,7 @@ void bridge_gaps(std::vector<WallLine>& walls, std::vector<WallRaster>& rasters,
   }
 }
 
-/// Whether two sides lie on one line, one behind the other.
+/// True if two sides lie on one line, one behind the other.
 bool in_line(const WallLine& a, const WallLine& b) {
   constexpr double kSameLine_m = 0.03;
   return a.normal.dot(b.normal) > 0.998 &&

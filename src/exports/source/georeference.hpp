@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Where on Earth a map lies.
+// Position of a map on Earth.
 #include <Eigen/Core>
 #include <filesystem>
 #include <optional>
@@ -29,7 +29,7 @@ struct Georeference {
   Eigen::Vector3d operator*(const Eigen::Vector3d& map) const { return origin + linear() * map; }
 };
 
-/// What a coordinate system says of itself and of one place (functions of the part "proj").
+/// Queries about a coordinate system and one position in it (functions of the part "proj").
 struct ProjFunctions {
   static constexpr const char* kPart = "proj";
   static constexpr std::uint64_t layout() { return core::layout_of<ProjFunctions, Georeference>(); }
@@ -40,7 +40,7 @@ struct ProjFunctions {
   core::Result<void> (*place)(double latitude, double longitude, double heading, Georeference& reference);
 };
 
-/// What --datum or --epsg with --origin ask for; none: neither was given. Errors (kUsage).
+/// Georeference requested by --datum, or by --epsg with --origin; none if neither was given. Errors (kUsage).
 core::Result<std::optional<Georeference>> georeference_of(const ExportOptions& options);
 
 /// The cloud in world coordinates; its large part is its shift.

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether the input is a cloud by itself.
+/// True if the input is a single cloud file.
 bool is_cloud_file(const fs::path& input) {
   constexpr std::array<const char*, 7> kEndings = {".ply", ".pcd", ".xyz", ".txt", ".csv", ".asc", ".pts"};
   std::error_code ec;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What formats are written from: one map, or one cloud, in one frame. Each piece is read when it is first
-// asked for.
+// Source that formats are written from: one map, or one cloud, in one frame. Each piece is read when it is
+// first needed.
 #include <Eigen/Geometry>
 #include <optional>
 #include <string>
@@ -49,7 +49,7 @@ class MapSource {
   [[nodiscard]] const geometry::Rigid3& world_from_map() const { return world_from_map_; }
   /// z is up. Errors (kInput): it is not, with the way out; `what` asks for it.
   [[nodiscard]] core::Result<void> need_upright(const std::string& what) const;
-  /// What the frame is, one line for files that hold text.
+  /// Description of the frame, one line, for files that hold text.
   [[nodiscard]] std::string frame_text() const;
 
   /// The dense cloud in that frame, as far as it was selected, without points that are not finite. Errors
@@ -62,7 +62,7 @@ class MapSource {
 
   /// Height of the floor of the selected storey, 0 where the map stands on its floor.
   [[nodiscard]] double floor_m() const { return floor_m_; }
-  /// Whether a place was selected.
+  /// True if the position is selected.
   [[nodiscard]] bool selects(const Eigen::Vector3d& place) const { return selected_.contains(place); }
   [[nodiscard]] const Eigen::AlignedBox3d& selected() const { return selected_; }
 

@@ -12,7 +12,7 @@
 namespace plumbline::exports {
 namespace {
 
-/// What the run that made the map was given, by robot; empty: the map was fused of others.
+/// Recordings from which the map was made, by robot; empty if the map was fused from other maps.
 std::vector<RecordingName> recordings_of_run(const std::string& configuration) {
   const auto root = core::parse_yaml(configuration, "configuration");
   const core::ConfigNode* run = root ? root->find("run") : nullptr;
@@ -69,7 +69,7 @@ double sharpness(const cv::Mat& gray) {
   return sum;
 }
 
-/// Of the frames that are nearer to a keyframe than to the next one, the sharpest.
+/// The sharpest of the frames that are nearer to a keyframe than to the next one.
 core::Result<std::vector<ExportPose>> sharpest_near(const MapSource& source,
                                                     const std::vector<ExportPose>& keyframes,
                                                     const std::vector<ExportPose>& frames,

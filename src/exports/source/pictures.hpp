@@ -16,7 +16,8 @@ namespace plumbline::exports {
 /// into the pinhole of RobotInfo::camera.
 class Pictures {
  public:
-  /// Of the request's recordings, or those the map was made from. Errors (kInput): gone, or not told.
+  /// Opens the request's recordings, or else those the map was made from. Errors (kInput): they are gone or
+  /// not known.
   static core::Result<Pictures> open(const MapSource& source);
 
   /// Number of the frame with this stamp in the robot's recording; none: it has none.

@@ -67,8 +67,8 @@ class GlobalBuilder {
   MapBundle take() { return std::move(bundle_); }
 
  private:
-  /// As many landmarks as every keyframe needs, those seen most often first: one is left out when all
-  /// keyframes that see it have enough.
+  /// Adds as many landmarks as every keyframe needs, those seen most often first. A landmark is left out if
+  /// all keyframes that see it have enough.
   template <typename Id>
   void add_seen_most(const std::vector<Id>& ids) {
     std::vector<std::pair<int, Id>> order;
@@ -95,7 +95,7 @@ class GlobalBuilder {
     if (found == nullptr) throw std::out_of_range("adjust_map: no such keyframe");
     return *found;
   }
-  /// What standard deviations of a keyframe's measurements are multiplied by.
+  /// Factor on the standard deviations of a keyframe's measurements.
   [[nodiscard]] double motion_factor(KeyframeId id) const {
     return motion_factor_[static_cast<std::size_t>(index_of(id))];
   }
@@ -106,7 +106,7 @@ class GlobalBuilder {
     return {(seen.x() - from.cx) * (to.fx / from.fx) + to.cx,
             (seen.y() - from.cy) * (to.fy / from.fy) + to.cy};
   }
-  /// How many of that camera's pixels one of the keyframe's is.
+  /// Size of one pixel of the keyframe, in pixels of that camera.
   [[nodiscard]] double pixel_size(KeyframeId id) const {
     const sensor::Pinhole& from = cameras_.at(id.robot);
     const sensor::Pinhole& to = bundle_.problem.camera;
@@ -155,7 +155,7 @@ class GlobalBuilder {
   std::vector<double> motion_factor_;  ///< of the problem's poses
 };
 
-/// Whether the poses may be put into the map; reported if not.
+/// True if the poses may be put into the map; reports it if not.
 bool may_move(const maps::Map& map, const KeyframePoses& poses, GlobalAdjustmentSummary& summary) {
   const auto wrong = contradiction(map, poses);
   if (!wrong) return true;
@@ -191,7 +191,7 @@ void run_pose_graph(maps::Map& map, const std::vector<PoseEdge>& extra,
   summary.changed = true;
 }
 
-/// Of the whole map, with the edges of `extra`. `surface_edges`: how many others there are.
+/// Bundle of the whole map with the edges of `extra`. `surface_edges`: number of other edges.
 MapBundle bundle_of(const maps::Map& map, const Cameras& cameras, const std::vector<PoseEdge>& extra,
                     const GlobalAdjustmentOptions& options, KeyframeId anchor, int& surface_edges) {
   GlobalBuilder builder(map, cameras, options, anchor);
@@ -235,14 +235,14 @@ void widen(const SigmaFactors& factors, optimize::BundleProblem& problem) {
 }  // namespace
 
 GlobalAdjustmentOptions::GlobalAdjustmentOptions() {
-  // As they scatter at true poses. Lines that are off by more are so for a reason, such as a shadow along an
-  // edge, and all alike in neighbouring views: small deviations count fully, large ones are held down.
+  // Scatter at true poses. Lines that are off by more are so for a reason, such as a shadow along an edge,
+  // and all alike in neighbouring views: small deviations count fully, large ones are held down.
   noise.aligned = 0.15;
   noise.line_sigma_px = 0.1;
   bundle_options.max_iterations = 10;
   bundle_options.rounds = 2;
-  // How the rooms of several robots lie to each other is what moves last: from a region of 1e4 it is short of
-  // the minimum when the iterations end (docs/notes/2026-11-24-merging.md).
+  // The relative poses of several robots' rooms move last: from a region of 1e4 they are short of the minimum
+  // when the iterations end (docs/notes/2026-11-24-merging.md).
   bundle_options.first_radius = 1e7;
   bundle_options.point_loss = 1.0;  // as in bundles while mapping: lone wrong matches count less
   bundle_options.line_loss = 1.0;

@@ -16,9 +16,9 @@ using geometry::Rigid3;
 
 constexpr int kMaxHeld = 20;
 
-/// What the tracker knows of the way to a keyframe from the one it followed, no better than 1 cm. No keyframe
-/// is freer than this, whatever it shares with others: what hangs on a handful of wrong matches would go
-/// where these pull it.
+/// Information of the tracked motion to a keyframe from the one it followed, 1 cm at best. No keyframe is
+/// freer than this, whatever it shares with others: a keyframe that depends on a handful of wrong matches
+/// would go where they pull it.
 Matrix6d tracked_information(const maps::Keyframe& keyframe) {
   constexpr double kLeast_m = 0.01;
   constexpr double kRadPerMetre = 0.7;
@@ -61,8 +61,8 @@ class Builder {
   }
   [[nodiscard]] bool has(KeyframeId id) const { return index_.count(id) != 0; }
 
-  /// Those before and after in the tracker's way: so every keyframe that moves is tied to one that is held,
-  /// and moves away from no neighbour unseen.
+  /// Holds the keyframes before and after on the tracked path: so every keyframe that moves is tied to one
+  /// that is held, and cannot move away from a neighbour unnoticed.
   void hold_neighbours_on_the_way() {
     const std::vector<KeyframeId> window = bundle_.keyframes;
     for (const KeyframeId id : window) {
@@ -193,7 +193,8 @@ class Builder {
   std::map<KeyframeId, int> index_;
 };
 
-/// Where the world around each keyframe went: those of the bundle that moved, then those made after the take.
+/// Correction of the world around each keyframe: of those of the bundle that moved, then of those made after
+/// the bundle was taken from the map.
 class CorrectionFinder {
  public:
   CorrectionFinder(const LocalBundle& bundle, const maps::Map& map) : bundle_(bundle), map_(map) {

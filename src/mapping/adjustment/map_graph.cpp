@@ -14,9 +14,9 @@ using core::KeyframeId;
 using geometry::Matrix6d;
 using geometry::Rigid3;
 
-// How well the map knows a relative pose: of keyframes that share many landmarks (with fewer it grows with
-// the root), and of one keyframe after another, which the tracker has seen through. Generous: errors of
-// neighbours are alike and add up to drift, which a loop must be allowed to take out.
+// Accuracy of relative poses in the map: of keyframes that share many landmarks (with fewer it grows with the
+// root), and of consecutive keyframes, which the tracker has seen through. Generous: errors of neighbours are
+// alike and add up to drift, which a loop must be allowed to take out.
 constexpr double kSigma_m = 0.015;
 constexpr double kSigma_rad = 0.01;
 constexpr double kMany = 100.0;  // landmarks
@@ -70,7 +70,7 @@ Matrix6d covariance_of_path(const maps::Map& map, const std::vector<KeyframeId>&
   return sum;
 }
 
-/// What an edge from elsewhere says against the way that leads from its one end to the other.
+/// Disagreement between an edge from elsewhere and the path that joins its two ends in the map.
 struct Discrepancy {
   bool known = false;               ///< both ends of one robot, and the edge may be wrong
   geometry::Vector6d error;         ///< as seen from the later keyframe

@@ -23,13 +23,13 @@ constexpr double kNearest_m = 0.1;
 constexpr std::size_t kSamples = 240;  // of what a keyframe saw, for relative poses
 constexpr std::size_t kLeastSamples = 20;
 
-/// What one image says with the one camera and with the other.
+/// Effect of a camera change on one image.
 struct ImageChange {
   const sensor::Recalibration* change = nullptr;
   Vector6d velocity = Vector6d::Zero();
   Vector6d shutter_before = Vector6d::Zero();  ///< FrameFeatures::shutter_motion
 
-  /// Where a place seen at `p`, on a surface of that normal, is now (camera frame).
+  /// Present position of a surface point that was seen at `p`, with the surface's normal (camera frame).
   [[nodiscard]] Eigen::Vector3d place(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) const {
     Eigen::Vector3d now = change->point(p);
     const Vector6d shutter = change->after().camera().readout_s.value_or(0.0) * velocity - shutter_before;
@@ -161,7 +161,7 @@ class MapRecalibration {
     map_.set_loops(std::move(loops));
   }
 
-  /// Where a frame lay to its keyframe, and to the frame before it.
+  /// Corrects each frame's pose relative to its keyframe and to the frame before it.
   void correct_frames() {
     const maps::FramePose* previous = nullptr;
     Rigid3 previous_before;
@@ -203,7 +203,7 @@ class MapRecalibration {
     }
   }
 
-  /// Of each point feature, by the surface of the landmark that it sees.
+  /// Depth rate of each point feature, m/s, from the surface of the landmark that it sees.
   [[nodiscard]] std::vector<double> depth_rates(KeyframeId id, const ImageChange& image) const {
     std::vector<double> rates;
     if (change_.delay_s() == 0.0) return rates;

@@ -15,7 +15,7 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-/// What pictures say of the keyframes' surfaces.
+/// Measures the keyframes' surfaces again in their pictures.
 class SurfaceReader {
  public:
   SurfaceReader(const sensor::Pinhole& camera, const std::vector<maps::FramePose>& frames,

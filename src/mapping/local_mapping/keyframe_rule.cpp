@@ -36,7 +36,7 @@ ViewOverlap overlap_of(const maps::Keyframe& keyframe, const geometry::Rigid3& c
           static_cast<double>(core::median(std::move(depths)))};
 }
 
-/// How many of the keyframe's own landmarks the frame has matched.
+/// Number of the keyframe's own landmarks that the frame has matched.
 int landmarks_in_common(const maps::Map& map, core::KeyframeId keyframe, const tracking::TrackResult& track) {
   int common = 0;
   for (const auto& m : track.points)
@@ -123,7 +123,7 @@ bool KeyframeRule::knows_cones() const {
 
 bool KeyframeRule::is_candidate(const ConeTerms& terms, const tracking::TrackResult& track,
                                 bool mapper_idle) const {
-  // What a scene has: what should be seen, or what was matched right after the keyframe.
+  // Numbers of landmarks in the scene: those that should be seen, or those matched right after the keyframe.
   const bool scaled = options_.cone_scaled;
   const std::size_t points = scaled ? first_.points : track.visible_points.size();
   const std::size_t lines = scaled ? first_.lines : track.visible_lines.size();

@@ -83,9 +83,9 @@ class PairSearch {
     return clear ? best : -1;
   }
 
-  /// Where the rays of corner `f` of the first image and of corner `g` of the second meet, in the first
-  /// camera's frame; none when they do not, or too far away to say where. `noise`: of both, over that of
-  /// corners as they are found.
+  /// Intersection of the rays of corner `f` of the first image and corner `g` of the second, in the first
+  /// camera's frame; none if they do not meet, or meet too far away to be located. `noise`: noise of both
+  /// corners, relative to that of corners as they are detected.
   [[nodiscard]] std::optional<Eigen::Vector3d> meet(const features::PointFeature& f,
                                                     const features::PointFeature& g, double noise) const {
     const Eigen::Vector3d ray_a = ray(f);
@@ -147,8 +147,8 @@ struct Meeting {
   std::optional<Eigen::Vector2f> shift;  ///< px, of the newest corner to what the older one shows
 };
 
-/// Where two corners' rays meet. Corners as they are found say so after a long way only; the newest one is
-/// looked for again by the older one's patch.
+/// Intersection of two corners' rays. Corners as they are detected need a long baseline for it; the newest
+/// one is therefore located again with the older one's patch.
 std::optional<Meeting> meet(const maps::Map& map, const PairSearch& search, const maps::Observation& newest,
                             const maps::Observation& older, const sensor::Pinhole& camera,
                             const TriangulationOptions& options, const NewestImage* image) {

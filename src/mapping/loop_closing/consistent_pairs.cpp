@@ -124,7 +124,7 @@ bool agree(const maps::Map& map_a, const maps::Map& map_b, const PlacePair& one,
   const auto fits = [&](const PlacePair& from, const PlacePair& at) {
     const Rigid3 by_way = between(map_b, from.b, at.b) * from.b_from_a * between(map_a, at.a, from.a);
     const Rigid3 difference = by_way * at.b_from_a.inverse();
-    // Where a's camera is seen from b: both say it.
+    // Both pairs must give the same pose of a's camera in b.
     return (by_way.translation - at.b_from_a.translation).norm() <= max_m &&
            geometry::rotation_angle(difference.rotation) <= max_rad;
   };

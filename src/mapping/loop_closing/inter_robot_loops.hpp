@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What other robots' maps tell a robot of where it is. A keyframe of its own that shows a place which another
-// robot has seen knows how the two worlds lie to each other there; two such keyframes, an early and a late
-// one, are tied by way of the other's map.
+// Loops by way of other robots' maps. A keyframe that shows a place which another robot has seen too gives
+// the relative pose of the two worlds there; two such keyframes, an early and a late one, are tied by way of
+// the other robot's map.
 #include <memory>
 #include <optional>
 #include <vector>

@@ -96,7 +96,8 @@ void LoopCloser::clear_pending() {
   pending_disputes_ = PendingLoops(kDisputePatience);
 }
 
-/// How far closing the loop would move the query, and the way in which drift may have grown that far.
+/// Measures how far closing the loop would move the query, and the length of the path on which that drift may
+/// have grown.
 void LoopCloser::measure_correction(const maps::Map& map, LoopTrial& trial) const {
   const Loop& loop = trial.loop;
   Eigen::Vector3d last = map.camera_from_world(loop.match).inverse().translation;

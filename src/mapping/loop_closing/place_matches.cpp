@@ -34,7 +34,7 @@ PLUMBLINE_CLONES std::uint32_t take_nearest(const int* distances, std::uint32_t 
 
 std::size_t index_of(std::uint32_t key) { return key & ((1U << kIndexBits) - 1U); }
 
-/// Whether nothing at another place of the image is nearly as near as `best`.
+/// True if no feature elsewhere in the image is nearly as near to the descriptor as `best`.
 bool clearly_nearest(const FrameFeatures& image, const int* distances, std::size_t step, std::size_t best) {
   const double limit = distances[best * step] / kRatio;
   for (std::size_t j = 0; j < image.descriptors.size(); ++j) {

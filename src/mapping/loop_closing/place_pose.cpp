@@ -18,7 +18,7 @@ using geometry::Rigid3;
 
 constexpr std::size_t kFewPoints = 60;
 
-// When a pair of points or lines fits a pose.
+// Limits within which a pair of points or lines fits a pose.
 constexpr double kNearest_m = 0.1;  // nothing nearer to the camera fits
 constexpr double kPoint_px =
     4.5;                          // at octave 0: 3 standard deviations of 1.5 px, the landmark's own among it
@@ -30,7 +30,7 @@ class Inliers {
  public:
   Inliers(const PosePairs& pairs, const sensor::Pinhole& camera) : pairs_(pairs), camera_(camera) {}
 
-  /// Whether more than `count` pairs fit. Most poses are wrong: it is clear after some of the pairs.
+  /// True if more than `count` pairs fit. Most poses are wrong, which is clear after some of the pairs.
   [[nodiscard]] bool more_than(std::size_t count, const Rigid3& pose) const {
     std::size_t possible = pairs_.points.size() + pairs_.lines.size();
     for (std::size_t i = 0; i < pairs_.points.size() && possible > count; ++i)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What the surfaces say about a supposed place: confirmed, or seen through.
+// Surface evidence about a supposed place: samples that are confirmed, or seen through.
 #include <vector>
 
 #include "plumbline/geometry/rigid3.hpp"
@@ -10,7 +10,7 @@
 
 namespace plumbline::mapping {
 
-/// How surface samples of one keyframe lie to the depth that another one measured.
+/// Votes of one keyframe's surface samples on the depth that another one measured.
 struct SurfaceVotes {
   int confirmed = 0;
   int contradicted = 0;  ///< the other camera saw something clearly behind the sample

@@ -41,7 +41,8 @@ const FrameFeatures& features_of(const PlaceView& view) {
   return features != nullptr ? *features : kNone;
 }
 
-/// Where the match's features are in space, in its camera frame: its landmark, else its own depth.
+/// Position of a feature of the match in its camera frame: that of its landmark, or else from its own depth.
+/// False if neither is known.
 bool point_in_space(const PlaceView& view, std::size_t feature, Eigen::Vector3d& point) {
   const core::PointId id = view.map->point_of(view.keyframe, static_cast<int>(feature));
   const features::PointFeature& f = features_of(view).points[feature];
@@ -181,7 +182,7 @@ class Growth {
   std::vector<core::LineId> lines_;
 };
 
-/// What neighbouring features and samples have in common does not average out: no pose is known better.
+/// Bounds the information: errors that neighbouring features and samples share do not average out.
 Matrix6d with_floor(const Matrix6d& information) {
   constexpr double kMetres = 0.006;
   constexpr double kRadians = 0.003;
@@ -192,7 +193,8 @@ Matrix6d with_floor(const Matrix6d& information) {
   return 0.5 * (result + result.transpose());
 }
 
-/// What depth says of each other's surface. `near`: the match and those around it.
+/// Compares the surfaces of query and match with each other's depth. `near`: the match and the keyframes
+/// around it.
 void compare_surfaces(const PlaceView& query, const PlaceView& match, const std::vector<KeyframeId>& near,
                       PlaceVerification& result) {
   const maps::Keyframe& q = query.map->keyframe(query.keyframe);

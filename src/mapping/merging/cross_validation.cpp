@@ -13,7 +13,7 @@ namespace {
 using core::KeyframeId;
 using geometry::Rigid3;
 
-/// How far apart keyframes lie that should see the same.
+/// Distances within which two keyframes should see the same.
 struct Reach {
   double near_m;
   double turned_rad;

@@ -10,7 +10,7 @@
 namespace plumbline::mapping {
 namespace {
 
-/// How far a map's cameras went along a direction of its world, metres.
+/// Extent of a map's camera positions along a direction of its world, metres.
 double way_along(const maps::Map& map, const Eigen::Vector3d& direction) {
   double least = std::numeric_limits<double>::max();
   double most = std::numeric_limits<double>::lowest();

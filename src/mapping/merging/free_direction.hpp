@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Where nothing but images says how two maps lie: a corridor or a lone wall slides along itself, and what
-// looks alike may stand there again and again.
+// Directions in which only images fix the relative pose of two maps: a corridor or a lone wall can slide
+// along itself, and similar things may stand there again and again.
 #include <Eigen/Core>
 #include <vector>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What laying maps over each other and looking for steps between their landmarks share.
+// Helpers shared by overlaying maps and by searching for steps between their landmarks.
 #include <algorithm>
 #include <cstddef>
 

@@ -16,13 +16,13 @@ using geometry::Rigid3;
 
 constexpr std::size_t kAroundPair = 4;  // keyframes around each end of a pair whose landmarks are compared
 
-/// Where the parts of the anchor's group lie, and by which keyframes they hang together.
+/// Poses of the parts in the anchor's group, and the keyframes that tie them together.
 struct Layout {
   std::map<std::size_t, Rigid3> anchor_from_part;
   std::vector<std::pair<KeyframeId, KeyframeId>> ties;  ///< root of a part, and the keyframe that it hangs on
 };
 
-/// How a part hangs on those that are laid already: by the pair of keyframes that share most.
+/// Ties a part to those that are laid out already, by the pair of keyframes that share most.
 std::pair<KeyframeId, KeyframeId> tie_of(const MergeEvidence& merge, const maps::Map& part) {
   const auto share = [](const VerifiedPair& pair) { return pair.evidence.points + 2 * pair.evidence.lines; };
   const auto best =

@@ -17,7 +17,7 @@ constexpr double kApart_m = 1.0;     // another place: more than maps drift with
 constexpr double kTurned_rad = 0.3;  // ... or so far turned
 constexpr int kFewLandmarks = 30;    // tell nothing
 constexpr double kWrong = 0.2;       // share of landmarks seen through where maps do not belong together
-// What rules an alignment out that no landmark speaks against: so many surfaces seen through ...
+// Thresholds that rule out an alignment against which no landmark speaks: so many surfaces seen through ...
 constexpr double kNoAlternative = 0.2;
 constexpr int kSurfaces = 500;
 // ... or fewer, where landmarks match at a spot or two: an edge or a strip is alike all along itself.
@@ -25,7 +25,7 @@ constexpr int kSpots = 3;
 constexpr double kNoAlternativeOfFewSpots = 0.1;
 constexpr int kFewSurfaces = 100;
 
-/// How far apart two alignments put the camera of b's keyframes that agree, and how far they turn it.
+/// Difference between two alignments at b's agreeing keyframes: distance and rotation of their cameras.
 struct Difference {
   double metres = 0.0;
   double radians = 0.0;

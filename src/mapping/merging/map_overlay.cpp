@@ -21,7 +21,7 @@ constexpr double kFar_m = 5.0;
 
 enum class Seen { kNot, kThere, kThrough };
 
-/// What a keyframe's depth says of a surface at `point` in its camera frame.
+/// Compares a keyframe's depth with a surface at `point` in its camera frame.
 Seen seen(const cv::Mat& depth, const sensor::Pinhole& camera, const Eigen::Vector3d& point) {
   const Eigen::Vector2d pixel = camera.project(point);
   const int x = static_cast<int>(std::floor(pixel.x() * depth.cols / camera.width));
@@ -94,7 +94,7 @@ MapOverlay::MapOverlay(const MapPart& a, const MapPart& b) : a_(side(a)), b_(sid
   alike_ /= std::max(1.0, pairs);
 }
 
-/// Whether the side has a landmark there that looks alike, and how probable that was.
+/// True if the side has a landmark there that looks alike; adds the probability of that by chance to `sum`.
 bool MapOverlay::match(const Side& side, const Landmark& landmark, const Eigen::Vector3d& at,
                        OverlayFit& sum) const {
   // Cells are twice the reach wide: eight of them hold all that is near.

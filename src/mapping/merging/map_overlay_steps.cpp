@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where do things repeat? Steps between landmarks that look alike.
+// Repetition in a map: steps between landmarks that look alike.
 #include <algorithm>
 #include <map>
 #include <set>

@@ -226,7 +226,7 @@ void MergeServer::take_back(const Robots& robots, const MergeEvidence& evidence,
       {MeetingStep::kTakenBack, robots.first, robots.second, keyframe.frame, keyframe.id, evidence, nullptr});
 }
 
-/// As the maps lie now.
+/// Merges of the maps in their present state.
 std::vector<MergeEvidence> MergeServer::merges() const {
   std::vector<MergeEvidence> merges;
   for (const auto& [robots, pair] : work_.pairs) {

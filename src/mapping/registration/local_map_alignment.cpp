@@ -96,7 +96,7 @@ class Aligner {
     result_.b_from_a = start;
     if (a_.tree() == nullptr || b_.tree() == nullptr) return refuse("the surfaces do not meet");
     if (!settle()) return result_;
-    // Of surfaces that lay far apart few samples were in reach. Now that they meet, more are.
+    // If the surfaces lay far apart few samples were in reach; now that they meet, more are.
     if (moved_since(start) > kFar * options_.distance_m && !settle()) return result_;
     judge(start);
     return result_;
@@ -141,7 +141,7 @@ class Aligner {
     refuse("it did not converge");
     return false;
   }
-  /// How far the middle of the matched samples has moved.
+  /// Distance by which the middle of the matched samples has moved, metres.
   [[nodiscard]] double moved_since(const Rigid3& start) const {
     return (step_.centre - start * (result_.b_from_a.inverse() * step_.centre)).norm();
   }
@@ -153,7 +153,8 @@ class Aligner {
     return result_;
   }
 
-  /// Those that have a counterpart at the start, so that all of them count where the surfaces overlap little.
+  /// Chooses samples that have a counterpart at the start, so that all of them count even if the surfaces
+  /// overlap little.
   void choose_samples() {
     const Overlap of_a = overlap_of(a_, b_, result_.b_from_a, options_);
     const Overlap of_b = overlap_of(b_, a_, result_.b_from_a.inverse(), options_);

@@ -64,7 +64,7 @@ CoarseSurface samples_of(const cloud::SurfaceCloud& cloud) {
   return samples;
 }
 
-/// Of the members of a local map, in its anchor's frame.
+/// Surface of the members of a local map, in its anchor's frame.
 CoarseSurface fused_surface(const maps::Map& map, const std::map<KeyframeId, CoarseSurface>& surfaces,
                             const LocalMap& local, double voxel_m) {
   cloud::SurfaceCloud all;
@@ -102,7 +102,7 @@ struct Common {
   std::uint32_t voxels;
 };
 
-/// How many voxels local maps have in common; a < b, by a, then b.
+/// Numbers of voxels that local maps have in common; a < b, sorted by a, then b.
 std::vector<Common> common_voxels(const std::vector<std::vector<std::uint64_t>>& keys,
                                   const core::Executor& executor) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> filled;  // voxel, local map

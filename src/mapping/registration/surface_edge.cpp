@@ -15,7 +15,8 @@ using geometry::Matrix6d;
 using geometry::Rigid3;
 using geometry::Vector6d;
 
-/// Of all grey values: what one pair of images says goes into the bundle, where others bear it out.
+/// Weight of all grey values together: small, so that one pair of images decides in the bundle only if others
+/// agree.
 constexpr double kPhotometricWeight = 0.02;
 constexpr double kHeld = 2500.0;  // information of a standard deviation of 2 cm: less is no hold
 

@@ -30,7 +30,7 @@ class HubMeetings {
   void restart();
   /// Reports what a job found and submits the next one; to be called often. True: shared frames have changed.
   bool step();
-  /// When nothing more will come: reports all that is left, draws, and removes the log.
+  /// Called when nothing more will come: reports all that is left, draws, and removes the log.
   void finish();
   /// Pose of a robot in the frame that it shares with others; empty: it met nobody.
   [[nodiscard]] SharedFrame frame(const std::string& robot) const;

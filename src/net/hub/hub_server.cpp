@@ -83,7 +83,7 @@ core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
     publisher_.publish_presence();
     bus_->wait(kWait);
     for (const HubStatus& other : bus_->poll_hubs()) {
-      // Of two hubs that start together the one with the lower id stays.
+      // If two hubs start together, the one with the lower id stays.
       const bool stays = other.up_s >= 0.0 || other.hub < publisher_.id();
       if (other.hub == publisher_.id() || !stays) continue;
       return core::usage_error(

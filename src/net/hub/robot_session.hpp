@@ -14,7 +14,7 @@
 
 namespace plumbline::net {
 
-/// When a robot was last received from.
+/// Time of the last message from a robot.
 class Presence {
  public:
   void note();

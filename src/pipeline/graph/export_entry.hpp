@@ -9,7 +9,7 @@
 
 namespace plumbline::pipeline {
 
-/// What of an entry is not an option of its format.
+/// Fields of an entry that are not options of its format.
 struct ExportEntry {
   std::string file;
   std::string format;

@@ -73,7 +73,7 @@ class Connector {
   }
 
  private:
-  /// What a stage of unknown type reads from is not unused.
+  /// Marks stages from which a stage of unknown type reads as used.
   void note_uses(StageSpec& spec, const ConfigNode* inputs) const {
     if (inputs == nullptr) return;
     for (const auto& [name, from] : inputs->entries) {

@@ -14,7 +14,7 @@ struct Writer {
   std::string file;  ///< normalised; '*' stands for a number
 };
 
-/// What every run writes beside its stages (map_recording.cpp).
+/// Files that every run writes besides those of its stages (map_recording.cpp).
 const std::vector<std::string> kFilesOfTheRun{"config.yaml", "summary.json", "timing.csv"};
 
 bool starts_with(const std::string& text, const std::string& start) {
@@ -24,7 +24,7 @@ bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-/// Whether the two patterns could name one file, or one the folder of the other.
+/// True if the two patterns could name the same file, or one the folder of the other.
 bool clash(const std::string& a, const std::string& b) {
   const std::size_t star_a = a.find('*');
   const std::size_t star_b = b.find('*');

@@ -69,7 +69,7 @@ std::vector<const ConfigNode*> words(const ConfigNode& root, const std::string& 
   return list;
 }
 
-/// What may be written about a stage's type: the same or nothing changes the included stage.
+/// True if `own` changes the included stage `base`: it names the same type or none.
 bool changes(const ConfigNode& own, const ConfigNode& base) {
   const ConfigNode* own_type = own.find("type");
   const ConfigNode* base_type = base.find("type");

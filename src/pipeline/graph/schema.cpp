@@ -92,7 +92,7 @@ Json names_schema(const std::string& description) {
           {"anyOf", Json::array({name, Json{{"type", "array"}, {"items", name}}})}};
 }
 
-/// What depends on whether the file begins with another one's stages.
+/// Rules that depend on whether the file includes another one's stages.
 Json with_or_without_include() {
   Json alone;
   alone["required"] = Json::array({"stages"});

@@ -27,7 +27,7 @@ bool is_picture_name(const std::string& name) {
                      [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-/// Whether a folder holds debug pictures and nothing else.
+/// True if a folder holds debug pictures and nothing else.
 bool is_debug_folder(const fs::path& folder) {
   std::error_code ec;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, ec)) {

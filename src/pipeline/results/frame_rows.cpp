@@ -44,7 +44,7 @@ const std::array kColumns{
     Column{"min_eigenvalue", [](const Report& r) { return fmt::format("{:.6g}", r.min_eigenvalue); }},
     Column{"weak_directions", [](const Report& r) { return number(r.degenerate_directions); }},
 
-    // Whether a keyframe is wanted.
+    // Columns of the keyframe decision.
     Column{"frames_since_keyframe", [](const Report& r) { return number(r.decision.frames_since); }},
     Column{"shared", [](const Report& r) { return fine(r.decision.shared); }},
     Column{"overlap", [](const Report& r) { return fine(r.decision.overlap); }},

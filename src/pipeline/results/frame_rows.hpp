@@ -8,7 +8,7 @@
 
 namespace plumbline::pipeline {
 
-/// What is said of a tracked frame, comma-separated.
+/// Values of a tracked frame, comma-separated.
 std::string row_columns(const mapping::FrameReport& report);
 /// The names of these columns, comma-separated.
 std::string row_column_names();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What an interrupted run left in its store, for the stages of the run that goes on.
+// Results of an interrupted run in its store, for the stages of the run that continues it.
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>

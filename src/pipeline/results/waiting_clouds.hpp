@@ -11,7 +11,7 @@
 
 namespace plumbline::pipeline {
 
-/// Whether a stage keeps the clouds that the graph lays down, all of them, in map.db.
+/// True if some stage keeps all clouds that the graph fuses in map.db.
 bool keeps_clouds(const Graph& graph);
 
 /// Clouds of a run until their final poses are known: in its map.db, where a stage keeps it, else in a

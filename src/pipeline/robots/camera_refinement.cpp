@@ -35,7 +35,7 @@ std::string doubt_of(const core::Result<mapping::CameraCalibration>& found) {
                      kGuessedFocalSigma * fx->given);
 }
 
-/// What an earlier question found stays, and all is told against what was given at first.
+/// Keeps the findings of earlier estimates; all are reported relative to the camera that was given at first.
 void keep_earlier(const std::vector<mapping::CameraFinding>& earlier,
                   std::vector<mapping::CameraFinding>& findings) {
   for (std::size_t i = 0; i < earlier.size(); ++i) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Whether a robot's camera is what its file says: asked of the robot's own map while it grows and once more
-// when it is finished. What is found is used from there on, and the map is made anew for it
-// (Slam::recalibrate).
+// Checks a robot's camera against its file: estimated from the robot's own map while it grows, and again when
+// it is finished. An improved camera is used from then on, and the map is rebuilt for it (Slam::recalibrate).
 #include <cstddef>
 #include <filesystem>
 #include <string>
@@ -17,7 +16,7 @@
 
 namespace plumbline::pipeline {
 
-/// What a robot's own map told about its camera.
+/// Result of estimating a robot's camera from its own map.
 struct CameraReport {
   std::string robot;
   std::vector<mapping::CameraFinding> findings;
@@ -39,9 +38,9 @@ class CameraRefinement {
            core::Log& log);
 
   [[nodiscard]] const sensor::Camera& camera() const { return camera_; }
-  /// What was found by all questions so far, against what was given.
+  /// Findings of all estimates so far, relative to the camera that was given.
   [[nodiscard]] const CameraReport& report() const { return report_; }
-  /// What camera() has from this frame of the run on; 0: from the first one on.
+  /// Sets the frame of the run from which camera() is used; 0: from the first one on.
   void used_from(std::size_t frame) { report_.from_frame = frame; }
   /// A run that goes on knows this camera already, which an earlier one has found.
   void restore(const sensor::Camera& camera, std::size_t from_frame);

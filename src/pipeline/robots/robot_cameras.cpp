@@ -8,7 +8,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-// What a map has seen when it is asked for its camera: keyframes or seconds.
+// Size of the map when its camera is estimated: keyframes, or seconds of the recording.
 constexpr std::size_t kKeyframes = 40;
 constexpr double kSeconds = 10.0;
 // The answer is waited for so many frames after the question, and used so many after that: by then no frame
@@ -17,7 +17,7 @@ constexpr double kSeconds = 10.0;
 constexpr std::size_t kAnswerFrames = 32;
 constexpr std::size_t kLeastFramesLeft = 60;
 constexpr std::size_t kUseFrames = kMostUnderWay + kLeastFramesLeft;
-// Of a finished map: what a wrong camera has bent shows when it is made anew.
+// Most estimates from a finished map: effects of a wrong camera on it show only after it is rebuilt.
 constexpr int kMostQuestions = 2;
 
 }  // namespace
@@ -25,7 +25,7 @@ constexpr int kMostQuestions = 2;
 RobotCameras::RobotCameras(RobotRecordings& recordings, bool refine, const core::Executor& executor,
                            core::Log& log)
     : recordings_(&recordings), executor_(&executor), log_(&log), robots_(recordings.robots()) {
-  // What is filmed while it is mapped has no lens, and no error.
+  // Generated recordings have no lens, and no error.
   asked_ = recordings.format() == "synth";
   refine_ = refine && !asked_;
   for (const RobotInfo& robot : robots_) cameras_.emplace_back(robot);
@@ -97,7 +97,8 @@ void RobotCameras::use(std::size_t robot, mapping::Slam& slam) {
 
 void RobotCameras::estimate_finished(const Slams& slams) {
   if (!refine_) return;
-  // What is live ended before the answer was used: as if nobody had asked, for nobody asks of a recording.
+  // A live source ended before the answer was used: it is dropped, as a recording of that length would not
+  // have asked.
   if (recordings_->live() && !waiting_.empty() && recordings_->size() <= use_from_) {
     cameras_ = given_;
     waiting_.assign(waiting_.size(), false);

@@ -25,7 +25,7 @@ class RobotCameras {
 
   /// The robots, with each version that their cameras turned out to be.
   [[nodiscard]] const std::vector<RobotInfo>& robots() const { return robots_; }
-  /// What each camera is as far as it is known now.
+  /// Each camera as far as it is known now.
   [[nodiscard]] std::vector<sensor::Camera> now() const;
 
   /// Before a frame is tracked: waits for the answer when it is due, and goes on with it from the first frame
@@ -36,7 +36,7 @@ class RobotCameras {
   /// Asks the finished maps, until they have nothing new to say.
   void estimate_finished(const Slams& slams);
 
-  /// What an interrupted run knew of a robot's camera; then resume().
+  /// Takes over a robot's camera from an interrupted run; resume() follows.
   void restore(const RobotInfo& stored, mapping::Slam& slam);
   void resume();
 
@@ -53,7 +53,7 @@ class RobotCameras {
   };
   [[nodiscard]] bool knows_enough(std::size_t frame, const Slams& slams) const;
   void take_answer(std::size_t frame);
-  /// What was mapped before is made anew for the robot's camera as it is known now.
+  /// Rebuilds the robot's map for its camera as it is known now.
   void use(std::size_t robot, mapping::Slam& slam);
 
   RobotRecordings* recordings_;

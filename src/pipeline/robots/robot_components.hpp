@@ -25,7 +25,7 @@ RobotComponents components_of(const RobotMap& whole);
 /// common each frame is that of the component in which it is tracked.
 std::vector<maps::FramePose> frames_of(const std::vector<const RobotMap*>& parts);
 
-/// What became of a component.
+/// Outcome for one component.
 struct ComponentFate {
   std::string name;        ///< of its folder, or of the robot and the keyframe that began it
   std::size_t frames = 0;  ///< tracked in it

@@ -18,8 +18,8 @@ struct RobotMerge {
   std::string a;
   std::string b;
   double time_s = -1.0;  ///< of the recordings, when it happened while mapping; negative: afterwards
-  /// When the fifth keyframe of those that agree was there on both sides, or the last of fewer; negative:
-  /// not known.
+  /// Time at which the fifth agreeing keyframe existed on both sides, or the last one if there are fewer;
+  /// negative: not known.
   double evident_s = -1.0;
   mapping::MergeEvidence evidence;
 };

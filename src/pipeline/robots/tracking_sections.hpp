@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What robots' SLAM says in summary.json: loops, components, maps of other robots.
+// Sections of the robots' SLAM in summary.json: loops, components, maps of other robots.
 #include <map>
 #include <string>
 
@@ -16,7 +16,7 @@ void report_loops(const mapping::Slam& slam, Json& loops);
 /// Adds the components that were joined while the robot mapped. `frames`: by root, as they were tracked.
 void report_joins(const std::string& robot, const mapping::Slam& slam,
                   const std::map<core::KeyframeId, std::size_t>& frames, Json& list);
-/// What maps of other robots were used for.
+/// Use that was made of other robots' maps.
 Json feedback_section(const Slams& slams, const mapping::OtherMapsInbox& others);
 
 /// Loops that agree with one another against the path.

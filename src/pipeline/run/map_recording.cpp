@@ -135,7 +135,7 @@ bool any_stage(const Graph& graph, Question question) {
                      [&](const Node& node) { return (node.stage.get()->*question)(); });
 }
 
-/// Whether the pipeline can do what is asked of it.
+/// Checks that the pipeline can do what the request asks for.
 core::Result<void> fits(const Graph& graph, const MapRequest& request) {
   if (!request.debug_video.empty() && !any_stage(graph, &Stage::draws_frames)) {
     return core::usage_error(fmt::format(
@@ -186,7 +186,7 @@ void report_resumed(const std::filesystem::path& folder, const std::optional<Res
                              folder.string()));
 }
 
-/// What a run that fails had stored stays.
+/// Keeps what a failed run has stored, and says so in the error.
 core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
   const std::size_t keyframes = stored_keyframes(output.path());
   if (keyframes == 0) return error;

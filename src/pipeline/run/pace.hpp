@@ -11,10 +11,10 @@
 
 namespace plumbline::pipeline {
 
-/// When frames may be handed out: frame n of a recording no earlier than n / hz seconds after the first frame
-/// of all. Results know nothing of it. Several recordings are played together: their frames keep the order of
-/// their stamps, so that one with fewer frames a second keeps its own rate beside the densest, which has
-/// `hz`.
+/// Limits the rate at which frames are handed out: frame n of a recording no earlier than n / hz seconds
+/// after the first frame of all. Results do not depend on it. Several recordings are played together: their
+/// frames keep the order of their stamps, so that one with fewer frames a second keeps its own rate beside
+/// the densest, which has `hz`.
 class Pace {
  public:
   /// hz 0: at once. `first`: the first frame of the run.
@@ -23,11 +23,11 @@ class Pace {
 
   /// Waits until the frame may be handed out, or until `stop` is requested.
   void wait_for(std::size_t frame, const core::StopToken& stop);
-  /// Whether it may be handed out. The clock starts with the first frame that is asked for.
+  /// True if the frame may be handed out. The clock starts with the first frame that is asked for.
   bool is_due(std::size_t frame);
   /// Frames are reported when all is done with them.
   void done(std::size_t frame);
-  /// How long after it was due the latest frame was done, seconds; 0 without a pace.
+  /// Delay of the latest frame behind its due time when it was done, seconds; 0 without a pace.
   [[nodiscard]] double behind_s() const { return behind_s_; }
 
  private:

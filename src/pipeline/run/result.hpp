@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// How `map` and `fuse` begin and end: a pipeline that is checked whole, a result folder with summary.json.
+// Begin and end of `map` and `fuse`: a pipeline that is checked whole, a result folder with summary.json.
 #include <chrono>
 #include <string>
 
@@ -16,7 +16,7 @@ using RunClock = std::chrono::steady_clock;
 /// The pipeline that is asked for. Errors: kUsage.
 core::Result<Graph> load_pipeline(const RunRequest& request);
 
-/// What the stages report. `began`: the whole run, so far.
+/// Summary of the stages' reports. `began`: start of the whole run so far.
 RunSummary summary_of_run(const Graph& graph, const RunReport& report, const RunRequest& request,
                           const std::string& input, double pace_hz, RunClock::time_point began,
                           const core::Executor& executor);

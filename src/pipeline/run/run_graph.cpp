@@ -158,7 +158,7 @@ class Runner {
 
   [[nodiscard]] bool given_up() const { return live_ && context_.input.recordings->given_up(); }
 
-  /// Of a live source, when it has ended: how many frames there are after all.
+  /// Sets the final number of frames when a live source has ended.
   void look_at_live() {
     if (!live_ || ended() || !context_.input.recordings->decided(started_)) return;
     if (const std::size_t frames = context_.input.recordings->size(); frames <= started_) total_ = frames;
@@ -252,7 +252,8 @@ class Runner {
       for (const auto& one : finished) {
         if (!one) return one;
       }
-      // What nobody will read any more is given back at once, to the system, too: the next stage may need it.
+      // Results that no stage will read again are returned to the system at once: the next stage may need the
+      // memory.
       for (std::size_t m = 0; m < first + count; ++m) {
         if (last_use_[m] < first + count) results[m].clear();
       }
@@ -276,7 +277,7 @@ class Runner {
     if (!names.empty()) context_.hooks.finishing(names);
   }
 
-  /// Whether node `n` and those from `first` on only write results, none of which another one takes.
+  /// True if node `n` and those from `first` on only write results, and none of them reads another one's.
   [[nodiscard]] bool may_export_beside(std::size_t first, std::size_t n) const {
     if (!graph_.nodes[first].type->exports || !graph_.nodes[n].type->exports) return false;
     const auto& inputs = graph_.nodes[n].inputs;

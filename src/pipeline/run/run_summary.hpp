@@ -13,7 +13,7 @@
 
 namespace plumbline::pipeline {
 
-/// How the run was made.
+/// Circumstances of the run.
 struct RunFacts {
   std::string input;     ///< as it was given
   std::string pipeline;  ///< likewise
@@ -22,7 +22,7 @@ struct RunFacts {
   int threads = 0;
 };
 
-/// What the stages report, with the gravest of their reasons.
+/// The stages' reports, with the gravest of their doubts.
 RunSummary summary_of(const Graph& graph, const RunReport& report, const RunFacts& facts);
 
 /// One line a frame: its number, stamp, the milliseconds of every stage and of parts of stages (empty =

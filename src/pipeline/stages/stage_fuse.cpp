@@ -97,7 +97,7 @@ class FuseStage : public Stage {
   }
 
  private:
-  /// What the summary says.
+  /// Values for the summary.
   struct Report {
     std::vector<cloud::FilterReport> filters;  ///< of the merged cloud
     UpFrame frame;
@@ -173,7 +173,7 @@ class FuseStage : public Stage {
     return cameras;
   }
 
-  /// Of finished maps, what cannot be used is reported with the name of its own file.
+  /// Reads a view. An error in a finished map names that map's own file.
   [[nodiscard]] core::Result<cloud::CloudPtr> read(const maps::StoredViews& views, std::size_t i) const {
     auto cloud = views.read(i);
     if (cloud || context_->input.stored_maps == nullptr) return cloud;

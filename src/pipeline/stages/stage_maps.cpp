@@ -50,7 +50,7 @@ class MapsStage : public Stage {
   }
 
  private:
-  /// As it was kept with the map, if it was.
+  /// Reads the surface that was kept with the map, if any.
   core::Result<void> read_surface(std::size_t index, KeyframeCloud& result) const {
     auto surface = maps_->surface(index);
     if (!surface) return tl::unexpected(surface.error());

@@ -26,7 +26,7 @@ namespace {
 
 constexpr const char* kMeetings = "meetings";
 
-/// What robots that are mapped side by side find of each other meanwhile.
+/// Meetings of robots that are mapped at the same time.
 class LiveMeetings {
  public:
   LiveMeetings(const mapping::MapFusionOptions& options, int lag, const RunContext& context)
@@ -65,7 +65,7 @@ class LiveMeetings {
     }
     return list;
   }
-  /// When robots that were merged in the end met, and when they could have.
+  /// Adds the times at which merged robots met, and at which they could have.
   void date(RobotMerge& merge) const {
     const auto when = met_s_.find({merge.evidence.a, merge.evidence.b});
     if (when != met_s_.end()) merge.time_s = when->second;
@@ -165,7 +165,7 @@ class MergeStage : public Stage {
     frames["tracked"] = tracked;
     frames["lost"] = result.frame_poses.size() - static_cast<std::size_t>(tracked);
   }
-  /// What became of the components that were not joined while their robot mapped.
+  /// Records the outcome for components that were not joined while their robot mapped.
   void note_components(const std::vector<RobotMap>& parts) {
     for (const RobotMap& part : parts) {
       if (!part.component) continue;

@@ -212,7 +212,7 @@ class OutputStage : public Stage {
     return {};
   }
 
-  /// Where each keyframe is, how exactly that is known beside the first one, and what holds it.
+  /// Writes each keyframe's pose, its accuracy relative to the first one, and its numbers of constraints.
   static core::Result<void> write_keyframes(const std::filesystem::path& file, const MapResult& map) {
     std::map<std::int32_t, std::string> names;
     for (const RobotInfo& robot : map.robots) names[robot.number] = robot.name;

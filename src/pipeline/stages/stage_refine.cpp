@@ -96,7 +96,7 @@ class RefineStage : public Stage {
     return result;
   }
   [[nodiscard]] bool wants_surfaces() const { return options_.icp && options_.adjust; }
-  /// As it came, when it has our voxels.
+  /// Surface as received if it has our voxel size, else computed from the cloud.
   [[nodiscard]] core::Result<mapping::CoarseSurface> surface_of(const KeyframeCloud& keyframe) const {
     if (keyframe.surface != nullptr && keyframe.surface->voxel_m == options_.local_maps.voxel_m) {
       return keyframe.surface->samples;
@@ -119,7 +119,7 @@ class RefineStage : public Stage {
     }
     return own;
   }
-  /// Of the keyframes of the run that this one goes on from.
+  /// Reads the surfaces of keyframes of the run that this one continues.
   core::Result<void> read_surfaces(const ResumedRun& run) {
     if (!wants_surfaces()) return {};
     const auto store = maps::StoreReader::open(run.store);

@@ -35,7 +35,7 @@ class StoreStage : public Stage {
     header.configuration = context.store.configuration;
     header.input = context.input.text;
     header.program_version = core::version();
-    // What is fused of finished maps is begun again, whatever ends it.
+    // Fusing finished maps always starts anew after an interruption.
     const auto use =
         context.input.stored_maps != nullptr ? maps::StoreUse::kInOneGo : maps::StoreUse::kGrowing;
     return take(maps::StoreWriter::create(context.output_folder / maps::kStoreFile, header, use));

@@ -25,7 +25,7 @@
 namespace plumbline::pipeline {
 namespace {
 
-/// What the store has not got yet of one robot's map.
+/// Part of one robot's map that is not in the store yet.
 struct Unstored {
   maps::MapRevision since;  ///< changes from here on
   bool new_camera = false;  ///< since its last keyframe
@@ -227,7 +227,7 @@ class TrackStage : public Stage {
     cameras_->resume();
   }
 
-  /// Of a robot, for who looks on.
+  /// Path of one robot, for observers.
   struct Way {
     core::KeyframeId component;       ///< the one that is told of
     std::optional<std::size_t> last;  ///< of the frame poses

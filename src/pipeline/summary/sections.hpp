@@ -25,7 +25,7 @@ double rounded(double value);
 /// The 4 x 4 matrix, row by row.
 Json rows(const geometry::Rigid3& transform);
 
-/// Of many standard deviations the middle one and the one that nine of ten do not pass; 0: not known.
+/// Median and 90th percentile of standard deviations; 0: not known.
 struct Sigma {
   double median = 0.0;
   double p90 = 0.0;
@@ -46,9 +46,9 @@ void report_frames(const std::vector<FrameRow>& rows, Json& frames);
 /// Points that filters left out, by the filter's type.
 Json left_out_section(const std::vector<std::pair<std::string, std::size_t>>& left_out);
 
-/// What keyframes measured and the cloud does not hold, in words; empty: hardly anything.
+/// Sentence on measured points that are missing in the cloud; empty if there are hardly any.
 std::string left_out_text(const Json& cloud);
-/// What the merged cloud's filters took from it, in words; empty: nothing.
+/// Sentence on points that the merged cloud's filters removed; empty if none.
 std::string left_out_of_map_text(const Json& cloud);
 
 /// More frames have no pose than would be trusted.

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What all taps have in common: a file below the result folder, with a '*' for the number where there are
-// many.
+// Common base of all taps: a file below the result folder, with a '*' for the number if there are many.
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -31,7 +30,7 @@ class Tap : public Stage {
   /// The name with `middle` before its ending: "a/*.png", ".depth" -> "a/*.depth.png".
   [[nodiscard]] std::string with(const std::string& middle) const;
   [[nodiscard]] bool skips(std::size_t frame) const { return frame % static_cast<std::size_t>(every_) != 0; }
-  /// Where to write; `number` replaces the '*', with six digits. `middle` as in with().
+  /// Path of the file; `number` replaces the '*', with six digits. `middle` as in with().
   [[nodiscard]] std::filesystem::path path(std::size_t number = 0, const std::string& middle = "") const;
 
  private:

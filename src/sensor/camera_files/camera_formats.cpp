@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the readers of other programs' camera files share.
+// Helpers shared by the readers of other programs' camera files.
 #include "camera_files/camera_formats.hpp"
 
 #include <fmt/format.h>

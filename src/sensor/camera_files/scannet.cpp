@@ -35,7 +35,7 @@ bool recognises_scannet(const CameraText& text) {
   return keys.count("fx_color") > 0 || keys.count("m_calibrationColorIntrinsic") > 0;
 }
 
-/// Of "color" or "depth". Returns "" or what is wrong.
+/// Reads the camera `which`, "color" or "depth". Returns "" or what is wrong.
 std::string take_scannet(const ScanNetKeys& keys, const std::string& which, Camera& camera) {
   const auto value = [&](const std::string& key) {
     const auto found = keys.find(key);

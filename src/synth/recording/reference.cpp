@@ -22,7 +22,7 @@ namespace {
 /// degrees; surface never seen at a larger angle than this is not required of a map.
 constexpr double kLeastSine = 0.342;
 
-/// Whether nothing but emptiness lies before a spot: the outside of the world.
+/// True if nearly all rays from a spot hit nothing: it faces the outside of the world.
 bool faces_nowhere(const World& world, const Face& face, const Vector3d& p) {
   int misses = 0;
   constexpr int kRays = 9;

@@ -42,9 +42,9 @@ struct DepthRange {
 };
 DepthRange depth_range(Sensor sensor);
 
-/// Whether the sensor reliably measures a surface that `pixel` of a picture of `size` sees at depth `z`
+/// True if the sensor reliably measures a surface that `pixel` of a picture of `size` sees at depth `z`
 /// (metres) and `cosine` of incidence: enough of its light comes back, and its own camera sees the spot. The
-/// ideal sensor measures all within its range.
+/// ideal sensor measures everything within its range.
 bool measures(Sensor sensor, const Material& material, const cv::Size& size, const cv::Point2d& pixel,
               double z, double cosine);
 

@@ -85,7 +85,7 @@ class World {
   /// kPacket rays from one origin; faces[k] = -1 for nothing. dx, dy, dz: directions.
   void cast_packet(const float origin[3], const float* dx, const float* dy, const float* dz,
                    int* faces) const;
-  /// Whether a point lies inside a solid.
+  /// True if a point lies inside a solid.
   [[nodiscard]] bool inside_solid(const Eigen::Vector3d& point) const;
 
  private:

@@ -23,7 +23,8 @@ constexpr std::uint32_t kVersion1 = 1;
 constexpr std::uint32_t kVersion2 = 2;
 constexpr std::int64_t kNanoseconds = 1'000'000'000;
 
-/// What the stream functions want to know of a type, of idlc's description of it. Nothing else of it is used.
+/// Type description for CycloneDDS's stream functions, from idlc's output; only the fields that they read are
+/// set.
 ddsi_sertype_default type_of(const dds_topic_descriptor_t& descriptor) {
   ddsi_sertype_default type{};
   type.type.size = descriptor.m_size;

@@ -29,7 +29,7 @@ std::unique_ptr<Inflater> make_inflater(Compression compression, const std::uint
 bool inflate_all(Compression compression, const std::uint8_t* data, std::size_t size, std::uint64_t most,
                  Bytes& to);
 
-/// Whether the bytes begin as a frame of zstd does, which no CDR does.
+/// True if the bytes begin like a zstd frame; no CDR message begins so.
 bool is_zstd(const std::uint8_t* data, std::size_t size);
 
 /// A file that lasts as long as this object, and no longer than its process if its name is taken away.
@@ -42,7 +42,7 @@ class TemporaryFile {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// Once it has been opened by all who want it.
   void take_name_away();
-  /// What `file`, compressed by zstd, holds; `cut` says that it ends early. Error (kInput, kOutput).
+  /// Content of `file`, which zstd has compressed; `cut` is set if it ends early. Error (kInput, kOutput).
   static core::Result<TemporaryFile> inflated(const std::filesystem::path& file, bool& cut);
 
  private:

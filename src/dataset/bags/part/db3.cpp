@@ -37,7 +37,7 @@ std::string plain_type(const std::string& type) {
   return msg == std::string::npos ? type : type.substr(0, msg) + type.substr(msg + 4);
 }
 
-/// As URI, so that `mode` can be said; '?', '#' and '%' mean something there.
+/// File name as a URI, so that `mode` can be given; '?', '#' and '%' are escaped.
 std::string uri_of(const std::filesystem::path& file, const char* mode) {
   std::string uri = "file:";
   for (const char c : file.string()) {

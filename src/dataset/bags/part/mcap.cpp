@@ -128,7 +128,7 @@ void McapFile::scan_chunk(std::uint64_t at, std::uint64_t size, const Visit& vis
   why_damaged_ = wrong;
 }
 
-/// Whether the whole chunk holds records; those before the first that does not are visited.
+/// True if the whole chunk holds records; those before the first damaged one are visited.
 bool McapFile::scan_records(ChunkCursor& records, const Chunk& chunk, std::uint64_t at, const Visit& visit) {
   while (records.position() < chunk.plain_size) {
     std::array<std::uint8_t, kRecordHead> head{};

@@ -71,7 +71,7 @@ class McapFields {
   bool good_ = true;
 };
 
-/// Of the chunk record whose fields begin at `at` and take `size` bytes; none when it is damaged.
+/// Head of the chunk record whose fields begin at `at` and take `size` bytes; none if it is damaged.
 std::optional<Chunk> read_chunk_head(const BinaryFile& file, std::uint64_t at, std::uint64_t size);
 
 }  // namespace plumbline::dataset
