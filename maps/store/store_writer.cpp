@@ -147,8 +147,8 @@ struct StoreWriter::Impl {
   std::int64_t transaction;  ///< the number of the last one, or of the one that is going on
   Mirror maps, keyframes, states, points, lines, edges, frames, log;
   std::vector<RobotInfo> robots;  ///< as in the file
-  bool anew =
-      false;  ///< keyframes and edges were made anew, for another camera: what is in the file is not kept
+  /// Keyframes and edges were made anew, for another camera: what is in the file is not kept.
+  bool anew = false;
   ByRobot<FramePose> frame_lists;  ///< as in the file
   ByRobot<std::string> log_lines;  ///< as in the file
 };

@@ -25,7 +25,7 @@ struct Executor::Impl {
   }
   tbb::global_control allowed;  ///< more threads than cores are given when they are asked for
   mutable tbb::task_arena arena;
-  mutable tbb::task_group beside;  ///< what was submitted
+  mutable tbb::task_group beside;  ///< submitted jobs
 };
 
 /// Done by whoever claims it first: a thread of the arena or the one that waits.

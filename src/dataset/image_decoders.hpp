@@ -13,8 +13,8 @@ namespace plumbline::dataset {
 using Bytes = std::vector<std::uint8_t>;
 using Decoded = tl::expected<cv::Mat, std::string>;
 
-constexpr std::int64_t kMaxPixels =
-    1 << 27;  // 134 megapixels: beyond any depth camera, small enough to allocate
+// 134 megapixels: beyond any depth camera, small enough to allocate.
+constexpr std::int64_t kMaxPixels = 1 << 27;
 
 bool is_png(const Bytes& file);
 bool is_jpeg(const Bytes& file);

@@ -34,7 +34,7 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 struct Truth {
   std::unique_ptr<PointIndex> index;  ///< of samples; null for a mesh
   std::unique_ptr<MeasuredSurface> surface;
-  SurfaceSamples counted;  ///< where completeness is measured
+  SurfaceSamples counted;  ///< samples at which completeness is measured
   std::size_t hidden = 0;
 };
 

@@ -17,8 +17,8 @@ constexpr std::size_t kMostPoints = 20000;
 constexpr int kMostIterations = 80;
 constexpr double kLeastReach = 0.02;  // m
 constexpr double kStill = 1e-7;       // m; a smaller step ends the search
-constexpr double kLeastStiffness =
-    1e-4;  // of the mean normal equations; below, a direction is not determined
+// Eigenvalue of the mean normal equations below which a direction is not determined.
+constexpr double kLeastStiffness = 1e-4;
 
 struct Pair {
   Eigen::Vector3d point;  ///< of the cloud, moved

@@ -21,8 +21,8 @@ struct IcpResult {
   double rmse_m = 0.0;   ///< point to plane, of the pairs kept
   double overlap = 0.0;  ///< share of the cloud with a partner in reach at the end
   bool converged = false;
-  bool determined =
-      false;  ///< the surfaces fix all six degrees of freedom; the others are left as they started
+  /// True if the surfaces fix all six degrees of freedom; those that are not fixed stay as they started.
+  bool determined = false;
 };
 
 IcpResult align_icp(const std::vector<Eigen::Vector3f>& cloud, const MeasuredSurface& surface,

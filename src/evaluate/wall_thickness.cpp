@@ -23,7 +23,7 @@ namespace {
 using Points = std::vector<Eigen::Vector3f>;
 using PointIndices = std::vector<std::uint32_t>;
 using Voxel = std::array<std::int64_t, 3>;
-using Voxels = std::map<Voxel, PointIndices>;  ///< those that hold points, ordered by x, y, z
+using Voxels = std::map<Voxel, PointIndices>;  ///< voxels that hold points, ordered by x, y, z
 
 constexpr std::size_t kLeastPatchPoints = 20;
 constexpr std::size_t kLeastCellPoints = 8;

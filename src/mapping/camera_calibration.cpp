@@ -44,8 +44,8 @@ struct View {
   Rigid3 camera_from_world;
   core::KeyframeId root;  ///< of its component
   std::vector<std::pair<core::PointId, CalibrationObservation>> seen;
-  double late_s =
-      0.0;  ///< by so much longer than was believed when it was read is the depth's delay known now
+  /// By so much longer than was believed when it was read is the depth's delay known now.
+  double late_s = 0.0;
 };
 
 /// Some of many, spread evenly.

@@ -28,7 +28,7 @@ class MapUnknowns {
   }
   double* pose(std::size_t i) { return numbers_.data() + kPoseBlock * i; }
   double* pose(int i) { return i < 0 ? world() : pose(static_cast<std::size_t>(i)); }
-  double* world() { return pose(poses_); }  ///< where edges from pose -1 begin
+  double* world() { return pose(poses_); }  ///< pose -1, from which edges to the world begin
   double* point(std::size_t i) { return pose(poses_ + 1) + 3 * i; }
   double* line(std::size_t i) { return point(points_) + kLineBlock * i; }
 

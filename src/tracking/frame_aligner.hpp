@@ -65,7 +65,7 @@ class FrameAligner {
   geometry::Rigid3 predicted_;
   optimize::PoseProblem problem_;
   TrackResult result_;  ///< its camera_from_world is the estimate so far; features: where they were corrected
-  std::optional<std::size_t> intensity_level_;  ///< what problem_.photometric was made for
+  std::optional<std::size_t> intensity_level_;  ///< pyramid level of problem_.photometric
   bool use_motion_prior_;
   bool surface_only_ = false;  ///< nothing else has a say
 };

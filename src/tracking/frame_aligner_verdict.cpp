@@ -18,8 +18,8 @@ constexpr double kNearlyHeld = 0.5;  // of the information that a direction need
 /// measurements that constrain every direction by themselves can contradict it: in front of a bare wall,
 /// chance would. The pose becomes the measured one.
 bool FrameAligner::contradicts_motion_prior() {
-  constexpr double kGain =
-      4.0;  // of the cost: 1 at most where the model was right, soon above 8 where it was not
+  // Reduction of the cost: at most 1 if the model was right, soon above 8 if it was not.
+  constexpr double kGain = 4.0;
   if (!use_motion_prior_ || !surface_only_ || !problem_.prior) return false;
   optimize::PoseProblem problem = problem_;
   problem.prior = motion_prior(result_.estimate.information, predicted_, MotionTrust::kUnknown);

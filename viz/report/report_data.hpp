@@ -20,7 +20,7 @@
 
 namespace plumbline::report {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  ///< what is not known
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();  ///< unknown value
 
 /// The way of one robot in the frame of the results.
 struct ReportPath {

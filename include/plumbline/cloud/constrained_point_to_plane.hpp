@@ -18,8 +18,8 @@ struct PlaneStep {
   Eigen::Matrix4d transformation = Eigen::Matrix4d::Identity();  ///< of the source
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double lever = 1.0;
-  Eigen::Matrix<double, 6, 1> eigenvalues =
-      Eigen::Matrix<double, 6, 1>::Zero();  ///< of the information, 1/m^2
+  /// Eigenvalues of the information, 1/m^2.
+  Eigen::Matrix<double, 6, 1> eigenvalues = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> directions = Eigen::Matrix<double, 6, 6>::Identity();  ///< its eigenvectors
   std::array<bool, 6> held{};  ///< the others were left alone
   int inliers = 0;

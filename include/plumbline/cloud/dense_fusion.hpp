@@ -24,7 +24,7 @@ struct DenseFusionOptions {
   VoxelMapOptions voxels;
   int min_observations = 1;      ///< views that must have seen a voxel for it to stay
   bool plane_projection = true;  ///< points of flat pieces of surface lie on their plane
-  bool free_space = true;        ///< what other views look through goes
+  bool free_space = true;        ///< remove points that other views look through
   bool exposure = true;          ///< colours are evened out between views
   int min_support = 6;     ///< points with fewer like them within about 3 blocks are isolated; 0: none is
   double tile_mb = 100.0;  ///< memory that one tile may take; tiles of six times that are filled together

@@ -34,7 +34,7 @@ struct Surfel {
   Eigen::Vector3f normal{0, 0, 0};  ///< unit
   float noise_m = 0.0F;             ///< standard deviation of one measurement
   float residual2 = 0.0F;           ///< mean squared distance from the plane, m^2
-  float noise2 = 0.0F;              ///< what the sensor model lets expect of it, m^2
+  float noise2 = 0.0F;              ///< its variance by the sensor model, m^2
   std::uint32_t support = 0;        ///< points of the surroundings that face the same way, its own included
   bool flat = false;                ///< the plane explains the points within the noise
 

@@ -59,7 +59,7 @@ struct VoxelSide {
   float variance = 0.0F;  ///< weighted sum of the sensor's variance of the measurements
   std::uint32_t observations = 1;
   std::uint32_t last_view = 0;
-  std::uint32_t last_observations = 0;  ///< what the last view added
+  std::uint32_t last_observations = 0;  ///< added by the last view
   std::uint32_t robot_lead : 23;        ///< measurements of `robot`, less those of all others
   std::uint32_t robot : 8;              ///< the majority's, where there is one (Boyer and Moore's vote)
   std::uint32_t normal_known : 1;

@@ -24,7 +24,7 @@ struct PlayOptions {
 struct PlaySummary {
   std::size_t published = 0;   ///< frames
   std::size_t unreadable = 0;  ///< frames left out
-  double late_s = 0.0;         ///< how long after it was due the latest frame was sent
+  double late_s = 0.0;         ///< delay of the latest frame behind its due time
 };
 
 /// Publishes the frames of `source`: colour as raw images (JPEG as it is) below /camera/color, depth below

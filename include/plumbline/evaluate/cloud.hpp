@@ -89,9 +89,9 @@ struct CloudReport {
   double density_per_m2 = 0.0;    ///< median of 16 / (pi r16^2), r16 the distance to the 16th neighbour
   double spacing_mm = 0.0;        ///< median distance to the nearest neighbour
   CloudAlignmentReport alignment;
-  std::vector<float>
-      error_m;  ///< per point of the cloud as given, NaN where dropped; empty without reference
-  std::vector<Eigen::Vector3f> reference_samples;  ///< what completeness was measured at
+  /// Per point of the cloud as given, NaN where dropped; empty without reference.
+  std::vector<float> error_m;
+  std::vector<Eigen::Vector3f> reference_samples;  ///< samples at which completeness was measured
   std::vector<Eigen::Vector3f> reference_normals;  ///< of each of them, zero = unknown; may be empty
   std::vector<float> reference_error_m;            ///< of each of them
   std::vector<std::string> warnings;

@@ -14,7 +14,7 @@ namespace plumbline::evaluate {
 
 struct WallPlanesOptions {
   int planes = 3;        ///< the largest so many are measured
-  double slab_m = 0.04;  ///< what lies within this of a plane belongs to it
+  double slab_m = 0.04;  ///< points within this distance of a plane belong to it
   void declare(core::OptionTable& table);
 };
 

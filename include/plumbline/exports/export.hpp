@@ -30,14 +30,14 @@ using OpenRecording =
     std::function<core::Result<std::unique_ptr<dataset::FrameSource>>(const RecordingName&)>;
 
 struct ExportRequest {
-  std::filesystem::path input;          ///< result folder, map.db, OUT of an interrupted run, or a cloud
-  std::filesystem::path output;         ///< a file, or a folder for the forms that are one
-  std::string format;                   ///< name of a Format; empty: by the ending of `output`
-  Content content = Content::kCloud;    ///< tells forms of one ending apart
-  std::string robot;                    ///< whose map, of an interrupted run of several; empty: the only one
-  std::vector<std::string> recordings;  ///< where pictures come from, in the order of the robots; empty:
-                                        ///< where the map says that it was made from
-  OpenRecording open;                   ///< null: there are no pictures
+  std::filesystem::path input;        ///< result folder, map.db, OUT of an interrupted run, or a cloud
+  std::filesystem::path output;       ///< a file, or a folder for the forms that are one
+  std::string format;                 ///< name of a Format; empty: by the ending of `output`
+  Content content = Content::kCloud;  ///< tells forms of one ending apart
+  std::string robot;                  ///< whose map, of an interrupted run of several; empty: the only one
+  /// Recordings for the pictures, in the order of the robots; empty: those that the map was made from.
+  std::vector<std::string> recordings;
+  OpenRecording open;  ///< null: there are no pictures
   /// Runs work during which libraries print what nobody wants to read (Poisson's); null: just runs it.
   std::function<void(const std::function<void()>&)> quietly = nullptr;
   ExportOptions options;
@@ -64,7 +64,7 @@ core::Result<void> check_export(const ExportRequest& request);
 
 /// One row of the table of formats.
 struct FormatInfo {
-  std::string name;                  ///< what --format takes
+  std::string name;                  ///< name for --format
   std::string endings;               ///< ".yaml .pgm", or "folder"
   std::string content;               ///< "cloud", "mesh", ...: what tells forms of one ending apart
   std::string needs;                 ///< "cloud", "map.db", "map.db, recording"

@@ -26,7 +26,7 @@ struct ExportOptions {
   bool text = false;      ///< COLMAP's text files instead of binary ones
   int every = 0;          ///< every n-th tracked frame besides the keyframes; 0: keyframes only
   bool sharpest = false;  ///< of each keyframe's neighbourhood
-  int dense_points = 0;   ///< so many points of the cloud instead of the landmarks; 0: landmarks
+  int dense_points = 0;   ///< number of points of the cloud to write instead of landmarks; 0: landmarks
   bool depth = true;      ///< depth images beside the pictures
   // Clouds and meshes.
   bool ascii = false;

@@ -14,7 +14,7 @@ namespace plumbline::features {
 
 /// Grey values around a corner, in pixels of its octave.
 struct CornerPatch {
-  static constexpr int kReach = 4;              ///< what is aligned reaches so far from the middle
+  static constexpr int kReach = 4;              ///< half width of the aligned area
   static constexpr int kSide = 2 * kReach + 3;  ///< one more on each side, for gradients
   static constexpr int kPixels = kSide * kSide;
   Eigen::Vector2f middle = Eigen::Vector2f::Zero();  ///< where it was cut out, full image as it was taken

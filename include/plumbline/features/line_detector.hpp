@@ -21,8 +21,8 @@ enum class LineScale { kHalf, kFull };
 struct LineDetectorOptions {
   LineMethod method = LineMethod::kLsd;
   LineScale scale = LineScale::kHalf;
-  double min_gradient =
-      3.0;  ///< LSD: grey levels per px at the detection scale; under 5.2 where strong ones are few
+  /// LSD: smallest gradient, grey levels per px at the detection scale; under 5.2 where strong ones are few.
+  double min_gradient = 3.0;
   double min_length_px = 25.0;
   double border_px = 4.0;
   bool border_either = false;  ///< lines with one end in that margin go too, not those along a side alone

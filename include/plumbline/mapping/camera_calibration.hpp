@@ -19,8 +19,8 @@ namespace plumbline::mapping {
 /// A map of one recording, made with the given camera. All must outlive the call.
 struct CalibrationRun {
   const maps::Map* map = nullptr;
-  const std::vector<maps::FramePose>* frames =
-      nullptr;            ///< every frame: how fast the camera moved, what it saw
+  /// Every frame: the camera's motion and observations.
+  const std::vector<maps::FramePose>* frames = nullptr;
   sensor::Pinhole image;  ///< of the images that the features lie in
 };
 
@@ -30,22 +30,22 @@ struct CameraFinding {
   double given = 0.0;
   double found = 0.0;
   double sigma = 0.0;  ///< by leaving parts of the runs out, one at a time (jackknife)
-  double gain = 0.0;   ///< share of the cost of parts held out that it takes away
+  double gain = 0.0;   ///< relative reduction of the cost on held-out parts
   bool used = false;   ///< it is in `camera`
 };
 
 struct CalibrationOptions {
   int views = 200;            ///< keyframes and frames between them of all runs, at most
-  double least_gain = 0.002;  ///< share of the cost of parts held out that must go
-  double least_sigmas = 3.0;  ///< by which what is found must differ from what was given
+  double least_gain = 0.002;  ///< smallest relative reduction of the cost on held-out parts
+  double least_sigmas = 3.0;  ///< smallest difference from the given value, in standard deviations
   double focal_prior = 0.02;  ///< standard deviation of the given focal length, share
   double centre_prior_px = 10.0;
   double readout_prior_s = 0.02;
   double slope_prior = 0.02;      ///< 1/m
   double distortion_prior = 0.1;  ///< of k1 and of k2
   double delay_prior_s = 0.02;
-  std::vector<CameraFinding> earlier;  ///< of a map made with another camera: looked for together at first
-  double earlier_least_gain = 0.002;   ///< as least_gain, of those together
+  std::vector<CameraFinding> earlier;  ///< of a map made with another camera: first all are tried together
+  double earlier_least_gain = 0.002;   ///< like least_gain, for those together
 };
 
 struct CameraCalibration {
@@ -53,7 +53,7 @@ struct CameraCalibration {
   std::vector<CameraFinding> findings;
   int views = 0;
   int observations = 0;
-  double gain = 0.0;  ///< share of the cost of parts held out that all together take away
+  double gain = 0.0;  ///< relative reduction of the cost on held-out parts by all together
 };
 
 /// `given`: the camera that the runs' features were read with. The same for any number of threads. Errors

@@ -24,7 +24,7 @@ struct PlacePair {
 };
 
 struct ConsistencyOptions {
-  double max_apart_m = 0.15;       ///< how far two pairs may put a camera apart ...
+  double max_apart_m = 0.15;       ///< largest distance between a camera's poses by two pairs ...
   double max_turned_rad = 0.06;    ///< ... and turn it
   double apart_per_metre = 0.02;   ///< more for every metre between them: the maps themselves drift
   double turned_per_metre = 0.01;  ///< rad

@@ -102,11 +102,11 @@ struct GlobalAdjustmentSummary {
   std::vector<optimize::EdgeVerdict> extra;  ///< of each edge of `extra`; empty when no pose graph was solved
   int rejected = 0;                          ///< edges of `extra` that were taken for wrong
   optimize::BundleSummary bundle;
-  double mean_shift_m = 0.0;  ///< how far keyframes moved
+  double mean_shift_m = 0.0;  ///< mean motion of the keyframes
   double max_shift_m = 0.0;
   bool changed = false;  ///< the map was moved
   int refused = 0;       ///< solutions that contradicted what the tracker had measured
-  std::string refusal;   ///< what the last of these would have torn
+  std::string refusal;   ///< connection that the last of these would have torn
   std::string message;   ///< why not, or what the solver said
 };
 

@@ -22,7 +22,7 @@ struct LocalBundle : MapBundle {
 };
 
 struct LocalBundleOptions {
-  int keyframes = 12;  ///< how many may move
+  int keyframes = 12;  ///< number that may move
   ObservationNoise noise;
 };
 

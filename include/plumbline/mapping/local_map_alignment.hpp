@@ -63,7 +63,7 @@ struct AlignmentOptions {
   double max_turn_rad = 0.2;
   double min_information = 0.02;  ///< share of the normals, squared, that a direction needs to count as held
   double correlation = 0.15;      ///< samples count by this much: noise of neighbours is alike
-  double floor_m = 0.0012;        ///< what no alignment of this sensor knows better
+  double floor_m = 0.0012;        ///< smallest standard deviation of an alignment with this sensor
   void declare(core::OptionTable& table);
 };
 
@@ -75,7 +75,7 @@ struct SurfaceAlignment {
   int inliers = 0;
   double overlap = 0.0;  ///< share of the surface with more of it in the other's reach that fits
   double rms = 0.0;      ///< of the inliers, in standard deviations
-  double shift_m = 0.0;  ///< how far the middle of the matched samples moved
+  double shift_m = 0.0;  ///< motion of the middle of the matched samples
   double turn_rad = 0.0;
   int iterations = 0;
   std::string refused;  ///< why it must not be used; empty: it may

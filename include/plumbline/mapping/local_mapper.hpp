@@ -23,8 +23,8 @@ namespace plumbline::mapping {
 
 struct LocalMapperOptions {
   double max_landmark_depth_m = 8.0;
-  double max_landmark_turn_rate =
-      0.6;  ///< rad/s; images taken while turning faster make and merge no landmarks
+  /// Rad/s; images taken while turning faster make and merge no landmarks.
+  double max_landmark_turn_rate = 0.6;
   LandmarkCullingOptions culling;
   bool triangulate = true;
   TriangulationOptions triangulation;

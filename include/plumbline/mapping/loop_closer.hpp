@@ -31,10 +31,11 @@ struct LoopOptions {
   int agreeing = 2;              ///< verified keyframes, following one another, that must be consistent
   double max_alternative = 0.5;  ///< another consistent set may have this share of them at most
   ConsistencyOptions consistency;
-  double max_drift = 0.02;  ///< of the way since the match, that a loop may correct: what looks alike further
-                            ///< off (doors of a corridor) is another place
-  bool robust = true;       ///< the pose graph may take loops for wrong
-  bool bundle = true;       ///< adjust the whole map after a loop
+  /// Largest correction by a loop, as a share of the distance travelled since the match: what looks alike
+  /// further off (doors of a corridor) is another place.
+  double max_drift = 0.02;
+  bool robust = true;  ///< the pose graph may take loops for wrong
+  bool bundle = true;  ///< adjust the whole map after a loop
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;
@@ -65,7 +66,7 @@ struct Loop {
 struct LoopTrial {
   Loop loop;
   double score = 0.0;         ///< of the images
-  double correction_m = 0.0;  ///< how far closing it would move the query; 0 when there is no pose
+  double correction_m = 0.0;  ///< motion of the query if the loop is closed; 0: there is no pose
   double correction_rad = 0.0;
   double path_m = 0.0;     ///< from the match to the query, along the keyframes
   bool by_others = false;  ///< query and match were both seen in another robot's map, not in each other

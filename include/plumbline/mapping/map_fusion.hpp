@@ -27,21 +27,25 @@
 namespace plumbline::mapping {
 
 struct MapFusionOptions {
-  int min_pairs = 5;          ///< keyframes of each map that must agree
-  int few_pairs = 2;          ///< so few will do when they have
-  int few_inliers = 100;      ///< points and lines (twice) in common, surfaces hold in all directions or both
-  double few_extent_m = 3.0;  ///< maps reach so far where none do, and nothing speaks for another answer
-  double min_span_m = 0.25;   ///< how far apart the keyframes that agree lie, at least; or
-  double min_span_rad = 0.5;  ///< how far turned
+  int min_pairs = 5;  ///< keyframes of each map that must agree
+  /// Exception for short overlaps: `few_pairs` keyframes suffice if they share `few_inliers` points and lines
+  /// (lines count twice), if surfaces hold in all directions or both maps extend over `few_extent_m` in a
+  /// free one, and if nothing supports another alignment.
+  int few_pairs = 2;
+  int few_inliers = 100;
+  double few_extent_m = 3.0;
+  double min_span_m = 0.25;   ///< smallest distance between agreeing keyframes; or
+  double min_span_rad = 0.5;  ///< smallest rotation between them
   ConsistencyOptions consistency;
-  double alternative = 0.1;  ///< a second answer with so many keyframes, as share of the best one, is a doubt
-  double alternative_share =
-      0.06;  ///< another answer that so many landmarks fit with, as share of the best one's
-  double max_seen_through = 0.06;  ///< share of landmarks seen through that refutes such an answer
+  /// Keyframes of a second answer, relative to those of the best one, from which it is a doubt.
+  double alternative = 0.1;
+  /// Matching landmarks of another answer, relative to the best one's, from which it is a doubt.
+  double alternative_share = 0.06;
+  double max_seen_through = 0.06;  ///< share of landmarks seen through above which such an answer is refuted
   double min_confirmed = 0.5;    ///< share of the keyframes with a view of the other map that must confirm it
   int verifications = 250;       ///< pairs of keyframes that are verified for each two maps, at most
   bool robust = true;            ///< the pose graph may take pairs for wrong
-  bool merge_duplicates = true;  ///< landmarks that are one; a preview does without
+  bool merge_duplicates = true;  ///< merge duplicate landmarks; a preview does not
   std::uint64_t seed = 1;
   places::VocabularyOptions vocabulary;
   places::RecogniserOptions places;
@@ -69,10 +73,10 @@ struct VerifiedPair {
 
 /// One map laid over another: landmarks of either one, at their place in the other.
 struct OverlayFit {
-  int expected = 0;      ///< where the other one measured a surface, from a like side and distance
-  int matched = 0;       ///< of these, that the other one has too
-  int contradicted = 0;  ///< where the other one saw through
-  double chance = 0.0;   ///< so many would match any other landmarks that lie as densely
+  int expected = 0;  ///< landmarks where the other map measured a surface, from a similar side and distance
+  int matched = 0;   ///< of these, landmarks that the other map has too
+  int contradicted = 0;  ///< landmarks where the other map saw through
+  double chance = 0.0;   ///< expected matches with any other landmarks of that density
   /// Share of the expected landmarks that match, beyond chance.
   [[nodiscard]] double share() const {
     return expected > 0 ? std::max(0.0, matched - chance) / expected : 0.0;
@@ -88,8 +92,8 @@ struct OverlayFit {
 struct Consistency {
   int verified = 0;                 ///< pairs in all
   int agreeing = 0;                 ///< keyframes of the set, on the side that has fewer
-  double span_m = 0.0;              ///< how far apart b's keyframes of the set lie
-  double span_rad = 0.0;            ///< how far turned
+  double span_m = 0.0;              ///< largest distance between b's keyframes of the set
+  double span_rad = 0.0;            ///< largest rotation between them
   std::vector<VerifiedPair> pairs;  ///< of the set
 };
 
@@ -101,19 +105,20 @@ struct Alignment {
   double spread_m = 0.0;  ///< RMS of where the pairs put b's cameras, about the mean
 };
 
-/// Would another alignment do as well?
+/// Evidence on whether another alignment would fit as well.
 struct Ambiguity {
-  OverlayFit overlap;   ///< the maps, as aligned
-  int alternative = 0;  ///< keyframes that speak for another one that the maps do not refute, at most
-  OverlayFit alternative_overlap;  ///< as the best other one has it that they do not refute, and
-  double alternative_m = 0.0;      ///< how far off it puts b's cameras; 0: there is none
+  OverlayFit overlap;  ///< the maps, as aligned
+  /// Largest number of keyframes that support another alignment which the maps do not refute.
+  int alternative = 0;
+  OverlayFit alternative_overlap;  ///< of the best other alignment that is not refuted
+  double alternative_m = 0.0;      ///< distance by which that one moves b's cameras; 0: there is none
   /// Pieces of surface of one map that the other one has, and that it saw through; counted where few
   /// keyframes agree.
   int surfaces_there = 0;
   int surfaces_through = 0;
 };
 
-/// Do other keyframes see what they should, if the alignment is right?
+/// Check that other keyframes see what they should, if the alignment is right.
 struct CrossValidation {
   int expected = 0;                 ///< keyframes of b that should see what a saw
   int confirmed = 0;                ///< of these, that do

@@ -28,11 +28,11 @@ struct RefinementSummary {
   std::size_t accepted = 0;   ///< of these, used
   std::size_t rejected = 0;   ///< of the accepted, taken for wrong by the pose graph
   double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
-  double mean_shift_m = 0.0;  ///< how far keyframes moved
+  double mean_shift_m = 0.0;  ///< mean motion of the keyframes
   double max_shift_m = 0.0;
   std::size_t refused = 0;      ///< solutions that would have torn the map
-  optimize::BundleFits before;  ///< how well all fits where the pose graph had put it; zeros: not known
-  optimize::BundleFits after;   ///< when all was adjusted
+  optimize::BundleFits before;  ///< fits at the poses of the pose graph; zeros: not known
+  optimize::BundleFits after;   ///< fits after the adjustment
 };
 
 struct Refinement {

@@ -16,9 +16,9 @@ maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const featur
 
 /// Last known position of a lost camera.
 struct LostAt {
-  core::KeyframeId reference;          ///< in whose surroundings
+  core::KeyframeId reference;          ///< keyframe near which it was lost
   geometry::Rigid3 camera_from_world;  ///< the last pose that was known
-  bool astray = false;                 ///< several frames ago: it may be elsewhere by now
+  bool astray = false;                 ///< lost several frames ago: the camera may be elsewhere by now
 };
 
 /// A camera that turns up far from where it was lost, or after several frames, must pass as a loop would:

@@ -27,8 +27,8 @@ struct SeenPoint {
 };
 /// Points that a frame saw.
 struct SeenPoints {
-  double depth_delay_s =
-      0.0;  ///< of the camera that was believed then: so much of it is not in the depths any more
+  /// Delay of the camera at that time, which the depths are already corrected for.
+  double depth_delay_s = 0.0;
   std::vector<SeenPoint> points;
 };
 
@@ -40,7 +40,8 @@ struct FramePose {
   /// Motion since the frame before as the tracker saw it; none where one of the two was not tracked.
   std::optional<geometry::Rigid3> camera_from_previous;
   double step_sigma_m = 0.0;  ///< its standard deviation where it is known worst; half as much in radians
-  std::shared_ptr<const SeenPoints> seen = nullptr;  ///< what its camera is asked of; null: not kept
+  /// Observations for estimating its camera; null: not kept.
+  std::shared_ptr<const SeenPoints> seen = nullptr;
 };
 
 /// A step between neighbouring frames of the path as it lies now, beside the one that the tracker saw.
@@ -48,7 +49,7 @@ struct PathStep {
   double stamp = 0.0;     ///< of the later frame, seconds
   core::KeyframeId from;  ///< reference of the earlier frame
   core::KeyframeId to;    ///< of the later one
-  double off_m = 0.0;     ///< by how much they differ
+  double off_m = 0.0;     ///< difference of the two
   double off_rad = 0.0;
 };
 

@@ -130,8 +130,8 @@ class IdMap {
   std::map<std::int32_t, std::vector<std::int32_t>> slots_;  ///< by id: entry of the pool
   std::deque<T> pool_;
   std::vector<std::int32_t> free_;  ///< entries of the pool
-  std::map<std::int32_t, std::vector<std::uint64_t>>
-      touched_;  ///< by page: revision_ when it was last touched
+  /// Value of revision_ when each page was last touched.
+  std::map<std::int32_t, std::vector<std::uint64_t>> touched_;
   std::uint64_t revision_ = 0;
 };
 

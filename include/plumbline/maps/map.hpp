@@ -42,8 +42,8 @@ struct Keyframe {
   /// lay to each other as the tracker saw it.
   KeyframeId reference;
   geometry::Rigid3 camera_from_reference;
-  double reference_sigma_m =
-      0.0;  ///< standard deviation of that where it is known worst; half as much in radians
+  /// Standard deviation of that where it is known worst; half as much in radians.
+  double reference_sigma_m = 0.0;
   std::shared_ptr<const features::FrameFeatures> features;
   std::vector<SurfaceSample> surface;  ///< well spread over directions and over the image
 };
@@ -66,7 +66,7 @@ static_assert(sizeof(Observation) == 12, "a map has thousands of them for each k
 /// True if one of the observations is this keyframe's.
 bool seen_by(const std::vector<Observation>& observations, KeyframeId keyframe);
 
-/// So many keyframes of each robot, those made last, keep the patches of their corners.
+/// Number of keyframes of each robot, the newest ones, that keep the patches of their corners.
 constexpr int kPatchedKeyframes = 200;
 
 struct MapPoint {
@@ -74,12 +74,12 @@ struct MapPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, metres
   features::Descriptor256 descriptor{};                ///< the most typical of its observations
   float angle = 0.0F;                                  ///< of that observation, degrees in its image
-  KeyframeId angle_keyframe;                           ///< whose image
-  int reference_octave = 0;                            ///< in which octave its first observation saw it
+  KeyframeId angle_keyframe;                           ///< keyframe in whose image the angle was measured
+  int reference_octave = 0;                            ///< octave of its first observation
   Eigen::Vector3d view_direction = Eigen::Vector3d::UnitZ();  ///< mean direction from the cameras to it, unit
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< world, unit, of the surface it lies on, towards the
-                                                     ///< camera that measured it; zero: unknown
-  double reference_distance = 1.0;                   ///< metres from the camera of its first observation
+  /// Normal of the surface it lies on, towards the camera that measured it; world, unit; zero: unknown.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double reference_distance = 1.0;  ///< metres from the camera of its first observation
   std::vector<Observation> observations;
   int visible = 0;  ///< frames whose view contained it
   int found = 0;    ///< frames that matched it

@@ -20,8 +20,7 @@ class OutputFolder {
   /// there. kOutput: cannot be created or written, or less than 64 MB are free. `is_earlier` tells what an
   /// earlier result is: what alone may be deleted.
   using IsEarlier = bool (*)(const std::filesystem::path&);
-  /// `takes_over`: goes on with what an interrupted run left in OUT.partial, and leaves it there again unless
-  /// committed.
+  /// `takes_over`: continues an interrupted run from OUT.partial, which stays there again unless committed.
   static core::Result<OutputFolder> prepare(const std::filesystem::path& out, bool replace,
                                             bool takes_over = false, IsEarlier is_earlier = is_result_folder);
   /// Folder in which results are written until they are complete.
@@ -31,7 +30,7 @@ class OutputFolder {
   OutputFolder& operator=(OutputFolder&&) = delete;
   ~OutputFolder();
 
-  [[nodiscard]] const std::filesystem::path& path() const { return partial_; }  ///< where to write
+  [[nodiscard]] const std::filesystem::path& path() const { return partial_; }  ///< folder to write to
   core::Result<void> commit();
   /// Keeps the files if this object ends without commit(), for another run to continue.
   void keep() { kept_ = true; }

@@ -44,9 +44,9 @@ struct RobotInfo {
 struct StoreHeader {
   std::vector<RobotInfo> robots;  ///< by number
   std::string configuration;      ///< the effective one, YAML
-  std::string input;            ///< what was mapped, text: tells whether a run that goes on is given the same
-  std::string program_version;  ///< core::version() of the program that made the file
-  int format = kStoreFormat;    ///< set by the reader; the writer always writes kStoreFormat
+  std::string input;              ///< input as text, to check that a resumed run is given the same
+  std::string program_version;    ///< core::version() of the program that made the file
+  int format = kStoreFormat;      ///< set by the reader; the writer always writes kStoreFormat
 };
 
 /// The camera of a robot; of one that is not there the first one's, or none.

@@ -25,8 +25,8 @@ struct StoredPart {
   std::vector<FramePose> frames;
   std::vector<RobotInfo> robots;  ///< their clouds are given as the latest version of their camera has them
   CameraHistory cameras;          ///< by the store's numbers
-  std::map<std::int32_t, geometry::Trajectory>
-      paths;                                     ///< of each robot in the part's map, by this run's numbers
+  /// Paths of the robots in the part's map, by this run's numbers.
+  std::map<std::int32_t, geometry::Trajectory> paths;
   std::map<std::int32_t, std::int32_t> numbers;  ///< of robots: from the store's to this run's
 };
 

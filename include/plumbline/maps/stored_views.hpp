@@ -22,7 +22,7 @@ struct StoredViews {
   std::vector<std::int32_t> robots;
   std::vector<double> stamps;
   std::vector<geometry::Vector6d> velocities;  ///< of camera_from_world, in its own frame; m/s, rad/s
-  CameraHistory cameras;                       ///< what the clouds were read as
+  CameraHistory cameras;                       ///< versions of the cameras of the clouds
 
   [[nodiscard]] std::size_t size() const { return stamps.size(); }
   /// A view's cloud as the latest version of its camera has it; from several threads at a time. Errors

@@ -60,7 +60,7 @@ struct CalibrationProblem {
 /// Evidence of a problem about its camera, with poses and points at their optimum: half the squared standard
 /// deviations, a quadratic function of the change.
 struct CameraEvidence {
-  CameraChange at = CameraChange::Zero();  ///< where it was linearised
+  CameraChange at = CameraChange::Zero();  ///< point of linearisation
   double cost = 0.0;                       ///< there
   CameraChange gradient = CameraChange::Zero();
   Eigen::Matrix<double, kCameraUnknowns, kCameraUnknowns> information =

@@ -34,8 +34,8 @@ struct PoseProblem {
 
 struct PoseSolverOptions {
   int max_iterations = 10;
-  double point_loss =
-      2.45;  ///< Huber threshold, in standard deviations (chi-square 95 %, 2 degrees of freedom)
+  /// Huber threshold, in standard deviations (chi-square 95 %, 2 degrees of freedom).
+  double point_loss = 2.45;
   double line_loss = 2.45;
   double plane_loss = 1.0;
   double point_weight = 1.0;  ///< of the whole family: its terms are not quite independent

@@ -42,12 +42,13 @@ struct TrackedFrame {
   maps::FrameId frame;        ///< its place on the robot's way; invalid: it lies nowhere
   double stamp = 0.0;         ///< seconds
   FrameRow row;
-  geometry::Rigid3 depth_from_camera;               ///< motion between the stamps of colour and depth
-  std::optional<maps::FramePose> pose;              ///< none before the map began, or where there is no map
-  std::optional<geometry::Rigid3> map_from_camera;  ///< when somebody looks on: as the map is now; none: lost
-  std::shared_ptr<const maps::MapChanges> changes;  ///< of the map since the last keyframe, with each
-                                                    ///< keyframe, when somebody keeps the map
-  std::shared_ptr<const maps::Map> map;             ///< of several robots: as it is with this keyframe
+  geometry::Rigid3 depth_from_camera;   ///< motion between the stamps of colour and depth
+  std::optional<maps::FramePose> pose;  ///< none before the map began, or where there is no map
+  /// Pose in the present map, if there is an observer; none: lost.
+  std::optional<geometry::Rigid3> map_from_camera;
+  /// Changes of the map since the last keyframe; with each keyframe, if some stage keeps the map.
+  std::shared_ptr<const maps::MapChanges> changes;
+  std::shared_ptr<const maps::Map> map;  ///< of several robots: as it is with this keyframe
   /// With a keyframe, when the robot's camera became another since the last one: all robots. Null: none did.
   std::shared_ptr<const std::vector<RobotInfo>> robots;
 };
@@ -87,12 +88,12 @@ struct MapResult : maps::MapPoses {
 /// sees through (cloud::depth_view). Its points are those of the depth camera at the moment of the depth
 /// image: cloud::sensor_pose() leads from there to the camera of the poses.
 struct KeyframeCloud {
-  core::KeyframeId id;                                       ///< not valid: a frame between keyframes
-  maps::FrameId frame;                                       ///< as TrackedFrame
-  double stamp = 0.0;                                        ///< seconds
-  cloud::CloudPtr cloud;                                     ///< null: what `compact` holds, not decoded
-  std::shared_ptr<const std::vector<std::uint8_t>> compact;  ///< the same as cloud::encode_cloud makes it;
-                                                             ///< null: it waits in a store
+  core::KeyframeId id;    ///< not valid: a frame between keyframes
+  maps::FrameId frame;    ///< as TrackedFrame
+  double stamp = 0.0;     ///< seconds
+  cloud::CloudPtr cloud;  ///< null: what `compact` holds, not decoded
+  /// The cloud as encoded by cloud::encode_cloud; null: it waits in a store.
+  std::shared_ptr<const std::vector<std::uint8_t>> compact;
   std::function<core::Result<std::vector<std::uint8_t>>()> stored;  ///< reads it there
   /// mapping::coarse_surface of the keyframe's cloud; null: none was kept.
   std::shared_ptr<const maps::StoredSurface> surface;
@@ -113,7 +114,7 @@ struct DenseCloud {
   double voxel_m = 0.0;
   geometry::Rigid3 output_from_map;
   bool upright = false;                                      ///< z is up in the output's frame
-  std::shared_ptr<const maps::FusionState> state = nullptr;  ///< what it was laid down with
+  std::shared_ptr<const maps::FusionState> state = nullptr;  ///< state of the maps that it was fused from
   std::vector<std::shared_ptr<const DenseCloud>> apart;      ///< of the components MapResult::apart
 };
 

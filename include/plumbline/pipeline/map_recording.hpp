@@ -23,11 +23,13 @@ namespace plumbline::pipeline {
 struct MapRequest : RunRequest {
   MapRequest() { pipeline = "rgbd"; }
   std::string input;                ///< folder or synth:...
-  std::vector<std::string> others;  ///< further recordings, each of a robot of its own
+  std::vector<std::string> others;  ///< further recordings, one per robot
   dataset::OpenOptions open;        ///< format, camera, from, to, every
-  bool resume = false;              ///< go on from what an interrupted run left in OUT.partial
-  double pace_hz = 0.0;  ///< play each recording at so many frames a second, at most; 0: as fast as that goes
-  std::filesystem::path debug_video;  ///< folder for a picture a frame of what the tracker sees; empty: none
+  bool resume = false;              ///< continue an interrupted run from OUT.partial
+  /// Highest rate at which each recording is played, frames a second; 0: as fast as possible.
+  double pace_hz = 0.0;
+  /// Folder for one picture per frame of what the tracker sees; empty: none.
+  std::filesystem::path debug_video;
   /// Frames that are still coming, in the place of `input`, which is then only a name for the results.
   /// Nothing is resumed. The run ends when they are closed.
   std::shared_ptr<dataset::LiveFrames> live;
@@ -37,8 +39,8 @@ struct MapRequest : RunRequest {
   /// Maps of other robots that the trackers use for relocalisation and loops: the result depends on what
   /// comes in there, and when; null: none do.
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;
-  std::function<void(maps::Map&)>
-      alter_map;  ///< for tests: changes the map when tracking has ended; may be empty
+  /// For tests: changes the map when tracking has ended; may be empty.
+  std::function<void(maps::Map&)> alter_map;
 };
 
 /// True if there is nothing to resume: OUT is whole and no run was interrupted since.

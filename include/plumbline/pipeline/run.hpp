@@ -33,10 +33,10 @@ struct RunReport {
   std::size_t frames = 0;  ///< that went through the graph
   std::size_t frames_available = 0;
   bool stopped = false;  ///< ended early because it was asked to
-  double map_s =
-      0.0;  ///< first frame read to last change of the map: frames and the end of non-export stages
+  /// First frame read to last change of the map: frames and the end of non-export stages.
+  double map_s = 0.0;
   double export_s = 0.0;            ///< end of the stages that export
-  double behind_s = 0.0;            ///< how long after it was due the latest frame was done; 0 without a pace
+  double behind_s = 0.0;            ///< delay of the latest frame behind its due time; 0 without a pace
   std::vector<StageTiming> stages;  ///< in graph order
   std::vector<float> rss_mb;        ///< one per frame, when it was done; NaN = not known
 };

@@ -130,7 +130,7 @@ struct RunInput {
   const maps::StoredMaps* stored_maps = nullptr;         ///< what a maps stage reads; null: there is none
   const std::vector<maps::RobotInfo>* robots = nullptr;  ///< of recordings or maps, by number
   std::string anchor;  ///< robot whose frame finished maps are laid into; empty: any
-  std::string text;    ///< what is mapped, as text that another recording does not give
+  std::string text;    ///< text that identifies what is mapped
 };
 
 /// Data kept in map.db.
@@ -142,11 +142,11 @@ struct RunStore {
 
 /// Hooks of callers that change a run or observe it.
 struct RunHooks {
-  std::filesystem::path debug_folder;                       ///< where its pictures go; empty: nowhere
+  std::filesystem::path debug_folder;                       ///< folder for debug pictures; empty: none
   std::shared_ptr<const mapping::OtherMapsInbox> feedback;  ///< MapRequest::feedback
-  std::function<void(maps::Map&)>
-      alter_map;                    ///< for tests: changes the map when tracking has ended; may be empty
-  RunObserver* observer = nullptr;  ///< who looks on; null: nobody
+  /// For tests: changes the map when tracking has ended; may be empty.
+  std::function<void(maps::Map&)> alter_map;
+  RunObserver* observer = nullptr;                    ///< who looks on; null: nobody
   std::function<void(const std::string&)> finishing;  ///< RunRequest::finishing
 };
 

@@ -59,7 +59,7 @@ struct Camera {
   /// 1) of the undistorted colour camera. It describes a depth camera whose axis is not where its maker
   /// thinks.
   std::array<double, 2> depth_slope{};
-  double depth_delay_s = 0.0;  ///< so much later than their stamps say were depth images taken
+  double depth_delay_s = 0.0;  ///< delay of depth images after their stamps
   bool guess = false;          ///< typical values, of no file
 
   [[nodiscard]] Lens lens() const { return {model, distortion}; }

@@ -52,7 +52,7 @@ class Recalibration {
   [[nodiscard]] Eigen::Vector3d point(const Eigen::Vector3d& p) const;
   /// The normal of a surface there, unit or zero: a slope of depth tilts it.
   [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) const;
-  /// So much later were depth images taken than was believed, seconds.
+  /// Additional delay of depth images relative to what was believed, seconds.
   [[nodiscard]] double delay_s() const {
     return after_.camera().depth_delay_s - before_.camera().depth_delay_s;
   }

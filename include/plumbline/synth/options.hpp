@@ -15,9 +15,9 @@ enum class Sensor { kIdeal, kKinect, kRealsense };
 enum class Motion { kScene, kHandheld, kWheeled };  ///< kScene: as the scene file says
 
 struct SynthOptions {
-  int frames = -1;  ///< of each robot; -1 = the path once; more than the path: it goes on round it
-  int robots = 1;   ///< how many recordings
-  int walkers = 0;  ///< how many of the scene's walkers are about: filmed, but no part of reference.ply
+  int frames = -1;  ///< per robot; -1: the path once; more than the path has: it starts again
+  int robots = 1;   ///< number of recordings
+  int walkers = 0;  ///< number of the scene's walkers to film; they are no part of reference.ply
   Texture texture = Texture::kFull;  ///< kNone: white cloth and grey floors, geometry unchanged
   Sensor sensor = Sensor::kKinect;   ///< kIdeal: no noise, no offset between stamps, no blur
   Motion motion = Motion::kScene;
@@ -25,9 +25,9 @@ struct SynthOptions {
   int width = 640;
   int height = 480;
   double fps = 30.0;
-  double speed = 1.0;          ///< times the scene's own speed
+  double speed = 1.0;          ///< factor on the scene's speed
   double readout_s = 0.0;      ///< rolling shutter of the colour camera: first to last row; 0: all at once
-  double depth_delay_s = 0.0;  ///< depth images are taken so much later than their stamps say
+  double depth_delay_s = 0.0;  ///< delay of depth images after their stamps
   double reference_spacing = 0.0;  ///< m between samples of reference.ply; 0 = 5 mm, more for large scenes
   double visible_range = 4.0;      ///< m; as far as the shipped pipelines use depth, and the sensor's range
   /// Hard moments, "kind@start+duration[*value]" in seconds from the first frame, separated by commas; added

@@ -70,10 +70,10 @@ class MotionModel {
   geometry::Rigid3 camera_from_world_;
   bool valid_ = false;
   geometry::Vector6d velocity_ = geometry::Vector6d::Zero();  ///< of camera_from_world, per second
-  int steps_ = 0;        ///< between frames, one after the other, that it was found from
-  double step_s_ = 0.0;  ///< how long the last one was
+  int steps_ = 0;        ///< consecutive steps between frames from which the velocity was found
+  double step_s_ = 0.0;  ///< duration of the last step
   int lost_frames_ = 0;
-  double dead_reckoning_s_ = 0.0;  ///< how long it has held what no measurement does
+  double dead_reckoning_s_ = 0.0;  ///< time for which it has held unmeasured directions
   bool contradicted_ = false;
   std::optional<geometry::Rigid3> odometry_;       ///< of the frame that is looked for
   std::optional<geometry::Rigid3> last_odometry_;  ///< of the last tracked frame

@@ -56,7 +56,7 @@ struct TrackerOptions {
 /// Result of tracking one frame.
 struct TrackResult {
   TrackState state = TrackState::kLost;
-  core::KeyframeId reference;  ///< in whose surroundings the camera is
+  core::KeyframeId reference;  ///< keyframe near which the camera is
   geometry::Rigid3 camera_from_world;
   geometry::Rigid3 depth_from_camera;  ///< motion between the stamps of colour and depth
   std::vector<PointMatch> points;      ///< inliers
@@ -71,8 +71,8 @@ struct TrackResult {
   /// Smallest eigenvalue of the information matrix of the families that are trusted, 1/m^2, rotations scaled
   /// by the scene's depth.
   double min_eigenvalue = 0.0;
-  bool continuous =
-      false;  ///< the frame before is tracked and no more than a step away: the motion model knew
+  /// The frame before is tracked and no more than a step away: the motion model knew.
+  bool continuous = false;
   /// Standard deviation of the motion since the frame before where it is known worst, metres; half as much in
   /// radians. After a gap nothing bears it out: a decimetre.
   [[nodiscard]] double sigma_m() const {
@@ -143,7 +143,7 @@ class Tracker {
   [[nodiscard]] bool astray() const { return motion_.outdated(); }
   /// The frames since `lost_frames` were lost are taken back: they are lost, too.
   void take_back(int lost_frames) { motion_.lost_since(lost_frames); }
-  /// So many frames in a row were lost.
+  /// Number of frames lost in a row.
   [[nodiscard]] int lost_frames() const { return motion_.lost_frames(); }
   [[nodiscard]] core::KeyframeId reference() const { return local_map_.reference; }
   [[nodiscard]] const LocalMap& local_map() const { return local_map_; }

@@ -45,8 +45,8 @@ struct SnapshotOptions {
   bool annotations = true;            ///< title, legend, scale bar, axes, colour bar
   Viewpoint viewpoint;                ///< used by View::kExplicit only
   std::optional<Eigen::Vector3d> up;  ///< scene's up direction; none = estimated by estimate_up()
-  std::optional<std::pair<double, double>>
-      scalar_range;  ///< of the colour bar; none = 2nd to 98th percentile
+  /// Range of the colour bar; none: 2nd to 98th percentile.
+  std::optional<std::pair<double, double>> scalar_range;
 
   void declare(core::OptionTable& table);
 };

@@ -244,8 +244,8 @@ class Fusion {
     append(points, several_robots(), all);
     if (views_.covariances.empty()) return;
     std::vector<float>& sigmas = all.columns.others.front().values;
-    const PoseNoise* pose =
-        nullptr;  // of what has settled beyond the cells that were seen: as the one before
+    // Noise of the point's cell; a point outside all known cells takes that of the point before.
+    const PoseNoise* pose = nullptr;
     for (const FusedPoint& fused : points) {
       const Eigen::Vector3d at = fused.point.getVector3fMap().cast<double>() / kCell_m;
       const auto found = pose_noise_.find(pack_cell(cell_of(at)));

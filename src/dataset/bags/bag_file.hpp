@@ -19,7 +19,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 /// Messages larger than this are taken for damaged lengths.
 constexpr std::uint64_t kMostMessageBytes = std::uint64_t{1} << 28;
-/// So much of each message is there while a bag is scanned: a stamp and the beginning of what follows.
+/// Bytes of each message that are available while a bag is scanned: a stamp and the beginning of the rest.
 constexpr std::size_t kHeadBytes = 64;
 
 struct BagTopic {

@@ -147,8 +147,8 @@ core::Result<ExportSummary> write_glb(MapSource& source, const std::filesystem::
   const Json json = glb_json(*data, source.name(), source.frame_text());
   std::string text = json.dump();
   text.append((4 - text.size() % 4) % 4, ' ');
-  const std::size_t binary =
-      json["buffers"][0]["byteLength"].get<std::size_t>();  // all parts are whole words
+  // All parts are whole words.
+  const std::size_t binary = json["buffers"][0]["byteLength"].get<std::size_t>();
   const std::size_t whole = 12 + 8 + text.size() + 8 + binary;
   if (whole > std::numeric_limits<std::uint32_t>::max()) {
     return core::input_error(

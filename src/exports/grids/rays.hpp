@@ -12,7 +12,7 @@ namespace plumbline::exports {
 /// The rays of one view, in the frame of the results.
 struct ViewRays {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  std::vector<Eigen::Vector3f> ends;  ///< what was measured
+  std::vector<Eigen::Vector3f> ends;  ///< measured points
 };
 
 /// Calls `take` with the rays of each view of the map, in order; of each view about one ray in 6 x 6 pixels.

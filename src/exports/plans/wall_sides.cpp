@@ -18,7 +18,7 @@
 namespace plumbline::exports {
 namespace {
 
-constexpr double kWallSlab_m = 0.03;   ///< what lies within this of a plane is its wall
+constexpr double kWallSlab_m = 0.03;   ///< points within this distance of a plane belong to its wall
 constexpr double kWallUpright = 0.26;  ///< most of a normal that is vertical: 15 degrees
 constexpr float kWallAlike = 0.906F;   ///< cosine of 25 degrees
 constexpr double kShortestWall_m = 0.25;

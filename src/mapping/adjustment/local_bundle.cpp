@@ -100,8 +100,8 @@ class Builder {
         add_edge(edge.a, id, edge.b_from_a, edge.information / (motion_factor(edge.a) * motion_factor(id)));
       }
       if (!keyframe.reference.valid() || !map_.has_keyframe(keyframe.reference)) continue;
-      const double turning =
-          motion_factor(keyframe.reference) * motion_factor(id);  // what they see holds them all the less
+      // In a turn the observations count for less, so the tracked motion counts for more.
+      const double turning = motion_factor(keyframe.reference) * motion_factor(id);
       add_edge(keyframe.reference, id, keyframe.camera_from_reference,
                turning * turning * tracked_information(keyframe));
     }

@@ -56,8 +56,8 @@ class EdgeCollector {
 /// b_from_a. `steps` counts them.
 Matrix6d covariance_of_path(const maps::Map& map, const std::vector<KeyframeId>& ids, KeyframeId a,
                             KeyframeId b, int& steps) {
-  const Matrix6d step =
-      geometry::information_of(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();  // several edges hold each
+  // Smaller than of one edge, as several edges hold each keyframe.
+  const Matrix6d step = geometry::information_of(0.5 * kSigma_m, 0.5 * kSigma_rad).inverse();
   Matrix6d sum = Matrix6d::Zero();
   steps = 0;
   const Rigid3& b_from_world = map.camera_from_world(b);
@@ -114,12 +114,12 @@ double drift_factor(const std::vector<Discrepancy>& discrepancies) {
   return *middle;
 }
 
-/// Which edges from elsewhere stay out of the graph: what no drift explains would tear it before the others
-/// could tell that it is wrong.
+/// Edges from elsewhere that stay out of the graph: an edge that no drift explains would tear it before the
+/// others could show that it is wrong.
 struct Gating {
   double drift_factor = 1.0;
-  std::vector<double> chi2;   ///< of each; 0: nothing to hold it against
-  std::vector<bool> refused;  ///< of each
+  std::vector<double> chi2;   ///< of each edge; 0: there is nothing to compare it with
+  std::vector<bool> refused;  ///< by edge
 };
 
 Gating gate_edges(const maps::Map& map, const std::vector<KeyframeId>& ids,

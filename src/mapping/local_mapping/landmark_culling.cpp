@@ -3,8 +3,8 @@
 
 namespace plumbline::mapping {
 
-constexpr int kMaxAge =
-    100;  // keyframes; who was hardly visible by then is watched no longer: the list stays short
+// Age in keyframes after which a landmark is not checked any more: the list stays short.
+constexpr int kMaxAge = 100;
 
 void LandmarkCullingOptions::declare(core::OptionTable& table) {
   table.number("landmark.min_found", min_found_share, {0.0, 1.0}, "",

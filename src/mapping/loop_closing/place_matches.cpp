@@ -17,8 +17,8 @@ using features::FrameFeatures;
 
 constexpr std::uint32_t kMaxHamming = 72;
 constexpr double kRatio = 0.95;
-constexpr unsigned kIndexBits =
-    20;  // distance and index in one number: the least is the nearest, the first of them
+// Distance and index in one number: the least is the nearest, the first of them.
+constexpr unsigned kIndexBits = 20;
 
 /// The nearest of a row, and of each column what is nearest so far.
 PLUMBLINE_CLONES std::uint32_t take_nearest(const int* distances, std::uint32_t count, std::uint32_t row,

@@ -20,9 +20,9 @@ constexpr std::size_t kFewPoints = 60;
 
 // Limits within which a pair of points or lines fits a pose.
 constexpr double kNearest_m = 0.1;  // nothing nearer to the camera fits
-constexpr double kPoint_px =
-    4.5;                          // at octave 0: 3 standard deviations of 1.5 px, the landmark's own among it
-constexpr double kLine_px = 5.0;  // between the ends of one line and the other
+// Limit at octave 0: 3 standard deviations of 1.5 px, which includes the landmark's own error.
+constexpr double kPoint_px = 4.5;
+constexpr double kLine_px = 5.0;     // between the ends of one line and the other
 constexpr double kLineCosine = 0.9;  // between their directions
 double depth_gate_m(double measured_m) { return 0.03 + 4.0 * sensor::depth_sigma(measured_m); }
 

@@ -12,16 +12,16 @@ namespace plumbline::mapping {
 
 /// The direction in which the surfaces of the keyframes that agree hold least.
 struct FreeDirection {
-  double held = 0.0;       ///< mean squared cosine of their normals with it: 0 nothing holds, 1/3 as all
+  /// Mean squared cosine of their normals with it; 0: nothing holds, 1/3: all directions hold alike.
+  double held = 0.0;
   double held_next = 0.0;  ///< the same of the next direction: small too in front of a lone wall
-  double reach_m =
-      0.0;  ///< how far the cameras of both maps went along it (or along the wall), the smaller way
+  double reach_m = 0.0;    ///< extent of the cameras along it (or along the wall), the smaller of both maps
   /// Surfaces leave it free.
   [[nodiscard]] bool slides() const { return held < kHeld; }
   /// ... and hold in the two others: a corridor.
   [[nodiscard]] bool corridor() const { return slides() && held_next > kHeldWell; }
 
-  static constexpr double kHeld = 0.01;  ///< as if one sample in a hundred faced it
+  static constexpr double kHeld = 0.01;  ///< value if one sample in a hundred faced it
   static constexpr double kHeldWell = 0.1;
 };
 

@@ -16,7 +16,7 @@ inline Eigen::Vector3i corner_of(const Eigen::Vector3i& low, int corner, int sig
   return low + sign * Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2);
 }
 
-/// Every how manieth, so that no more than `most` are taken.
+/// Step through `count` items that takes no more than `most` of them.
 inline std::size_t stride(std::size_t count, std::size_t most) {
   return std::max<std::size_t>(1, (count + most - 1) / most);
 }

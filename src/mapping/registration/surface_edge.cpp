@@ -53,8 +53,8 @@ optimize::PosePrior weak_prior(const Rigid3& start, const Eigen::Vector3d& middl
 
 /// At the solution with the hold both pull alike: one step on, in what the surfaces hold, is without it.
 Rigid3 without_prior(const Rigid3& held, const optimize::PosePrior& prior, const Matrix6d& information) {
-  const Vector6d pull =
-      prior.information * geometry::log_se3(held * prior.camera_from_world.inverse());  // of the prior
+  // Gradient of the prior.
+  const Vector6d pull = prior.information * geometry::log_se3(held * prior.camera_from_world.inverse());
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
   Vector6d step = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {

@@ -23,7 +23,7 @@ class DebugFolder {
                                            const std::filesystem::path& out,
                                            const std::filesystem::path& out_path, bool replace);
 
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< where to write
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }  ///< folder to write to
   core::Result<void> commit() { return own_ ? own_->commit() : core::Result<void>(); }
 
  private:

@@ -110,7 +110,7 @@ core::Result<void> find_done(const RobotRecordings& recordings, ResumedRun& run)
   return {};
 }
 
-/// Whose maps they are.
+/// Assigns the stored maps to the robots of the run.
 void take_maps(std::vector<maps::StoredMap> maps, std::size_t robots, ResumedRun& run) {
   for (maps::StoredMap& stored : maps) {
     if (stored.map.keyframe_count() == 0) continue;

@@ -23,7 +23,7 @@ struct ResumedRun {
   std::optional<RobotMap> merged;  ///< or the map of all, when the run had done all but write its results
   std::vector<FrameRow> rows;      ///< of the frames that are done and could be read
   std::vector<bool> done;          ///< by frame: each robot's up to its last keyframe
-  std::size_t frames = 0;          ///< how many are done, the unreadable ones too
+  std::size_t frames = 0;          ///< number of frames done, unreadable ones included
   std::size_t keyframes = 0;
 };
 

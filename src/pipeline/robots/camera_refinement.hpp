@@ -20,11 +20,11 @@ namespace plumbline::pipeline {
 struct CameraReport {
   std::string robot;
   std::vector<mapping::CameraFinding> findings;
-  double gain = 0.0;           ///< by which share parts of the map fit better that it was not found from
-  std::string note;            ///< why nothing was found; empty: it was looked for
-  std::string doubt;           ///< why the camera must not be trusted; empty: nothing speaks against it
-  int asked = 0;               ///< times; the second time of a map made with what was found the first time
-  std::size_t from_frame = 0;  ///< what was found is used from this frame on; 0: from the first
+  double gain = 0.0;  ///< improvement of the fit on parts of the map that it was not estimated from, share
+  std::string note;   ///< why the camera was not estimated; empty: it was
+  std::string doubt;  ///< why the camera must not be trusted; empty: nothing speaks against it
+  int asked = 0;      ///< number of estimates; the second is of a map made with the result of the first
+  std::size_t from_frame = 0;  ///< first frame for which the result is used; 0: all
 };
 Json section_of(const CameraReport& camera);
 
