@@ -30,7 +30,7 @@ core::Result<FusionState> fusion_state_of(const std::vector<std::uint8_t>& bytes
   try {
     return core::decode<FusionState>(bytes);
   } catch (const core::BadBytes&) {
-    return core::input_error("what its clouds were laid down with is damaged; map the recording again");
+    return core::input_error("the state that its clouds were fused with is damaged; map the recording again");
   }
 }
 

@@ -44,10 +44,10 @@ core::Result<void> check_target(const fs::path& target, bool replace, OutputFold
 
   if (fs::is_empty(target, ec)) return {};
   if (!is_earlier(target)) {
-    return core::usage_error(
-        fmt::format("{}: exists, is not empty and is no earlier result; name a folder that does not exist "
-                    "yet (only earlier results are ever replaced)",
-                    target.string()));
+    return core::usage_error(fmt::format(
+        "{}: exists, is not empty and is not an earlier result; name a folder that does not exist "
+        "yet (only earlier results are ever replaced)",
+        target.string()));
   }
 
   if (!replace) {
@@ -78,7 +78,7 @@ core::Result<void> clear_leftover(const fs::path& partial, bool takes_over) {
   if (!fs::exists(partial, ec)) return {};
   if (!fs::is_empty(partial, ec) && !fs::exists(partial / kMarker, ec)) {
     return core::usage_error(fmt::format(
-        "{}: is in the way; results are written there first. Remove it or name another output folder",
+        "{}: is in the way: results are first written there; remove it or name another output folder",
         partial.string()));
   }
   if (takes_over) return {};

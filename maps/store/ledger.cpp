@@ -13,7 +13,7 @@ constexpr std::int64_t kLedgerApplication = 0x504c4e57;  // "PLNW", in the head 
 
 void check_ledger(Database& database) {
   if (database.number("PRAGMA application_id") != kLedgerApplication) {
-    throw StoreFailure(ErrorKind::kInput, "is no network.db of Plumbline; move it away");
+    throw StoreFailure(ErrorKind::kInput, "is not a network.db of Plumbline; move it away");
   }
 }
 

@@ -133,8 +133,9 @@ core::Result<StoredMap> StoreReader::load(const std::string& robot) const {
       names += (names.empty() ? "" : ", ") + info.name;
     }
   }
-  return core::input_error(impl_->file.string() + ": the maps of its robots (" + names +
-                           ") are not one yet; name one with --robot, or go on with plumbline map --resume");
+  return core::input_error(
+      impl_->file.string() + ": the maps of its robots (" + names +
+      ") are not merged yet; name one with --robot, or continue with plumbline map --resume");
 }
 
 template <typename IdType>

@@ -105,7 +105,7 @@ void check_store(Database& database) {
 
   if (application != kStoreApplication) {
     throw StoreFailure(core::ErrorKind::kInput,
-                       "is an SQLite file, but no map store; give the map.db of a result folder");
+                       "is an SQLite file, but not a map store; give the map.db of a result folder");
   }
 
   const std::int64_t format = database.number("PRAGMA user_version");
@@ -158,7 +158,7 @@ void check_file(const std::filesystem::path& file) {
     throw StoreFailure(core::ErrorKind::kInput, "no such file; give the map.db of a result folder");
   }
   if (!std::filesystem::is_regular_file(file, ignored)) {
-    throw StoreFailure(core::ErrorKind::kInput, "is no file; give the map.db of a result folder");
+    throw StoreFailure(core::ErrorKind::kInput, "is not a file; give the map.db of a result folder");
   }
   constexpr std::uintmax_t kHeaderBytes = 100;  // of any SQLite file; a shorter one opens as an empty one
   const std::uintmax_t bytes = std::filesystem::file_size(file, ignored);

@@ -26,7 +26,7 @@ SQLite::Database opened(const std::filesystem::path& file, Database::Access acce
 std::string remedy_of(int code) {
   switch (code & 0xff) {
     case SQLITE_FULL:
-      return "the disk is full; what was stored before is safe: free some space and go on from there";
+      return "the disk is full; what was stored before is safe: free some space and continue";
     case SQLITE_IOERR:
     case SQLITE_CANTOPEN:
       return "cannot be read or written; what was stored before is safe: check disk, folder and permissions";
@@ -37,7 +37,7 @@ std::string remedy_of(int code) {
     case SQLITE_LOCKED:
       return "is in use by another program; wait until that is done";
     case SQLITE_NOTADB:
-      return "is no map store; give the map.db of a result folder";
+      return "is not a map store; give the map.db of a result folder";
     default:
       return "damaged; use a copy of the file or map the recording again";
   }

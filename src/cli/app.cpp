@@ -107,10 +107,10 @@ void add_progress_option(CLI::App& command, Session& session) {
   const std::map<std::string, ProgressStyle> styles = {
       {"auto", ProgressStyle::kAuto}, {"json", ProgressStyle::kJson}, {"none", ProgressStyle::kNone}};
   command
-      .add_option("--progress", session.progress,
-                  "How progress is shown on stderr: json writes an object a line, for programs; messages "
-                  "stay as they are "
-                  "(default: auto, one line that is rewritten on a terminal, else lines)")
+      .add_option(
+          "--progress", session.progress,
+          "Progress on stderr: json writes one object per line, for programs; messages are not affected "
+          "(default: auto, one line that is rewritten on a terminal, else lines)")
       ->type_name("auto|json|none")
       ->transform(CLI::CheckedTransformer(styles));
 }
@@ -163,9 +163,8 @@ void add_topic_option(CLI::App& command, dataset::OpenOptions& open) {
   command
       .add_option_function<std::vector<std::string>>(
           "--topic", take,
-          "Of a bag or a live camera: the topic of color, depth, info (colour's CameraInfo) or depth_info, "
-          "where it is not "
-          "found by itself; may be repeated")
+          "Topic of a bag or a live camera, if it is not found automatically: color, depth, info (colour's "
+          "CameraInfo) or depth_info; may be repeated")
       ->type_name("WHAT=/TOPIC")
       ->allow_extra_args(false);
 }

@@ -10,26 +10,24 @@ void add_live_options(CLI::App& command, pipeline::MapRequest& request) {
   dataset::LiveOptions& live = request.open.live;
   command
       .add_option("--for", live.for_s,
-                  "Of a live camera: end this many seconds after its first frame (default: at Ctrl-C)")
+                  "Live camera: end this many seconds after its first frame (default: at Ctrl-C)")
       ->type_name("S")
       ->transform(
           CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1.0}, {"min", 60.0}, {"h", 3600.0}},
                                 CLI::AsNumberWithUnit::CASE_SENSITIVE, "TIME"))
       ->check(CLI::PositiveNumber);
   command
-      .add_option(
-          "--record", live.record,
-          "Of a live camera: also write the frames that are mapped to this MCAP file; mapping that gives "
-          "the same bytes")
+      .add_option("--record", live.record,
+                  "Live camera: also write the mapped frames to this MCAP file, which gives the same bytes "
+                  "when mapped")
       ->type_name("FILE.mcap");
 }
 
 void add_publish_option(CLI::App& command, std::string& address) {
   command
-      .add_option(
-          "--publish", address,
-          "Publish the map while it is made, for RViz and others on ROS 2's network: /tf, paths, points "
-          "(docs/guide/inputs.md)")
+      .add_option("--publish", address,
+                  "Publish the growing map on ROS 2's network, for RViz and others: /tf, paths, points "
+                  "(docs/guide/inputs.md)")
       ->type_name("ros2://DOMAIN");
 }
 

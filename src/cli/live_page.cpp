@@ -8,7 +8,9 @@ void add_live_options(CLI::App& command, PageAddress& page) {
       .add_option("--http", page.http,
                   "Show the map in the browser while it grows, at this address (127.0.0.1:8080)")
       ->type_name("HOST:PORT");
-  command.add_option("--http-token", page.token, "Asked of every browser: the address that is told has it")
+  command
+      .add_option("--http-token", page.token,
+                  "Token that every browser must present; it is part of the address that is printed")
       ->type_name("TEXT");
 }
 

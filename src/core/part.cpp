@@ -64,14 +64,14 @@ Result<const void*> load_part(const std::string& name, std::uint64_t layout) {
   if (folder == folders.end()) {
     return failure(
         ErrorKind::kInternal,
-        fmt::format("{}: this part of Plumbline is missing; {}, it belongs into {}", file, remedy(name),
+        fmt::format("{}: this part of Plumbline is missing; {}. It belongs in {}", file, remedy(name),
                     folders.empty() ? "lib/plumbline" : folders.front().lexically_normal().string()));
   }
 
   const std::string path = (*folder / file).lexically_normal().string();
   const auto unfit = [&path](const std::string& why) {
     return failure(ErrorKind::kInternal,
-                   fmt::format("{}: this part of Plumbline {}; install Plumbline anew", path, why));
+                   fmt::format("{}: this part of Plumbline {}; install Plumbline again", path, why));
   };
 
   void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);

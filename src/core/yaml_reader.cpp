@@ -259,7 +259,7 @@ std::optional<ConfigNode> parse_yaml(const std::string& text, const std::string&
                                      ConfigProblems& problems) {
   try {
     if (text.size() > kMaxBytes) {
-      throw Refused{{{file_name, 0, 0}, "", "the file is over 1 MB; this is no configuration file"}};
+      throw Refused{{{file_name, 0, 0}, "", "the file is over 1 MB; this is not a configuration file"}};
     }
 
     check_characters(text, file_name);

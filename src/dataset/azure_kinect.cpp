@@ -123,7 +123,7 @@ core::Result<AzureCamera> camera_in_mode(const json& camera, const AzureMode& mo
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r->data());
   const double bent = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(bent < 1e-3) || rotation.determinant() < 0.0)
-    return core::input_error("its calibration is damaged: Rt is no rotation");
+    return core::input_error("its calibration is damaged: Rt is not a rotation");
   result.from_rig =
       geometry::Rigid3(Eigen::Quaterniond(rotation), Eigen::Vector3d((*t)[0], (*t)[1], (*t)[2]));
   return result;
@@ -215,10 +215,9 @@ core::Result<std::unique_ptr<AzureKinectFile>> AzureKinectFile::open(const std::
   std::unique_ptr<AzureKinectFile> opened(new AzureKinectFile(file, **demuxer));
   ContainerContents contents;
   opened->container_ = (*demuxer)->open(file.c_str(), contents);
-  if (opened->container_ == nullptr)
-    return core::input_error(file + ": is no Matroska file that can be read");
+  if (opened->container_ == nullptr) return core::input_error(file + ": is not a readable Matroska file");
   if (auto understood = opened->understand(contents); !understood) {
-    return core::input_error(fmt::format("{}: is no recording of an Azure Kinect with colour and depth: {}",
+    return core::input_error(fmt::format("{}: is not an Azure Kinect recording with colour and depth: {}",
                                          file, understood.error().message));
   }
   return opened;

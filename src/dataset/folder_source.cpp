@@ -64,7 +64,7 @@ class FolderSource final : public FrameSource {
     const PairInfo& pair = layout_.pairs.at(index);
     if (pair.camera >= 0) {
       return core::usage_error(
-          name_ + ": each of its images has a camera of its own, which no copy could say; map it as it is");
+          name_ + ": each image has its own camera, which a copy cannot describe; map the original");
     }
     auto color = stored_image(pair.color_file);
     if (!color) return tl::unexpected(color.error());

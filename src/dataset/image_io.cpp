@@ -27,7 +27,8 @@ core::Result<Bytes> read_bytes(const std::filesystem::path& file) {
   Bytes bytes(static_cast<std::size_t>(size));
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!stream)
-    return core::input_error(fmt::format("{}: cannot be read: no right or disk error", file.string()));
+    return core::input_error(
+        fmt::format("{}: cannot be read: no permission, or a disk error", file.string()));
   return bytes;
 }
 

@@ -81,10 +81,10 @@ Decoded decode_npy(const Bytes& file) {
   const std::string_view order = after_key(header->text, "fortran_order");
   if (type < 0 || shape.size() != 2 || order.substr(0, 6).find("False") == std::string_view::npos) {
     return tl::unexpected<std::string>(
-        "this .npy is no image: needed are two dimensions of '<f4', '<f8' or '<u2', row by row");
+        "this .npy is not an image: it needs two dimensions of '<f4', '<f8' or '<u2', row by row");
   }
   if (shape[0] * shape[1] > kMaxPixels || shape[0] * shape[1] < 1)
-    return tl::unexpected(fmt::format("{}x{} is none of an image", shape[1], shape[0]));
+    return tl::unexpected(fmt::format("{}x{} is not the size of an image", shape[1], shape[0]));
   const std::size_t bytes = static_cast<std::size_t>(shape[0] * shape[1]) * CV_ELEM_SIZE(type);
   if (file.size() - header->numbers_at < bytes)
     return tl::unexpected<std::string>("the file ends before its numbers do");

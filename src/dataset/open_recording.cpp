@@ -64,7 +64,7 @@ core::Result<Layout> read_any(const fs::path& path, const OpenOptions& open, con
   if (any && is_bag(path)) return read_bag(path, open.topics, options, log);
   if (open.topics.any()) {
     return core::usage_error(
-        fmt::format("{}: is no bag, and --topic is about topics of bags; leave it out", path.string()));
+        fmt::format("{}: is not a bag, and --topic is for bags only; leave it out", path.string()));
   }
   if (!is_folder(path) && layout_of(path) == nullptr) return core::input_error(not_a_recording_file(path));
   return read_layout(path, open.format, options, log);
@@ -100,7 +100,7 @@ void drop_same_stamps(const std::string& folder, std::vector<PairInfo>& pairs, c
 core::Result<void> select(const OpenOptions& options, const std::string& folder,
                           std::vector<PairInfo>& pairs) {
   if (options.every < 1) {
-    return core::usage_error(fmt::format("every {} makes no sense (allowed: 1 and more)", options.every));
+    return core::usage_error(fmt::format("every: {} is not possible (allowed: 1 and more)", options.every));
   }
   const double start = pairs.front().stamp;
   const double duration = pairs.back().stamp - start;

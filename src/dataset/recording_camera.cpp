@@ -64,7 +64,7 @@ core::Result<std::optional<fs::path>> find_camera_file(const fs::path& folder, c
     const fs::path file = folder / kCameraFiles[i];
     if (!fs::exists(file, ignored)) continue;
     if (i < kMustBeCameras || sensor::is_foreign_camera_file(file, true)) return file;
-    log.warning(fmt::format("{}: is no camera file that is known; not used", file.string()));
+    log.warning(fmt::format("{}: is not a known camera file; it is not used", file.string()));
   }
   const std::vector<fs::path> found = foreign_camera_files(folder);
   if (found.empty()) return std::nullopt;
@@ -264,8 +264,8 @@ core::Result<sensor::Camera> guess(const fs::path& folder, const Layout& layout,
         folder.string()));
   }
   std::string text = fmt::format(
-      "{}: no camera.yaml; taken for a {} by the size of its images, with fx = fy = {:g}: a "
-      "guess; put a camera.yaml there or name one with --camera",
+      "{}: no camera.yaml; its images have the size of a {}, so fx = fy = {:g} is guessed; put a camera.yaml "
+      "there or name one with --camera",
       folder.string(), camera->name, camera->color.fx);
   if (layout.format == "7scenes") {
     text +=
@@ -331,7 +331,7 @@ core::Result<sensor::Camera> complete_camera(const fs::path& folder, const std::
   const int full_width = camera.color.width;
   reduce_color(camera);
   if (camera.color.width < full_width) {
-    log.info(fmt::format("{}: colour is made smaller, to {}x{}, and depth of {}x{} brought up to that",
+    log.info(fmt::format("{}: colour is reduced to {}x{}, and depth of {}x{} is scaled up to that",
                          folder.string(), camera.color.width, camera.color.height, camera.depth->width,
                          camera.depth->height));
   }

@@ -22,7 +22,7 @@ core::Result<std::vector<RawLine>> read_raw_lines(const std::filesystem::path& f
   std::ifstream stream(file);
   std::error_code ignored;
   if (!stream || std::filesystem::is_directory(file, ignored)) {
-    return core::input_error(fmt::format("{}: cannot be read: missing or no right", file.string()));
+    return core::input_error(fmt::format("{}: cannot be read: missing, or no permission", file.string()));
   }
   std::vector<RawLine> lines;
   std::string text;

@@ -39,7 +39,7 @@ core::Result<void> VideoFrames::open() {
   if (!decoder) return tl::unexpected(decoder.error());
   decoder_ = *decoder;
   video_ = decoder_->open(file_.c_str());
-  if (video_ == nullptr) return core::input_error(file_ + ": is no video that can be decoded");
+  if (video_ == nullptr) return core::input_error(file_ + ": is not a video that can be decoded");
   return {};
 }
 

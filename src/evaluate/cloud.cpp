@@ -252,8 +252,8 @@ void warn_when_apart(const CloudOptions& options, CloudReport& report) {
   report.warnings.push_back(fmt::format(
       "half of the cloud lies {:.0f} mm or more from the reference: {}", report.accuracy_mm.median,
       options.align == CloudAlignment::kNone
-          ? "the two are hardly in one frame; lay them on each other first with --align se3 (and "
-            "--trajectory EST --truth GT if these are not found by themselves)"
+          ? "the two are hardly in one frame; align them first with --align se3 (and --trajectory EST "
+            "--truth GT if that does not suffice)"
           : "the alignment found no good start; give it the cloud's path and its truth with --trajectory EST "
             "--truth GT"));
 }

@@ -58,7 +58,7 @@ core::Result<Choice> chosen_by_name(const ExportRequest& request) {
     if (holds(format, request.content)) return Choice{&format, request.content};
     if (request.content == Content::kCloud) return Choice{&format, format.contents.front()};
     return core::usage_error(
-        fmt::format("--format {}: does not hold the map's {}", format.name, content_name(request.content)));
+        fmt::format("--format {}: cannot hold the map's {}", format.name, content_name(request.content)));
   }
   return core::usage_error(fmt::format("--format {}: there is no such format (allowed: {}){}", request.format,
                                        fmt::join(names, ", "), core::hint(request.format, names)));
@@ -86,15 +86,13 @@ core::Result<Choice> chosen_by_ending(const ExportRequest& request) {
   if (best.format != nullptr && !text_of_a_path) return best;
   std::sort(endings.begin(), endings.end());
   endings.erase(std::unique(endings.begin(), endings.end()), endings.end());
-  return core::usage_error(
-      fmt::format("{}: the ending tells no form that the map's {} is written in (allowed: {}); "
-                  "or choose with --format",
-                  request.output.string(), content_name(request.content), fmt::join(endings, ", ")));
+  return core::usage_error(fmt::format(
+      "{}: this ending is not that of a format for the map's {} (allowed: {}); or choose with --format",
+      request.output.string(), content_name(request.content), fmt::join(endings, ", ")));
 }
 
 core::Result<Choice> chosen(const ExportRequest& request) {
-  if (request.output.empty())
-    return core::usage_error("nothing is to be written; name a file or a folder with -o");
+  if (request.output.empty()) return core::usage_error("no output is named; name a file or a folder with -o");
   return request.format.empty() ? chosen_by_ending(request) : chosen_by_name(request);
 }
 
@@ -114,9 +112,9 @@ core::Result<void> check_options(const ExportRequest& request, const Choice& cho
     if ((in(format.options) || in(common_options())) && !idle) continue;
     std::vector<std::string> flags;
     for (const std::string& own : format.options) flags.push_back(flag_of(own));
-    return core::usage_error(fmt::format("{}: means nothing to {}{} (which takes {}{}--box, --z, --storey)",
-                                         flag_of(key), format.name, idle ? " without --mesh" : "",
-                                         fmt::join(flags, ", "), flags.empty() ? "" : ", "));
+    return core::usage_error(fmt::format(
+        "{}: is not an option of {}{} (which takes {}{}--box, --z, --storey)", flag_of(key), format.name,
+        idle ? " without --mesh" : "", fmt::join(flags, ", "), flags.empty() ? "" : ", "));
   }
   return {};
 }

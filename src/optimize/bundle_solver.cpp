@@ -123,7 +123,7 @@ RoundSummary BundleRound::run(BundleState& state) {
   summary.initial_cost = summary.final_cost = linearise(state);
   summary.iterations = 1;
   if (!std::isfinite(summary.initial_cost)) {
-    summary.message = "the cost is not a number: an observation or a pose is none";
+    summary.message = "the cost is not a number, because an observation or a pose is not";
     return summary;
   }
   summary.usable = true;

@@ -78,7 +78,7 @@ class MapRound {
 
     double cost = 0.0;
     if (!ceres_.Evaluate({}, &cost, nullptr, nullptr, nullptr))  // or Ceres would print that it cannot
-      return {0.0, 0.0, 0, false, "the cost is not a number: an observation or a pose is none"};
+      return {0.0, 0.0, 0, false, "the cost is not a number, because an observation or a pose is not"};
 
     const ceres::Solver::Summary solved = optimize::solve(std::move(solver), ceres_);
     if (!solved.IsSolutionUsable()) return {0.0, 0.0, 0, false, solved.message};

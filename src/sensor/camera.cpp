@@ -86,7 +86,7 @@ void read_color_from_depth(const ConfigNode& node, Camera& camera, ConfigProblem
   const std::optional<Eigen::Matrix4d> matrix = read_matrix(node);
   if (!matrix) {
     problems.push_back(
-        {node.mark, path, "is no 4x4 matrix (allowed: four lists of four numbers, or 16 numbers)"});
+        {node.mark, path, "is not a 4x4 matrix (allowed: four lists of four numbers, or 16 numbers)"});
     return;
   }
   const Eigen::Matrix3d r = matrix->topLeftCorner<3, 3>();
@@ -143,7 +143,7 @@ void read_depth_camera(const ConfigNode& root, Camera& camera, ConfigProblems& p
   if (depth == nullptr) return;
   if (transform == nullptr) {
     problems.push_back({depth->mark, "color_from_depth",
-                        "is missing: with a depth camera of its own, say where it sits (4x4, metres)"});
+                        "is missing: a separate depth camera needs its pose (4x4, metres)"});
   }
   if (depth->kind != ConfigNode::Kind::kMap) {
     problems.push_back({depth->mark, "depth", "must hold the keys width height fx fy cx cy"});
@@ -192,7 +192,7 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
 
   ConfigProblems problems;
   if (root->kind != ConfigNode::Kind::kMap && root->kind != ConfigNode::Kind::kNull) {
-    problems.push_back({root->mark, "", "is no camera file: expected lines such as 'fx: 525.0'"});
+    problems.push_back({root->mark, "", "is not a camera file: expected lines such as 'fx: 525.0'"});
     return tl::unexpected(core::to_error(problems));
   }
   if (root->mark.file.empty()) root->mark = {file.string(), 1, 1};

@@ -37,11 +37,12 @@ void TrackerOptions::declare(core::OptionTable& table) {
   table.boolean("depth", depth, "Align depth with the surfaces of the local map");
   table.boolean("align_stamps", align_stamps,
                 "Synchronise colour and depth with different stamps by the motion model");
-  table.boolean("thumbnails", thumbnails, "Small images tell where the camera may be");
-  table.boolean("motion_prior", motion_prior, "The motion model holds what measurements leave open");
+  table.boolean("thumbnails", thumbnails, "Search for the camera's pose with small images");
+  table.boolean("motion_prior", motion_prior,
+                "Hold directions that measurements leave open by the motion model");
   table.boolean(
       "pnp_start", pnp_start,
-      "Every frame begins with PnP over descriptors, where these are enough, not with the motion model");
+      "Start every frame with PnP over descriptors, if there are enough, instead of the motion model");
   table.number("readout", readout_s, {0.0, 0.1}, "s",
                "Rolling shutter: time from the first to the last row of an image; 0: from the camera file");
   table.integer("min_inliers", min_inliers, {3, 1000}, "",

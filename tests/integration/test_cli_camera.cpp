@@ -145,7 +145,7 @@ TEST_F(CameraRefinement, WithoutAFileTheCameraIsAGuessThatTheRecordingConfirms) 
   fs::remove(path("bare/camera.yaml"));
   const Outcome o = map("bare -o out");
   ASSERT_EQ(o.code, 0) << o;
-  EXPECT_TRUE(o.told("no camera.yaml; taken for a Kinect")) << o;
+  EXPECT_TRUE(o.told("no camera.yaml; its images have the size of a Kinect")) << o;
   EXPECT_NEAR(fx_of(path("out/camera.yaml")), true_fx_, 0.01 * true_fx_);
   const Outcome off = map("bare -o off --set track.camera.refine=off");
   EXPECT_EQ(off.code, 4) << off;

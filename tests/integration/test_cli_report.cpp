@@ -214,7 +214,7 @@ TEST_F(Report, TellsOfSeveralRobots) {
   ASSERT_EQ(fused.code, 0) << fused;
   const std::string html = page("out --truth world/robot0");
   for (const char* text : {"id=\"merges\"", "Evidence: ", "all, one alignment", "Robots</th><td>a, b",
-                           "Points by who saw them most", "How well the finished map fits",
+                           "Points by the robot that saw them most", "Fit of the finished map",
                            "adjusted together", "why pairs of keyframes were refused"}) {
     EXPECT_TRUE(has(html, text)) << text;
   }

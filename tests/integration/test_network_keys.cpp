@@ -68,7 +68,7 @@ TEST_F(Keys, WhoHasNoneOrOthersGetsNothing) {
   for (Process* process : {&none, &foreign, &revoked}) {
     EXPECT_EQ(process->wait(60.0), 0) << process->told();
     EXPECT_NE(process->told().find("no answer in 10 s"), std::string::npos) << process->told();
-    EXPECT_NE(process->told().find("To hand it in later"), std::string::npos) << process->told();
+    EXPECT_NE(process->told().find("To send it later"), std::string::npos) << process->told();
   }
   EXPECT_FALSE(fs::exists(path("out.partial/robots/b")));
   EXPECT_FALSE(fs::exists(path("out.partial/robots/c")));

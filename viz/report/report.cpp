@@ -34,7 +34,7 @@ core::Result<void> check_output(const fs::path& file, bool replace) {
   if (!fs::is_regular_file(file, ec)) return {};
   if (!is_report(file)) {
     return core::usage_error(fmt::format(
-        "{}: exists and is no report; name another file (only reports are ever replaced)", file.string()));
+        "{}: exists and is not a report; name another file (only reports are ever replaced)", file.string()));
   }
   if (replace) return {};
   return core::usage_error(fmt::format(

@@ -165,7 +165,7 @@ std::string saved_html(const ReportData& data) {
     } else if (json.is_object() && (json.contains("accuracy_mm") || json.contains("wall_thickness_mm"))) {
       clouds.row(json, {name});
     } else {
-      out += note(name + " is no output of plumbline evaluate --json.");
+      out += note(name + " is not output of plumbline evaluate --json.");
     }
   }
 

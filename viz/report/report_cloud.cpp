@@ -38,7 +38,7 @@ void add_robots(const ReportData& data, Facts& facts) {
                         name != data.robot_names.end() ? name->second : fmt::format("robot {}", i),
                         count_text(static_cast<double>(counts[i])));
   }
-  facts.emplace_back("Points by who saw them most", text);
+  facts.emplace_back("Points by the robot that saw them most", text);
 }
 
 /// Adds the points that filters removed from the clouds of keyframes, or from the merged one.

@@ -111,7 +111,7 @@ std::string what_is(const std::string& name) {
        {"map.db", "the map itself: for fuse, export, render and --resume"},
        {"trajectory.txt", "camera poses of the tracked frames, TUM format"},
        {"keyframes.txt", "camera poses of the keyframes, TUM format"},
-       {"keyframes.csv", "the same, how exactly they are known, and what holds them"},
+       {"keyframes.csv", "the same with their accuracy and number of constraints"},
        {"lines.ply", "3D lines as edges"},
        {"frames.csv", "one line a frame: what tracking saw and decided"},
        {"timing.csv", "one line a frame: milliseconds by stage, memory"},

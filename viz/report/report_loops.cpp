@@ -55,7 +55,7 @@ std::string merge_evidence(const Json& m) {
           {"Surfaces overlap", "{/overlap:0 %}"},
           {"Spread of the keyframes",
            "{/span_m:2 m} and {/span_rad:0 deg} apart; they agree to {/spread_m:1 mm}"},
-          {"Pairs of the pose graph", "{/pairs}, of which {/rejected} were taken for wrong"}});
+          {"Pairs of the pose graph", "{/pairs}, of which {/rejected} were rejected"}});
   facts.insert(facts.begin(),
                {"Decision", flag_at(m, "/accepted") ? "merged" : "not merged: " + text_at(m, "/reason")});
 
@@ -118,7 +118,7 @@ std::string fit_html(const ReportData& data) {
   add("Points, in the picture", data.fit->points_px, 2, "px");
   add("Points, depth", data.fit->depths_mm, 1, "mm");
   add("Ends of lines, across the line", data.fit->lines_px, 2, "px");
-  return table.rows() == 0 ? "" : "<h3>How well the finished map fits</h3>\n" + table.html();
+  return table.rows() == 0 ? "" : "<h3>Fit of the finished map</h3>\n" + table.html();
 }
 
 std::string sigma_text(const Json& s) {
@@ -165,7 +165,7 @@ std::string closings_html(const ReportData& data) {
   std::string out =
       paragraph(filled(data.summary,
                        "{/loops/candidates} candidates, {/loops/verified} verified; loops moved the map "
-                       "{/loops/accepted} times; the pose graph took {/loops/rejected} for wrong."));
+                       "{/loops/accepted} times; the pose graph rejected {/loops/rejected}."));
   if (!list_at(data.summary, "/loops/disputes").empty()) out += disputes_html(data);
   if (closed.rows() > 0) out += "<h3>Closed</h3>\n" + closed.html();
 
@@ -245,13 +245,13 @@ std::string refinement_html(const ReportData& data) {
   }
 
   Facts facts = filled_facts(
-      s, {{"Local maps", "{/refine/local_maps}"},
-          {"Alignments of their surfaces",
-           "{/refine/tried} tried, {/refine/accepted} used; the pose graph took {/refine/rejected} of them "
-           "for wrong"},
-          {"Mean rms of the surfaces aligned", "{/refine/mean_rms:2 σ of the depth noise}"},
-          {"Keyframes moved", "{/refine/mean_shift_m:1 mm} on average, {/refine/max_shift_m:1 mm} at most"}});
-  facts.emplace_back("Standard deviation of keyframes beside the first", sigma_text(s));
+      s,
+      {{"Local maps", "{/refine/local_maps}"},
+       {"Alignments of their surfaces",
+        "{/refine/tried} tried, {/refine/accepted} used; the pose graph rejected {/refine/rejected} of them"},
+       {"Mean rms of the surfaces aligned", "{/refine/mean_rms:2 σ of the depth noise}"},
+       {"Keyframes moved", "{/refine/mean_shift_m:1 mm} on average, {/refine/max_shift_m:1 mm} at most"}});
+  facts.emplace_back("Standard deviation of keyframes relative to the first", sigma_text(s));
 
   std::string out = facts_html(facts);
   out += adjustment_html(s);

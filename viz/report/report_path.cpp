@@ -159,8 +159,8 @@ std::string numbers(const ReportData& data) {
                                         number_text(last.stamp - data.start_s, 1, "s")));
     table.value("Length", number_text(path.length_m(), 2, "m"));
     table.value("Mean speed", number_text(time_s > 0.0 ? path.length_m() / time_s : kNaN, 2, "m/s"));
-    table.value("Reach along x, y, z", fmt::format("{:.2f}, {:.2f}, {:.2f} m", reach(path.poses, 0),
-                                                   reach(path.poses, 1), reach(path.poses, 2)));
+    table.value("Extent along x, y, z", fmt::format("{:.2f}, {:.2f}, {:.2f} m", reach(path.poses, 0),
+                                                    reach(path.poses, 1), reach(path.poses, 2)));
     table.value("End from start", number_text(apart_m, 3, "m"));
   }
 

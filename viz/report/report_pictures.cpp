@@ -17,7 +17,7 @@ struct Caption {
   const char* name;
   const char* text;
 };
-constexpr std::array<Caption, 7> kCaptions{{{"iso", "From aslant; surfaces that face away are left out"},
+constexpr std::array<Caption, 7> kCaptions{{{"iso", "Obliquely; surfaces that face away are left out"},
                                             {"top", "From above, true to scale"},
                                             {"front", "From the front, true to scale"},
                                             {"back", "From the back, true to scale"},
@@ -51,7 +51,7 @@ std::string snapshots_html(ReportData& data) {
       const std::string name = fmt::format("snapshots/{}{}.png", by_robot ? "robots_" : "", caption.name);
       if (!fs::exists(data.folder / name, ec)) continue;
       const std::string what =
-          by_robot ? std::string(caption.text) + "; colours tell which robot saw it" : caption.text;
+          by_robot ? std::string(caption.text) + "; colours show which robot saw it" : caption.text;
       const std::string picture = picture_html(data.folder / name, what);
       if (picture.empty()) data.missing.push_back(name + " is damaged");
       out += picture;

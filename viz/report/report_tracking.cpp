@@ -29,8 +29,8 @@ class RobotCharts {
            chart("features that fit", "inliers",
                  {line("points", column("points"), "k0"), line("lines", column("lines"), "k1")}) +
            chart("samples of surfaces that fit", "surface", {line("", column("surface"), "k2")}) +
-           chart("how well the pose is held in its weakest direction", "1 σ (mm)",
-                 {line("", weakest_mm(), "k3")}, true, true);
+           chart("accuracy of the pose in its weakest direction", "1 σ (mm)", {line("", weakest_mm(), "k3")},
+                 true, true);
   }
 
   void report(RobotTable& table) const {
@@ -63,7 +63,7 @@ class RobotCharts {
     table.value("Tracked", share(tracked));
     table.value("Made keyframes", count(keyframes));
 
-    table.value("Found again by what the picture looks like", count(found_again));
+    table.value("Found again by appearance", count(found_again));
     table.value("Held to no better than 2 cm in some direction", share(weak));
     table.value("Points that fit, median", family("points"));
     table.value("Lines that fit, median", family("lines"));
@@ -125,7 +125,7 @@ class RobotCharts {
     chart.bands = bands_;
 
     viz::SvgDots keyframes{"keyframes", "plain", {}, {}, 2.5, false};
-    viz::SvgDots found{"found again by its looks", "k1", {}, {}, 4.5, true};
+    viz::SvgDots found{"found again by appearance", "k1", {}, {}, 4.5, true};
 
     for (std::size_t i = 0; i < frames_.rows.size(); ++i) {
       const auto is = [&](const char* name, double least) {

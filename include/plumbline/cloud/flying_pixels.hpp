@@ -37,9 +37,9 @@ class FlyingPixels : public ChoosingFilter<PointT> {
   void setSigmas(double sigmas) { sigmas_ = sigmas; }
   /// Surfaces up to this angle from face on may be that steep, radians in (0, pi / 2).
   void setMaxAngle(double max_angle_rad) { max_angle_rad_ = max_angle_rad; }
-  /// Cells removed beside the two at a jump, >= 0.
+  /// Number of further cells to remove on both sides of a jump, >= 0.
   void setMargin(int margin) { margin_ = margin; }
-  /// Points with fewer of their 8 neighbours on the same surface go, 0 to 8.
+  /// Remove points with fewer of their 8 neighbours on the same surface, 0 to 8.
   void setMinNeighbours(int min_neighbours) { min_neighbours_ = min_neighbours; }
 
  protected:

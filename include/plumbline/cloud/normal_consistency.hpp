@@ -29,7 +29,7 @@ class NormalConsistency : public ChoosingFilter<PointT> {
 
   /// Number of nearest neighbours to compare, >= 1.
   void setNeighbours(int neighbours) { neighbours_ = neighbours; }
-  /// Between normals that agree, radians in [0, pi].
+  /// Largest angle between normals that agree, radians in [0, pi].
   void setMaxAngle(double max_angle_rad) { max_angle_rad_ = max_angle_rad; }
   /// Share of the neighbours that must agree, 0 to 1; more than 1/2 eats edges.
   void setMinShare(double min_share) { min_share_ = min_share; }

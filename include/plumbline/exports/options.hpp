@@ -23,7 +23,7 @@ struct ExportOptions {
   double resolution_m = 0.0;              ///< edge of a cell or of a mesh's triangles; 0: 5 cm and 2 cm
   std::vector<double> heights{0.1, 1.8};  ///< over the floor; what lies between them is in the way
   // Pictures and models.
-  bool text = false;      ///< COLMAP's text files instead of binary ones
+  bool text = false;      ///< Write COLMAP's text files instead of binary ones
   int every = 0;          ///< every n-th tracked frame besides the keyframes; 0: keyframes only
   bool sharpest = false;  ///< of each keyframe's neighbourhood
   int dense_points = 0;   ///< number of points of the cloud to write instead of landmarks; 0: landmarks

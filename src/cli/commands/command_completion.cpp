@@ -205,7 +205,7 @@ void add_man(CLI::App& app, Session& session) {
 
 void add_complete(CLI::App& app, Session& session) {
   const auto request = std::make_shared<CompleteRequest>();
-  CLI::App* command = app.add_subcommand("complete", "What the scripts of `plumbline completion` ask");
+  CLI::App* command = app.add_subcommand("complete", "Used by the scripts of `plumbline completion`");
   command->group("");  // not for people
   command->add_option("--line", request->line);
   command->add_option("--word", request->word);

@@ -61,7 +61,7 @@ core::Result<void> run_export(ExportCommand& command, Session& session) {
     return core::usage_error("MAP is required: a result folder, map.db, or a cloud file");
   if (auto applied = command.flags.apply(); !applied) return applied;
   if (request.output.empty() && command.keyframes.empty())
-    return core::usage_error("nothing is to be written; name a file with -o or a folder with --keyframes");
+    return core::usage_error("no output is named; name a file with -o or a folder with --keyframes");
 
   if (!command.keyframes.empty()) {
     auto done = export_keyframes(command);
@@ -105,13 +105,15 @@ std::string formats_help() {
 
 void add_export(CLI::App& app, Session& session) {
   const auto state = std::make_shared<ExportCommand>();
-  CLI::App* command = add_command(app, session, "export", "Write a map in the forms that other programs read",
+  CLI::App* command = add_command(app, session, "export", "Write a map in formats of other programs",
                                   [&session, state] { return run_export(*state, session); });
 
   exports::ExportRequest& request = state->request;
   command->add_option("MAP", request.input,
-                      "A result folder, also of a run that was interrupted, map.db, or a cloud file");
-  command->add_option("-o,--output", request.output, "File to write, or folder for the formats that are one")
+                      "Result folder (of an interrupted run, too), map.db, or cloud file");
+  command
+      ->add_option("-o,--output", request.output,
+                   "File to write, or a folder for formats that consist of several files")
       ->type_name("FILE|FOLDER");
   command
       ->add_option("--format", request.format, "One of the formats below (default: by the output's ending)")
@@ -128,7 +130,7 @@ void add_export(CLI::App& app, Session& session) {
 
   command
       ->add_option("--recording", request.recordings,
-                   "Where pictures come from, one for each robot (default: what the map was made from)")
+                   "Recordings for the pictures, one per robot (default: those the map was made from)")
       ->type_name("INPUT")
       ->allow_extra_args(false);
 
@@ -143,7 +145,7 @@ void add_export(CLI::App& app, Session& session) {
   command->add_flag("--mesh", state->mesh, "Write the cloud as a mesh, .ply, .obj or .glb")->excludes(what);
 
   command->add_flag("--force", request.replace, "Replace the folder of an earlier export");
-  command->add_flag("--describe", state->page, "Print the page of all formats, docs/guide/exports.md");
+  command->add_flag("--describe", state->page, "Print a page about all formats (docs/guide/exports.md)");
   add_progress_option(*command, session);
   state->flags.add(*command, request.options);
   command->footer(formats_help());

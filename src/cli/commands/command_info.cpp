@@ -59,7 +59,7 @@ core::Result<void> describe_store(const std::filesystem::path& file) {
   fmt::print("store: {}\nstore.format: {}\nstore.program: plumbline {}\nstore.robot: {}\n", file.string(),
              header.format, header.program_version, robots);
   fmt::print("store.complete: {}\n",
-             contents->complete ? "yes" : "no; map --resume goes on from it, export and render read it");
+             contents->complete ? "yes" : "no; map --resume continues it, export and render read it");
   fmt::print("store.keyframes: {}\nstore.points: {}\nstore.lines: {}\n", contents->keyframes,
              contents->points, contents->lines);
   fmt::print("store.surface_edges: {}\nstore.loops: {}\nstore.frames: {}\n", contents->edges, contents->loops,

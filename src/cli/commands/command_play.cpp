@@ -26,7 +26,7 @@ core::Result<void> play(Session& session, PlayRequest& request) {
   if (!address) return tl::unexpected<core::Error>(address.error());
   if (address->topics.any()) {
     return core::usage_error(
-        fmt::format("{}: topics are not named here: they are those of a camera's node", request.address));
+        fmt::format("{}: topics cannot be named here: they are those of a camera's node", request.address));
   }
 
   const auto pipelines = session.pipelines_folder();
@@ -69,16 +69,15 @@ void add_play(CLI::App& app, Session& session) {
   command->add_option("INPUT", request->input, "A recording, as for plumbline map")->required();
   command->add_option("ADDRESS", request->address, "ros2://DOMAIN[?interface=IF&peers=HOST,...]")->required();
   command
-      ->add_option("--pace", request->play.pace_hz,
-                   "Frames a second (default: as the recording's stamps say)")
+      ->add_option("--pace", request->play.pace_hz, "Frames per second (default: by the recording's stamps)")
       ->type_name("HZ")
       ->check(CLI::Range(0.01, 1000.0));
 
   command->add_flag("--loop", request->play.loop,
-                    "Begin again after the last frame, until Ctrl-C; stamps go on");
+                    "Start again after the last frame, until Ctrl-C; stamps continue");
   command
       ->add_option("--wait", request->play.wait_s,
-                   "Seconds to wait for somebody who listens, before the first frame (default: 10)")
+                   "Seconds to wait for a subscriber before the first frame (default: 10)")
       ->type_name("S")
       ->check(CLI::NonNegativeNumber);
 

@@ -44,7 +44,7 @@ core::Result<void> parse_size(const std::string& text, viz::SnapshotOptions& opt
   int used = 0;
   if (std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &used) != 2 ||
       static_cast<std::size_t>(used) != text.size() || width < 1 || height < 1) {
-    return core::usage_error(fmt::format("--size: '{}' is no size; write it as 1600x1200", text));
+    return core::usage_error(fmt::format("--size: '{}' is not a size; write it as 1600x1200", text));
   }
   options.width_px = width;
   options.height_px = height;

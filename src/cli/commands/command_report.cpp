@@ -40,8 +40,9 @@ void add_report(CLI::App& app, Session& session) {
       ->type_name("FOLDER|FILE");
 
   command
-      ->add_option("--points", request->points,
-                   "Points of the map to walk through, at most, thinned by voxels; 0: all (default: 1500000)")
+      ->add_option(
+          "--points", request->points,
+          "Largest number of points of the map to walk through, thinned by voxels; 0: all (default: 1500000)")
       ->type_name("N");
   command->add_flag("--force", request->replace, "Replace an earlier report");
 }

@@ -57,16 +57,18 @@ void add_view(CLI::App& app, Session& session) {
       add_command(app, session, "view", "Show a map in the browser, to walk through and measure in",
                   [&session, state] { return run_view(*state, session); });
   command->add_option("OUT", state->request.input, "A result folder, map.db, or a cloud file")->required();
-  command->add_option("OTHER", state->other, "A second one, laid over the first");
+  command->add_option("OTHER", state->other, "Second result, shown over the first");
   command
       ->add_option("--http", state->http,
                    "Address to serve the page at, until Ctrl-C (default: 127.0.0.1:8080)")
       ->type_name("HOST:PORT");
-  command->add_option("--http-token", state->token, "Asked of every browser: the address printed has it")
+  command
+      ->add_option("--http-token", state->token,
+                   "Token that every browser must present; it is part of the address that is printed")
       ->type_name("TEXT");
   command
       ->add_option("--points", state->request.options.points,
-                   "Points of the cloud, at most, thinned by voxels; 0: all (default: 1500000)")
+                   "Largest number of points, thinned by voxels; 0: all (default: 1500000)")
       ->type_name("N");
 }
 

@@ -25,12 +25,12 @@ class ColorFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
     table.choice("channel", channel_, {"red", "green", "blue", "hue", "saturation", "value"},
-                 "What of the colour is looked at");
+                 "Channel of the colour");
     table.number(
         "min", min_, {0.0, 360.0}, "",
-        "Smallest that passes: red, green, blue 0 to 255, hue 0 to 360, saturation and value 0 to 1");
+        "Smallest value to keep: red, green, blue 0 to 255, hue 0 to 360, saturation and value 0 to 1");
     table.number("max", max_, {0.0, 360.0}, "", "Largest that passes");
-    table.boolean("inside", inside_, "Keep what is within the limits (on) or beyond them (off)");
+    table.boolean("inside", inside_, "Keep points within the limits (on) or outside them (off)");
   }
   std::string check() const override {
     if (!(min_ < max_)) return fmt::format("min ({}) must be less than max ({})", min_, max_);
@@ -69,7 +69,7 @@ class CurvatureFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
     table.number("min", min_, {0.0, 1.0}, "", "Flatter points go");
-    table.number("max", max_, {0.0, 1.0}, "", "More curved points go");
+    table.number("max", max_, {0.0, 1.0}, "", "Remove points with a larger curvature");
   }
   std::string check() const override {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);

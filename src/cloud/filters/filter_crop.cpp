@@ -19,7 +19,7 @@ class CropBoxFilter : public Filter {
   void declare(core::OptionTable& table) override {
     table.numbers("min", min_m_, 3, {-1e8, 1e8}, "m", "Corner with the smallest x, y, z");
     table.numbers("max", max_m_, 3, {-1e8, 1e8}, "m", "Corner with the largest x, y, z");
-    table.boolean("inside", inside_, "Keep what is inside (on) or outside (off)");
+    table.boolean("inside", inside_, "Keep points inside (on) or outside (off)");
   }
   std::string check() const override {
     for (std::size_t i = 0; i < 3; ++i) {
@@ -48,15 +48,15 @@ class PassThroughFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
     table.choice("field", field_, {"x", "y", "z", "normal_x", "normal_y", "normal_z", "curvature"},
-                 "The number of a point that is looked at");
+                 "Field of a point to compare");
     table.text(
         "column", column_,
         "Instead of field: a further column of the file by its name, such as confidence, observations, robot "
         "or intensity; empty: field");
     table.number("min", min_, {-1e9, 1e9}, "",
-                 "Smallest value that passes, in the field's own unit (metres for x, y, z)");
-    table.number("max", max_, {-1e9, 1e9}, "", "Largest value that passes");
-    table.boolean("inside", inside_, "Keep what is within the limits (on) or beyond them (off)");
+                 "Smallest value to keep, in the field's own unit (metres for x, y, z)");
+    table.number("max", max_, {-1e9, 1e9}, "", "Largest value to keep");
+    table.boolean("inside", inside_, "Keep points within the limits (on) or outside them (off)");
   }
   std::string check() const override {
     return min_ < max_ ? "" : fmt::format("min ({}) must be less than max ({})", min_, max_);

@@ -8,12 +8,13 @@ namespace {
 class FlyingPixelsFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.number("sigmas", sigmas_, {1.0, 100.0}, "", "A jump is more than this many sigma_z of the depth");
+    table.number("sigmas", sigmas_, {1.0, 100.0}, "",
+                 "Smallest depth difference at a jump, in sigma_z of the depth");
     table.number("max_angle", max_angle_rad_, {0.5, 1.57}, "rad",
-                 "Surfaces up to this angle from face on may be that steep; beyond it is a jump");
-    table.integer("margin", margin_, {0, 8}, "", "Cells removed beside the two at a jump");
+                 "Largest slope of a surface, from facing the camera; what is steeper is a jump");
+    table.integer("margin", margin_, {0, 8}, "", "Number of further cells to remove on both sides of a jump");
     table.integer("min_neighbours", min_neighbours_, {0, 8}, "",
-                  "Points with fewer of their 8 neighbours on the same surface go");
+                  "Remove points with fewer of their 8 neighbours on the same surface");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     if (input->empty()) return like(*input);

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 class MergeFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.text("file", file_, "Cloud to add (.ply, .pcd, .xyz, .csv), seen from where the program runs");
+    table.text("file", file_, "Cloud to add (.ply, .pcd, .xyz, .csv), relative to the working directory");
   }
   std::string check() const override { return file_.empty() ? "file: a cloud to add must be named" : ""; }
   core::Result<void> ready(const FilterContext&) const override {
@@ -58,7 +58,7 @@ class MergeFilter : public Filter {
 class TeeFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.text("file", file_, "Where to write (.ply or .pcd), seen from where the program runs");
+    table.text("file", file_, "File to write (.ply or .pcd), relative to the working directory");
   }
   std::string check() const override {
     const std::string ending = fs::path(file_).extension().string();

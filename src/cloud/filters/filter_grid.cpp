@@ -179,7 +179,7 @@ class VoxelGridFilter : public GridFilter {
  public:
   void declare(core::OptionTable& table) override {
     GridFilter::declare(table);
-    table.integer("min_points", min_points_, {1, 100000}, "", "Cells with fewer points give none");
+    table.integer("min_points", min_points_, {1, 100000}, "", "Remove cells with fewer points");
   }
   CloudPtr resample(const CloudConstPtr& points) const override {
     pcl::VoxelGrid<Point> grid;

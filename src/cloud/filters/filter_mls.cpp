@@ -9,9 +9,10 @@ namespace {
 class MlsFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.number("radius", radius_m_, {1e-4, 10.0}, "m", "How far around a point the surface is fitted");
+    table.number("radius", radius_m_, {1e-4, 10.0}, "m",
+                 "Radius around a point within which the surface is fitted");
     table.integer("order", order_, {0, 5}, "",
-                  "Of the polynomial; 0 and 1 fit a plane, which is quicker and rounds edges more");
+                  "Order of the polynomial; 0 and 1 fit a plane, which is faster and rounds edges more");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     const CloudConstPtr points = finite_list(input);

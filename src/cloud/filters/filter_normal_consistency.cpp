@@ -8,10 +8,11 @@ namespace {
 class NormalConsistencyFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.integer("neighbours", neighbours_, {1, 1000}, "", "Nearest neighbours looked at");
-    table.number("max_angle", max_angle_rad_, {0.0, 3.1416}, "rad", "Between normals that agree");
+    table.integer("neighbours", neighbours_, {1, 1000}, "", "Number of nearest neighbours");
+    table.number("max_angle", max_angle_rad_, {0.0, 3.1416}, "rad",
+                 "Largest angle between normals that agree");
     table.number("min_share", min_share_, {0.0, 1.0}, "ratio",
-                 "Of the neighbours with a normal, so many must agree; more than 1/2 eats edges");
+                 "Smallest share of neighbours with normals that must agree; more than 1/2 removes edges");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& context) const override {
     NormalConsistency<Point> filter;

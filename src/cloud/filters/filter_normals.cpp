@@ -12,8 +12,8 @@ class NormalsFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
     table.integer("neighbours", neighbours_, {0, 1000}, "",
-                  "Nearest neighbours of the plane; 0: those within radius");
-    table.number("radius", radius_m_, {0.0, 10.0}, "m", "Neighbourhood of the plane when neighbours is 0");
+                  "Number of nearest neighbours for the plane; 0: all within radius");
+    table.number("radius", radius_m_, {0.0, 10.0}, "m", "Radius of the neighbourhood if neighbours is 0");
   }
   std::string check() const override {
     if (neighbours_ == 0 && radius_m_ <= 0.0) return "one of neighbours and radius must be more than 0";

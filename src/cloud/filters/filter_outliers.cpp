@@ -12,9 +12,10 @@ namespace {
 class StatisticalOutlierFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.integer("neighbours", neighbours_, {1, 1000}, "", "Nearest neighbours looked at");
-    table.number("deviations", deviations_, {0.0, 100.0}, "",
-                 "Points whose mean distance exceeds the mean of all by this many standard deviations go");
+    table.integer("neighbours", neighbours_, {1, 1000}, "", "Number of nearest neighbours");
+    table.number(
+        "deviations", deviations_, {0.0, 100.0}, "",
+        "Remove points whose mean distance exceeds the mean of all by this many standard deviations");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& /*context*/) const override {
     const CloudConstPtr points = finite_list(input);
@@ -33,8 +34,8 @@ class StatisticalOutlierFilter : public Filter {
 class RadiusOutlierFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.number("radius", radius_m_, {1e-4, 100.0}, "m", "How far a neighbour may be");
-    table.integer("min_neighbours", min_neighbours_, {1, 100000}, "", "Points with fewer neighbours go");
+    table.number("radius", radius_m_, {1e-4, 100.0}, "m", "Radius within which neighbours are counted");
+    table.integer("min_neighbours", min_neighbours_, {1, 100000}, "", "Remove points with fewer neighbours");
   }
   core::Result<CloudPtr> apply(const CloudConstPtr& input, const FilterContext& /*context*/) const override {
     const CloudConstPtr points = finite_list(input);

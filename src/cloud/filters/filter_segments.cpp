@@ -68,15 +68,15 @@ double furthest_coordinate(const Cloud& cloud) {
 class PlaneFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.number("distance", distance_m_, {1e-4, 10.0}, "m", "Points up to this far off belong to the plane");
-    table.integer("planes", planes_, {1, 100}, "", "How many planes are looked for, the largest first");
-    table.integer("min_points", min_points_, {3, 100000000}, "", "Planes with fewer points are none");
-    table.integer("iterations", iterations_, {1, 1000000}, "", "Tries of RANSAC, at most");
+    table.number("distance", distance_m_, {1e-4, 10.0}, "m", "Largest distance of a plane's points");
+    table.integer("planes", planes_, {1, 100}, "", "Number of planes to find, the largest first");
+    table.integer("min_points", min_points_, {3, 100000000}, "", "Smallest number of points of a plane");
+    table.integer("iterations", iterations_, {1, 1000000}, "", "Largest number of RANSAC samples");
     table.choice<PlaneFit>(
         "refine", refine_,
         {{"on", PlaneFit::kOnce}, {"off", PlaneFit::kNever}, {"spread", PlaneFit::kSpread}},
-        "Fit each plane to all of its points, then choose its points again; spread: again and again, "
-        "in the end those within twice the standard deviation of its own points");
+        "Fit each plane to all of its points, then choose its points again; spread: repeatedly, in the end "
+        "the points within twice their standard deviation");
     table.choice<Mode>("mode", mode_,
                        {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},
                        "Keep the planes, remove them, or colour each (and grey the rest)");
@@ -136,16 +136,17 @@ class PlaneFilter : public Filter {
 class ClustersFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.number("distance", distance_m_, {1e-4, 10.0}, "m",
-                 "Points nearer than this belong together; never less than twice what a fused cloud's points "
-                 "are apart");
-    table.number("leaf", leaf_m_, {0.0, 10.0}, "m",
-                 "Cells whose means stand for their points in this, which is quicker; 0: all points");
-    table.integer("min_points", min_points_, {1, 100000000}, "", "Clusters with fewer points are none");
+    table.number(
+        "distance", distance_m_, {1e-4, 10.0}, "m",
+        "Largest distance of points that belong together; at least twice the spacing of a fused cloud");
+    table.number(
+        "leaf", leaf_m_, {0.0, 10.0}, "m",
+        "Edge length of cells whose means replace their points for this, which is faster; 0: all points");
+    table.integer("min_points", min_points_, {1, 100000000}, "", "Smallest number of points of a cluster");
     table.number(
         "min_share", min_share_, {0.0, 1.0}, "ratio",
         "Unless they hold this share of all points, as in a small or coarse cloud; 1: only if they are all");
-    table.integer("count", count_, {0, 1000000}, "", "How many clusters, the largest first; 0: all");
+    table.integer("count", count_, {0, 1000000}, "", "Number of clusters, the largest first; 0: all");
     table.choice<Mode>("mode", mode_,
                        {{"keep", Mode::kKeep}, {"remove", Mode::kRemove}, {"label", Mode::kLabel}},
                        "Keep the clusters, remove them, or colour each (and grey the rest)");

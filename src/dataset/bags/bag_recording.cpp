@@ -40,7 +40,7 @@ class BagImages final : public MessageImages {
       if (!bytes) return tl::unexpected(bytes.error());
       return Place{list->topic.type == "sensor_msgs/Image", list->decoder, std::move(*bytes)};
     }
-    return core::input_error(name + ": is no image of this bag");
+    return core::input_error(name + ": is not an image of this bag");
   }
 
   std::vector<std::shared_ptr<const BagFile>> files_;

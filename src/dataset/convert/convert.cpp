@@ -22,13 +22,13 @@ core::Result<void> make_room(const fs::path& out, bool file, bool replace) {
   if (!fs::exists(out, ignored)) return {};
   if (!replace)
     return core::usage_error(
-        fmt::format("{}: is there already; --force replaces an earlier copy", out.string()));
+        fmt::format("{}: exists already; --force replaces an earlier copy", out.string()));
   const bool copy =
       file ? fs::is_regular_file(out, ignored)
            : fs::is_regular_file(out / "associations.txt", ignored) || fs::is_empty(out, ignored);
   if (copy) return {};
   return core::usage_error(
-      fmt::format("{}: is there already, and is no copy of a recording; name another place", out.string()));
+      fmt::format("{}: exists already and is not a copy of a recording; name another place", out.string()));
 }
 
 /// A folder is written beside its place, which it takes in the end.

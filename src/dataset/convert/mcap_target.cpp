@@ -114,7 +114,7 @@ class McapTarget final : public CopyTarget {
       bag_->write(topic + "/compressed",
                   CompressedImageMessage{header, "bgr8; jpeg compressed bgr8", image.bytes});
     } else if (encoding.empty() || pixels->depth() == CV_32F || encoding == "16UC1") {
-      return core::input_error("a colour image of a kind that ROS has no name for");
+      return core::input_error("a colour image in a format for which ROS has no name");
     } else {
       bag_->write(topic, message_of(*pixels, header, encoding));
     }
@@ -141,7 +141,7 @@ class McapTarget final : public CopyTarget {
     const bool odd = depth.type() == CV_16UC1 && camera_.depth_scale != kMillimetresOfMetre;
     if (odd && !told_scale_) {
       log_.warning(
-          fmt::format("depth is written in its own units, {} a metre; other programs take 16UC1 for "
+          fmt::format("depth is written in its own units, {} per metre; other programs take 16UC1 for "
                       "millimetres",
                       camera_.depth_scale));
       told_scale_ = true;

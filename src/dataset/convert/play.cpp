@@ -124,13 +124,13 @@ class Player {
 
   void wait_for_listener() {
     const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(Seconds(options_.wait_s));
-    if (!writer_->heard()) log_.info("waiting for somebody who listens");
+    if (!writer_->heard()) log_.info("waiting for a subscriber");
     while (!writer_->heard() && Clock::now() < until && !options_.stop.stop_requested())
       std::this_thread::sleep_for(kLookForListeners);
     if (writer_->heard()) {
       std::this_thread::sleep_for(kAfterFirstListener);
     } else if (options_.wait_s > 0.0) {
-      log_.info("nobody listens; playing all the same");
+      log_.info("no subscriber; playing nevertheless");
     }
   }
 

@@ -75,7 +75,7 @@ std::string nearest_layout(const fs::path& folder) {
     best = share;
     text =
         fmt::format("the nearest layout is '{}' ({}), of which is missing: {}", format->name, format->program,
-                    missing.empty() ? "nothing by name, so look into its files" : missing);
+                    missing.empty() ? "nothing is found by name; look into its files" : missing);
   }
   return text;
 }

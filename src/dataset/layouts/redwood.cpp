@@ -75,8 +75,8 @@ geometry::Trajectory read_log(const fs::path& file, const std::vector<PairInfo>&
         (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     good = good && matrix.allFinite() && error < 0.01;
     if (!good) {
-      log.warning(
-          fmt::format("{}:{}: is no pose of a pair; the truth ends here", file.string(), (*lines)[i].number));
+      log.warning(fmt::format("{}:{}: is not the pose of a pair; the truth ends here", file.string(),
+                              (*lines)[i].number));
       break;
     }
     truth.push_back({pairs[static_cast<std::size_t>(*index)].stamp,

@@ -57,7 +57,7 @@ geometry::Trajectory tartanair_truth(const fs::path& file, double fps, core::Log
   }
   if (left_out > 0) {
     log.warning(
-        fmt::format("{}: {} of {} rows are no pose (tx ty tz qx qy qz qw) and are left out of the truth",
+        fmt::format("{}: {} of {} rows are not poses (tx ty tz qx qy qz qw) and are left out of the truth",
                     file.string(), left_out, lines->size()));
   }
   return truth;

@@ -26,7 +26,7 @@ core::Result<double> read_stamp(const std::string& list, const TextLine& line, s
   const std::optional<double> stamp = core::to_number(line.words[word]);
   if (stamp && std::isfinite(*stamp)) return *stamp;
   return core::input_error(
-      fmt::format("{}:{}: '{}' is no time in seconds", list, line.number, line.words[word]));
+      fmt::format("{}:{}: '{}' is not a time in seconds", list, line.number, line.words[word]));
 }
 
 /// "1300000000,066667 rgb/1.png": commas separate words here, so that the stamp falls in two.

@@ -46,7 +46,7 @@ core::Result<PoseOfRow> read_kitti(const TrajectoryText& text, const TextLine& r
   if (!n) return tl::unexpected(n.error());
   if (!all_finite(*n)) return PoseOfRow();
   const Eigen::Matrix<double, 3, 4> m = matrix_of(*n);
-  if (!is_rotation(m.leftCols<3>())) return text.wrong(row.number, "the matrix is no rotation");
+  if (!is_rotation(m.leftCols<3>())) return text.wrong(row.number, "the matrix is not a rotation");
   const Eigen::Quaterniond q(Eigen::Matrix3d(m.leftCols<3>()));
   return PoseOfRow(geometry::StampedPose{0.0, {q, m.col(3)}});
 }

@@ -43,14 +43,14 @@ core::Result<void> describe_system(int epsg, Georeference& reference) {
   if (!system) return core::usage_error(fmt::format("EPSG:{}: PROJ knows no such coordinate system", epsg));
   if (proj_get_type(system.get()) != PJ_TYPE_PROJECTED_CRS || !in_metres(context.get(), system.get())) {
     return core::usage_error(fmt::format(
-        "EPSG:{} ({}): is no projected coordinate system in metres; choose one such as that of the "
+        "EPSG:{} ({}): is not a projected coordinate system in metres; choose one such as that of the "
         "UTM zone, 32601 to 32760",
         epsg, proj_get_name(system.get())));
   }
   const char* const options[] = {"MULTILINE=NO", nullptr};
   const char* text = proj_as_wkt(context.get(), system.get(), PJ_WKT1_GDAL, options);
   if (text == nullptr)
-    return core::usage_error(fmt::format("EPSG:{}: cannot be told as well-known text", epsg));
+    return core::usage_error(fmt::format("EPSG:{}: cannot be written as well-known text", epsg));
   reference.name = proj_get_name(system.get());
   reference.wkt = text;
   return {};

@@ -13,7 +13,7 @@ core::Result<geometry::Rigid3> body_from_camera_of(const ExportOptions& options)
   if (body.size() != 7) return core::usage_error("--body: takes x,y,z,qx,qy,qz,qw of the camera in the body");
   const Eigen::Quaterniond turn(body[6], body[3], body[4], body[5]);
   if (std::abs(turn.norm() - 1.0) > 0.01)
-    return core::usage_error("--body: qx,qy,qz,qw are no rotation: their squares add up to 1");
+    return core::usage_error("--body: qx,qy,qz,qw are not a rotation: their squares must add up to 1");
   return geometry::Rigid3(turn, {body[0], body[1], body[2]});
 }
 

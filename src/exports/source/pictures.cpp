@@ -37,7 +37,7 @@ core::Result<std::vector<RecordingName>> recordings_of(const MapSource& source,
   if (given.empty() && names.size() == robots) return names;
   if (given.empty()) {
     return core::input_error(fmt::format(
-        "{}: does not tell which recordings it was made from; name them with --recording, one for each robot",
+        "{}: does not say from which recordings it was made; name them with --recording, one for each robot",
         source.request().input.string()));
   }
   if (given.size() != robots) {

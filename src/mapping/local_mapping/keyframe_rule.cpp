@@ -85,8 +85,9 @@ void KeyframeRuleOptions::declare(core::OptionTable& table) {
                 "Cone rule: smallest number of points that a keyframe matches, or half of the visible ones");
   table.integer("keyframe.cone_min_lines", cone_min_lines, {0, 10000}, "",
                 "Cone rule: smallest number of lines that a keyframe matches, or half of the visible ones");
-  table.number("keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
-               "Cone rule: points whose viewing angle changed more are asked to spread over the image");
+  table.number(
+      "keyframe.cone_min_change", cone_min_change_rad, {0.001, 1.5}, "rad",
+      "Cone rule: points whose viewing angle changed by more than this must be spread over the image");
   table.choice("keyframe.cone_balance", cone_balance,
                {{"above", Balance::kAbove}, {"below", Balance::kBelow}, {"off", Balance::kOff}},
                "Cone rule: how far these must be spread (ECOG against its threshold)");

@@ -11,7 +11,7 @@ void LandmarkCullingOptions::declare(core::OptionTable& table) {
                "Remove landmarks found in a smaller share of the frames that should see them");
   table.integer("landmark.min_visible", min_visible, {1, 1000}, "",
                 "Frames that should have seen a landmark before that share is judged");
-  table.boolean("landmark.by_keyframes", by_keyframes, "Only frames that become keyframes are counted");
+  table.boolean("landmark.by_keyframes", by_keyframes, "Count only frames that become keyframes");
   table.integer("landmark.min_keyframes", min_keyframes, {1, 100}, "",
                 "Remove landmarks that fewer keyframes see after the grace time; 1: none");
   table.integer("landmark.min_age", grace_keyframes, {1, 1000}, "",

@@ -129,15 +129,15 @@ Ambiguity ambiguity_of(const PartPair& maps, const PairSets& sets, const Rigid3&
 std::string objection(const Ambiguity& ambiguity, int agreeing, const MapFusionOptions& options) {
   const OverlayFit& overlap = ambiguity.overlap;
   if (overlap.expected + overlap.contradicted >= kFewLandmarks && overlap.seen_through() > kWrong) {
-    return fmt::format("laid over each other, the maps contradict: {} of the landmarks were seen through",
+    return fmt::format("the aligned maps contradict each other: {} of the landmarks were seen through",
                        percent(overlap.seen_through()));
   }
   const bool few = agreeing < options.min_pairs;
   const MapOverlay::Surfaces surfaces{ambiguity.surfaces_there, ambiguity.surfaces_through};
   if (few && (surfaces.there < kSurfaces || surfaces.contradict(kNoAlternativeOfFewSpots, kSurfaces))) {
     return fmt::format(
-        "only {} keyframes agree on how the maps lie, and laid over each other {} pieces of surface are "
-        "there and {} were seen through",
+        "only {} keyframes agree on the relative pose, where {} pieces of surface are confirmed and {} are "
+        "seen through",
         agreeing, surfaces.there, surfaces.through);
   }
   // One keyframe may be mistaken; two that agree are an alternative. Few have no such alternatives at all.

@@ -112,7 +112,7 @@ std::vector<fs::path> usable_maps(const fs::path& folder, const std::vector<Robo
   }
 
   if (traffic.size() < expected) {
-    leave_out(fmt::format("{} of {} robots never came", expected - traffic.size(), expected));
+    leave_out(fmt::format("{} of {} robots did not connect", expected - traffic.size(), expected));
   }
 
   return maps;
@@ -139,7 +139,7 @@ core::Result<pipeline::RunSummary> fuse_collected(const HubRequest& request, con
   if (last.maps.empty()) {
     return core::failure(
         core::ErrorKind::kUntrustworthy,
-        fmt::format("no map came that could be fused{}; what came is in {}, --resume continues",
+        fmt::format("no map was received that could be fused{}; received data are in {}, --resume continues",
                     reason.empty() ? "" : " (" + reason + ")", folder.string()));
   }
 
@@ -170,7 +170,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   const fs::path folder = output->path();
 
   LogFile log(folder / "hub.log", console);
-  if (auto secure = warn_of_security(*options, "anybody on it can read maps and send some", log); !secure)
+  if (auto secure = warn_of_security(*options, "anybody on it can read maps and send data", log); !secure)
     return tl::unexpected(secure.error());
   auto bus = open_logged_bus(*options, log);
   if (!bus) return tl::unexpected(bus.error());
@@ -180,7 +180,7 @@ core::Result<pipeline::RunSummary> run_hub(const HubRequest& request, const core
   if (auto alone = (*server)->look_for_others(stop); !alone) return tl::unexpected(alone.error());
   log.info(fmt::format("waiting for {} on {}, domain {}",
                        request.robots > 0 ? fmt::format("{} robots", request.robots)
-                                          : "robots; press Ctrl-C to fuse what has come",
+                                          : "robots; press Ctrl-C to fuse what was received",
                        options->interface, options->domain));
 
   (*server)->serve(stop, status);

@@ -86,10 +86,10 @@ core::Result<void> HubServer::look_for_others(const core::StopToken& stop) {
       // If two hubs start together, the one with the lower id stays.
       const bool stays = other.up_s >= 0.0 || other.hub < publisher_.id();
       if (other.hub == publisher_.id() || !stays) continue;
-      return core::usage_error(
-          fmt::format("another hub is there in domain {}; end that one, or choose another --domain for this "
-                      "one and its robots",
-                      request_.network.domain));
+      return core::usage_error(fmt::format(
+          "another hub is running in domain {}; end that one, or choose another --domain for this "
+          "one and its robots",
+          request_.network.domain));
     }
   }
   publisher_.serve();
@@ -188,7 +188,7 @@ void HubServer::confirm_if_complete(RobotSession& session) {
     }
     log_.info(fmt::format("{}: everything is here, {} keyframes{}", session.robot.name,
                           session.copy().keyframes(),
-                          session.copy().complete() ? "" : "; its run did not come to its end"));
+                          session.copy().complete() ? "" : "; its run did not finish"));
   }
   session.reply.answer = Answer::kDone;
   session.changed = true;
@@ -225,7 +225,8 @@ void HubServer::apply_failure(RobotSession& session, const core::Error& error) {
   } else {
     reply.answer = Answer::kRefused;
     reply.problem = fmt::format(
-        "{} sent what no map of Plumbline {} holds ({}): check both ends for the same version, then start it "
+        "{} sent data that Plumbline {} cannot store ({}): check both ends for the same version, then start "
+        "it "
         "again with --resume",
         name, core::version(), error.message);
   }
@@ -275,7 +276,7 @@ void HubServer::poll() {
   for (const ReceivedStatus& received : bus_->poll_robots()) receive_status(received);
   for (const HubStatus& hub : bus_->poll_hubs()) {
     if (hub.hub != publisher_.id() && hub.up_s >= 0.0)
-      report_once("there is another hub; robots stay with the one that they found first");
+      report_once("another hub is running; robots stay with the one that they found first");
   }
   for (auto& [name, session] : robots_) {
     receive_chunks(session);

@@ -43,7 +43,7 @@ bool HubSession::accepts() const {
 bool HubSession::select(const HubStatus& hub) {
   if (id_ == hub.hub) return true;
   if (!id_.empty() && Clock::now() - received_at_ < kOtherHub) {
-    if (!std::exchange(other_hub_reported_, true)) log_.warning("there is a second hub; it is ignored");
+    if (!std::exchange(other_hub_reported_, true)) log_.warning("a second hub is running; it is ignored");
     return false;
   }
   log_.info("hub found");

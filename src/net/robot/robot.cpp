@@ -91,7 +91,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
     };
     const bool stopped = stop.stop_requested() && !was_stopped;
     if (!now.found && (stopped || waited_s(since) > request.wait_s)) {
-      outcome.undelivered = fmt::format("no hub has answered; the map is in {}. To hand it in later: {}",
+      outcome.undelivered = fmt::format("no hub has answered; the map is in {}. To send it later: {}",
                                         folder.string(), command);
       return outcome;
     }
@@ -99,7 +99,7 @@ core::Result<RobotOutcome> deliver(const RobotRequest& request, const fs::path& 
       const std::string why = now.problem.empty() ? "" : " (" + now.problem + ")";
       return core::failure(
           core::ErrorKind::kUntrustworthy,
-          fmt::format("the hub has not received everything{}; the map is in {}. To hand in the rest: {}", why,
+          fmt::format("the hub has not received everything{}; the map is in {}. To send the rest: {}", why,
                       folder.string(), command));
     }
     std::this_thread::sleep_for(50ms);

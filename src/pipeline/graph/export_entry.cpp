@@ -12,7 +12,7 @@ void ExportEntry::declare(core::OptionTable& table) {
   table.text("file", file, "File or folder below the result folder");
   table.text("format", format, "A format of plumbline export; empty: by the file's ending");
   table.choice("what", what, {"cloud", "mesh", "trajectory", "keyframes", "lines"},
-               "What of the map is written, where the ending does not tell");
+               "Part of the map to write, if the ending does not determine it");
 }
 
 nlohmann::ordered_json exports_definition() {

@@ -65,7 +65,7 @@ core::Result<void> check_same(const fs::path& file, const char* what, const std:
   if (found.empty()) return {};
   const std::string more = found.size() > 1 ? fmt::format(" (and {} more)", found.size() - 1) : "";
   return core::usage_error(fmt::format(
-      "{}: was begun with another {}: {}{}; give the same again, or leave out --resume to begin anew",
+      "{}: was begun with another {}: {}{}; give the same again, or leave out --resume to start again",
       file.string(), what, found.front(), more));
 }
 
@@ -80,7 +80,7 @@ core::Result<void> add_rows(const fs::path& file, const std::vector<std::string>
     const auto [stop, error] = std::from_chars(line.data(), end, row.frame);
     if (second == std::string::npos || error != std::errc() || stop != end) {
       return core::input_error(
-          fmt::format("{}: its log is damaged; leave out --resume to begin anew", file.string()));
+          fmt::format("{}: its log is damaged; leave out --resume to start again", file.string()));
     }
     row.state = line.substr(first + 1, second - first - 1);
     row.columns = line.substr(second + 1);
@@ -98,7 +98,7 @@ core::Result<void> find_done(const RobotRecordings& recordings, ResumedRun& run)
     const std::size_t frame = run.rows[i].frame;
     if (frame >= recordings.size() || (i > 0 && frame == run.rows[i - 1].frame)) {
       return core::input_error(
-          fmt::format("{}: its log is damaged; leave out --resume to begin anew", run.store.string()));
+          fmt::format("{}: its log is damaged; leave out --resume to start again", run.store.string()));
     }
     last[recordings.robot_of(frame)] = frame;
   }

@@ -172,11 +172,12 @@ MergedRobots merge_robots(const std::vector<RobotMap>& parts, std::size_t anchor
   map->frame_poses = frames_of(used);
   take_poses_from_map(*map);
   map->apart = components_apart(parts, fused.parts);
-  log.debug(fmt::format(
-      "fused {} maps: {} pairs of keyframes, {} taken for wrong; {} points and {} lines were doubles",
-      fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
+  log.debug(
+      fmt::format("fused {} maps: {} pairs of keyframes, {} rejected; {} points and {} lines were duplicates",
+                  fused.parts.size(), fused.edges, fused.rejected, fused.merged_points, fused.merged_lines));
   result.refused = static_cast<std::size_t>(fused.refused);
-  if (fused.refused > 0) log.warning("merge: maps are laid into one frame, but not bent: " + fused.refusal);
+  if (fused.refused > 0)
+    log.warning("merge: maps are moved into one frame, but not deformed: " + fused.refusal);
   result.map = map;
   return result;
 }

@@ -114,7 +114,7 @@ core::Result<std::unique_ptr<RobotRecordings>> open_inputs(const MapRequest& req
   for (const std::string& input : inputs) {
     if (inputs.size() > 1 && dataset::is_live_address(input)) {
       return core::usage_error(fmt::format(
-          "{}: is live, and is mapped alone; give each robot a process of its own: plumbline robot, hub",
+          "{}: is live and must be mapped alone; run one process per robot: plumbline robot, plumbline hub",
           input));
     }
   }
@@ -191,7 +191,7 @@ core::Error with_what_is_kept(core::Error error, maps::OutputFolder& output) {
   const std::size_t keyframes = stored_keyframes(output.path());
   if (keyframes == 0) return error;
   output.keep();
-  error.message += fmt::format("; {} keyframes are kept in {}: --resume goes on from there", keyframes,
+  error.message += fmt::format("; {} keyframes are kept in {}: --resume continues from there", keyframes,
                                (output.path() / maps::kStoreFile).string());
   return error;
 }

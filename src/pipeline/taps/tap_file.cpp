@@ -29,7 +29,7 @@ void Tap::check(const CheckContext& /*context*/, const core::ConfigMark& mark, c
   const fs::path normal = fs::path(file_).lexically_normal();
   const bool outside = normal.is_absolute() || (!normal.empty() && *normal.begin() == "..");
   if (outside || !normal.has_filename()) {
-    return refuse(fmt::format("{} is no file below the result folder, e.g. {}", file_, example));
+    return refuse(fmt::format("{} is not a file below the result folder, such as {}", file_, example));
   }
   if (std::any_of(file_.begin(), file_.end(), [](unsigned char c) { return c < 0x20; })) {
     return refuse("a file's name has no control characters");

@@ -27,7 +27,7 @@ core::Result<std::string> read_camera_text(const std::filesystem::path& file) {
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxCameraBytes)
-    return core::usage_error(file.string() + ": over 1 MB, this is no camera file");
+    return core::usage_error(file.string() + ": is over 1 MB and thus not a camera file");
   return text;
 }
 
@@ -100,7 +100,7 @@ core::Error unknown_kind(const CameraText& text) {
     programs += (programs.empty() ? "" : ", ") + std::string(format->program);
   const std::string what =
       other.empty()
-          ? fmt::format("is no camera file that is known (read are camera.yaml and those of {})", programs)
+          ? fmt::format("is not a known camera file (known are camera.yaml and those of {})", programs)
           : fmt::format("is a camera file of {}, which is not read", other);
   return {core::ErrorKind::kUsage, fmt::format("{}: {}; write a camera.yaml with these lines:\n{}", text.file,
                                                what, camera_lines({}))};
@@ -130,9 +130,9 @@ core::Result<CameraReading> read_foreign(const CameraText& text, const CameraFor
 std::string pinhole_problem(const Pinhole& p, const std::string& which) {
   const auto focal = [](double f) { return f >= 1e-3 && f <= 1e6; };
   if (p.width < 1 || p.height < 1 || p.width > 32768 || p.height > 32768)
-    return fmt::format("{}the size {}x{} is none of an image", which, p.width, p.height);
+    return fmt::format("{}{}x{} is not the size of an image", which, p.width, p.height);
   if (!focal(p.fx) || !focal(p.fy))
-    return fmt::format("{}fx {} and fy {} are no focal lengths", which, p.fx, p.fy);
+    return fmt::format("{}fx {} and fy {} are not focal lengths", which, p.fx, p.fy);
   if (p.fx < 10.0 && p.cx <= 1.0 && p.cy <= 1.0) {
     return fmt::format("{}fx {} and cx {} are shares of the image's size; multiply them by it", which, p.fx,
                        p.cx);

@@ -111,7 +111,7 @@ std::string take_matrix(const std::vector<double>& numbers, Camera& camera) {
   camera.color.cx = by_columns ? at(2, 0) : at(0, 2);
   camera.color.cy = by_columns ? at(2, 1) : at(1, 2);
   if (at(2, 2) != 1.0 || other != 0.0)
-    return "the matrix is none of a camera (expected: fx 0 cx, 0 fy cy, 0 0 1)";
+    return "the matrix is not that of a camera (expected: fx 0 cx, 0 fy cy, 0 0 1)";
   if (std::abs(skew) > 1e-6 * std::abs(at(0, 0))) {
     return fmt::format("the matrix has a skew of {}, which no camera here has", skew);
   }

@@ -66,7 +66,7 @@ std::string take_extrinsics(const core::ConfigNode& node, Camera& camera) {
   const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix3d>(r->data());
   const bool rigid =
       (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-3;
-  if (!rigid || rotation.determinant() < 0.0) return "the extrinsics are no rotation";
+  if (!rigid || rotation.determinant() < 0.0) return "the extrinsics are not a rotation";
   camera.color_from_depth =
       geometry::Rigid3(Eigen::Quaterniond(rotation), Eigen::Vector3d((*t)[0], (*t)[1], (*t)[2]));
   return "";

@@ -419,7 +419,8 @@ void read_objects(const ConfigNode& list, Builder& builder, ConfigProblems& prob
     const auto& [type, body] = item.entries.front();
     const auto reader = object_readers().find(type);
     if (reader == object_readers().end()) {
-      problems.push_back({item.mark, path + "." + type, "is no kind of thing" + core::hint(type, types)});
+      problems.push_back(
+          {item.mark, path + "." + type, "is not a known kind of object" + core::hint(type, types)});
       continue;
     }
 

@@ -83,7 +83,7 @@ core::Result<Event> parse_event(const std::string& text) {
 
   if (kind == nullptr) {
     return core::usage_error(
-        fmt::format("events: '{}' is no kind of event{}", name, core::hint(name, names)));
+        fmt::format("events: '{}' is not a kind of event{}", name, core::hint(name, names)));
   }
 
   Event event{kind->kind, 0.0, 0.0, kind->default_value};

@@ -258,7 +258,7 @@ TEST_F(Topics, TopicsAreAboutBags) {
   write_tum(3);
   OpenOptions named;
   named.topics.depth = "/depth";
-  EXPECT_THAT(open_error(named), HasSubstr("no bag"));
+  EXPECT_THAT(open_error(named), HasSubstr("not a bag"));
 }
 
 TEST_F(Topics, WithoutDepthItIsSaidWhatIsThere) {

@@ -235,7 +235,7 @@ TEST_F(StrayScanner, FilmMasksAndOneCalibrationForTwoSizes) {
   }
   EXPECT_EQ((*source)->truth()->size(), 5U);
   write_text("rgb.mp4", "no film");
-  EXPECT_THAT(open_error(), AllOf(HasSubstr("rgb.mp4"), HasSubstr("no video")));
+  EXPECT_THAT(open_error(), AllOf(HasSubstr("rgb.mp4"), HasSubstr("not a video")));
 }
 
 using Detection = RecordingTest;

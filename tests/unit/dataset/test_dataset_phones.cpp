@@ -71,8 +71,8 @@ TEST_F(Npy, WhatIsNoImageIsRefused) {
               HasSubstr("row by row"));
   EXPECT_THAT(
       refusal(npy("{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999, 99999999999)}", "x")),
-      HasSubstr("none of an image"));
-  EXPECT_THAT(refusal(npy("{}", "x")), HasSubstr("no image"));
+      HasSubstr("not the size of an image"));
+  EXPECT_THAT(refusal(npy("{}", "x")), HasSubstr("not an image"));
 }
 
 using TartanAir = RecordingTest;
@@ -92,7 +92,7 @@ TEST_F(TartanAir, NumbersPosesAndTheCameraOfAllOfIt) {
   EXPECT_EQ((*source)->camera().color.fx, 320.0);
   EXPECT_EQ((*source)->camera().color.cx, 320.0);
   EXPECT_NEAR((*source)->read(1)->depth.at<float>(7, 9), 3.0F, 1e-4);
-  EXPECT_THAT(log_.warnings, HasSubstr("1 of 3 rows are no pose"));
+  EXPECT_THAT(log_.warnings, HasSubstr("1 of 3 rows are not poses"));
   const auto truth = (*source)->truth();
   ASSERT_TRUE(truth);
   ASSERT_EQ(truth->size(), 2U);

@@ -180,7 +180,7 @@ TEST_F(TrajectoryFile, ReplicaHasWholeMatrices) {
   EXPECT_FALSE(reading->stamped);
   EXPECT_EQ(reading->poses[1].world_from_camera.translation.z(), 8.0);
   EXPECT_THAT(error_of("1 0 0 5 0 1 0 6 0 0 1 7\n2 0 0 5 0 1 0 6 0 0 1 7\n"),
-              AllOf(HasSubstr("t.txt:2"), HasSubstr("no rotation")));
+              AllOf(HasSubstr("t.txt:2"), HasSubstr("not a rotation")));
 }
 
 TEST_F(TrajectoryFile, SharedStampsAreCounted) {

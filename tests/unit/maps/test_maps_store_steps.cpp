@@ -202,7 +202,7 @@ TEST(StoreSteps, RobotsHaveMapsOfTheirOwnUntilTheyAreOne) {
   }
   const auto two = load_map(folder.file());
   EXPECT_EQ(two.error().kind, core::ErrorKind::kInput);
-  EXPECT_NE(two.error().message.find("are not one yet"), std::string::npos) << two.error().message;
+  EXPECT_NE(two.error().message.find("are not merged yet"), std::string::npos) << two.error().message;
   const auto second = StoreReader::open(folder.file())->load("b");
   ASSERT_TRUE(second) << second.error().message;
   EXPECT_TRUE(equal(second->map, worlds[1].map));

@@ -252,7 +252,7 @@ TEST_F(ForeignCamera, PlainMatricesAndLines) {
               AllOf(HasSubstr("a.txt:1"), HasSubstr("decimal comma")));
   EXPECT_THAT(refusal("481.2 3 319.5\n0 480 239.5\n0 0 1\n", "a.txt"), HasSubstr("skew"));
   EXPECT_THAT(refusal("0.75 1.0 0.5 0.5\n", "a.txt"), HasSubstr("shares of the image's size"));
-  EXPECT_THAT(refusal("-481 480 319 239\n", "a.txt"), HasSubstr("no focal lengths"));
+  EXPECT_THAT(refusal("-481 480 319 239\n", "a.txt"), HasSubstr("not focal lengths"));
 }
 
 TEST_F(ForeignCamera, RealSenseScaleIsMetresAUnit) {
@@ -342,8 +342,8 @@ TEST_F(ForeignCamera, WhatIsNotReadIsNamedWithTheLinesToWrite) {
   EXPECT_THAT(refusal("%YAML:1.0\nmodel_type: PINHOLE\nprojection_parameters:\n   fx: 4.6e+02\n"),
               HasSubstr("VINS"));
   EXPECT_THAT(refusal("dear diary\n", "notes.txt"),
-              AllOf(HasSubstr("is no camera file"), HasSubstr("COLMAP")));
-  EXPECT_THAT(refusal("", "empty.txt"), HasSubstr("is no camera file"));
+              AllOf(HasSubstr("is not a camera file"), HasSubstr("COLMAP")));
+  EXPECT_THAT(refusal("", "empty.txt"), HasSubstr("is not a camera file"));
   EXPECT_THAT(refusal(std::string(2'000'000, '1'), "long.txt"), HasSubstr("1 MB"));
   EXPECT_THAT(refusal("a: [1, 2\n", "broken.yaml"), HasSubstr("broken.yaml:"));
 }

@@ -98,8 +98,8 @@ core::Result<void> Db3File::prepare() {
   }
   read_ = statement("SELECT data FROM messages WHERE id = ?");
   if (topics != nullptr && read_ != nullptr) return {};
-  return core::input_error(
-      fmt::format("{}: is no bag of rosbag2, or damaged at its beginning: {}", shown_, sqlite3_errmsg(db)));
+  return core::input_error(fmt::format("{}: is not a rosbag2 bag, or is damaged at its beginning: {}", shown_,
+                                       sqlite3_errmsg(db)));
 }
 
 /// The first bytes of a message; of the pages of a large one only the first is read.

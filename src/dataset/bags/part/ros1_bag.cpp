@@ -272,7 +272,7 @@ OpenedBag open_ros1_bag(const std::filesystem::path& file, const std::string& sh
   if (!opened->read(0, version.data(), version.size()) ||
       std::string_view(version.data(), version.size()) != kBagVersion) {
     return core::input_error(fmt::format(
-        "{}: is no bag of format 2.0, which ROS 1 has written since 2010; rosbag fix makes one of it",
+        "{}: is not a bag of format 2.0, which ROS 1 has written since 2010; convert it with rosbag fix",
         shown));
   }
   return std::make_unique<Ros1Bag>(std::move(*opened), shown);
