@@ -16,7 +16,7 @@ class GreyFilter : public cloud::Filter {
  public:
   /// Key, where the value goes, allowed range, unit, help: parser, checks and reference follow from it.
   void declare(core::OptionTable& table) override {
-    table.number("share", share_, {0.0, 1.0}, "ratio", "How much of the colour goes");
+    table.number("share", share_, {0.0, 1.0}, "ratio", "Share of the colour to remove");
   }
 
   /// The input is never changed; what is returned is a cloud of its own.

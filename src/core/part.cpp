@@ -49,7 +49,7 @@ std::vector<fs::path> library_folders() {
 std::string remedy(const std::string& name) {
   if (name == "dds") return "install the package plumbline-net";
   if (name == "bags") return "install the package plumbline-ros1";
-  return "install it anew";
+  return "install it again";
 }
 
 }  // namespace

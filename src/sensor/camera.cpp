@@ -207,12 +207,12 @@ core::Result<Camera> camera_in(core::Result<ConfigNode> root, const std::filesys
   table.number("fps", camera.fps, {1e-3, 1e4}, "", "Pairs a second");
   double readout_s = 0.0;
   table.number("readout", readout_s, {0.0, 0.1}, "s",
-               "From the first row of an image to the last; 0: all at once");
+               "Time from the first to the last row of an image; 0: all at once");
   std::vector<double> slope(2, 0.0);
   table.numbers("depth_slope", slope, 2, {-0.2, 0.2}, "1/m",
-                "Along x and y: what to add to 1 / depth on the ray (x, y, 1)");
+                "Slope along x and y: added to 1 / depth on the ray (x, y, 1)");
   table.number("depth_delay", camera.depth_delay_s, {-0.1, 0.1}, "s",
-               "How much later than their stamps say depth images were taken");
+               "Delay of depth images after their stamps");
   if (root->kind == ConfigNode::Kind::kMap) table.set_all(*root, "", problems, {"color_from_depth", "depth"});
 
   check_pinhole(*root, camera.color, "", problems);

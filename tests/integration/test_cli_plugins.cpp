@@ -31,7 +31,7 @@ TEST_F(Plugins, AFilterIsListedDescribedCheckedAndRun) {
   EXPECT_EQ(run("filters list").out.find("grey"), std::string::npos);
   const auto described = run("filters describe grey" + plugin("grey"));
   EXPECT_EQ(described.code, 0) << described;
-  EXPECT_NE(described.out.find("share                How much of the colour goes (default: 1)"),
+  EXPECT_NE(described.out.find("share                Share of the colour to remove (default: 1)"),
             std::string::npos)
       << described;
   EXPECT_EQ(run("filters check chain.yaml" + plugin("grey")).code, 0);

@@ -203,7 +203,7 @@ TEST_F(ResumeCommand, OnlyTheSameRunIsGoneOnWith) {
   EXPECT_NE(finished.out.find("is finished"), std::string::npos) << finished;
   const Outcome fresh = run("map wall --resume -o fresh --to 0.5 --set output.views= -p fast");
   EXPECT_EQ(fresh.code, 0) << fresh;
-  EXPECT_TRUE(fresh.told("beginning with the first frame")) << fresh;
+  EXPECT_TRUE(fresh.told("starting with the first frame")) << fresh;
 }
 
 /// The rows of a trajectory; comments above them differ.

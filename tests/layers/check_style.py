@@ -19,7 +19,7 @@ BOUND = 0.8
 BOUNDS = {"dataset": 0.0, "exports": 0.0, "features": 0.0, "mapping": 0.0, "pipeline": 0.0, "sensor": 0.0, "tracking": 0.0}
 OPENING = re.compile(r"(?:^|\s)///?<? ?(What|Those)\b")
 # Comments that still begin so, at most, by module.
-OPENINGS = {"dataset": 99, "exports": 99, "features": 99, "mapping": 99, "pipeline": 99, "sensor": 99, "tracking": 99}
+OPENINGS = {"dataset": 99, "exports": 99}
 
 
 def sources(root):

@@ -85,7 +85,7 @@ std::string errors_table(const ReportData& data) {
                                         count_text(static_cast<double>(r.estimated)));
 
     table.value("ATE, rmse", distances(r.ate_m));
-    table.value("Of the path's length",
+    table.value("Share of the path's length",
                 number_text(r.path_m > 0.0 ? 100.0 * r.ate_m.rmse / r.path_m : NAN, 3, "%"));
     table.value("Orientation, rmse", number_text(r.rotation_deg.rmse, 3, "deg"));
     table.value("RPE over a frame, rmse", relative(r.rpe_frame));

@@ -48,7 +48,7 @@ std::string merge_evidence(const Json& m) {
            "{/candidates}; {/tried} verified or refused, {/verified} show the same place"},
           {"Keyframes that agree", "{/agreeing}; {/alternative} in the best other answer"},
           {"Asked for confirmation", "{/expected}, of which {/confirmed} confirmed"},
-          {"Landmarks laid over each other",
+          {"Landmarks of the aligned maps",
            "{/overlay/expected} expected, {/overlay/matched} found again ({/overlay/chance} by chance), "
            "{/overlay/seen_through} seen through"},
           {"Matches", "{/matches} by descriptor; {/inliers} points and lines fit, rms {/rms:2 σ}"},

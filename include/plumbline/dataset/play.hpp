@@ -15,8 +15,8 @@ namespace plumbline::dataset {
 
 struct PlayOptions {
   double pace_hz = 0.0;  ///< frames a second; 0: as their stamps say
-  bool loop = false;     ///< begin again after the last frame; stamps go on
-  double wait_s = 10.0;  ///< for somebody who listens, before the first frame
+  bool loop = false;     ///< start again after the last frame; stamps continue
+  double wait_s = 10.0;  ///< longest wait for a subscriber before the first frame
   core::StopToken stop;
   std::function<void(std::size_t done, std::size_t total)> progress;  ///< may be empty
 };

@@ -32,7 +32,7 @@ struct PoseEdge {
   core::KeyframeId b;
   geometry::Rigid3 b_from_a;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
-  bool trusted = false;  ///< never taken for wrong
+  bool trusted = false;  ///< never rejected
 };
 
 /// Relative poses of keyframes in the map now: of each to its predecessor of the same robot, to those it
@@ -45,7 +45,7 @@ std::vector<PoseEdge> map_edges(const maps::Map& map, int min_shared = 30, int m
 /// the next were independent: of log(b_from_a_estimate * b_from_a^-1).
 geometry::Matrix6d path_covariance(const maps::Map& map, core::KeyframeId a, core::KeyframeId b);
 
-/// The loops of the map that were closed: edges that may be taken for wrong.
+/// The loops of the map that were closed: edges that may be rejected.
 std::vector<PoseEdge> loop_edges(const maps::Map& map);
 /// Makes these the map's loops. Throws as maps::Map::set_loops.
 void set_loops(maps::Map& map, const std::vector<PoseEdge>& edges);
@@ -100,7 +100,7 @@ struct GlobalAdjustmentSummary {
   int lines = 0;
   int surface_edges = 0;
   std::vector<optimize::EdgeVerdict> extra;  ///< of each edge of `extra`; empty when no pose graph was solved
-  int rejected = 0;                          ///< edges of `extra` that were taken for wrong
+  int rejected = 0;                          ///< edges of `extra` that were rejected
   optimize::BundleSummary bundle;
   double mean_shift_m = 0.0;  ///< mean motion of the keyframes
   double max_shift_m = 0.0;

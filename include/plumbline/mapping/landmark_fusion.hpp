@@ -24,7 +24,7 @@ struct FusionOptions {
 
 struct FusionSummary {
   int observed = 0;  ///< observations that were missing
-  int merged = 0;    ///< landmarks that were doubles
+  int merged = 0;    ///< duplicate landmarks
 };
 
 /// Landmarks of `keyframe` are projected into each of `neighbours`, and the neighbours' landmarks into

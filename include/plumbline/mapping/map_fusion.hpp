@@ -2,9 +2,9 @@
 #pragma once
 
 // Maps of several robots become one (docs/method/merging.md; Algorithm 2). Each map has a world frame of its
-// own. Places that two maps share are looked for by what keyframes look like, verified one by one, and
-// believed only when enough of them say the same of how the two worlds lie, the maps laid over each other
-// fit, and no other way to lay them is as good.
+// own. Places that two maps share are found by the appearance of keyframes, verified one by one, and believed
+// only if enough of them agree on the relative pose of the two worlds, the aligned maps fit, and no other
+// alignment is as good.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -143,7 +143,7 @@ struct MergeEvidence {
   Ambiguity ambiguity;
   CrossValidation validation;
   std::vector<VerifiedPair> pairs;           ///< all that agree
-  int rejected = 0;                          ///< of these, taken for wrong by the pose graph of the whole
+  int rejected = 0;                          ///< of these, rejected by the pose graph of all maps
   std::map<std::string, int> refused_pairs;  ///< why pairs were refused, and how many
   bool accepted = false;
   std::string refused;  ///< why not; empty when accepted
@@ -204,7 +204,7 @@ std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts,
 std::vector<MergeEvidence> find_overlaps(const std::vector<MapPart>& parts, const MapFusionOptions& options,
                                          const core::Executor& executor);
 
-/// Which parts hang together: for each part the lowest number of its group.
+/// Connected groups of parts: for each part the lowest number of its group.
 std::vector<std::size_t> connected_parts(std::size_t parts, const std::vector<MergeEvidence>& merges);
 
 struct FusedMap {
@@ -212,12 +212,12 @@ struct FusedMap {
   Cameras cameras;
   std::vector<std::size_t> parts;                  ///< that are in it, ascending
   std::vector<geometry::Rigid3> anchor_from_part;  ///< of these, before adjustment
-  int merged_points = 0;                           ///< landmarks that were doubles
+  int merged_points = 0;                           ///< duplicate landmarks
   int merged_lines = 0;
   int edges = 0;        ///< pairs of keyframes given to the pose graph
-  int rejected = 0;     ///< of these, taken for wrong
-  int refused = 0;      ///< 1: the pose graph would have torn a map, and parts lie as `anchor_from_part` says
-  std::string refusal;  ///< where
+  int rejected = 0;     ///< of these, rejected
+  int refused = 0;      ///< 1: the pose graph would have torn a map, and the parts lie at `anchor_from_part`
+  std::string refusal;  ///< location of that tear
 };
 
 /// Lays all parts that hang together with `anchor` into its world by a pose graph and merges what is there

@@ -26,7 +26,7 @@ struct RefinementSummary {
   std::size_t local_maps = 0;
   std::size_t tried = 0;      ///< alignments of two local maps
   std::size_t accepted = 0;   ///< of these, used
-  std::size_t rejected = 0;   ///< of the accepted, taken for wrong by the pose graph
+  std::size_t rejected = 0;   ///< of the accepted, rejected by the pose graph
   double mean_rms = 0.0;      ///< of the accepted, standard deviations of the depth noise
   double mean_shift_m = 0.0;  ///< mean motion of the keyframes
   double max_shift_m = 0.0;

@@ -58,7 +58,7 @@ struct ResultFrame {
   bool upright = false;  ///< z is up in it
 };
 
-/// Everything of a store but clouds; of robots whose maps are not one yet, of one robot.
+/// Everything in a store except clouds; if the robots' maps are not merged yet, of one robot.
 struct StoredMap {
   StoreHeader header;
   bool complete = false;    ///< save_final was the last thing that happened
@@ -169,13 +169,13 @@ class StoreReader {
   ~StoreReader();
 
   [[nodiscard]] const StoreHeader& header() const;
-  /// Tells the system that all of the file will be wanted soon: it is read from disk ahead.
+  /// Asks the system to read the whole file from disk ahead.
   void read_ahead() const;
   /// The map as it was committed: equal in every bit, order and id. The points' look-up grid is made anew for
-  /// images of the camera's size. `robot`: whose map, where those of several are not one yet. Errors
+  /// images of the camera's size. `robot`: whose map, if those of several are not merged yet. Errors
   /// (kInput): damaged, or there are several maps and none of that name.
   [[nodiscard]] core::Result<StoredMap> load(const std::string& robot = {}) const;
-  /// The same of each map that there is: of robots whose maps are not one yet, by robot.
+  /// The same for every map in the store: by robot, if their maps are not merged yet.
   [[nodiscard]] core::Result<std::vector<StoredMap>> load_each() const;
   /// Errors (kInput): damaged.
   [[nodiscard]] core::Result<StoreContents> contents() const;

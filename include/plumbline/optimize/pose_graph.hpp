@@ -20,7 +20,7 @@ struct GraphEdge {
   int b = -1;
   geometry::Rigid3 b_from_a;
   geometry::Matrix6d information = geometry::Matrix6d::Zero();
-  bool trusted = false;  ///< odometry: never taken for wrong
+  bool trusted = false;  ///< odometry: never rejected
 };
 
 struct PoseGraph {

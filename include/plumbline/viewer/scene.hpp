@@ -73,7 +73,7 @@ struct Scene {
   std::string frame;           ///< one line for people: which frame coordinates are in
   bool z_up = true;            ///< else y is down, and the page turns the map upright for the eye alone
   double floor_m = 0.0;        ///< height of the floor; known only where z is up
-  std::vector<Points> clouds;  ///< one; or two that are laid over one another
+  std::vector<Points> clouds;  ///< one, or two that are shown over one another
   std::vector<CameraPath> paths;
   std::vector<Keyframe> keyframes;
   std::vector<Segment> lines;

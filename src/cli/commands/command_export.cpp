@@ -134,7 +134,7 @@ void add_export(CLI::App& app, Session& session) {
       ->type_name("INPUT")
       ->allow_extra_args(false);
 
-  CLI::Option* what = command->add_option("--what", state->what, "What to write (default: cloud)")
+  CLI::Option* what = command->add_option("--what", state->what, "Part of the map to write (default: cloud)")
                           ->check(CLI::IsMember({"cloud", "trajectory", "keyframes", "lines"}));
   CLI::Option* trajectory =
       command->add_flag("--trajectory", state->trajectory, "The same as --what trajectory")->excludes(what);

@@ -68,7 +68,7 @@ class ColorFilter : public Filter {
 class CurvatureFilter : public Filter {
  public:
   void declare(core::OptionTable& table) override {
-    table.number("min", min_, {0.0, 1.0}, "", "Flatter points go");
+    table.number("min", min_, {0.0, 1.0}, "", "Remove points with a smaller curvature");
     table.number("max", max_, {0.0, 1.0}, "", "Remove points with a larger curvature");
   }
   std::string check() const override {

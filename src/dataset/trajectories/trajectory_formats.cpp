@@ -136,7 +136,7 @@ core::Result<std::vector<double>> TrajectoryText::numbers(const TextLine& row) c
   std::vector<double> numbers;
   for (const std::string& word : row.words) {
     const std::optional<double> value = core::to_number(word);
-    if (!value) return wrong(row.number, fmt::format("'{}' is no number", word));
+    if (!value) return wrong(row.number, fmt::format("'{}' is not a number", word));
     numbers.push_back(*value);
   }
   return numbers;
@@ -154,7 +154,7 @@ core::Result<PoseOfRow> read_columns(const TrajectoryText& text, const TextLine&
     }
     const std::string& word = row.words[columns.at[i]];
     const std::optional<double> value = core::to_number(word);
-    if (!value) return text.wrong(row.number, fmt::format("'{}' is no number", word));
+    if (!value) return text.wrong(row.number, fmt::format("'{}' is not a number", word));
     n[i] = *value;
   }
   stamp = n[0] / units_per_second(text);

@@ -254,7 +254,7 @@ bool LoopCloser::close(maps::Map& map, const std::vector<PoseEdge>& edges) {
   std::vector<PoseEdge> fresh;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const bool wrong = i < solved.summary.edges.size() && solved.summary.edges[i].rejected;
-    if (i >= known) note_verdict(all[i], wrong ? "the pose graph took it for wrong" : "");
+    if (i >= known) note_verdict(all[i], wrong ? "the pose graph rejected it" : "");
     if (wrong) {
       ++counts_.rejected;
       continue;

@@ -139,13 +139,14 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
                "Smallest extent of both maps along a direction that no surface constrains, to detect "
                "repeated structure");
   table.number(prefix + "min_span", min_span_m, {0.0, 100.0}, "m",
-               "How far apart the keyframes that agree lie, at least");
-  table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or how far turned");
+               "Smallest distance between the keyframes that agree");
+  table.number(prefix + "min_turn", min_span_rad, {0.0, 3.2}, "rad", "Or smallest rotation between them");
   table.number(prefix + "max_translation", consistency.max_apart_m, {0.0, 10.0}, "m",
-               "How far apart pairs that agree may put the maps");
-  table.number(prefix + "max_rotation", consistency.max_turned_rad, {0.0, 3.2}, "rad", "How far turned");
+               "Largest distance between the alignments of two pairs that agree");
+  table.number(prefix + "max_rotation", consistency.max_turned_rad, {0.0, 3.2}, "rad",
+               "Largest rotation between them");
   table.number(prefix + "drift", consistency.apart_per_metre, {0.0, 1.0}, "",
-               "Metres more for every metre between the pairs: maps drift");
+               "Additional distance per metre between the pairs, for drift");
   table.number(prefix + "max_alternative", alternative, {0.0, 1.0}, "",
                "A second answer with this share of the best one's keyframes makes both doubtful");
   table.number(prefix + "max_seen_through", max_seen_through, {0.0, 1.0}, "",

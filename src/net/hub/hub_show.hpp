@@ -22,7 +22,7 @@ namespace plumbline::net {
 
 class HubShow {
  public:
-  /// `observer` null: nobody looks on.
+  /// `observer` null: there is none.
   HubShow(std::shared_ptr<pipeline::RunObserver> observer, const core::Executor& executor, core::Log& log)
       : observer_(std::move(observer)), executor_(executor), log_(log) {}
 

@@ -127,12 +127,13 @@ std::string pipeline_schema(const StageRegistry& registry) {
   schema["additionalProperties"] = false;
   Json& keys = schema["properties"];
   keys["description"] = {{"type", Json::array({"string", "number", "boolean"})},
-                         {"description", "What the pipeline is for"}};
+                         {"description", "Purpose of the pipeline"}};
   keys["include"] = names_schema("Pipelines to begin with: files beside this one, or shipped ones");
-  keys["remove"] = names_schema("Included stages that are left out");
+  keys["remove"] = names_schema("Included stages to leave out");
   keys["stages"] = {{"type", "object"}};
   keys["taps"] = taps_schema(registry);
-  keys["run"] = {{"description", "What a result's config.yaml says of its run; configures nothing"}};
+  keys["run"] = {
+      {"description", "Information on the run in a result's config.yaml; it is not used as configuration"}};
   schema["allOf"] = Json::array({with_or_without_include()});
   schema["definitions"] = definitions(registry);
   return schema.dump(2) + "\n";

@@ -16,10 +16,10 @@ class ExportsOption {
   void declare(core::OptionTable& table) {
     table.text_or_list(
         "exports", value_, "exports",
-        "What is written besides, in the forms of plumbline export: names of files, such as [grid.yaml, "
+        "Further files to write in the formats of plumbline export: names of files, such as [grid.yaml, "
         "plan.svg], or maps of file, format, what and the format's options");
   }
-  /// Every entry is checked; problems are told where it stands.
+  /// Checks every entry; problems are reported with its position.
   void check(const std::string& path, core::ConfigProblems& problems);
   /// Below the result folder.
   [[nodiscard]] std::vector<std::string> files() const;

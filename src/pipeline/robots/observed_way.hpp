@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// A robot's way while it is tracked, for somebody who looks on.
+// Path of a robot while it is tracked, for an observer.
 #include <cstddef>
 #include <optional>
 
@@ -13,13 +13,13 @@ namespace plumbline::pipeline {
 
 class ObservedWay {
  public:
-  /// Tells the observer of a frame of the run, and where the camera is when it was tracked. A component has
-  /// no place in the map before it is joined.
+  /// Reports a frame of the run to the observer, with the camera's pose if it was tracked. A component has no
+  /// pose in the map before it is joined.
   void report(std::size_t frame, const mapping::Slam& slam, const mapping::FrameReport& report,
               TrackedFrame& tracked, RunObserver& observer);
 
  private:
-  core::KeyframeId component_;       ///< the one that is told of
+  core::KeyframeId component_;       ///< component that is reported
   std::optional<std::size_t> last_;  ///< of the frame poses
   geometry::Rigid3 odometry_from_camera_;
 };

@@ -167,9 +167,10 @@ core::Result<void> fits_live(const MapRequest& request) {
 core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
   if (!request.resume) return {};
   if (!any_stage(graph, &Stage::keeps_map) || !any_stage(graph, &Stage::resumes)) {
-    return core::usage_error(fmt::format(
-        "{}: keeps no map.db to go on from; it takes a track stage and a store stage, or leave out --resume",
-        graph.file.string()));
+    return core::usage_error(
+        fmt::format("{}: keeps no map.db to continue from; it takes a track stage and a store stage, or "
+                    "leave out --resume",
+                    graph.file.string()));
   }
   if (!request.debug_video.empty()) {
     return core::usage_error(
@@ -180,10 +181,10 @@ core::Result<void> can_resume(const Graph& graph, const MapRequest& request) {
 
 void report_resumed(const std::filesystem::path& folder, const std::optional<ResumedRun>& run,
                     core::Log& log) {
-  log.info(run ? fmt::format("going on after {} frames, with {} keyframes of {}", run->frames, run->keyframes,
-                             run->store.string())
-               : fmt::format("{}: nothing is there to go on from; beginning with the first frame",
-                             folder.string()));
+  log.info(
+      run ? fmt::format("continuing after {} frames, with {} keyframes of {}", run->frames, run->keyframes,
+                        run->store.string())
+          : fmt::format("{}: there is nothing to continue; starting with the first frame", folder.string()));
 }
 
 /// Keeps what a failed run has stored, and says so in the error.

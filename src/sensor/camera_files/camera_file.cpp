@@ -22,7 +22,7 @@ core::Result<std::string> read_camera_text(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file, ignored))
     return core::usage_error(file.string() + ": is a folder, not a camera file");
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) return core::usage_error(file.string() + ": no such file, or no right to read it");
+  if (!stream) return core::usage_error(file.string() + ": no such file, or no permission to read it");
   std::string text(kMaxCameraBytes + 1, '\0');  // the file may be a device without end
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));

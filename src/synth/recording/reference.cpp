@@ -210,7 +210,8 @@ core::Result<ReferenceCounts> write_reference(const std::filesystem::path& file,
 
   out.flush();
   if (!out)
-    return core::output_error(fmt::format("{}: cannot be written (disk full, no right?)", file.string()));
+    return core::output_error(
+        fmt::format("{}: cannot be written (disk full, no permission?)", file.string()));
 
   return counts;
 }

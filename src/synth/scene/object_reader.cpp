@@ -19,12 +19,12 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Reads one object: binds locals to keys, tells problems, and says whether the object may be built.
+/// Reads one object: binds locals to keys, reports problems, and decides whether the object may be built.
 class ObjectReader {
  public:
   ObjectReader(const ConfigNode& node, std::string path, ConfigProblems& problems)
       : node_(node), path_(std::move(path)), problems_(problems), before_(problems.size()) {
-    table_.text("name", name, "What messages call it");
+    table_.text("name", name, "Name of the object in messages");
   }
 
   ObjectReader& point(const std::string& key, std::vector<double>& value, std::size_t length,

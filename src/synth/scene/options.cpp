@@ -24,12 +24,12 @@ void SynthOptions::declare(core::OptionTable& table) {
                "Camera model; ideal: no noise, no offset between stamps, no blur");
   table.choice("motion", motion,
                {{"scene", Motion::kScene}, {"handheld", Motion::kHandheld}, {"wheeled", Motion::kWheeled}},
-               "How the camera is carried; scene: as the scene file says");
+               "Motion of the camera; scene: as the scene file says");
   table.integer("seed", seed, {0, 2147483647}, "", "Seed of textures, sway and noise");
 
   table.integer("width", width, {64, 4096}, "px", "Picture width");
   table.integer("height", height, {48, 4096}, "px", "Picture height");
-  table.number("fps", fps, {1.0, 240.0}, "Hz", "Frames a second");
+  table.number("fps", fps, {1.0, 240.0}, "Hz", "Frames per second");
   table.number("speed", speed, {0.05, 20.0}, "", "Speed factor");
   table.number("readout", readout_s, {0.0, 0.1}, "s",
                "Rolling shutter of the colour camera: time from the first row to the last; stamps are those "

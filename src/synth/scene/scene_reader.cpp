@@ -25,7 +25,7 @@ bool read_waypoint(const ConfigNode& node, const std::string& path, double heigh
   w.mark = node.mark;
   table.numbers("at", at, 0, {-1000.0, 1000.0}, "m", "Position");
   table.numbers("look", look, 3, {-1000.0, 1000.0}, "m", "Point looked at");
-  table.number("pitch", w.pitch_rad, {-1.5, 1.5}, "rad", "Looks up by");
+  table.number("pitch", w.pitch_rad, {-1.5, 1.5}, "rad", "Angle by which the camera looks up");
   table.number("yaw", w.yaw_rad, {-7.0, 7.0}, "rad", "Looks left by");
 
   if (node.kind == ConfigNode::Kind::kSequence) {
@@ -52,12 +52,12 @@ void read_robot(const ConfigNode& node, std::size_t index, RobotPath& robot, Con
 
   core::OptionTable table;
   table.text("name", robot.name, "Name");
-  table.boolean("closed", robot.closed, "The path goes on from its last waypoint to the first");
+  table.boolean("closed", robot.closed, "Close the path from its last waypoint to the first");
   table.number("speed", robot.speed, {0.02, 5.0}, "m/s", "Speed along the path");
   table.number("turn_rate", robot.turn_rate, {0.05, 5.0}, "rad/s",
-               "Slower where the camera would turn faster");
+               "Largest turn rate; the camera slows down for it");
   table.number("height", height, {-100.0, 100.0}, "m", "Height of waypoints given as [x, y]");
-  table.number("pitch", pitch, {-1.5, 1.5}, "rad", "Looks up by");
+  table.number("pitch", pitch, {-1.5, 1.5}, "rad", "Angle by which the camera looks up");
 
   if (node.kind != ConfigNode::Kind::kMap) {
     problems.push_back({node.mark, path, "needs a path: a list of waypoints"});
@@ -119,10 +119,10 @@ void read_walkers(const ConfigNode& list, Scene& scene, ConfigProblems& problems
     Walker walker;
     walker.mark = node.mark;
     core::OptionTable table;
-    table.numbers("from", from, 2, {-1000.0, 1000.0}, "m", "Where the walk begins");
-    table.numbers("to", to, 2, {-1000.0, 1000.0}, "m", "Where it turns back");
+    table.numbers("from", from, 2, {-1000.0, 1000.0}, "m", "Start of the walk");
+    table.numbers("to", to, 2, {-1000.0, 1000.0}, "m", "Turning point of the walk");
     table.number("speed", walker.speed, {0.02, 5.0}, "m/s", "Speed");
-    table.choice("material", walker.material, material_names(), "What is worn");
+    table.choice("material", walker.material, material_names(), "Material of the clothes");
 
     const std::size_t before = problems.size();
     table.set_all(node, path, problems);
@@ -142,10 +142,10 @@ void read_root(const ConfigNode& root, Scene& scene, ConfigProblems& problems) {
   std::string events, motion = "handheld";
   core::OptionTable table;
   table.text("name", scene.name, "Name");
-  table.text("description", scene.description, "What it is");
+  table.text("description", scene.description, "Description of the scene");
   table.number("ambient", scene.ambient, {0.0, 1.0}, "", "Share of light without direction");
-  table.choice("motion", motion, {"handheld", "wheeled"}, "How cameras are carried");
-  table.text("events", events, "Hard moments, as the option of the same name");
+  table.choice("motion", motion, {"handheld", "wheeled"}, "Motion of the cameras");
+  table.text("events", events, "Difficult moments, like the option of the same name");
   table.set_all(root, "", problems, {"objects", "robots", "walkers"});
   scene.motion = motion == "wheeled" ? Motion::kWheeled : Motion::kHandheld;
 

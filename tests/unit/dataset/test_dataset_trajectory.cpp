@@ -69,11 +69,11 @@ TEST_F(TrajectoryFile, ErrorsNameTheLine) {
   EXPECT_THAT(error_of("# x\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n"),
               AllOf(HasSubstr("t.txt:3"), HasSubstr("7 words")));
   EXPECT_THAT(error_of("1 0 0 zero 0 0 0 1\n"),
-              AllOf(HasSubstr("t.txt:1"), HasSubstr("'zero' is no number")));
+              AllOf(HasSubstr("t.txt:1"), HasSubstr("'zero' is not a number")));
   EXPECT_THAT(error_of("1 0 inf 0 0 0 0 1\n"), AllOf(HasSubstr("t.txt:1"), HasSubstr("no row is finite")));
   EXPECT_THAT(error_of("\n\n1 0 0 0 0 0 0 0\n"),
               AllOf(HasSubstr("t.txt:3"), HasSubstr("quaternion is zero")));
-  EXPECT_THAT(error_of("1 0 0 0x1 0 0 0 1\n"), HasSubstr("no number"));
+  EXPECT_THAT(error_of("1 0 0 0x1 0 0 0 1\n"), HasSubstr("not a number"));
 }
 
 TEST_F(TrajectoryFile, RowsWithNanAreLeftOutAndCounted) {

@@ -170,7 +170,7 @@ DecodedMessage<geometry::Rigid3> read_transform(const Bytes& bytes) {
   if (std::string wrong = sample.read(bytes.data(), bytes.size()); !wrong.empty())
     return tl::unexpected(std::move(wrong));
   geometry::Rigid3 motion = rigid_of({sample->translation, sample->rotation});
-  if (!is_motion(motion)) return tl::unexpected<std::string>("is no motion");
+  if (!is_motion(motion)) return tl::unexpected<std::string>("is not a motion");
   return motion;
 }
 

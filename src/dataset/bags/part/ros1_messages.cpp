@@ -144,7 +144,7 @@ DecodedMessage<std::vector<TransformMessage>> ros1_transforms(const Bytes& bytes
 DecodedMessage<geometry::Rigid3> ros1_transform(const Bytes& bytes) {
   Ros1Fields fields(bytes);
   const geometry::Rigid3 motion = fields.transform();
-  if (!is_finite(motion)) return tl::unexpected<std::string>("is no motion");
+  if (!is_finite(motion)) return tl::unexpected<std::string>("is not a motion");
   return whole(fields, motion);
 }
 
