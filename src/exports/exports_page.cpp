@@ -15,17 +15,17 @@ constexpr const char* kExportsIntroduction = R"(# Exports
 
 <!-- Made by `plumbline export --describe`; change the table in src/exports. -->
 
-`plumbline export MAP -o FILE` writes a map in the form that the next program reads. `MAP` is a result folder, the
-`map.db` of a run, also of one that was interrupted, a fused map of several robots, or, where a cloud is enough, any
-PLY or PCD file. The form follows the ending of the output, or `--format`.
+`plumbline export MAP -o FILE` writes a map in the format of another program. `MAP` is a result folder, the
+`map.db` of a run (of an interrupted one, too), a fused map of several robots, or, where a cloud is enough, any
+PLY or PCD file. The format follows from the ending of the output, or from `--format`.
 
 ```sh
 plumbline export out/room -o grid.yaml                       # for Nav2, with grid.pgm
 plumbline export out/room -o colmap                          # a COLMAP model with pictures
 plumbline export out/room -o room.las --voxel "2 cm"         # for surveyors' programs
 plumbline export out/room -o room.glb --mesh                 # for a browser
-plumbline export out/room -o path.csv --what trajectory      # the path, as EuRoC has it
-plumbline export out/room -o ground.ply --z 0,2m             # what lies up to 2 m over the floor
+plumbline export out/room -o path.csv --what trajectory      # the path in EuRoC's format
+plumbline export out/room -o ground.ply --z 0,2m             # up to 2 m over the floor
 ```
 
 )";
@@ -33,7 +33,7 @@ plumbline export out/room -o ground.ply --z 0,2m             # what lies up to 2
 constexpr const char* kExportsFrame = R"(
 ![Grid of a generated office](pictures/grid.png)
 
-*The grid of a generated office that two robots filmed in part: black is in the way, white is free, grey was not seen.*
+*The grid of a generated office that two robots filmed in part: black is occupied, white is free, grey was not seen.*
 
 ![Plan of a generated office](pictures/plan.png)
 
@@ -67,22 +67,22 @@ shows plans and links the rest:
       - {file: model, format: colmap, sharpest: on}
 ```
 
-What cannot be made, a plan without walls for instance, is told as a warning; the map is there without it.
+An export that cannot be made, such as a plan without walls, only causes a warning.
 
 ## One frame
 
 All exports of one map are in one frame, that of its results: metres, right-handed, z up, 0 on the floor, x along the
-walls ([dense_cloud.md](dense_cloud.md)). Grid, cloud, LAS, octree, COLMAP model and path lie on one another; GLB is
-turned to glTF's axes, as `--datum` and `--epsg` move what they move. Each file that can hold text tells its frame. Of an
-interrupted run, whose floor was not found yet, it is looked for during the export.
+walls ([dense_cloud.md](dense_cloud.md)). Grid, cloud, LAS, octree, COLMAP model and path coincide; only GLB is turned to
+glTF's axes, and `--datum` and `--epsg` move their outputs. Each file that can hold text names its frame. For an
+interrupted run the floor is searched during the export.
 
-`--datum LAT,LON,HEADING` says where the map's origin is on WGS 84 and which way its x axis looks (degrees clockwise from
-true north); the map is moved into the UTM zone there, turned by the zone's convergence and scaled as the zone is at that
-place. `--epsg N --origin E,N,H` moves it into any projected system in metres; a fourth number turns the map clockwise,
-in degrees. What was applied stands in the file's own header and, with the whole matrix, in `FILE.georeference.json`.
+`--datum LAT,LON,HEADING` gives the position of the map's origin on WGS 84 and the direction of its x axis (degrees clockwise
+from true north); the map is moved into the UTM zone there, turned by the zone's convergence and scaled by its local
+scale. `--epsg N --origin E,N,H` moves it into any projected system in metres; a fourth number turns the map clockwise,
+in degrees. The transform is in the file's own header and, as a whole matrix, in `FILE.georeference.json`.
 
 Files are written under another name first and renamed when they are whole: a full disk leaves nothing that looks
-finished. A folder is only ever replaced (`--force`) when an earlier export made it.
+finished. A folder is replaced (`--force`) only if an earlier export made it.
 
 )";
 
@@ -111,19 +111,19 @@ std::string options_text() {
 
 std::string exports_page() {
   std::string page = kExportsIntroduction;
-  page += "| format | output | what it is | needs besides |\n|---|---|---|---|\n";
+  page += "| format | output | what it is | also needs |\n|---|---|---|---|\n";
   const std::vector<FormatInfo> infos = export_formats();
   for (const FormatInfo& format : infos) {
     page += fmt::format("| [{0}](#{0}) | {1} | {2} | {3} |\n", format.name, endings_text(format),
                         format.title, format.needs);
   }
   page +=
-      "\nForms of one ending are told apart by `--what trajectory|keyframes|lines` and `--mesh`. E57 is not "
-      "among "
-      "them: no library in Debian writes it; CloudCompare makes E57 of PLY and LAS.\n";
+      "\nFormats with the same ending are selected by `--what trajectory|keyframes|lines` and `--mesh`. "
+      "There is "
+      "no E57, because no library in Debian writes it; CloudCompare converts PLY and LAS to E57.\n";
   page += kExportsFrame;
   page += fmt::format(
-      "## Options\n\n{} are taken by every format, the others by those that name them below. In "
+      "## Options\n\n{} work with every format, the others with those that list them below. In "
       "`exports:` of the stage `output` they are written as here, on the command line as `--dense-points "
       "1000`.\n\n{}",
       flags_text(common_options()), options_text());

@@ -184,7 +184,7 @@ Format glb_format() {
       {Content::kCloud, Content::kMesh},
       "",
       "glTF binary for browsers and viewers",
-      "The points, or with `--mesh` the mesh with vertex colours; metres, y up as glTF wants it, colours as "
+      "The points, or with `--mesh` the mesh with vertex colours; metres, y up as glTF requires, colours as "
       "linear light, unlit. Positions are floats: no viewer needs an extension for them. Of a large cloud, "
       "`--voxel \"2 cm\"` makes a file that a phone opens.",
       {"voxel", "resolution", "reach"},

@@ -221,11 +221,10 @@ Format las_format() {
       "",
       "LAS 1.4 for surveying",
       "Point format 7 with 16-bit colours, steps of 0.1 mm from an offset in the middle of the data, so that "
-      "large coordinates stay whole; `robot`, `confidence` and `sigma` (metres) as named extra bytes where "
-      "the map knows them. With `--datum` or `--epsg` in world coordinates, the system as WKT in the file "
-      "and "
-      "all that was applied in `FILE.georeference.json`. There is no `.laz`: no library in Debian writes it; "
-      "`laszip` of others compresses the file without loss.",
+      "large coordinates stay exact; `robot`, `confidence` and `sigma` (metres) as named extra bytes if the "
+      "map has them. With `--datum` or `--epsg` in world coordinates, with the system as WKT in the file and "
+      "the whole transform in `FILE.georeference.json`. There is no `.laz`: no library in Debian writes it; "
+      "the program `laszip` compresses the file without loss.",
       {"voxel", "datum", "epsg", "origin"},
       &write_las};
 }

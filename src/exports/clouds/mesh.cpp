@@ -52,9 +52,8 @@ Format mesh_format() {
           {Content::kMesh},
           "",
           "Mesh with vertex colours",
-          "Poisson's reconstruction, cut off where nothing was seen. `.obj` has the colours behind the "
-          "coordinates, "
-          "as MeshLab and Blender read them.",
+          "Poisson reconstruction, cut off where nothing was seen. `.obj` has the colours after the "
+          "coordinates, as MeshLab and Blender read them.",
           {"voxel", "resolution", "reach"},
           &write_mesh_file};
 }

@@ -61,10 +61,10 @@ Format ply_format() {
       {Content::kCloud},
       "",
       "Cloud as PLY",
-      "Position, normal, colour, and the columns that the map knows (`confidence`, `observations`, `robot`, "
+      "Position, normal, colour, and the other columns of the map (`confidence`, `observations`, `robot`, "
       "`sigma`); opens in CloudCompare, MeshLab, PCL, Open3D. With `--datum` or `--epsg` positions are "
       "doubles "
-      "in world coordinates, which the header tells; all that was applied is in `FILE.georeference.json`.",
+      "in world coordinates, as the header says; the whole transform is in `FILE.georeference.json`.",
       {"voxel", "ascii", "datum", "epsg", "origin"},
       &write_ply_cloud};
 }

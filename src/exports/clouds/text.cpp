@@ -33,15 +33,15 @@ core::Result<ExportSummary> write_xyz_cloud(MapSource& source, const std::filesy
 }  // namespace
 
 Format csv_format() {
-  return {
-      "csv",
-      {".csv"},
-      {Content::kCloud},
-      "",
-      "Cloud as a table",
-      "A header line names the columns: x, y, z, red, green, blue, the normal, and what else the map knows.",
-      {"voxel"},
-      &write_csv_cloud};
+  return {"csv",
+          {".csv"},
+          {Content::kCloud},
+          "",
+          "Cloud as a table",
+          "A header line names the columns: x, y, z, red, green, blue, the normal, and the other columns of "
+          "the map.",
+          {"voxel"},
+          &write_csv_cloud};
 }
 
 Format xyz_format() {
@@ -50,7 +50,7 @@ Format xyz_format() {
           {Content::kCloud},
           "",
           "Cloud as rows of numbers",
-          "The columns of `csv` apart by blanks, without a header: CloudCompare asks what they are.",
+          "The columns of `csv`, separated by blanks, without a header: CloudCompare asks for their meaning.",
           {"voxel"},
           &write_xyz_cloud};
 }

@@ -109,10 +109,9 @@ Format tum_format() {
       kPathContents,
       "",
       "Path, TUM",
-      "`stamp tx ty tz qx qy qz qw`, seconds and metres; what evo and `plumbline evaluate trajectory` read. "
-      "Of several robots one file with a comment line before each, or, when the output has no ending, a "
-      "folder "
-      "with a file each. `--body` writes the path of a body that carries the camera.",
+      "`stamp tx ty tz qx qy qz qw`, seconds and metres; read by evo and `plumbline evaluate trajectory`. "
+      "Several robots are written to one file with a comment line before each, or, if the output has no "
+      "ending, to a folder with a file each. `--body` writes the path of a body that carries the camera.",
       {"body"},
       &write_tum};
 }
@@ -123,8 +122,8 @@ Format kitti_format() {
           kPathContents,
           "",
           "Path, KITTI",
-          "A row of a 3 x 4 matrix per tracked frame, world from camera, without stamps: of several robots a "
-          "folder with a file each.",
+          "A row of a 3 x 4 matrix per tracked frame, world from camera, without stamps; for several robots "
+          "a folder with a file each.",
           {"body"},
           &write_kitti};
 }
@@ -136,15 +135,14 @@ Format euroc_format() {
           "",
           "Path, EuRoC",
           "Nanoseconds, position, quaternion with w first. Give `--body` the pose of the camera in the IMU "
-          "to get "
-          "the IMU's path, as that data set has it.",
+          "to get the IMU's path, as in that data set.",
           {"body"},
           &write_euroc};
 }
 
 Format path_format() {
   return {"path",   {".ply"},        kPathContents,
-          "",       "Path as edges", "Vertices and edges for viewers, one chain a robot.",
+          "",       "Path as edges", "Vertices and edges for viewers, one chain per robot.",
           {"body"}, &write_path};
 }
 

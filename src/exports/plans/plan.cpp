@@ -248,9 +248,10 @@ Format plan_format() {
           "wall. Walls over "
           "1 m have their length, closed rooms their area; a grid of metres, a scale bar, the paths. SVG and "
           "PDF are "
-          "in a round scale that the file tells; DXF (R2000) is in metres with the layers grid, rooms, path, "
+          "in a round scale, which is written in the file; DXF (R2000) is in metres with the layers grid, "
+          "rooms, path, "
           "walls, "
-          "doors, dimensions. `--section x,y,x,y` draws what a vertical cut along that line meets instead.",
+          "doors, dimensions. `--section x,y,x,y` draws a vertical cut along that line instead.",
           {"cut", "section", "voxel", "datum", "epsg", "origin"},
           &write_plan};
 }
