@@ -11,7 +11,7 @@ from typing import Any, Dict
 
 import plumbline
 
-SETTINGS: Dict[str, Dict[str, Any]] = {"points and lines": {}, "points alone": {"track": {"lines": False}}}
+SETTINGS: Dict[str, Dict[str, Any]] = {"points and lines": {}, "points alone": {"features": {"lines": False}}}
 
 
 def main(recording: str, out: str) -> int:
@@ -23,7 +23,7 @@ def main(recording: str, out: str) -> int:
         ate_mm = 1000.0 * report["ate_m"]["rmse"]
         print(f"{name}: ATE {ate_mm:.2f} mm, {report['matched']} poses, {result.summary['timing']['wall_s']:.1f} s")
     try:
-        import matplotlib
+        import matplotlib  # type: ignore[import]
 
         matplotlib.use("Agg")
         from matplotlib import pyplot

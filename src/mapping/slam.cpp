@@ -114,6 +114,14 @@ Slam::Slam(const SlamOptions& options, const sensor::Pinhole& camera, std::int32
   tracker_.set_place_judge([this](const sensor::RgbdFrame& frame, const features::FrameFeatures& features,
                                   core::KeyframeId keyframe, const Rigid3& found_at) {
     const LostAt lost{tracker_.reference(), tracker_.camera_from_world(), tracker_.astray()};
+    // After half a second the camera may be where doors and walls repeat: one frame that looks like another
+    // place is no evidence there. A component that begins in its place is joined by the evidence of several
+    // keyframes.
+    const bool stayed = is_near(found_at, lost.camera_from_world, 0.15, 0.15);
+    if (options_.components && !stayed && tracker_.lost_frames() >= kLostFrames &&
+        can_begin_component(frame, features)) {
+      return false;
+    }
     return relocalisation_.passes(map_, lost, frame, features, keyframe, found_at);
   });
 }

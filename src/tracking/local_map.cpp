@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "plumbline/cloud/cell_map.hpp"
+#include "plumbline/maps/components.hpp"
 
 namespace plumbline::tracking {
 namespace {
@@ -97,12 +98,15 @@ LocalMap build_local_map(const maps::Map& map, KeyframeId reference, const Local
   local.keyframes.push_back(reference);
   const auto wanted = static_cast<std::size_t>(options.keyframes);
   for (const KeyframeId id : map.neighbours(reference, wanted - 1)) append_unique(local.keyframes, id);
+  // Poses of other components say nothing of where their keyframes lie.
+  const KeyframeId root = maps::root_of(map, reference);
   const geometry::Rigid3& reference_from_world = map.camera_from_world(reference);
   for (std::int32_t index = reference.index - 1; index >= 0 && index > reference.index - 40; --index) {
     if (local.keyframes.size() >= wanted) break;
     const KeyframeId id{reference.robot, index};
     if (map.has_keyframe(id) &&
-        overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad)) {
+        overlaps(map.camera_from_world(id), reference_from_world, options.overlap_angle_rad) &&
+        maps::root_of(map, id) == root) {
       append_unique(local.keyframes, id);
     }
   }

@@ -27,7 +27,7 @@ bool predict(const maps::MapPoint& point, const geometry::Rigid3& camera_from_wo
   if (ray.dot(point.view_direction) < 0.4 * distance) return false;  // seen from another side
   const double octave =
       point.reference_octave + std::log(point.reference_distance / distance) / log_scale + octaves_closer;
-  // Of another camera's landmarks many are smaller than what this one sees at all.
+  // Many landmarks of another camera are smaller than anything that this one can see.
   const double beyond = octaves_closer == 0.0 ? 2.5 : 0.5;
   if (octave < -beyond || octave > 7.0 + beyond) return false;
   prediction = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y()),

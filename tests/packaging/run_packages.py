@@ -101,6 +101,7 @@ class Root:
 def lower_version(deb, work):
     """The same package with a version below its own."""
     folder = work / "lower" / deb.stem
+    folder.parent.mkdir(parents=True, exist_ok=True)
     run("dpkg-deb", "-R", deb, folder)
     control = folder / "DEBIAN" / "control"
     text = control.read_text()

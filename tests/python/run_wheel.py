@@ -15,7 +15,7 @@ SCRIPT = """
 import plumbline
 result = plumbline.map("synth:room?frames=12&width=160&height=120", "out")
 assert len(result.trajectory) == 12 and len(result.cloud) > 100
-assert plumbline.render(result, size=(64, 48)).shape == (48, 64, 3)  # a part, found beside the module
+assert plumbline.render(result, size=(96, 64)).shape == (64, 96, 3)  # a part, found beside the module
 print(plumbline.__file__)
 """
 

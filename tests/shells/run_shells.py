@@ -17,12 +17,12 @@ from pathlib import Path
 SKIPPED = 77
 # What is typed, and what must stand there after the tabulator: {} is a place where more than one word may follow.
 COMPLETED = [
-    ("plumbline ma", "plumbline map "),
+    ("plumbline fus", "plumbline fuse "),
     ("plumbline evaluate traj", "plumbline evaluate trajectory "),
-    ("plumbline map --pipel", "plumbline map --pipeline "),
+    ("plumbline map --debug", "plumbline map --debug-video "),
     ("plumbline map rec -p points_o", "plumbline map rec -p points_only "),
     ("plumbline map rec --camera tum_fr1", "plumbline map rec --camera tum_fr1 "),
-    ("plumbline map rec --set track.loo", "plumbline map rec --set track.loops="),
+    ("plumbline map rec --set track.loops.min_g", "plumbline map rec --set track.loops.min_gap="),
     ("plumbline map rec --set track.loops=of", "plumbline map rec --set track.loops=off "),
     ("plumbline filter keyf", "plumbline filter keyframe "),
     ("plumbline filters describe voxel_g", "plumbline filters describe voxel_grid "),

@@ -14,6 +14,9 @@ namespace plumbline::mapping {
 maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
                     const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface);
 
+/// True if two cameras (camera_from_world) lie within `most_m` metres and are turned by less than `most_rad`.
+bool is_near(const geometry::Rigid3& a, const geometry::Rigid3& b, double most_m, double most_rad);
+
 /// Last known position of a lost camera.
 struct LostAt {
   core::KeyframeId reference;          ///< keyframe near which it was lost

@@ -9,7 +9,7 @@
 
 namespace plumbline::mapping {
 
-/// How large features are in space, in octaves of the pyramid, where their depth is known (else NaN). Images
+/// Sizes of features in space, in octaves of the pyramid, where their depth is known (else NaN). Images
 /// of cameras with other focal lengths show one corner in octaves that lie far apart; its size in space is
 /// the same.
 struct SizeGate {

@@ -6,16 +6,13 @@
 #include "plumbline/maps/components.hpp"
 
 namespace plumbline::mapping {
-namespace {
 
 using geometry::Rigid3;
 
-bool within(const Rigid3& a, const Rigid3& b, double most_m, double most_rad) {
+bool is_near(const Rigid3& a, const Rigid3& b, double most_m, double most_rad) {
   return (a.inverse().translation - b.inverse().translation).norm() < most_m &&
          geometry::rotation_angle(a.rotation * b.rotation.transpose()) < most_rad;
 }
-
-}  // namespace
 
 maps::Map image_map(const sensor::RgbdFrame& frame, std::shared_ptr<const features::FrameFeatures> features,
                     const sensor::Pinhole& camera, const tracking::SurfaceSamplerOptions& surface) {
@@ -33,7 +30,7 @@ bool RelocalisationCheck::passes(const maps::Map& map, const LostAt& lost, const
                                  const features::FrameFeatures& features, core::KeyframeId keyframe,
                                  const Rigid3& found_at) const {
   if (maps::root_of(map, keyframe) != maps::root_of(map, lost.reference)) return false;
-  const bool near = within(found_at, lost.camera_from_world, 0.6, 0.6);
+  const bool near = is_near(found_at, lost.camera_from_world, 0.6, 0.6);
   if (near && !lost.astray) return true;
   if (features.points.empty() && features.lines.empty()) return true;  // depth alone: nothing to match
   const maps::Map image =
@@ -41,7 +38,7 @@ bool RelocalisationCheck::passes(const maps::Map& map, const LostAt& lost, const
   const PlaceVerification place =
       verify_place({&image, image.keyframe_ids().front(), camera}, {&map, keyframe, camera}, verify, seed);
   return place.accepted &&
-         within(found_at, place.query_from_match * map.camera_from_world(keyframe), 0.1, 0.05);
+         is_near(found_at, place.query_from_match * map.camera_from_world(keyframe), 0.1, 0.05);
 }
 
 }  // namespace plumbline::mapping

@@ -140,7 +140,7 @@ def filter(  # noqa: A001, the program's name for it
     Raises ConfigError with every mistake of the chain. What each filter did is in `.reports`.
     """
     if isinstance(chain, str) or hasattr(chain, "__fspath__"):
-        text, is_yaml = os.fspath(chain), False  # type: ignore[call-overload]
+        text, is_yaml = os.fspath(chain), False
     else:
         text, is_yaml = nested(list(chain)), True
     result, reports = cloud_of(cloud)._core.filter(text, is_yaml, pipelines() / "filters", threads)

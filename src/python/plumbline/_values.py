@@ -22,7 +22,7 @@ def text_of(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(nested(item) for item in value) + "]"
     if hasattr(value, "__fspath__"):
-        return os.fspath(value)
+        return str(os.fspath(value))
     return str(value)
 
 

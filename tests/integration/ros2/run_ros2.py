@@ -60,7 +60,7 @@ class Case:
         """A generated room on disk."""
         folder = self.work / "room"
         self.run("synth", "room", "-o", folder, "--frames", frames, "--seed", 1, "-q")
-        return folder
+        return folder / "robot0"
 
     def to_and_fro(self, room, frames):
         """The room's frames again and again, forwards and backwards, 30 a second."""
