@@ -104,6 +104,7 @@ Grid on_grid(const Points& points, bool z_up, EncodedCloud& out) {
       const double at = (p[static_cast<int>(k)] - out.origin[k]) / out.step_m;
       steps[i][k] = static_cast<std::uint16_t>(std::lround(std::clamp(at, 0.0, kMostSteps)));
     }
+
     sorted[i] = {morton(steps[i]), i};
   }
   std::sort(sorted.begin(), sorted.end());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Content of a page that shows a map in the browser: points with their layers, paths, lines, the plan.
+// A map as a page in the browser shows it: points with their layers, paths, lines, the plan.
 #include <array>
 #include <cstdint>
 #include <string>
