@@ -106,7 +106,7 @@ class Ros2Stream final : public dataset::MessageStream {
     // Pieces that a full buffer loses are sent again only to a reliable reader.
     dds_qset_reliability(qos.get(), offered.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
                          DDS_MSECS(100));
-    /// New publications. Of several of one topic the least that is offered counts.
+    // Messages from before, as on /tf_static.
     dds_qset_durability(qos.get(),
                         offered.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kSamplesKept);
