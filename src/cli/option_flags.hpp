@@ -13,7 +13,7 @@ namespace plumbline::cli {
 
 class OptionFlags {
  public:
-  /// Adds a flag for each of the `options`, which outlive this, as does the command.
+  /// Adds a flag for each option of `options`. Options and command must outlive this.
   template <typename Options>
   void add(CLI::App& command, Options& options) {
     command_ = &command;

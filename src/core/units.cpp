@@ -13,7 +13,7 @@
 namespace plumbline::core {
 namespace {
 
-/// value_in_base = value * numerator / denominator; kept apart so that "5 mm" gives exactly 0.005.
+/// value_in_base = value * numerator / denominator; the two are kept apart so that "5 mm" is exactly 0.005.
 struct Unit {
   std::string_view name;
   std::string_view quantity;

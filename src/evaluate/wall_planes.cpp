@@ -62,7 +62,7 @@ SharedPlane fitted(const Patches& patches, const PatchIndices& own, const Shared
   }
 
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
-  // Patches in a row say nothing about the rotation around it: their own normals do.
+  // Patches in a row do not determine the rotation about that row; their own normals do.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 
   if (solver.eigenvalues()[1] > 1e-2 * solver.eigenvalues()[2]) {
@@ -83,7 +83,7 @@ WallPlane measured(const SurfaceSamples& cloud, const Patches& own, const Shared
   result.offset_m = plane.offset_m;
   result.thickness = thickness_of(own);
 
-  // A grid of voxels cuts a plane into more pieces when it lies askew.
+  // A voxel grid cuts a plane into more pieces if the plane is oblique to it.
   result.area_m2 = static_cast<double>(own.size()) * patch_m * patch_m / plane.normal.lpNorm<1>();
   double sum = 0.0;
   for (const WallPatch& patch : own) {

@@ -14,9 +14,9 @@
 namespace plumbline::optimize {
 namespace {
 
-/// The state's numbers as Ceres wants them, and back. All in one array: within an elimination group Ceres
-/// goes by the blocks' addresses, so that with points and lines in arrays of their own the order of its sums,
-/// and with it the last digits of the result, would hang on where the heap put them.
+/// Converts the state to Ceres' parameter blocks and back. All are in one array: within an elimination group
+/// Ceres orders blocks by address, so with separate arrays of points and lines the order of its sums, and
+/// thus the last digits of the result, would depend on the heap.
 class MapUnknowns {
  public:
   explicit MapUnknowns(const BundleState& state) : poses_(state.poses.size()), points_(state.points.size()) {
@@ -46,7 +46,7 @@ class MapUnknowns {
   std::vector<double> numbers_;
 };
 
-/// The round as Ceres' problem, and what is eliminated first.
+/// The round as a problem for Ceres, with the order of elimination.
 class MapRound {
  public:
   MapRound(const BundleProblem& problem, const BundleOptions& options, BundleState& state)
@@ -77,7 +77,7 @@ class MapRound {
     solver.parameter_tolerance = 1e-7;
 
     double cost = 0.0;
-    if (!ceres_.Evaluate({}, &cost, nullptr, nullptr, nullptr))  // or Ceres would print that it cannot
+    if (!ceres_.Evaluate({}, &cost, nullptr, nullptr, nullptr))  // otherwise Ceres would print an error
       return {0.0, 0.0, 0, false, "the cost is not a number, because an observation or a pose is not"};
 
     const ceres::Solver::Summary solved = optimize::solve(std::move(solver), ceres_);

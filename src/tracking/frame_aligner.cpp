@@ -21,7 +21,7 @@ constexpr AlignmentRound kFine[] = {{kFineRadius_px, 0.05, 1200, 0, true, true},
                                     {kFineRadius_px, 0.03, 2400, 0, false, true},
                                     {kFineRadius_px, 0.03, 2400, 0, false, false}};
 
-constexpr int kIterations = 3;      // of a round; the next one associates anew
+constexpr int kIterations = 3;      // per round; the next one associates again
 constexpr double kPointGate = 7.8;  // chi-square, 2 degrees of freedom, 98 %
 constexpr double kLineGate = 9.2;   // 99 %: line ends are less exact than corners
 constexpr double kLineSigma_px = 0.6;
@@ -61,15 +61,15 @@ void FrameAligner::align(const AlignmentRound& round) {
   if (round.reject_outliers) reject_outliers();  // chi-square gates
 }
 
-/// The motion model, by which the features were freed of the rolling shutter, lags behind a motion that
-/// changes. Now that the pose is roughly known, so is the motion.
+/// Repeats the rolling-shutter correction: the motion model, with which it was made, lags behind a changing
+/// motion, which is now known from the rough pose.
 void FrameAligner::correct_rolling_shutter() {
   const double readout_s = in_.options.readout_s;
   const double dt = in_.frame.stamp - in_.motion.last_stamp();
   if (readout_s == 0.0 || !in_.motion.continuous() || dt < 1e-4 || dt > 0.5) return;
   const Rigid3 step = result_.camera_from_world * in_.motion.camera_from_world().inverse();
   const geometry::Vector6d mean = geometry::log_se3(step) / dt;
-  // Both are means of their steps: half a step on.
+  // Both velocities are means over their steps; extrapolate by half a step.
   const geometry::Vector6d before = in_.motion.velocity();
   const geometry::Vector6d change = before.isZero(0.0) ? mean : geometry::Vector6d(1.5 * (mean - before));
   auto corrected = std::make_shared<features::FrameFeatures>(in_.features);
@@ -121,7 +121,7 @@ void FrameAligner::associate_intensity(const AlignmentRound& round) {
   intensity_level_ = round.pyramid_level;
 }
 
-/// Without intensity where it disagrees.
+/// Solves for the pose; once more without the intensity terms if they disagree.
 void FrameAligner::solve() {
   optimize::PoseSolverOptions solver = in_.options.solver;
   solver.max_iterations = kIterations;

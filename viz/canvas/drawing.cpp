@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Hands on to the part that draws, which has functions of the same names, and stands in for GLX.
+// Forwards to the functions of the same names in the part "viz", and replaces GLX.
 #include "canvas/drawing.hpp"
 
 namespace plumbline::viz {

@@ -13,15 +13,15 @@
 namespace plumbline::evaluate {
 
 struct WallPlanesOptions {
-  int planes = 3;        ///< the largest so many are measured
+  int planes = 3;        ///< number of planes to measure, the largest ones
   double slab_m = 0.04;  ///< points within this distance of a plane belong to it
   void declare(core::OptionTable& table);
 };
 
-/// One plane through many patches (wall_thickness.hpp). A wall that is doubled shows in `thickness` where
-/// both layers lie one behind the other and in `straightness_mm` where one goes over into the other.
+/// One plane through many patches (wall_thickness.hpp). A double wall increases `thickness` where both layers
+/// lie behind one another, and `straightness_mm` where one layer continues in the other.
 struct WallPlane {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< towards where the points face
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< towards the side that the points face
   double offset_m = 0.0;                              ///< normal . p of its points
   double area_m2 = 0.0;                               ///< of its patches
   WallThickness thickness;                            ///< over its patches
@@ -31,10 +31,10 @@ struct WallPlane {
 };
 
 /// Every patch proposes its plane; the one that most patches share (within slab_m, normals within 10 degrees)
-/// is fitted to them by least squares, until they stay the same; then the next one among the patches that are
-/// left. Largest first; fewer when the cloud has no more. `points`: those the patches were found in, finite.
-/// In the slab are points within slab_m that face the plane's way within 30 degrees, if the cloud has
-/// normals.
+/// is fitted to them by least squares, until its patches stay the same; then the next one among the remaining
+/// patches. Largest first; fewer if the cloud has no more. `cloud`: the points in which the patches were
+/// found, all finite. The slab holds points within slab_m that, if the cloud has normals, face the same way
+/// as the plane within 30 degrees.
 std::vector<WallPlane> wall_planes(const SurfaceSamples& cloud, std::vector<WallPatch> patches,
                                    double patch_m, const WallPlanesOptions& options);
 

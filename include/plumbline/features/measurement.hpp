@@ -32,9 +32,9 @@ PixelDepth feature_of(const PixelDepth& measurement, const geometry::Vector6d& s
 double depth_rate(const Eigen::Vector3d& p, const Eigen::Vector3d& normal,
                   const geometry::Vector6d& velocity);
 
-/// Makes the features anew for another camera. `velocity` (m/s, rad/s): of camera_from_world, in its own
-/// frame, as it is known now. `depth_rates` (m/s), one a point or none at all: how fast the depth on its ray
-/// changes as the camera moves, for a delay of the depth image that turned out longer.
+/// Computes the features again for another camera. `velocity` (m/s, rad/s): present estimate of that of
+/// camera_from_world, in its own frame. `depth_rates` (m/s), one per point or none at all: rates at which the
+/// depth on their rays changes as the camera moves, needed if the delay of the depth image changes.
 void recalibrate(FrameFeatures& features, const sensor::Recalibration& change,
                  const geometry::Vector6d& velocity, const std::vector<double>& depth_rates);
 

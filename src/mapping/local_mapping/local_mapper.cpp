@@ -60,9 +60,9 @@ core::KeyframeId LocalMapper::insert(maps::Map& map, const sensor::RgbdFrame& fr
   if (!still(track.depth_from_camera))
     features::undo_line_depth_delay(*own, frame.depth, camera_, track.depth_from_camera);
   keyframe->features = own;
-  // A keyframe's pose is that of its colour image. What its depth image measured a little later or earlier is
-  // carried there: left where it is, every keyframe would be a few milliseconds of motion off what the next
-  // ones see, all in the direction of travel.
+  // A keyframe's pose is that of its colour image, so the surface that the depth image measured a little
+  // later or earlier is moved there. Otherwise every keyframe would be off by a few milliseconds of motion,
+  // all in the direction of travel.
   keyframe->surface = tracking::sample_surface(frame.depth, camera_, options_.surface);
   if (!still(track.depth_from_camera))
     keyframe->surface =
@@ -156,8 +156,7 @@ std::optional<SurfaceEdgeJob> LocalMapper::begin_surface_edges(
                         {options_.edge_min_overlap}, executor);
 }
 
-/// Images taken while turning fast are distorted: their rays lie, and what they show does not lie where it
-/// seems to.
+/// True for images taken while turning fast: the rolling shutter distorts them, so their rays are wrong.
 bool LocalMapper::distorted(const maps::Map& map, core::KeyframeId id) const {
   return map.keyframe(id).turn_rate > options_.max_landmark_turn_rate;
 }

@@ -19,7 +19,8 @@ constexpr std::size_t kAroundPair = 4;  // keyframes around each end of a pair w
 /// Poses of the parts in the anchor's group, and the keyframes that tie them together.
 struct Layout {
   std::map<std::size_t, Rigid3> anchor_from_part;
-  std::vector<std::pair<KeyframeId, KeyframeId>> ties;  ///< root of a part, and the keyframe that it hangs on
+  std::vector<std::pair<KeyframeId, KeyframeId>>
+      ties;  ///< root of a part, and the keyframe that becomes its parent
 };
 
 /// Ties a part to those that are laid out already, by the pair of keyframes that share most.
@@ -33,7 +34,7 @@ std::pair<KeyframeId, KeyframeId> tie_of(const MergeEvidence& merge, const maps:
   return {maps::root_of(part, inside), query_in_part ? best->match : best->query};
 }
 
-/// Along the merges with most pairs first (a spanning tree).
+/// Lays out the parts along a spanning tree of merges, those with most pairs first.
 Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidence>& merges,
                std::size_t anchor) {
   std::vector<const MergeEvidence*> order;
@@ -61,7 +62,7 @@ Layout lay_out(const std::vector<MapPart>& parts, const std::vector<MergeEvidenc
       if (!merge->pairs.empty())
         layout.ties.push_back(tie_of(*merge, *parts[has_a ? merge->b : merge->a].map));
       grown = true;
-      break;  // the best merge that is left, again
+      break;  // start again with the best remaining merge
     }
   }
   return layout;
@@ -86,7 +87,7 @@ std::vector<KeyframeId> surroundings(const maps::Map& map, KeyframeId id) {
   return result;
 }
 
-/// Landmarks that both ends of an edge have.
+/// Merges landmarks that exist around both ends of an edge.
 void merge_duplicates(const PoseEdge& edge, const MapFusionOptions& options,
                       std::set<std::pair<KeyframeId, KeyframeId>>& done, FusedMap& fused) {
   const std::vector<KeyframeId> ours = surroundings(fused.map, edge.a);
@@ -102,7 +103,7 @@ void merge_duplicates(const PoseEdge& edge, const MapFusionOptions& options,
   }
 }
 
-/// Merges most of whose pairs the pose graph takes for wrong; true: there were some.
+/// Takes back merges of which the pose graph rejects most pairs; true if there were any.
 bool take_back(const std::vector<optimize::EdgeVerdict>& verdicts, const std::vector<MergeEvidence*>& used,
                FusedMap& fused) {
   bool any = false;
@@ -125,7 +126,7 @@ bool take_back(const std::vector<optimize::EdgeVerdict>& verdicts, const std::ve
 }  // namespace
 
 MapFusionOptions::MapFusionOptions() {
-  places.consistent = 1;  // pairs need not come in a row: they must agree
+  places.consistent = 1;  // pairs need not be consecutive, since they must agree
 }
 
 void MapFusionOptions::declare_decision(core::OptionTable& table, const std::string& prefix) {
@@ -155,7 +156,7 @@ void MapFusionOptions::declare_decision(core::OptionTable& table, const std::str
                "Share of the keyframes with a view of the other map that must see what it holds");
   table.integer(prefix + "verifications", verifications, {1, 100000}, "",
                 "Largest number of pairs of keyframes to verify for each two maps");
-  table.boolean(prefix + "robust", robust, "The pose graph may take pairs of keyframes for wrong");
+  table.boolean(prefix + "robust", robust, "Let the pose graph reject wrong pairs of keyframes");
 }
 
 void MapFusionOptions::declare(core::OptionTable& table) {
@@ -201,13 +202,13 @@ FusedMap fuse_maps(const std::vector<MapPart>& parts, std::vector<MergeEvidence>
   }
   fused.edges = static_cast<int>(edges.size());
   if (edges.empty()) return fused;
-  const std::vector<PoseEdge> loops = loop_edges(fused.map);  // that each robot has closed
+  const std::vector<PoseEdge> loops = loop_edges(fused.map);  // closed by each robot
   edges.insert(edges.end(), loops.begin(), loops.end());
   const std::vector<KeyframeId> ids = parts[anchor].map->keyframe_ids();
   GlobalAdjustmentOptions adjustment = options.adjustment;
   adjustment.robust = options.robust;
   adjustment.noise.orb_scale_factor = options.verify.orb_scale_factor;
-  adjustment.bundle = false;  // before surfaces are aligned it bends a map that hangs on a narrow overlap
+  adjustment.bundle = false;  // before surfaces are aligned it would bend a map with a narrow overlap
   const GlobalAdjustmentSummary graph = adjust_map(fused.map, fused.cameras, edges, adjustment, ids.front());
   fused.refused = graph.refused;
   fused.refusal = graph.refusal;

@@ -33,7 +33,8 @@ class CameraRefinement {
  public:
   explicit CameraRefinement(const RobotInfo& robot);
 
-  /// Asks the map and the frames of a run that was made with camera(). True: camera() is a better one now.
+  /// Estimates the camera from the map and frames of a run that was made with camera(). True: camera() was
+  /// improved.
   bool ask(const maps::Map& map, const std::vector<maps::FramePose>& frames, const core::Executor& executor,
            core::Log& log);
 
@@ -42,7 +43,7 @@ class CameraRefinement {
   [[nodiscard]] const CameraReport& report() const { return report_; }
   /// Sets the frame of the run from which camera() is used; 0: from the first one on.
   void used_from(std::size_t frame) { report_.from_frame = frame; }
-  /// A run that goes on knows this camera already, which an earlier one has found.
+  /// Takes over the camera that the interrupted run had found.
   void restore(const sensor::Camera& camera, std::size_t from_frame);
 
  private:
@@ -51,7 +52,7 @@ class CameraRefinement {
   CameraReport report_;
 };
 
-/// Writes OUT/camera.yaml, of several robots OUT/robots/NAME/camera.yaml. `cameras`: by robot.
+/// Writes OUT/camera.yaml, or for several robots OUT/robots/NAME/camera.yaml. `cameras`: by robot.
 core::Result<void> write_cameras(const std::filesystem::path& folder, const std::vector<RobotInfo>& robots,
                                  const std::vector<sensor::Camera>& cameras);
 

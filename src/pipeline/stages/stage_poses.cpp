@@ -95,12 +95,12 @@ class PosesStage : public Stage {
 
  private:
   static constexpr const char* kRobot = "{robot}";
-  /// A robot's.
+  /// Poses of one robot, and counts of its frames so far.
   struct Way {
     geometry::Trajectory poses;
     std::int32_t frames = 0;
     std::int32_t keyframes = 0;
-    geometry::Rigid3 last;  ///< keyframe's pose
+    geometry::Rigid3 last;  ///< pose of the last keyframe
   };
   [[nodiscard]] bool several() const { return ways_.size() > 1; }
 
@@ -117,7 +117,7 @@ class PosesStage : public Stage {
     return core::input_error(fmt::format(
         "{}: the recording has no poses of its own; name a file with --set poses.file=FILE", robot.name));
   }
-  /// Between the moments of both images; identity where no pose is near that of the depth image.
+  /// Motion between the stamps of both images; identity if no pose is near the stamp of the depth image.
   [[nodiscard]] geometry::Rigid3 depth_from_camera(const geometry::Trajectory& poses,
                                                    const sensor::RgbdFrame& frame,
                                                    const geometry::Rigid3& world_from_camera) const {
